@@ -1,0 +1,56 @@
+"""Everything the library refuses, and why.
+
+AnimError
+├─ FormatError       the input is not valid glTF (or BVH, PC2 ...), or can't be read
+├─ UnsupportedError  valid, but not handled: a required extension, a missing extra
+├─ NotFoundError     no such clip, node, skin or mesh
+├─ RangeError        a parameter outside the values it can take
+└─ ShapeError        an array of the wrong shape or type: the caller's mistake
+"""
+
+from __future__ import annotations
+
+from typing import Self
+
+
+class AnimError(Exception):
+    """One refusal: what is wrong, where, and, if we know, what to do about it.
+
+    problem: what is wrong, with what was got and what was expected. One line.
+    where: the place from the outside in, "clip 'walk', track 3"; empty if the message says all.
+    help: one line that says what to do, or empty.
+    """
+
+    def __init__(self, problem: str, *, where: str = "", help: str = "") -> None:
+        super().__init__(problem)
+        self.problem = problem
+        self.where = where
+        self.help = help
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.problem}" if self.where else self.problem
+
+    def at(self, where: str, separator: str = ", ") -> Self:
+        """Return this error with `where` put in front of its place: the caller knows more of the way."""
+        self.where = f"{where}{separator}{self.where}" if self.where else where
+        return self
+
+
+class FormatError(AnimError):
+    """The input is not what its format says it must be, or can't be read."""
+
+
+class UnsupportedError(AnimError):
+    """The input is valid, but needs something that is not handled or not installed."""
+
+
+class NotFoundError(AnimError):
+    """Nothing in the input has this name or number."""
+
+
+class RangeError(AnimError):
+    """A parameter lies outside the values it can take."""
+
+
+class ShapeError(AnimError):
+    """An array has the wrong shape or type."""

@@ -1,0 +1,160 @@
+"""Numbers out of a document: every component type, stride, normalised, sparse, zero-filled, compressed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Floats, Ints
+from anim.errors import AnimError, FormatError, UnsupportedError
+from anim.gltf import layout, meshopt
+from anim.gltf.document import Bytes, Document, Json, items
+
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+FLOAT = 5126
+T = TypeVar("T")
+
+
+class Accessors:
+    """Reads accessors of one document; views are opened, and decompressed, once."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._accessors = items(document.json, "accessors")
+        self._views = items(document.json, "bufferViews")
+        self._bytes: dict[int, Bytes] = {}
+
+    def about(self, index: int) -> Json:
+        """Return the JSON of an accessor."""
+        return self._accessors[index]
+
+    def raw(self, index: int) -> NDArray[Any]:
+        """Return the stored numbers (count, components) in their own type, matrices column by column; read-only.
+
+        Sparse values are put in, accessors without data are zeros. Raises FormatError, UnsupportedError.
+        """
+        return self._located(index, self._raw)
+
+    def floats(self, index: int) -> Floats:
+        """Return the numbers (count, components) as float64, normalised integers as fractions (glTF 2.0, 3.11).
+
+        Raises FormatError for NaN or infinity.
+        """
+        return self._located(index, self._floats)
+
+    def integers(self, index: int) -> Ints:
+        """Return the numbers (count, components) as int64. Raises FormatError where they are floats."""
+        raw = self.raw(index)
+        if raw.dtype.kind == "f":
+            raise FormatError("holds floats (expected integers)", where=f"accessor {index}")
+        return raw.astype(np.int64)
+
+    def matrices(self, index: int) -> Floats:
+        """Return MAT4 as (count, 4, 4) for column vectors: glTF's column-major order is transposed here only."""
+        return self.floats(index).reshape(-1, 4, 4).transpose(0, 2, 1)
+
+    def _located(self, index: int, read: Callable[[int], T]) -> T:
+        try:
+            return read(index)
+        except AnimError as error:
+            raise error.at(f"accessor {index}") from None
+
+    def _raw(self, index: int) -> NDArray[Any]:
+        about = self._accessors[index]
+        kind = about["type"]
+        if kind not in layout.COMPONENTS:
+            raise FormatError(f"has type '{kind}' (expected one of {', '.join(layout.COMPONENTS)})")
+        dtype = np.dtype(DTYPES[about["componentType"]])
+        columns, rows, column = layout.element(about["componentType"], kind)
+        count = about["count"]
+        if "bufferView" in about:
+            base = self._dense(about, dtype, (columns, rows, column))
+        else:
+            base = np.broadcast_to(np.zeros((), dtype), (count, columns * rows))
+        return self._with_sparse(base, about, dtype, (columns, rows, column)) if "sparse" in about else base
+
+    def _dense(self, about: Json, dtype: np.dtype[Any], shape: tuple[int, int, int]) -> NDArray[Any]:
+        number = about["bufferView"]
+        stride = self._views[number].get("byteStride", shape[0] * shape[2])
+        return _strided(self._view(number), about.get("byteOffset", 0), about["count"], stride, dtype, shape)
+
+    def _with_sparse(
+        self, base: NDArray[Any], about: Json, dtype: np.dtype[Any], shape: tuple[int, int, int]
+    ) -> NDArray[Any]:
+        sparse = about["sparse"]
+        count, where, values = sparse["count"], sparse["indices"], sparse["values"]
+        kind = np.dtype(DTYPES[where["componentType"]])
+        view = self._view(where["bufferView"])
+        places = _strided(view, where.get("byteOffset", 0), count, kind.itemsize, kind, (1, 1, kind.itemsize))[:, 0]
+        places = places.astype(np.int64)
+        if places[-1] >= about["count"] or (np.diff(places) <= 0).any():
+            raise FormatError("sparse indices are not increasing, or beyond its count")
+        view = self._view(values["bufferView"])
+        new = _strided(view, values.get("byteOffset", 0), count, shape[0] * shape[2], dtype, shape)
+        full = base.copy()
+        full[places] = new
+        full.flags.writeable = False
+        return full
+
+    def _floats(self, index: int) -> Floats:
+        raw = self._raw(index)
+        if raw.dtype.kind == "f":
+            values = raw.astype(np.float64)
+            if not np.isfinite(values).all():
+                row = int(np.argwhere(~np.isfinite(values))[0][0])
+                raise FormatError(f"holds NaN or infinity (element {row})")
+            return values
+        values = raw.astype(np.float64)
+        if self._accessors[index].get("normalized"):
+            values = denormalized(values, raw.dtype)
+        return values
+
+    def _view(self, number: int) -> Bytes:
+        found = self._bytes.get(number)
+        if found is None:
+            found = self._bytes[number] = self._opened(number)
+        return found
+
+    def _opened(self, number: int) -> Bytes:
+        view = self._views[number]
+        compressed = layout.compression(view)
+        try:
+            if compressed is not None:
+                stored = _slice(self._document.buffers[compressed["buffer"]].data, compressed)
+                plain = meshopt.decode(stored, compressed)
+                if len(plain) < view["byteLength"]:
+                    raise FormatError(f"decodes to {len(plain)} bytes (expected {view['byteLength']})")
+                return plain
+            if view.get("extensions") and not self._document.buffers[view["buffer"]].has_data:
+                names = ", ".join(view["extensions"])
+                raise UnsupportedError(f"its data is hidden by {names}, which is not handled")
+            return _slice(self._document.buffers[view["buffer"]].data, view)
+        except AnimError as error:
+            raise error.at(f"bufferView {number}") from None
+
+
+def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:
+    """Return stored normalised integers as the fractions that they mean: c / max, signed ones not below −1."""
+    scaled = values / float(np.iinfo(dtype).max)
+    return np.maximum(scaled, -1.0) if dtype.kind == "i" else scaled
+
+
+def _slice(data: Bytes, place: Json) -> Bytes:
+    start = place.get("byteOffset", 0)
+    return data[start : start + place["byteLength"]]
+
+
+def _strided(
+    view: Bytes, offset: int, count: int, stride: int, dtype: np.dtype[Any], shape: tuple[int, int, int]
+) -> NDArray[Any]:
+    """Elements (count, columns × rows) as a view into the bytes; `stride` and column distance in bytes."""
+    columns, rows, column = shape
+    size = dtype.itemsize
+    if columns == 1:
+        array: NDArray[Any] = np.ndarray((count, rows), dtype, view, offset, (stride, size))
+        return array
+    array = np.ndarray((count, columns, rows), dtype, view, offset, (stride, column, size))
+    return array.reshape(count, columns * rows)

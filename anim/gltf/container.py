@@ -1,0 +1,220 @@
+"""Bytes ↔ Document: GLB and .gltf text, read without copying buffers and written as pieces that are never joined."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.errors import FormatError, UnsupportedError
+from anim.gltf import structure, text, uri
+from anim.gltf.document import Buffer, Bytes, Document, Json, items
+
+MAGIC = b"glTF"
+JSON_CHUNK = 0x4E4F534A
+BIN_CHUNK = 0x004E4942
+MAX_GLB = 2**32 - 1  # the header's length field has 32 bits
+LFS_POINTER = b"version https://git-lfs"
+
+Resolve: TypeAlias = Callable[[str], Bytes]
+
+
+def read(data: Bytes, resolve: Resolve | None = None) -> Document:
+    """Return the document in `data`, a GLB or a .gltf text.
+
+    data: uint8 array, best a memory map: nothing of a GLB's BIN chunk is copied or even touched.
+    resolve: gives the bytes of a file beside the input by its relative path; None where there is no such place.
+    Raises FormatError with what is wrong and where.
+    """
+    head = data[:64].tobytes()
+    if head[:4] == MAGIC:
+        return _read_glb(data, resolve)
+    if head.startswith(LFS_POINTER):
+        raise FormatError("is a Git LFS pointer, not the file itself", help="git lfs pull")
+    if not len(data):
+        raise FormatError("is empty (expected glTF)")
+    if head.lstrip()[:1] != b"{":
+        raise FormatError(f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)")
+    raw = data.tobytes()
+    parsed = _parse(raw)
+    return Document(parsed, _buffers(parsed, None, resolve, glb=False), indent=text.indent_of(raw))
+
+
+def glb(document: Document) -> list[Bytes]:
+    """Return the pieces of a self-contained GLB: buffer 0 as BIN, any further buffer as a data URI.
+
+    Raises UnsupportedError beyond 4 GiB, FormatError where a buffer's bytes can't be had.
+    """
+    content = dict(document.json)
+    described = items(content, "buffers")
+    if described:
+        content["buffers"] = [
+            _in_glb(i, d, b) for i, (d, b) in enumerate(zip(described, document.buffers, strict=True))
+        ]
+    pieces = [_chunk_head(0, JSON_CHUNK), *_padded(text.dump(content), b" ")]
+    pieces[0] = _chunk_head(_size(pieces[1:]), JSON_CHUNK)
+    chunks: list[tuple[int, list[Bytes]]] = []
+    if described:
+        chunks.append((BIN_CHUNK, _padded(document.buffers[0].data, b"\0")))
+    chunks += [(kind, [_bytes(content)]) for kind, content in document.chunks]
+    for kind, body in chunks:
+        pieces += [_chunk_head(_size(body), kind), *body]
+    total = 12 + _size(pieces)
+    if total > MAX_GLB:
+        raise UnsupportedError(f"a GLB can't hold {total} bytes (its limit is {MAX_GLB})", help="write a .gltf")
+    return [_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
+
+
+def gltf(document: Document, stem: str, *, keep_external: bool = False) -> dict[str, list[Bytes]]:
+    """Return the files of a .gltf by name: `stem`.gltf last, before it the .bin files that it needs.
+
+    A buffer that was a data URI stays one; others become `stem`.bin, `stem`-1.bin, … With `keep_external` a buffer
+    that was a file of its own and has not changed stays that file.
+    """
+    content = dict(document.json)
+    described = items(content, "buffers")
+    files: dict[str, list[Bytes]] = {}
+    beside = []
+    for i, (about, buffer) in enumerate(zip(described, document.buffers, strict=True)):
+        about = dict(about)
+        if buffer.uri is not None and uri.is_data(buffer.uri):
+            about["uri"] = _kept_data_uri(buffer)
+        elif buffer.has_data and not (keep_external and buffer.uri is not None and not buffer.replaced):
+            name = f"{stem}.bin" if i == 0 else f"{stem}-{i}.bin"
+            about["uri"] = uri.from_path(name)
+            files[name] = [buffer.data]
+        beside.append(about)
+    if described:
+        content["buffers"] = beside
+    files[f"{stem}.gltf"] = [_bytes(text.dump(content, indent=document.indent) + b"\n")]
+    return files
+
+
+def _read_glb(data: Bytes, resolve: Resolve | None) -> Document:
+    if len(data) < 12:
+        raise FormatError(f"GLB header is cut off ({len(data)} bytes of 12)")
+    version, total = struct.unpack("<II", data[4:12].tobytes())
+    if version != 2:
+        raise FormatError(f"GLB version is {version} (expected 2)")
+    if not 12 <= total <= len(data):
+        state = "is truncated" if total > len(data) else "has a wrong length in its header"
+        raise FormatError(f"GLB {state} ({len(data)} bytes, the header says {total})")
+    parsed: Json | None = None
+    binary: Bytes | None = None
+    others: list[tuple[int, bytes]] = []
+    for number, (kind, body) in enumerate(_chunks(data[:total])):
+        if number == 0:
+            if kind != JSON_CHUNK:
+                raise FormatError(f"GLB's first chunk has type {kind:#010x} (expected JSON, {JSON_CHUNK:#010x})")
+            parsed = _parse(body.tobytes())
+        elif kind == BIN_CHUNK and number == 1:
+            binary = body
+        elif kind in (JSON_CHUNK, BIN_CHUNK):
+            raise FormatError(f"GLB chunk {number} is a second or misplaced {'JSON' if kind == JSON_CHUNK else 'BIN'}")
+        else:
+            others.append((kind, body.tobytes()))
+    if parsed is None:
+        raise FormatError("GLB has no JSON chunk")
+    return Document(parsed, _buffers(parsed, binary, resolve, glb=True), tuple(others))
+
+
+def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
+    chunks = []
+    at = 12
+    while at < len(data):
+        if at + 8 > len(data):
+            raise FormatError(f"GLB chunk header at byte {at} is cut off")
+        size, kind = struct.unpack("<II", data[at : at + 8].tobytes())
+        if size % 4:
+            raise FormatError(f"GLB chunk at byte {at} has {size} bytes (expected a multiple of 4)")
+        if at + 8 + size > len(data):
+            raise FormatError(f"GLB chunk at byte {at} is truncated ({len(data) - at - 8} bytes of {size})")
+        chunks.append((kind, data[at + 8 : at + 8 + size]))
+        at += 8 + size
+    return chunks
+
+
+def _parse(raw: bytes) -> Json:
+    parsed = text.parse(raw)
+    structure.check(parsed)
+    return parsed
+
+
+def _buffers(parsed: Json, binary: Bytes | None, resolve: Resolve | None, *, glb: bool) -> tuple[Buffer, ...]:
+    buffers = []
+    for i, about in enumerate(items(parsed, "buffers")):
+        load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
+        buffers.append(Buffer(about["byteLength"], about.get("uri"), load, where=where))
+        if glb and i == 0 and "uri" not in about:
+            _check_binary(about, binary)
+    return tuple(buffers)
+
+
+def _loader(about: Json, binary: Bytes | None, resolve: Resolve | None) -> Callable[[], Bytes] | None:
+    address = about.get("uri")
+    if address is None:
+        return None if binary is None else lambda: binary
+    if uri.is_data(address):
+        return lambda: _bytes(uri.decode_data(address))
+    return lambda: _beside(address, resolve)
+
+
+def _beside(address: str, resolve: Resolve | None) -> Bytes:
+    path = uri.relative_path(address)
+    if resolve is None:
+        raise FormatError(
+            f"'{path}' lies beside the file, but the input is a pipe", help="give the file's path, or pipe a GLB"
+        )
+    return resolve(path)
+
+
+def _check_binary(about: Json, binary: Bytes | None) -> None:
+    if binary is None:
+        if about.get("extensions") or "fallback" in json.dumps(about):
+            return
+        raise FormatError("has no uri and the GLB has no BIN chunk", where="buffer 0")
+    if len(binary) < about["byteLength"]:
+        raise FormatError(
+            f"BIN chunk holds {len(binary)} bytes (expected at least byteLength, {about['byteLength']})",
+            where="buffer 0",
+        )
+
+
+def _in_glb(number: int, about: Json, buffer: Buffer) -> Json:
+    if number == 0:
+        if not buffer.has_data:
+            raise UnsupportedError("has no data, so it can't be a GLB's BIN chunk", where="buffer 0")
+        return {key: value for key, value in about.items() if key != "uri"}
+    if buffer.uri is None:
+        return about
+    return {**about, "uri": _kept_data_uri(buffer)}
+
+
+def _kept_data_uri(buffer: Buffer) -> str:
+    """The URI as it was where it already holds these bytes, else a new one with its media type."""
+    if buffer.uri is not None and uri.is_data(buffer.uri) and not buffer.replaced:
+        return buffer.uri
+    media = re.match(r"data:([^;,]+)", buffer.uri or "", re.IGNORECASE)
+    return uri.encode_data(buffer.data.tobytes(), media[1] if media else uri.BUFFER_TYPES[0])
+
+
+def _chunk_head(size: int, kind: int) -> Bytes:
+    return _bytes(struct.pack("<II", size, kind))
+
+
+def _padded(content: bytes | Bytes, filler: bytes) -> list[Bytes]:
+    rest = -len(content) % 4
+    body = _bytes(content) if isinstance(content, bytes) else content
+    return [body, _bytes(filler * rest)] if rest else [body]
+
+
+def _size(pieces: list[Bytes]) -> int:
+    return sum(len(piece) for piece in pieces)
+
+
+def _bytes(content: bytes) -> Bytes:
+    return np.frombuffer(content, np.uint8)

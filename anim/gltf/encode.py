@@ -1,0 +1,93 @@
+"""Track → the numbers that a file holds, in the track's own storage where that keeps every value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+from anim.gltf.accessors import DTYPES, FLOAT, denormalized
+from anim.gltf.document import Json
+from anim.gltf.layout import COMPONENTS
+from anim.model import Interpolation, Track
+
+ELEMENTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The content of one accessor: stored bytes and what they are. Equal ones can share an accessor."""
+
+    data: bytes
+    component_type: int
+    element: str
+    normalized: bool = False
+    bounds: tuple[float, float] | None = None
+
+    def accessor(self, view: int, offset: int) -> Json:
+        """Return the JSON of an accessor that finds these bytes at `offset` of `view`; defaults are left out."""
+        columns, rows = COMPONENTS[self.element]
+        size = np.dtype(DTYPES[self.component_type]).itemsize * columns * rows
+        about: Json = {"bufferView": view}
+        if offset:
+            about["byteOffset"] = offset
+        about["componentType"] = self.component_type
+        if self.normalized:
+            about["normalized"] = True
+        about["count"] = len(self.data) // size
+        about["type"] = self.element
+        if self.bounds is not None:
+            about["min"], about["max"] = [self.bounds[0]], [self.bounds[1]]
+        return about
+
+
+def times(track: Track) -> Numbers:
+    """Return the key times as float32, with bounds that are exact in float32 and short as text.
+
+    Raises RangeError where rounding to float32 makes two keys one.
+    """
+    stored = track.times.astype("<f4")
+    if len(stored) > 1 and not (np.diff(stored) > 0).all():
+        k = int(np.argmax(np.diff(stored) <= 0))
+        raise RangeError(f"keys {k} and {k + 1} fall together in float32 (both at {stored[k]} s)")
+    return Numbers(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
+
+
+def values(track: Track) -> Numbers:
+    """Return the values, with tangents for CUBICSPLINE as glTF orders them: in, value, out per key.
+
+    Integers, as the track's storage asks for, only where they give every value back; float32 otherwise.
+    """
+    rows = track.values
+    if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
+        assert track.out_tangents is not None
+        rows = np.stack((track.in_tangents, rows, track.out_tangents), axis=1)
+    element = ELEMENTS.get(track.path) or track.storage.element or BY_WIDTH.get(rows.shape[-1], "SCALAR")
+    kind, normalized = track.storage.component_type, track.storage.normalized
+    if kind != FLOAT:
+        integers = _integers(rows, np.dtype(DTYPES[kind]), normalized)
+        if integers is not None:
+            return Numbers(integers.tobytes(), kind, element, normalized)
+    return Numbers(rows.astype("<f4").tobytes(), FLOAT, element)
+
+
+def _integers(rows: Floats, dtype: np.dtype[Any], normalized: bool) -> NDArray[Any] | None:
+    limits = np.iinfo(dtype)
+    scaled = np.rint(rows * limits.max if normalized else rows)
+    if scaled.min() < limits.min or scaled.max() > limits.max:
+        return None
+    stored = scaled.astype(dtype)
+    back = stored.astype(np.float64)
+    if normalized:
+        back = denormalized(back, dtype)
+    return stored if np.array_equal(back, rows) else None
+
+
+def _shortest(value: np.float32) -> float:
+    """The double with the shortest text that rounds to this float32: 1.0416666, not 1.0416666269302368."""
+    return float(str(value))

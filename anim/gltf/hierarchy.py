@@ -1,0 +1,47 @@
+"""Are the nodes a forest, and do skins and animation targets fit them?"""
+
+from __future__ import annotations
+
+from anim.errors import FormatError
+from anim.gltf.document import Json, items
+
+
+def parents(json: Json) -> list[int]:
+    """Return each node's parent, −1 for roots. Raises FormatError for a second parent or a cycle."""
+    nodes = items(json, "nodes")
+    parent = [-1] * len(nodes)
+    for i, node in enumerate(nodes):
+        for child in node.get("children", ()):
+            if parent[child] >= 0:
+                raise FormatError(f"has two parents ({parent[child]} and {i})", where=f"nodes[{child}]")
+            parent[child] = i
+    for i in range(len(nodes)):
+        _check_reaches_root(i, parent)
+    return parent
+
+
+def check(json: Json) -> None:
+    """Raise FormatError where nodes are no forest, or a skin's matrices don't fit its joints."""
+    parents(json)
+    accessors = items(json, "accessors")
+    for i, skin in enumerate(items(json, "skins")):
+        if "inverseBindMatrices" not in skin:
+            continue
+        matrices = accessors[skin["inverseBindMatrices"]]
+        where = f"skins[{i}].inverseBindMatrices"
+        if matrices["type"] != "MAT4" or matrices["componentType"] != 5126:
+            raise FormatError(
+                f"accessor is {matrices['type']} of {matrices['componentType']} (expected MAT4 of 5126)", where=where
+            )
+        if matrices["count"] < len(skin["joints"]):
+            raise FormatError(
+                f"accessor has {matrices['count']} matrices for {len(skin['joints'])} joints", where=where
+            )
+
+
+def _check_reaches_root(node: int, parent: list[int]) -> None:
+    at, steps = node, 0
+    while at >= 0:
+        at, steps = parent[at], steps + 1
+        if steps > len(parent):
+            raise FormatError("lies on a cycle (expected trees)", where=f"nodes[{node}]")

@@ -1,0 +1,137 @@
+"""Primitives → Mesh: vertices, faces, influences and morph targets, whatever form the file keeps them in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import AnimError, FormatError, UnsupportedError
+from anim.gltf.accessors import Accessors
+from anim.gltf.document import Document, Json, items
+from anim.model import Mesh
+
+POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
+HIDING = ("KHR_draco_mesh_compression",)  # extensions that keep a primitive's vertices from us
+
+
+class Meshes:
+    """Reads meshes of one document, each once per skin size."""
+
+    def __init__(self, document: Document, accessors: Accessors) -> None:
+        self._meshes = items(document.json, "meshes")
+        self._accessors = accessors
+        self._done: dict[tuple[int, int], Mesh] = {}
+
+    def mesh(self, number: int, *, joint_count: int) -> Mesh:
+        """Return a mesh, its primitives one after another. joint_count: of the skin it is used with, 0 without one.
+
+        Raises FormatError for influences outside the skin, UnsupportedError for vertices that are hidden.
+        """
+        key = (number, joint_count)
+        if key not in self._done:
+            about = self._meshes[number]
+            name = about.get("name", "")
+            try:
+                self._done[key] = self._read(about, joint_count)
+            except AnimError as error:
+                raise error.at(f"mesh {number}{f' {name!r}' if name else ''}") from None
+        return self._done[key]
+
+    def _read(self, about: Json, joint_count: int) -> Mesh:
+        parts = []
+        for i, primitive in enumerate(about["primitives"]):
+            try:
+                parts.append(self._primitive(primitive, joint_count))
+            except AnimError as error:
+                raise error.at(f"primitive {i}") from None
+        offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
+        influences = max((part.joints.shape[1] for part in parts), default=0)
+        faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=False)]
+        count = len(about["primitives"][0].get("targets", ())) if about["primitives"] else 0
+        return Mesh(
+            about.get("name", ""),
+            np.concatenate([np.empty((0, 3)), *(part.positions for part in parts)]),
+            np.concatenate([np.empty((0, 3), np.int64), *faces]),
+            _stacked([part.joints for part in parts], influences, np.int64),
+            _stacked([part.weights for part in parts], influences, np.float64),
+            np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
+            np.array(about.get("weights", [0.0] * count), float),
+        )
+
+    def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
+        hidden = [name for name in HIDING if name in primitive.get("extensions", {})]
+        if hidden:
+            raise UnsupportedError(f"vertices are compressed by {hidden[0]}, which is not handled")
+        attributes = primitive["attributes"]
+        if "POSITION" not in attributes:
+            return _nothing(len(primitive.get("targets", ())))
+        positions = self._accessors.floats(attributes["POSITION"])
+        if positions.shape[1] != 3:
+            raise FormatError(f"POSITION has {positions.shape[1]} components (expected 3)")
+        joints, weights = self._influences(attributes, len(positions), joint_count)
+        targets = [self._displacements(t, len(positions)) for t in primitive.get("targets", ())]
+        stacked = np.stack(targets) if targets else np.empty((0, len(positions), 3))
+        faces = self._faces(primitive, len(positions))
+        return Mesh("", positions, faces, joints, weights, stacked, np.zeros(len(targets)))
+
+    def _influences(self, attributes: Json, vertices: int, joint_count: int) -> tuple[Ints, Floats]:
+        joints: list[Ints] = []
+        weights: list[Floats] = []
+        while joint_count and f"JOINTS_{len(joints)}" in attributes and f"WEIGHTS_{len(joints)}" in attributes:
+            k = len(joints)
+            joints.append(self._accessors.integers(attributes[f"JOINTS_{k}"]))
+            weights.append(self._accessors.floats(attributes[f"WEIGHTS_{k}"]))
+            if joints[k].shape != (vertices, 4) or weights[k].shape != (vertices, 4):
+                raise FormatError(f"JOINTS_{k} or WEIGHTS_{k} don't have 4 numbers for each of {vertices} vertices")
+        if joint_count and not joints:
+            raise FormatError("is used with a skin but has no JOINTS_0 and WEIGHTS_0")
+        if not joints:
+            return np.empty((vertices, 0), np.int64), np.empty((vertices, 0))
+        all_joints, all_weights = np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
+        outside = (all_joints >= joint_count) & (all_weights != 0)
+        if outside.any():
+            raise FormatError(
+                f"vertex {int(np.argmax(outside.any(axis=1)))} uses joint {int(all_joints[outside][0])} "
+                f"(the skin has {joint_count})"
+            )
+        return np.where(all_weights != 0, all_joints, 0), all_weights
+
+    def _displacements(self, target: Json, vertices: int) -> Floats:
+        if "POSITION" not in target:
+            return np.zeros((vertices, 3))
+        moved = self._accessors.floats(target["POSITION"])
+        if moved.shape != (vertices, 3):
+            raise FormatError(f"a morph target has {len(moved)} positions for {vertices} vertices")
+        return moved
+
+    def _faces(self, primitive: Json, vertices: int) -> Ints:
+        if "indices" in primitive:
+            indices = self._accessors.integers(primitive["indices"])[:, 0]
+        else:
+            indices = np.arange(vertices)
+        return _triangles(indices, primitive.get("mode", TRIANGLES))
+
+
+def _triangles(indices: Ints, mode: int) -> Ints:
+    """Faces (T, 3) of triangles, a strip (every second one turned round) or a fan; none of points and lines."""
+    if mode == TRIANGLES:
+        return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    if mode in (TRIANGLE_STRIP, TRIANGLE_FAN) and len(indices) >= 3:
+        i = np.arange(len(indices) - 2)
+        if mode == TRIANGLE_FAN:
+            return np.stack([indices[i + 1], indices[i + 2], np.broadcast_to(indices[0], i.shape)], axis=1)
+        odd = i % 2
+        return np.stack([indices[i], indices[i + 1 + odd], indices[i + 2 - odd]], axis=1)
+    return np.empty((0, 3), np.int64)
+
+
+def _stacked(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarray:
+    """Parts (V, I) under each other, filled up with zeros to the same number of influences."""
+    filled = [np.pad(part, ((0, 0), (0, influences - part.shape[1]))) for part in parts]
+    return np.concatenate([np.empty((0, influences), dtype), *filled])
+
+
+def _nothing(targets: int) -> Mesh:
+    none = np.empty((0, 0))
+    faces = np.empty((0, 3), np.int64)
+    return Mesh("", np.empty((0, 3)), faces, none.astype(np.int64), none, np.empty((targets, 0, 3)), np.zeros(targets))

@@ -1,0 +1,56 @@
+"""Views compressed by EXT_meshopt_compression or KHR_meshopt_compression, decoded by the package `meshopt`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.errors import FormatError, UnsupportedError
+from anim.gltf.document import Bytes, Json
+
+MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
+FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
+
+
+def decode(stored: Bytes, about: Json) -> Bytes:
+    """Return the plain bytes (count × byteStride,) of a compressed view.
+
+    stored: the compressed bytes. about: the extension's object: byteStride, count, mode, filter.
+    Raises FormatError where the stream does not hold what the object says, UnsupportedError for an unknown mode.
+    """
+    mode, chosen_filter = about.get("mode"), about.get("filter", "NONE")
+    if mode not in MODES or chosen_filter not in FILTERS:
+        raise UnsupportedError(f"meshopt mode {mode!r} with filter {chosen_filter!r} is not known")
+    count, stride = about["count"], about["byteStride"]
+    _check_stride(mode, chosen_filter, stride, count)
+    from meshopt import decode_gltf_buffer
+
+    try:
+        decoded = decode_gltf_buffer(
+            stored.tobytes(), count, stride, mode, None if chosen_filter == "NONE" else chosen_filter
+        )
+    except (ValueError, RuntimeError) as error:
+        raise FormatError(f"meshopt stream is broken ({error})") from None
+    plain = np.ascontiguousarray(decoded).reshape(-1).view(np.uint8)
+    if len(plain) != count * stride:
+        plain = _narrowed(np.asarray(decoded), count, stride)
+    return plain
+
+
+def _check_stride(mode: str, chosen_filter: str, stride: int, count: int) -> None:
+    if mode == "ATTRIBUTES":
+        good = stride % 4 == 0 and stride <= 256
+        good &= {"OCTAHEDRAL": stride in (4, 8), "QUATERNION": stride == 8, "COLOR": stride in (4, 8)}.get(
+            chosen_filter, True
+        )
+    else:
+        good = stride in (2, 4) and chosen_filter == "NONE" and (mode == "INDICES" or count % 3 == 0)
+    if not good:
+        raise FormatError(f"meshopt byteStride {stride} and count {count} don't fit {mode} with filter {chosen_filter}")
+
+
+def _narrowed(indices: np.ndarray[tuple[int, ...], np.dtype[np.uint32]], count: int, stride: int) -> Bytes:
+    """Indices come back as 32-bit numbers; the view holds them in 2 or 4 bytes."""
+    flat = indices.reshape(-1)
+    if len(flat) != count:
+        raise FormatError(f"meshopt stream holds {len(flat)} indices (expected {count})")
+    return flat.astype(f"<u{stride}").view(np.uint8)

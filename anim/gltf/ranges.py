@@ -1,0 +1,71 @@
+"""Sets of byte ranges, and where bytes end up when some of them are dropped."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable
+from typing import TypeAlias
+
+Range: TypeAlias = tuple[int, int]  # first byte, byte after the last
+
+ALIGNMENT = 4  # bytes; nothing in a glTF buffer needs more
+
+
+def union(ranges: Iterable[Range]) -> list[Range]:
+    """Return the same bytes as sorted ranges that neither touch nor overlap."""
+    merged: list[Range] = []
+    for start, end in sorted(ranges):
+        if start >= end:
+            continue
+        if merged and start <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(end, merged[-1][1]))
+        else:
+            merged.append((start, end))
+    return merged
+
+
+def difference(ranges: Iterable[Range], without: Iterable[Range]) -> list[Range]:
+    """Return the bytes of `ranges` that are not in `without`.
+
+    difference([(0, 10)], [(2, 4)]) → [(0, 2), (4, 10)]
+    """
+    left: list[Range] = []
+    cuts = union(without)
+    for start, end in union(ranges):
+        first = max(bisect_right(cuts, (start, start)) - 1, 0)
+        for cut_start, cut_end in cuts[first:]:
+            if cut_start >= end:
+                break
+            if cut_end > start:
+                left.append((start, cut_start))
+                start = cut_end
+        left.append((start, end))
+    return [(start, end) for start, end in left if start < end]
+
+
+def aligned(ranges: Iterable[Range]) -> list[Range]:
+    """Return the part of each range that starts and ends on a multiple of four, so that what follows stays aligned."""
+    inward = [(-(-start // ALIGNMENT) * ALIGNMENT, end // ALIGNMENT * ALIGNMENT) for start, end in ranges]
+    return [(start, end) for start, end in inward if start < end]
+
+
+class Shift:
+    """Where bytes go when `dropped` ranges are taken out of a buffer."""
+
+    def __init__(self, dropped: list[Range]) -> None:
+        self.dropped = union(dropped)
+        self._starts = [start for start, _ in self.dropped]
+        self._before = [0]
+        for start, end in self.dropped:
+            self._before.append(self._before[-1] + end - start)
+
+    @property
+    def dropped_bytes(self) -> int:
+        """How many bytes go."""
+        return self._before[-1]
+
+    def __call__(self, at: int) -> int:
+        """Return the new position of byte `at`; of a dropped one, that of the next that stays."""
+        i = bisect_right(self._starts, at)
+        inside = max(self.dropped[i - 1][1] - at, 0) if i else 0
+        return at - self._before[i] + inside

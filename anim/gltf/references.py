@@ -1,0 +1,119 @@
+"""Who refers to which accessor and view: what may be dropped when animations are replaced, and what must not move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from anim.gltf.document import Json, items
+
+# Extensions known to hold no number of an accessor or view, other than those collected below. Numbers inside any
+# other extension, and inside extras, are taken for both: whatever they might name stays where it is.
+HARMLESS = frozenset(
+    """
+    EXT_mesh_gpu_instancing EXT_meshopt_compression EXT_texture_avif EXT_texture_webp
+    KHR_animation_pointer KHR_draco_mesh_compression KHR_lights_punctual KHR_materials_anisotropy
+    KHR_materials_clearcoat KHR_materials_dispersion KHR_materials_emissive_strength KHR_materials_ior
+    KHR_materials_iridescence KHR_materials_pbrSpecularGlossiness KHR_materials_sheen KHR_materials_specular
+    KHR_materials_transmission KHR_materials_unlit KHR_materials_variants KHR_materials_volume
+    KHR_mesh_quantization KHR_meshopt_compression KHR_node_visibility KHR_texture_basisu KHR_texture_transform
+    KHR_xmp_json_ld VRMC_materials_mtoon VRMC_node_constraint VRMC_springBone VRMC_vrm VRMC_vrm_animation
+    """.split()  # noqa: SIM905 (one name per line would hide the words)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class References:
+    """Numbers of accessors and views that something other than the replaced animations refers to."""
+
+    accessors: frozenset[int]
+    views: frozenset[int]
+
+
+def outside(json: Json, replaced: Iterable[int]) -> References:
+    """Return what everything but the samplers of the animations `replaced` refers to.
+
+    Accessors in the result stay with number and bytes. Views in it are named by someone who is not an accessor;
+    views under an accessor in the result are the caller's to add, since parts of those may be dropped.
+    """
+    skipped = set(replaced)
+    accessors = set(_of_meshes(json)) | set(_of_skins(json)) | set(_of_instancing(json))
+    for i, animation in enumerate(items(json, "animations")):
+        for sampler in animation["samplers"] if i not in skipped else ():
+            accessors |= {sampler["input"], sampler["output"]}
+    views = {image["bufferView"] for image in items(json, "images") if "bufferView" in image}
+    views |= set(_of_draco(json))
+    unknown = set(_numbers_of_unknown(json))
+    return References(frozenset(accessors | unknown), frozenset(views | unknown))
+
+
+def views_of(accessor: Json) -> list[int]:
+    """Return the views that an accessor's numbers lie in: its own, and those of its sparse part."""
+    views = [accessor["bufferView"]] if "bufferView" in accessor else []
+    if "sparse" in accessor:
+        views += [accessor["sparse"][part]["bufferView"] for part in ("indices", "values")]
+    return views
+
+
+def _primitives(json: Json) -> Iterator[Json]:
+    for mesh in items(json, "meshes"):
+        yield from mesh["primitives"]
+
+
+def _of_meshes(json: Json) -> Iterator[int]:
+    for primitive in _primitives(json):
+        yield from primitive["attributes"].values()
+        if "indices" in primitive:
+            yield primitive["indices"]
+        for target in primitive.get("targets", ()):
+            yield from target.values()
+
+
+def _of_skins(json: Json) -> Iterator[int]:
+    return (skin["inverseBindMatrices"] for skin in items(json, "skins") if "inverseBindMatrices" in skin)
+
+
+def _of_instancing(json: Json) -> Iterator[int]:
+    for node in items(json, "nodes"):
+        instancing = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
+        yield from _whole_numbers(instancing)
+
+
+def _of_draco(json: Json) -> Iterator[int]:
+    for primitive in _primitives(json):
+        yield from _whole_numbers(primitive.get("extensions", {}).get("KHR_draco_mesh_compression", {}))
+
+
+def _numbers_of_unknown(value: Any) -> Iterator[int]:
+    """Whole numbers anywhere inside extras and extensions that are not known to be harmless."""
+    if isinstance(value, list):
+        for item in value:
+            if isinstance(item, dict | list):
+                yield from _numbers_of_unknown(item)
+        return
+    for key, item in value.items():
+        if key == "extras":
+            yield from _whole_numbers(item)
+        elif key == "extensions" and isinstance(item, dict):
+            for name, extension in item.items():
+                yield from _whole_numbers(extension) if name not in HARMLESS else _numbers_inside(extension)
+        elif isinstance(item, dict | list):
+            yield from _numbers_of_unknown(item)
+
+
+def _numbers_inside(extension: Any) -> Iterator[int]:
+    return _numbers_of_unknown(extension) if isinstance(extension, dict | list) else iter(())
+
+
+def _whole_numbers(value: Any) -> Iterator[int]:
+    if isinstance(value, bool):
+        return
+    if isinstance(value, int):
+        yield value
+    elif isinstance(value, dict):
+        for item in value.values():
+            yield from _whole_numbers(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _whole_numbers(item)

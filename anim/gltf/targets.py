@@ -1,0 +1,69 @@
+"""Which property a channel animates: a node's own, or by KHR_animation_pointer anything that a JSON pointer names."""
+
+from __future__ import annotations
+
+import re
+from typing import TypeAlias
+
+from anim.errors import FormatError
+from anim.gltf.document import Json, items
+from anim.model.track import PATHS
+
+EXTENSION = "KHR_animation_pointer"
+_NODE_PROPERTY = re.compile(r"/nodes/(\d+)/(translation|rotation|scale|weights)")
+
+Target: TypeAlias = tuple[int | None, str, str | None]  # node, path, pointer
+
+
+def of_channel(channel: Json) -> Target | None:
+    """Return (node, path, pointer) that a channel animates, None where glTF says to ignore it or it is not known.
+
+    A pointer at a node's translation, rotation, scale or weights gives that node and path: plain channels could do it.
+    of_channel({"sampler": 0, "target": {"node": 3, "path": "scale"}}) → (3, "scale", None)
+    """
+    target = channel["target"]
+    path = target["path"]
+    if path == "pointer":
+        return _pointed(target.get("extensions", {}).get(EXTENSION))
+    if path not in PATHS or "node" not in target:
+        return None
+    return target["node"], path, None
+
+
+def check(json: Json) -> None:
+    """Raise FormatError for a channel on a node that is missing or has a matrix, or a second one for its property.
+
+    Two channels for one pointer outside the nodes stand in files of real exporters; they are read and kept as they are.
+    """
+    nodes = items(json, "nodes")
+    for i, animation in enumerate(items(json, "animations")):
+        seen: set[tuple[int, str]] = set()
+        for k, channel in enumerate(animation["channels"]):
+            found = of_channel(channel)
+            if found is None:
+                continue
+            try:
+                _check(found, nodes, seen)
+            except FormatError as error:
+                raise error.at(f"animations[{i}].channels[{k}].target", ".") from None
+
+
+def _check(target: Target, nodes: list[Json], seen: set[tuple[int, str]]) -> None:
+    node, path, _ = target
+    if node is None:
+        return
+    if (node, path) in seen:
+        raise FormatError(f"is the second channel for node {node}, {path}")
+    seen.add((node, path))
+    if node >= len(nodes):
+        raise FormatError(f"names node {node} (the file has {len(nodes)} nodes)")
+    if path != "weights" and "matrix" in nodes[node]:
+        raise FormatError(f"animates {path} of node {node}, which has a matrix")
+
+
+def _pointed(extension: object) -> Target | None:
+    pointer = extension.get("pointer") if isinstance(extension, dict) else None
+    if not isinstance(pointer, str):
+        return None
+    match = _NODE_PROPERTY.fullmatch(pointer)
+    return (int(match[1]), match[2], pointer) if match else (None, "pointer", pointer)

@@ -1,0 +1,72 @@
+"""URIs of buffers and images: data URIs are decoded, relative ones confined to the file's own folder."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+from urllib.parse import quote, unquote, unquote_to_bytes
+
+from anim.errors import FormatError
+
+BUFFER_TYPES = ("application/octet-stream", "application/gltf-buffer")  # glTF 2.0, 3.6.1.1
+_DATA = re.compile(r"data:([\w.+-]+/[\w.+-]+)?((?:;[\w.+-]+=[^;,]*)*)(;base64)?,", re.ASCII | re.IGNORECASE)
+_SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.ASCII | re.IGNORECASE)
+
+
+def is_data(uri: str) -> bool:
+    """Return whether the URI holds its bytes itself."""
+    return uri[:5].lower() == "data:"
+
+
+def decode_data(uri: str) -> bytes:
+    """Return the bytes of a data URI of a buffer.
+
+    Raises FormatError for a broken one, or a media type that glTF doesn't allow for buffers.
+    decode_data("data:application/octet-stream;base64,AAE=") → b"\\0\\1"
+    """
+    match = _DATA.match(uri)
+    if match is None:
+        raise FormatError(f"broken data URI ({_short(uri)})")
+    media = (match[1] or "").lower()
+    if media not in BUFFER_TYPES:
+        raise FormatError(f"data URI has media type '{media}' (expected {' or '.join(BUFFER_TYPES)})")
+    payload = unquote_to_bytes(uri[match.end() :])
+    if not match[3]:
+        return payload
+    try:
+        return base64.b64decode(payload, validate=True)
+    except binascii.Error as error:
+        raise FormatError(f"broken base64 in a data URI ({str(error).lower()})") from None
+
+
+def encode_data(data: bytes, media: str = BUFFER_TYPES[0]) -> str:
+    """Return `data` as a base64 data URI."""
+    return f"data:{media};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def relative_path(uri: str) -> str:
+    """Return the path that a relative URI names, percent-decoded, with forward slashes.
+
+    Raises FormatError unless it stays in the file's own folder: no scheme, no absolute path, no "..".
+    relative_path("walk%20data.bin") → "walk data.bin"
+    """
+    if _SCHEME.match(uri):
+        raise FormatError(f"URI '{_short(uri)}' has a scheme (only files beside this one are read)")
+    path = unquote(uri)
+    if not path or "\0" in path:
+        raise FormatError(f"URI '{_short(uri)}' names no file")
+    if path[0] in "/\\" or _SCHEME.match(path):
+        raise FormatError(f"URI '{_short(uri)}' is absolute (only files beside this one are read)")
+    if ".." in re.split(r"[/\\]", path):
+        raise FormatError(f"URI '{_short(uri)}' leaves the file's folder (only files beside this one are read)")
+    return path
+
+
+def from_path(path: str) -> str:
+    """Return the relative URI of a file name, percent-encoded."""
+    return quote(path)
+
+
+def _short(uri: str) -> str:
+    return uri if len(uri) <= 60 else uri[:57] + "..."

@@ -1,0 +1,120 @@
+"""Clips → a new Document in which only the animations were replaced.
+
+Everything else keeps its JSON, its order and its numbers. Accessors and views that only the replaced animations used
+are used again for the new ones, and their old bytes leave the buffer. A number left over in the middle gets the
+smallest legal placeholder, so that no other number moves.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+
+from anim.errors import AnimError
+from anim.gltf import encode, targets
+from anim.gltf.assemble import Place, assemble
+from anim.gltf.document import Document, Json, items
+from anim.gltf.encode import Numbers
+from anim.model import Clip, Interpolation, Track
+
+_SAMPLER_KEYS = ("input", "output", "interpolation")
+
+
+def replace_clips(document: Document, clips: Mapping[int, Clip]) -> Document:
+    """Return the document with the animations numbered in `clips` replaced; all others stay as they are.
+
+    Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
+    channel get one. Names, extras and extensions of animations, channels and samplers stay.
+    Raises RangeError where keys fall together in float32.
+    """
+    if not clips:
+        return document
+    pool = _Pool()
+    animations = [
+        _animation(animation, clips[i], pool) if i in clips else animation
+        for i, animation in enumerate(items(document.json, "animations"))
+    ]
+    return assemble(document, animations, set(clips), pool.numbers)
+
+
+class _Pool:
+    """Contents of new accessors, each kept once; numbers are given out later, so samplers hold places in here."""
+
+    def __init__(self) -> None:
+        self.numbers: list[Numbers] = []
+        self._places: dict[Numbers, int] = {}
+        self._axes: dict[int, int] = {}
+
+    def place(self, numbers: Numbers) -> int:
+        place = self._places.get(numbers)
+        if place is None:
+            place = self._places[numbers] = len(self.numbers)
+            self.numbers.append(numbers)
+        return place
+
+    def axis(self, track: Track) -> int:
+        """The place of a track's times; tracks that share one array are encoded once."""
+        found = self._axes.get(id(track.times))
+        if found is None:
+            found = self._axes[id(track.times)] = self.place(encode.times(track))
+        return found
+
+
+def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
+    waiting: dict[tuple[int | None, str], deque[Track]] = {}
+    for track in clip.tracks:
+        waiting.setdefault(track.target, deque()).append(track)
+    samplers = _Samplers(animation, pool)
+    channels = []
+    for channel in animation["channels"]:
+        target = targets.of_channel(channel)
+        if target is None:
+            channels.append({**channel, "sampler": samplers.kept(channel["sampler"])})
+            continue
+        node, path, pointer = target
+        queue = waiting.get((None, pointer or "") if node is None else (node, path))
+        if queue:
+            channels.append({**channel, "sampler": samplers.new(queue.popleft(), channel["sampler"])})
+    for queue in waiting.values():
+        channels += [{"sampler": samplers.new(track, None), "target": _target(track)} for track in queue]
+    replaced = {**animation, "channels": channels, "samplers": samplers.list}
+    if clip.name != animation.get("name", ""):
+        replaced["name"] = clip.name
+    return replaced
+
+
+class _Samplers:
+    """Samplers of one new animation; equal ones are shared unless they carry something of their own."""
+
+    def __init__(self, animation: Json, pool: _Pool) -> None:
+        self.list: list[Json] = []
+        self._old = animation["samplers"]
+        self._pool = pool
+        self._numbers: dict[tuple[object, ...], int] = {}
+
+    def kept(self, old: int) -> int:
+        return self._number(("kept", old), self._old[old])
+
+    def new(self, track: Track, old: int | None) -> int:
+        try:
+            times, values = self._pool.axis(track), self._pool.place(encode.values(track))
+        except AnimError as error:
+            raise error.at(f"{track.path} of node {track.node}" if track.pointer is None else track.pointer) from None
+        own = {} if old is None else {k: v for k, v in self._old[old].items() if k not in _SAMPLER_KEYS}
+        sampler: Json = {"input": Place(times), "output": Place(values), **own}
+        if track.interpolation is not Interpolation.LINEAR:
+            sampler["interpolation"] = str(track.interpolation)
+        return self._number((times, values, track.interpolation, old if own else None), sampler)
+
+    def _number(self, key: tuple[object, ...], sampler: Json) -> int:
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = len(self.list)
+            self.list.append(sampler)
+        return number
+
+
+def _target(track: Track) -> Json:
+    if track.pointer is not None:
+        return {"path": "pointer", "extensions": {targets.EXTENSION: {"pointer": track.pointer}}}
+    return {"node": track.node, "path": track.path}

@@ -1,0 +1,87 @@
+"""Affine matrices (..., 3, 4) for column vectors: the last row 0 0 0 1 is left out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.maths import quaternion
+
+
+def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
+    """Return T·R·S as (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4) and scale (..., 3)."""
+    x, y, z, w = rotation[..., 0], rotation[..., 1], rotation[..., 2], rotation[..., 3]
+    x2, y2, z2 = x + x, y + y, z + z
+    xx, yy, zz = x * x2, y * y2, z * z2
+    xy, xz, yz = x * y2, x * z2, y * z2
+    wx, wy, wz = w * x2, w * y2, w * z2
+    result: Floats = np.empty((*rotation.shape[:-1], 3, 4))
+    result[..., 0, 0] = 1 - (yy + zz)
+    result[..., 0, 1] = xy - wz
+    result[..., 0, 2] = xz + wy
+    result[..., 1, 0] = xy + wz
+    result[..., 1, 1] = 1 - (xx + zz)
+    result[..., 1, 2] = yz - wx
+    result[..., 2, 0] = xz - wy
+    result[..., 2, 1] = yz + wx
+    result[..., 2, 2] = 1 - (xx + yy)
+    result[..., :3] *= scale[..., None, :]
+    result[..., 3] = translation
+    return result
+
+
+def multiply(a: Floats, b: Floats) -> Floats:
+    """Return the product a·b of affine matrices (..., 3, 4): first b, then a."""
+    product: Floats = a[..., :3] @ b
+    product[..., 3] += a[..., 3]
+    return product
+
+
+def apply(matrix: Floats, points: Floats) -> Floats:
+    """Return points (..., P, 3) moved by matrices (..., 3, 4)."""
+    moved: Floats = points @ np.swapaxes(matrix[..., :3], -1, -2) + matrix[..., None, :, 3]
+    return moved
+
+
+def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, float]:
+    """Return translation (3,), unit quaternion (4,), scale (3,) and shear of one affine matrix (3, 4).
+
+    shear: the largest cosine between two axes; the parts give the matrix back where it is 0. A mirroring matrix gets
+    a negative x scale. An axis of length 0 gets scale 0 and any direction.
+    """
+    axes = matrix[:, :3].T
+    scale: Floats = np.sqrt((axes * axes).sum(axis=1))
+    directions = _completed(axes / np.where(scale > 0, scale, 1)[:, None], scale)
+    cosines = directions @ directions.T
+    shear = float(np.abs(cosines - np.diag(np.diag(cosines))).max())
+    if np.linalg.det(directions) < 0:
+        scale[0], directions[0] = -scale[0], -directions[0]
+    rotation = quaternion.from_matrix(_nearest_rotation(directions.T))
+    return matrix[:, 3].copy(), rotation, scale, shear
+
+
+def chained(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
+    """Return world matrices (N, F, 3, 4) from local ones: one batched product per level of the hierarchy.
+
+    parents: (N,), −1 for roots. levels: node numbers by depth, roots first.
+    """
+    world = np.empty_like(local)
+    for depth, nodes in enumerate(levels):
+        world[nodes] = local[nodes] if depth == 0 else multiply(world[parents[nodes]], local[nodes])
+    return world
+
+
+def _completed(directions: Floats, scale: Floats) -> Floats:
+    """Directions with those of zero length replaced, so that all three are orthogonal."""
+    for i in np.flatnonzero(scale == 0):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        normal = np.cross(directions[j], directions[k])
+        length = np.linalg.norm(normal)
+        directions[i] = normal / length if length > 0 else np.eye(3)[i]
+    return directions
+
+
+def _nearest_rotation(matrix: Floats) -> Floats:
+    u, _, v = np.linalg.svd(matrix)
+    nearest: Floats = u @ v
+    return nearest

@@ -1,0 +1,190 @@
+"""Rotations as quaternions (..., 4) in the order x, y, z, w, float64.
+
+Every function works on the last axis and broadcasts over the others. Unit length is the caller's promise unless the
+docstring says otherwise; q and −q are the same rotation. A product `multiply(a, b)` turns by b first, then by a.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+
+TINY = 1e-8  # below this |xyz| the angle equals its sine in float64
+
+
+def multiply(a: Floats, b: Floats) -> Floats:
+    """Return the Hamilton product a ⊗ b (..., 4): the rotation b followed by a, both seen from outside.
+
+    multiply([0, 0, 1, 0], [0, 0, 1, 0]) → [0, 0, 0, −1]
+    """
+    ax, ay, az, aw = np.moveaxis(a, -1, 0)
+    bx, by, bz, bw = np.moveaxis(b, -1, 0)
+    return np.stack(
+        (
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ),
+        axis=-1,
+    )
+
+
+def conjugate(q: Floats) -> Floats:
+    """Return the inverse rotation (..., 4) of unit quaternions: x, y, z negated.
+
+    conjugate([0.6, 0, 0, 0.8]) → [−0.6, 0, 0, 0.8]
+    """
+    return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Return the scalar product (...) of quaternions (..., 4): the cosine of half the angle between, up to sign."""
+    return np.asarray((a * b).sum(axis=-1))
+
+
+def normalize(q: Floats) -> Floats:
+    """Return quaternions (..., 4) scaled to unit length, signs kept.
+
+    Raises RangeError if one has no length.
+    normalize([0, 0, 0, 2]) → [0, 0, 0, 1]
+    """
+    length = np.sqrt(dot(q, q))[..., None]
+    if not (length > 0).all():
+        raise RangeError("a quaternion of length 0 has no direction (expected a rotation)")
+    return np.asarray(q / length)
+
+
+def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
+    """Return the rotation (..., 4) a share u of the way from a to b, at constant speed along the shorter arc.
+
+    u: (...), 0 gives a and 1 gives b or −b, exactly; beyond 0 and 1 the turn goes on along the same arc.
+    The sign of b changes where dot(a, b) < 0, so results lie in a's hemisphere. A half turn keeps b's sign.
+    slerp([0, 0, 0, 1], [0, 0, 1, 0], 0.5) → [0, 0, √½, √½]
+    Source: Shoemake 1985; sin(uθ)/sin θ = u·sinc(uθ)/sinc θ is stable at θ = 0, and θ ≤ 90° keeps sin θ away from 0.
+    """
+    u = np.asarray(u, dtype=np.float64)
+    b = _near(a, b)
+    theta = 2 * np.arctan2(_length(b - a), _length(b + a))
+    whole = np.sinc(theta / np.pi)
+    of_a = (1 - u) * np.sinc((1 - u) * theta / np.pi) / whole
+    of_b = u * np.sinc(u * theta / np.pi) / whole
+    return np.asarray(of_a[..., None] * a + of_b[..., None] * b)
+
+
+def nlerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
+    """Return the normalized chord (..., 4) between a and b on the shorter side: slerp's arc, but not at constant speed.
+
+    u: (...) in 0 … 1. Off slerp by 0.033°, 0.27°, 0.92° for 30°, 60°, 90° between a and b.
+    """
+    u = np.asarray(u, dtype=np.float64)[..., None]
+    return normalize((1 - u) * a + u * _near(a, b))
+
+
+def rotation_vector(q: Floats) -> Floats:
+    """Return axis · angle (..., 3) in radians, the angle in 0 … π: the logarithm of a rotation (twice that of q).
+
+    The length of q does not matter, its sign neither, but for a half turn, where it picks the axis.
+    rotation_vector([0, 0, √½, √½]) → [0, 0, π/2]
+    """
+    xyz, w = q[..., :3], q[..., 3]
+    sine = _length(xyz)
+    sign = np.where(w < 0, -1.0, 1.0)
+    small = sine <= TINY * np.abs(w)
+    angle = np.where(small, 2.0, 2 * np.arctan2(sine, np.abs(w)))
+    return np.asarray(xyz * (sign * angle / np.where(small, np.maximum(np.abs(w), TINY), sine))[..., None])
+
+
+def from_rotation_vector(vector: Floats) -> Floats:
+    """Return unit quaternions (..., 4) that turn by |vector| radians about `vector` (..., 3): the exponential.
+
+    from_rotation_vector([0, 0, π]) → [0, 0, 1, 0]
+    """
+    half = _length(vector)[..., None] / 2
+    return np.concatenate((vector * (np.sinc(half / np.pi) / 2), np.cos(half)), axis=-1)
+
+
+def angle_between(a: Floats, b: Floats) -> Floats:
+    """Return the angle (...) in radians, 0 … π, of the turn from a to b. Exact near 0, where acos(dot) is not.
+
+    angle_between([0, 0, 0, 1], [0, 0, 0, −1]) → 0
+    """
+    chord = np.minimum(_length(a - b), _length(a + b))
+    return np.asarray(4 * np.arcsin(np.minimum(chord / 2, 1.0)))
+
+
+def align_signs(q: Floats) -> Floats:
+    """Return q (K, ..., 4) with signs flipped along the first axis so that no neighbors point apart (dot < 0).
+
+    The first key keeps its sign, and so does every one that stands at a right angle to its neighbor.
+    align_signs([[0, 0, 0, 1], [0, 0, 0, −1]]) → [[0, 0, 0, 1], [0, 0, 0, 1]]
+    """
+    signs = np.ones(q.shape[:-1])
+    signs[1:] = np.cumprod(np.where(dot(q[1:], q[:-1]) < 0, -1.0, 1.0), axis=0)
+    return np.asarray(q * signs[..., None])
+
+
+def rotate(q: Floats, vectors: Floats) -> Floats:
+    """Return vectors (..., 3) turned by unit quaternions (..., 4).
+
+    rotate([0, 0, √½, √½], [1, 0, 0]) → [0, 1, 0]
+    """
+    axis, w = q[..., :3], q[..., 3:]
+    side = 2 * np.cross(axis, vectors)
+    return np.asarray(vectors + w * side + np.cross(axis, side))
+
+
+def to_matrix(q: Floats) -> Floats:
+    """Return rotation matrices (..., 3, 3) for column vectors of unit quaternions (..., 4)."""
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    rows = (
+        np.stack((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)), axis=-1),
+        np.stack((2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)), axis=-1),
+        np.stack((2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)), axis=-1),
+    )
+    return np.stack(rows, axis=-2)
+
+
+def from_matrix(matrix: Floats) -> Floats:
+    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3); the largest component is positive.
+
+    The matrices must be rotations: no scale, no mirror. Small faults (1e-6) are averaged out.
+    Source: Shepperd 1978; the table below is 4 q qᵀ, and its row with the largest diagonal is the safe one.
+    """
+    m = np.moveaxis(matrix, (-2, -1), (0, 1))
+    xy, xz, yz = m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] + m[1, 2]
+    xw, yw, zw = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    xx, yy, zz = m[0, 0], m[1, 1], m[2, 2]
+    diagonal = np.stack((1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz), axis=-1)
+    table = np.stack(
+        (
+            np.stack((diagonal[..., 0], xy, xz, xw), axis=-1),
+            np.stack((xy, diagonal[..., 1], yz, yw), axis=-1),
+            np.stack((xz, yz, diagonal[..., 2], zw), axis=-1),
+            np.stack((xw, yw, zw, diagonal[..., 3]), axis=-1),
+        ),
+        axis=-2,
+    )
+    row = diagonal.argmax(axis=-1)[..., None, None]
+    return normalize(np.take_along_axis(table, row, axis=-2)[..., 0, :])
+
+
+def derivative(q: Floats, omega: Floats) -> Floats:
+    """Return the rate of change (..., 4) of q (..., 4) per second: ½ q ⊗ (omega, 0).
+
+    omega: angular velocity (..., 3) in rad/s along the turning thing's own axes. It stands at a right angle to q.
+    derivative([0, 0, 0, 1], [0, 0, 2]) → [0, 0, 1, 0]
+    """
+    still = np.zeros((*omega.shape[:-1], 1))
+    return multiply(q, np.concatenate((omega, still), axis=-1)) / 2
+
+
+def _near(a: Floats, b: Floats) -> Floats:
+    """Return b (..., 4) with the sign that puts it on a's side."""
+    return np.asarray(b * np.where(dot(a, b) < 0, -1.0, 1.0)[..., None])
+
+
+def _length(vectors: Floats) -> Floats:
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))

@@ -1,0 +1,92 @@
+"""Points that must not move by accident: the vertices of a scene, or small cubes on its nodes where it has none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.maths import matrix
+from anim.model import Instance, Scene
+from anim.sampling import rest, world_matrices
+
+SHELL = 0.01  # half the edge of the cube around a node without vertices, as a share of the scene's diagonal
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Vertices that one set of joints carries.
+
+    name: of the mesh or node, for reports. nodes: (J,) the joints, or the one node of a rigid mesh.
+    bind: (J, 3, 4) joint_from_mesh at bind time. points: (V, 3) m, in mesh space. targets: (M, V, 3).
+    joints, weights: (V, I), into `nodes`. owner: the node whose morph weights count, and what they are at rest (M,).
+    """
+
+    name: str
+    nodes: Ints
+    bind: Floats
+    points: Floats
+    targets: Floats
+    joints: Ints
+    weights: Floats
+    owner: int
+    rest_weights: Floats
+
+
+def surfaces(scene: Scene) -> list[Surface]:
+    """Return one surface per mesh instance; where no mesh has a vertex, one per node."""
+    found = [_of_instance(scene, instance) for instance in scene.instances if len(instance.mesh.positions)]
+    return found or list(_of_nodes(scene))
+
+
+def diagonal(scene: Scene) -> float:
+    """Return the length of the diagonal of the scene's bounding box in its rest pose, in metres; 0 of an empty one.
+
+    Of the vertices, skinned and morphed; of the nodes where there are none.
+    """
+    world = world_matrices(scene.skeleton, rest(scene.skeleton))[0]
+    meshes = [_of_instance(scene, i) for i in scene.instances if len(i.mesh.positions)]
+    points = [placed(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [world[:, :, 3]]
+    every = np.concatenate(points)
+    return float(np.linalg.norm(every.max(axis=0) - every.min(axis=0))) if len(every) else 0.0
+
+
+def placed(surface: Surface, world: Floats, weights: Floats) -> Floats:
+    """Return the points (V, 3) in world space: morphed by weights (M,), then blended linearly by the joints' world
+    matrices (J, 3, 4), with skin weights as stored."""
+    points = surface.points
+    if len(weights):
+        points = points + np.tensordot(weights, surface.targets, axes=1)
+    bound = matrix.multiply(world, surface.bind)
+    moved = np.zeros_like(points)
+    for i in range(surface.joints.shape[1]):
+        chosen = bound[surface.joints[:, i]]
+        moved += surface.weights[:, i, None] * (np.einsum("vij,vj->vi", chosen[..., :3], points) + chosen[..., 3])
+    return moved
+
+
+def _of_instance(scene: Scene, instance: Instance) -> Surface:
+    mesh = instance.mesh
+    name = mesh.name or scene.skeleton.names[instance.node] or f"node {instance.node}"
+    if instance.skin is not None:
+        carried = (instance.skin.joints, instance.skin.inverse_bind, mesh.joints, mesh.weights)
+    else:
+        carried = _rigid(instance.node, len(mesh.positions))
+    nodes, bind, joints, weights = carried
+    return Surface(name, nodes, bind, mesh.positions, mesh.targets, joints, weights, instance.node, instance.weights)
+
+
+def _of_nodes(scene: Scene) -> Iterator[Surface]:
+    size = SHELL * diagonal(scene)
+    cube = size * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    for node in range(len(scene.skeleton)):
+        nodes, bind, joints, weights = _rigid(node, len(cube))
+        name = scene.skeleton.names[node] or f"node {node}"
+        yield Surface(name, nodes, bind, cube, np.empty((0, 8, 3)), joints, weights, node, np.empty(0))
+
+
+def _rigid(node: int, vertices: int) -> tuple[Ints, Floats, Ints, Floats]:
+    one = np.zeros((vertices, 1), np.int64)
+    return np.array([node], np.int64), np.eye(4)[None, :3], one, np.ones((vertices, 1))

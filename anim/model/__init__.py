@@ -1,0 +1,22 @@
+"""Immutable values with their invariants, and no algorithms."""
+
+from anim.model.clip import Clip
+from anim.model.pose import Pose
+from anim.model.scene import Instance, Mesh, Scene, Skin
+from anim.model.skeleton import Skeleton
+from anim.model.track import FLOAT32, Interpolation, Kind, Storage, Track
+
+__all__ = [
+    "FLOAT32",
+    "Clip",
+    "Instance",
+    "Interpolation",
+    "Kind",
+    "Mesh",
+    "Pose",
+    "Scene",
+    "Skeleton",
+    "Skin",
+    "Storage",
+    "Track",
+]

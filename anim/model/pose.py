@@ -1,0 +1,23 @@
+"""Pose: where every node is, in its parent's space, at some times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from anim.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Local transforms of all nodes at F times.
+
+    times: (F,) s. translation (F, N, 3) m, rotation (F, N, 4) unit xyzw, scale (F, N, 3).
+    weights: by node number, morph weights (F, M), for the nodes whose weights are animated.
+    """
+
+    times: Floats
+    translation: Floats
+    rotation: Floats
+    scale: Floats
+    weights: Mapping[int, Floats] = field(default_factory=dict)

@@ -1,0 +1,80 @@
+"""Skin, Mesh and Scene: what a skeleton carries, and where vertices come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim import arrays
+from anim.arrays import Floats, Ints
+from anim.errors import FormatError, ShapeError
+from anim.model.skeleton import Skeleton
+
+
+@dataclass(frozen=True, slots=True)
+class Skin:
+    """Joints of a skin and the matrices that take mesh space to each joint's space at bind time.
+
+    joints: (J,) node numbers. inverse_bind: (J, 3, 4).
+    """
+
+    joints: Ints
+    inverse_bind: Floats
+
+    def __post_init__(self) -> None:
+        if len(self.joints) != len(self.inverse_bind):
+            raise ShapeError(f"{len(self.inverse_bind)} inverse bind matrices for {len(self.joints)} joints")
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Vertices of all primitives of a glTF mesh, one after another.
+
+    positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0, as stored.
+    targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3) or None where any lacks.
+    """
+
+    name: str
+    positions: Floats
+    faces: Ints
+    joints: Ints
+    weights: Floats
+    targets: Floats
+    rest_weights: Floats
+    normals: Floats | None = None
+
+    def __post_init__(self) -> None:
+        arrays.check_shape(self.positions, "V 3", name="positions")
+        if len(self.weights) and self.weights.size and self.weights.min() < 0:
+            raise FormatError(f"a skin weight is negative ({self.weights.min():g})", where=f"mesh '{self.name}'")
+        if self.faces.size and int(self.faces.max()) >= len(self.positions):
+            raise FormatError(
+                f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=f"mesh '{self.name}'"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """A mesh on a node; with a skin, the joints place the vertices and the node does not count.
+
+    weights: (M,) morph weights at rest: the node's own, or the mesh's.
+    """
+
+    node: int
+    mesh: Mesh
+    skin: Skin | None
+    weights: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The skeleton and every mesh instance, in depth-first order of nodes."""
+
+    skeleton: Skeleton
+    instances: tuple[Instance, ...]
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices of all instances."""
+        return int(np.sum([len(i.mesh.positions) for i in self.instances], dtype=np.int64))

@@ -1,0 +1,75 @@
+"""Skeleton: all nodes of a file as a forest in its rest pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim import arrays
+from anim.arrays import Floats, Ints
+from anim.errors import FormatError, ShapeError
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """Every node, by its number in the file; joints of skins are some of them.
+
+    names: (N,) as in the file, empty where a node has none.
+    parents: (N,) number of the parent, −1 for a root; acyclic.
+    translation (N, 3) m, rotation (N, 4) unit xyzw, scale (N, 3): the rest pose, in the parent's space.
+    sheared: (X,) numbers of the nodes whose `matrix` no translation, rotation and scale give; they can't be animated.
+    sheared_local: (X, 3, 4) local matrices of those.
+    """
+
+    names: tuple[str, ...]
+    parents: Ints
+    translation: Floats
+    rotation: Floats
+    scale: Floats
+    sheared: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    sheared_local: Floats = field(default_factory=lambda: np.empty((0, 3, 4)))
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__
+        set_field(self, "parents", arrays.read_only(np.asarray(self.parents, dtype=np.int64)))
+        arrays.check_shape(self.parents, "N", name="parents")
+        for name, shape in (("translation", "N 3"), ("rotation", "N 4"), ("scale", "N 3")):
+            array = arrays.floats(getattr(self, name), shape, name=name)
+            if len(array) != len(self.names) or len(self.parents) != len(self.names):
+                raise ShapeError(f"{name} has {len(array)} rows for {len(self.names)} names")
+            set_field(self, name, array)
+        self.levels()
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def label(self, node: int) -> str:
+        """Return how messages call a node: "node 7 'hip'"."""
+        return f"node {node} '{self.names[node]}'" if self.names[node] else f"node {node}"
+
+    def levels(self) -> list[Ints]:
+        """Return the nodes of each depth, roots first: children never come before their parents.
+
+        Raises FormatError for a cycle or a parent that does not exist.
+        """
+        if len(self.parents) and (self.parents.min() < -1 or self.parents.max() >= len(self.parents)):
+            raise FormatError("a node's parent does not exist")
+        levels: list[Ints] = []
+        done = 0
+        level = np.flatnonzero(self.parents < 0)
+        children = _children(self.parents)
+        while len(level):
+            levels.append(level)
+            done += len(level)
+            level = np.array([c for p in level.tolist() for c in children.get(p, ())], dtype=np.int64)
+        if done != len(self.parents):
+            raise FormatError("nodes form a cycle (expected trees)")
+        return levels
+
+
+def _children(parents: Ints) -> dict[int, list[int]]:
+    children: dict[int, list[int]] = {}
+    for child, parent in enumerate(parents.tolist()):
+        children.setdefault(parent, []).append(child)
+    return children

@@ -1,0 +1,63 @@
+"""Which clips and tracks a command is about: the same globs everywhere."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from anim.errors import NotFoundError
+from anim.model import Clip, Skeleton
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Globs for the names of clips and nodes, and the paths of tracks; empty means all."""
+
+    clips: Sequence[str] = ()
+    nodes: Sequence[str] = ()
+    paths: Sequence[str] = ()
+
+    def chosen_clips(self, clips: Sequence[Clip]) -> list[int]:
+        """Return the numbers of the clips that are meant; a clip without a name is called by its number, "3".
+
+        Raises NotFoundError for a glob that matches no clip, and says which name is near.
+        """
+        names = [clip.name or str(i) for i, clip in enumerate(clips)]
+        return _matching(self.clips, names, "clip")
+
+    def chosen_nodes(self, skeleton: Skeleton) -> list[int]:
+        """Return the numbers of the nodes that are meant; a node without a name is called by its number."""
+        names = [name or str(i) for i, name in enumerate(skeleton.names)]
+        return _matching(self.nodes, names, "node")
+
+    def chosen_tracks(self, clip: Clip, skeleton: Skeleton) -> frozenset[int]:
+        """Return the numbers of the tracks of `clip` that are meant; pointers only where neither node nor path is."""
+        nodes = set(self.chosen_nodes(skeleton)) if self.nodes else None
+        return frozenset(
+            i
+            for i, track in enumerate(clip.tracks)
+            if (nodes is None or track.node in nodes) and (not self.paths or track.path in self.paths)
+        )
+
+
+def _matching(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
+    if not globs:
+        return list(range(len(names)))
+    for glob in globs:
+        if not any(fnmatchcase(name, glob) for name in names):
+            raise NotFoundError(f"no {what} matches '{glob}'", help=_suggestion(glob, names, what))
+    return [i for i, name in enumerate(names) if any(fnmatchcase(name, glob) for glob in globs)]
+
+
+def _suggestion(glob: str, names: Iterable[str], what: str) -> str:
+    known = list(dict.fromkeys(names))
+    folded = {name.casefold(): name for name in known}
+    near = difflib.get_close_matches(glob.casefold(), folded, n=1)
+    if near:
+        return f"did you mean '{folded[near[0]]}'?"
+    if not known:
+        return f"the file has no {what}s"
+    listed = ", ".join(f"'{name}'" for name in known[:8])
+    return f"the {what}s are {listed}{f' and {len(known) - 8} more' if len(known) > 8 else ''}"

@@ -1,0 +1,58 @@
+"""Clip + Skeleton → Pose at any times, and Pose → world matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import matrix
+from anim.model import Clip, Pose, Skeleton
+from anim.sampling.batch import batches
+from anim.sampling.track import Located, locate
+
+
+def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
+    """Return the local transforms of all nodes at times `at` (F,) in seconds; what no track moves stays at rest."""
+    at = np.asarray(at, np.float64)
+    frames, nodes = len(at), len(skeleton)
+    parts = {
+        "translation": _at_rest(skeleton.translation, frames),
+        "rotation": _at_rest(skeleton.rotation, frames),
+        "scale": _at_rest(skeleton.scale, frames),
+    }
+    weights: dict[int, Floats] = {}
+    places: dict[int, Located] = {}
+    for batch in batches(track for track in clip.tracks if track.node is not None and track.node < nodes):
+        place = places.get(id(batch.times))
+        if place is None:
+            place = places[id(batch.times)] = locate(batch.times, at)
+        values = batch.sample(at, place)
+        numbers = [track.node for track in batch.tracks if track.node is not None]
+        if batch.tracks[0].path == "weights":
+            weights.update((node, values[:, i]) for i, node in enumerate(numbers))
+        else:
+            parts[batch.tracks[0].path][:, numbers] = values
+    return Pose(at, parts["translation"], parts["rotation"], parts["scale"], weights)
+
+
+def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return world_from_node (F, N, 3, 4) for every time and node of a pose."""
+    return world_by_node(skeleton, pose).transpose(1, 0, 2, 3)
+
+
+def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return world_from_node (N, F, 3, 4): the order in which it is fast to compute."""
+    by_node = (np.swapaxes(part, 0, 1) for part in (pose.translation, pose.rotation, pose.scale))
+    local = matrix.from_trs(*by_node)
+    if len(skeleton.sheared):
+        local[skeleton.sheared] = skeleton.sheared_local[:, None]
+    return matrix.chained(local, skeleton.parents, skeleton.levels())
+
+
+def rest(skeleton: Skeleton) -> Pose:
+    """Return the rest pose, as one frame at 0 s."""
+    return pose(skeleton, Clip("", ()), np.zeros(1))
+
+
+def _at_rest(values: Floats, frames: int) -> Floats:
+    return np.repeat(values[None], frames, axis=0)

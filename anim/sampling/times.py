@@ -1,0 +1,40 @@
+"""Frames against seconds: the only place where a frame rate becomes times.
+
+A frame number belongs to a display; a time, in seconds, belongs to the clip. Frame k lies at start + k / fps, computed
+in float64 from the whole number k, so that no error adds up; the last frame is the clip's exact end.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from anim import arrays
+from anim.arrays import Floats
+from anim.errors import RangeError
+
+SLIVER = 1e-3  # frames; a last step shorter than this is float32 rounding of the end, not a frame
+MAX_FRAMES = 10_000_000
+
+
+def grid(start: float, end: float, *, fps: float) -> Floats:
+    """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
+
+    fps: frames per second, > 0. Raises RangeError otherwise, or for a grid of over ten million frames.
+    grid(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
+    grid(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
+    """
+    if not (math.isfinite(fps) and fps > 0):
+        raise RangeError(f"fps is {fps:g} (expected a number above 0)")
+    frames = (end - start) * fps
+    if frames > MAX_FRAMES:
+        raise RangeError(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
+    whole = max(math.ceil(frames - SLIVER), 0)
+    times = start + np.arange(whole, dtype=np.float64) / fps
+    return arrays.read_only(np.append(times, end)) if whole else arrays.read_only(np.array([start], np.float64))
+
+
+def key_times(seconds: Floats) -> Floats:
+    """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
+    return np.unique(np.asarray(seconds, np.float64).astype(np.float32)).astype(np.float64)

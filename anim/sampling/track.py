@@ -1,0 +1,71 @@
+"""Values of tracks at any time, exactly as glTF 2.0 says in appendix C."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.maths import hermite, quaternion
+from anim.model import Interpolation, Kind, Track
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """Times placed between keys: looked up once per time axis, used by every track on it.
+
+    left: (F,) key at or before each time (the first key before the first). right: (F,) the next key, or the last.
+    u: (F,) share of the way from left to right, 0 exactly at keys and outside. duration: (F,) s from left to right.
+    """
+
+    left: Ints
+    right: Ints
+    u: Floats
+    duration: Floats
+
+
+def locate(times: Floats, at: Floats) -> Located:
+    """Return where times `at` (F,) lie between the keys `times` (K,); outside they are held at the nearest end."""
+    last = len(times) - 1
+    left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, last)
+    right = np.minimum(left + 1, last)
+    duration = times[right] - times[left]
+    inside = (at > times[left]) & (duration > 0)
+    u = np.where(inside, (at - times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
+    return Located(left, right, u, duration)
+
+
+def sample(track: Track, at: Floats) -> Floats:
+    """Return the values (F, C) of a track at times `at` (F,) in seconds.
+
+    At a key the key's own value; outside the keys the first or the last one; rotations are unit quaternions.
+    (0 s: 1, 2 s: 3, LINEAR) at 0.5, 9 → 1.5, 3
+    """
+    tangents = None
+    if track.in_tangents is not None and track.out_tangents is not None:
+        tangents = (track.in_tangents, track.out_tangents)
+    place = locate(track.times, np.asarray(at, np.float64))
+    return interpolate(place, track.values, tangents, track.interpolation, track.kind)
+
+
+def interpolate(
+    place: Located, values: Floats, tangents: tuple[Floats, Floats] | None, interpolation: Interpolation, kind: Kind
+) -> Floats:
+    """Return the values (F, ..., C) between keys `values` (K, ..., C): any number of tracks on one time axis at once.
+
+    tangents: in and out, both (K, ..., C) per second, for CUBICSPLINE. Rotations come out normalised.
+    """
+    start = values[place.left]
+    if interpolation is Interpolation.STEP or len(values) == 1:
+        return quaternion.normalize(start) if kind is Kind.ROTATION else start
+    shape = (len(place.u),) + (1,) * (values.ndim - 1)
+    u, end = place.u.reshape(shape), values[place.right]
+    if interpolation is Interpolation.CUBICSPLINE and tangents is not None:
+        arriving, leaving = tangents
+        duration = place.duration.reshape(shape)
+        result = hermite.evaluate(u, start, duration * leaving[place.left], end, duration * arriving[place.right])
+        return quaternion.normalize(result) if kind is Kind.ROTATION else result
+    if kind is Kind.ROTATION:
+        return quaternion.slerp(quaternion.normalize(start), quaternion.normalize(end), u[..., 0])
+    return start + u * (end - start)

@@ -1,0 +1,135 @@
+"""The command table, and a group that imports a command only when it runs."""
+
+from __future__ import annotations
+
+import difflib
+import gc
+import importlib
+import signal
+import sys
+from typing import Annotated, Any, NamedTuple
+
+import typer
+from typer.core import TyperGroup
+
+from anim import __version__
+
+PROGRAM = "gltf-anim"
+
+
+class Row(NamedTuple):
+    """One command: what `--help` says of it, and examples that its own help ends with."""
+
+    about: str
+    examples: tuple[str, ...]
+
+
+COMMANDS = {
+    "inspect": Row(
+        "Show what is in a file and whether it is healthy.",
+        (
+            "gltf-anim inspect walk.glb",
+            "gltf-anim inspect *.glb --format json > report.json",
+            "gltf-anim inspect hero.glb --clip 'Run*' --tracks",
+        ),
+    ),
+    "sample": Row(
+        "Give the pose of every node at chosen times.",
+        (
+            "gltf-anim sample walk.glb --at 0.5",
+            "gltf-anim sample walk.glb poses.npz --fps 60 --space world",
+            "gltf-anim sample walk.glb --fps 30 --node '*Foot*' --format csv",
+        ),
+    ),
+    "resample": Row(
+        "Put the keys of clips on a regular grid of frames.",
+        (
+            "gltf-anim resample walk.glb walk30.glb --fps 30",
+            "gltf-anim resample walk.glb walk.glb --fps 24 --clip 'idle*' --dry-run",
+            "cat walk.glb | gltf-anim resample --fps 30 | gltf-anim inspect",
+        ),
+    ),
+    "convert": Row(
+        "Change between .glb and .gltf, and nothing else.",
+        ("gltf-anim convert walk.glb walk.gltf", "gltf-anim convert scene/walk.gltf - | gltf-anim inspect"),
+    ),
+}
+
+
+class LazyGroup(TyperGroup):
+    """A group whose commands live in `cli.commands`, one module each, imported on use only."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands, in the table's order."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command, imported now, None where there is none of this name."""
+        row = COMMANDS.get(cmd_name)
+        if row is None:
+            return None
+        name = cmd_name.replace("-", "_")
+        function = getattr(importlib.import_module(f"cli.commands.{name}"), name)
+        single = typer.Typer(add_completion=False, rich_markup_mode=None)
+        examples = "\n".join(f"  {example}" for example in row.examples)
+        single.command(cmd_name, epilog=f"\b\nExamples:\n{examples}", no_args_is_help=False)(function)
+        return typer.main.get_command(single)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that `args` name; a misspelled one is answered with the nearest."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else f" The commands are {', '.join(COMMANDS)}."
+            ctx.fail(f"no such command '{args[0]}'.{hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the table of commands without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, row.about) for name, row in COMMANDS.items()])
+
+
+app = typer.Typer(
+    cls=LazyGroup,
+    rich_markup_mode=None,
+    add_completion=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="IN and OUT may be '-' for a pipe (GLB). Exit codes: 0 done, 2 usage, 3 bad input, 4 not handled, "
+    "5 no such clip or node, 6 a check said no.",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        sys.stdout.write(f"{PROGRAM} {__version__}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def gltf_anim(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """The command-line workbench for glTF 2.0 animation: inspect, sample, resample, convert."""
+
+
+def main() -> None:
+    """Run the command line of this process and exit with the code that says how it went."""
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends us quietly, as it ends any other tool
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that temporary files are cleared away
+    gc.disable()  # one short job over many long-lived objects: collecting only costs time
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(args: list[str]) -> int:
+    """Run one command line and return its exit code; whatever goes wrong is said on stderr."""
+    from cli import errors
+
+    command = typer.main.get_command(app)
+    return errors.guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Options that several commands share: one meaning everywhere."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+Input = Annotated[str, typer.Argument(metavar="IN", help="A .glb or .gltf file, '-' for stdin.", show_default=False)]
+Output = Annotated[
+    str, typer.Argument(metavar="OUT", help="A .glb or .gltf file, '-' for stdout (GLB).", show_default=False)
+]
+Clips = Annotated[
+    list[str] | None, typer.Option("--clip", metavar="GLOB", help="Only clips of this name; may be repeated.")
+]
+Nodes = Annotated[
+    list[str] | None, typer.Option("--node", metavar="GLOB", help="Only nodes of this name; may be repeated.")
+]
+
+
+class Path(StrEnum):
+    """A property of a node that clips animate."""
+
+    TRANSLATION = "translation"
+    ROTATION = "rotation"
+    SCALE = "scale"
+    WEIGHTS = "weights"
+
+
+Paths = Annotated[list[Path] | None, typer.Option("--path", help="Only tracks of this property; may be repeated.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do everything but write.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more: one line per clip.")]

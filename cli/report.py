@@ -1,0 +1,56 @@
+"""Words for a person, on stderr: numbers with units that are read at a glance."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Voice:
+    """How much is said: nothing but errors, one line, or every detail."""
+
+    quiet: bool = False
+    verbose: bool = False
+
+    def say(self, line: str) -> None:
+        """Write a line to stderr, unless quiet."""
+        if not self.quiet:
+            sys.stderr.write(line + "\n")
+
+    def detail(self, line: str) -> None:
+        """Write a line to stderr only where details are wanted."""
+        if self.verbose and not self.quiet:
+            sys.stderr.write(line + "\n")
+
+
+def size(count: int) -> str:
+    """Return bytes as people say them: "812 B", "42.3 kB", "3.66 MB"."""
+    if count < 1000:
+        return f"{count} B"
+    for unit in ("kB", "MB", "GB"):
+        count_in_unit = count / 1000 ** (("kB", "MB", "GB").index(unit) + 1)
+        if count_in_unit < 999.5 or unit == "GB":
+            return f"{count_in_unit:.3g} {unit}" if count_in_unit < 100 else f"{count_in_unit:.0f} {unit}"
+    raise AssertionError
+
+
+def change(before: int, after: int) -> str:
+    """Return "42.3 kB → 9.1 kB (-78 %)"."""
+    percent = f"{100 * (after - before) / before:+.0f} %" if before else "new"
+    return f"{size(before)} → {size(after)} ({percent})"
+
+
+def length(meters: float) -> str:
+    """Return a length in the unit in which it is easy to read: "0.41 mm", "12 µm", "1.5 cm", "2.9 m"."""
+    if meters == 0:
+        return "0 mm"
+    for unit, factor, limit in (("nm", 1e9, 1e-6), ("µm", 1e6, 1e-4), ("mm", 1e3, 1e-2), ("cm", 1e2, 1.0)):
+        if meters < limit:
+            return f"{meters * factor:.2g} {unit}"
+    return f"{meters:.3g} m"
+
+
+def plural(count: int, noun: str) -> str:
+    """Return "1 clip", "3 clips"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -1,0 +1,208 @@
+"""Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from anim.errors import AnimError, FormatError
+from anim.gltf import container, uri
+from anim.gltf.document import Bytes, Document, items
+from cli.errors import UsageError
+
+PIPE = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An input: its document, what messages call it, its size in bytes with its .bin files, and its folder."""
+
+    document: Document
+    name: str
+    size: int
+    folder: Path | None
+
+
+@contextmanager
+def source(path: str) -> Iterator[Source]:
+    """Give the document at `path`, "-" for stdin; errors raised inside name the input."""
+    name = "stdin" if path == PIPE else path
+    try:
+        data = _stdin() if path == PIPE else _mapped(Path(path))
+        folder = None if path == PIPE else Path(path).parent
+        document = container.read(data, None if folder is None else lambda address: _beside(folder, address))
+        yield Source(document, name, len(data) + _external_size(document), folder)
+    except UsageError:
+        raise
+    except AnimError as error:
+        raise error.at(name, ": ") from None
+
+
+def write(document: Document, path: str, beside: Path | None, *, dry_run: bool = False) -> int:
+    """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
+
+    beside: the folder of the input: external buffers and images that are still right from the output's folder keep
+    their URI. Files appear whole or not at all, and only if their bytes differ from what is there.
+    """
+    if path.lower().endswith(".gltf"):
+        target = Path(path)
+        same_folder = beside is not None and target.parent.resolve() == beside.resolve()
+        files = container.gltf(document, target.stem, keep_external=same_folder)
+        pieces = {target.parent / name: content for name, content in files.items()}
+        if not dry_run:
+            for file, content in pieces.items():
+                _replace(target if file.suffix == ".gltf" and file.stem == target.stem else file, content)
+        return sum(len(piece) for content in pieces.values() for piece in content)
+    content = container.glb(document)
+    if not dry_run:
+        write_bytes(content, path)
+    return sum(len(piece) for piece in content)
+
+
+def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
+    """Write pieces to a file, whole or not at all, or to stdout for "-"; never binary to a terminal."""
+    if path == PIPE:
+        if sys.stdout.isatty():
+            raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
+        out = sys.stdout.buffer
+        for piece in pieces:
+            out.write(piece.data)
+        out.flush()
+    else:
+        _replace(Path(path), list(pieces))
+
+
+def write_text(text: str, path: str = PIPE) -> None:
+    """Write a text product to a file, whole or not at all, or to stdout."""
+    if path == PIPE:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    else:
+        _replace(Path(path), [np.frombuffer(text.encode(), np.uint8)])
+
+
+def check_output(path: str) -> None:
+    """Raise UsageError at once, before any work, where `path` can't be written."""
+    if path == PIPE:
+        if sys.stdout.isatty():
+            raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
+        return
+    target = Path(path)
+    if target.is_dir():
+        raise UsageError(f"{path}: is a folder (expected a file name)")
+    if not target.parent.is_dir():
+        raise UsageError(f"{path}: there is no folder '{target.parent}'")
+
+
+def _stdin() -> Bytes:
+    if sys.stdin.isatty():
+        raise UsageError("no input: name a file, or pipe a GLB into stdin")
+    return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
+
+
+def _mapped(path: Path) -> Bytes:
+    try:
+        with path.open("rb") as file:
+            if not path.is_file() or os.fstat(file.fileno()).st_size == 0:
+                return np.frombuffer(file.read(), np.uint8)
+            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
+    except OSError as error:
+        raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
+
+
+def _beside(folder: Path, address: str) -> Bytes:
+    """Bytes of a file in or below the folder; links that lead out of it are refused."""
+    path = folder / address
+    root = folder.resolve()
+    if root not in path.resolve().parents:
+        raise FormatError(f"'{address}' leads out of the file's folder (only files beside it are read)")
+    if not path.exists():
+        raise FormatError(f"'{address}' is not beside the file", help=f"put it into '{folder}'")
+    try:
+        return _mapped(path)
+    except FormatError as error:
+        raise error.at(f"'{address}'", " ") from None
+
+
+def _external_size(document: Document) -> int:
+    return sum(b.byte_length for b in document.buffers if b.uri is not None and not b.uri.startswith("data:"))
+
+
+def _replace(path: Path, pieces: list[Bytes]) -> None:
+    """Write a temporary neighbour and rename it over `path`, unless the bytes are there already."""
+    path = Path(os.path.realpath(path))
+    try:
+        if path.exists() and not path.is_file():  # /dev/null, a named pipe
+            with path.open("wb") as file:
+                file.writelines(piece.data for piece in pieces)
+            return
+        if _is_same(path, pieces):
+            return
+        _write_neighbor(path, pieces)
+    except OSError as error:
+        raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
+
+
+def _write_neighbor(path: Path, pieces: list[Bytes]) -> None:
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.writelines(piece.data for piece in pieces)
+        os.chmod(temporary, _mode(path))
+        os.replace(temporary, path)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+
+
+def _mode(path: Path) -> int:
+    if path.exists():
+        return path.stat().st_mode & 0o7777
+    umask = os.umask(0)
+    os.umask(umask)
+    return 0o666 & ~umask
+
+
+def _is_same(path: Path, pieces: list[Bytes]) -> bool:
+    if not path.is_file() or path.stat().st_size != sum(len(piece) for piece in pieces):
+        return False
+    with path.open("rb") as file:
+        return all(file.read(len(piece)) == piece.tobytes() for piece in pieces)
+
+
+def stays_in(folder: Path | None, output: str) -> bool:
+    """Return whether `output` lies in `folder`, so that relative URIs stay right."""
+    return folder is not None and output != PIPE and Path(output).parent.resolve() == folder.resolve()
+
+
+def with_images(document: Document, folder: Path | None) -> Document:
+    """Return the document with its external images as data URIs. Raises FormatError for one that can't be read."""
+    images = []
+    for i, image in enumerate(items(document.json, "images")):
+        address = image.get("uri")
+        if address is not None and not uri.is_data(address):
+            if folder is None:
+                raise FormatError("lies beside the file, but the input is a pipe", where=f"image {i}")
+            data = _beside(folder, uri.relative_path(address))
+            image = {**image, "uri": uri.encode_data(data.tobytes(), _media_type(data))}
+        images.append(image)
+    return replace(document, json={**document.json, "images": images}) if images else document
+
+
+def _media_type(data: Bytes) -> str:
+    head = data[:12].tobytes()
+    if head.startswith(b"\x89PNG"):
+        return "image/png"
+    if head.startswith(b"\xff\xd8"):
+        return "image/jpeg"
+    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+        return "image/webp"
+    return "image/ktx2" if head.startswith(b"\xabKTX 20") else "application/octet-stream"
