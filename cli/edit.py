@@ -51,7 +51,7 @@ def edit(
         accessors = Accessors(document)
         clips = read.clips(document, accessors)
         skeleton = read.skeleton(document)
-        chosen = selection.chosen_clips(clips)
+        chosen = selection.chosen_clips([clip.name for clip in clips])
         new = {i: _changed(clips[i], i, skeleton, selection, change) for i in chosen}
         result = write.replace_clips(document, new)
         written = read.clips(result)

@@ -40,11 +40,7 @@ def guarded(job: Callable[[], Any]) -> int:
         code = job()
         return code if isinstance(code, int) and not isinstance(code, bool) else DONE
     except AnimError as error:
-        code = CODES.get(type(error), BUG)
-        if code == BUG:
-            traceback.print_exc()
-        _say(str(error), error.help)
-        return code
+        return reported(error)
     except TyperException as error:
         _say(_usage(error), "")
         return USAGE
@@ -57,6 +53,15 @@ def guarded(job: Callable[[], Any]) -> int:
         traceback.print_exc()
         _say("this is a bug of ours; please report the lines above", "")
         return BUG
+
+
+def reported(error: AnimError) -> int:
+    """Say what was refused, in one line and maybe a hint, and return its exit code."""
+    code = CODES.get(type(error), BUG)
+    if code == BUG:
+        traceback.print_exc()
+    _say(str(error), error.help)
+    return code
 
 
 def _usage(error: TyperException) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import gc
 import importlib
+import os
 import signal
 import sys
 from typing import Annotated, Any, NamedTuple
@@ -13,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from anim import __version__
+from cli.coerce import quicken
 
 PROGRAM = "gltf-anim"
 
@@ -73,7 +75,7 @@ class LazyGroup(TyperGroup):
         single = typer.Typer(add_completion=False, rich_markup_mode=None)
         examples = "\n".join(f"  {example}" for example in row.examples)
         single.command(cmd_name, epilog=f"\b\nExamples:\n{examples}", no_args_is_help=False)(function)
-        return typer.main.get_command(single)
+        return quicken(typer.main.get_command(single))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that `args` name; a misspelled one is answered with the nearest."""
@@ -120,14 +122,17 @@ def main() -> None:
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends us quietly, as it ends any other tool
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that temporary files are cleared away
     gc.disable()  # one short job over many long-lived objects: collecting only costs time
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # without taking all those objects apart first
 
 
 def run(args: list[str]) -> int:
     """Run one command line and return its exit code; whatever goes wrong is said on stderr."""
     from cli import errors
 
-    command = typer.main.get_command(app)
+    command = quicken(typer.main.get_command(app))
     return errors.guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False))
 
 

@@ -47,8 +47,18 @@ def length(meters: float) -> str:
         return "0 mm"
     for unit, factor, limit in (("nm", 1e9, 1e-6), ("µm", 1e6, 1e-4), ("mm", 1e3, 1e-2), ("cm", 1e2, 1.0)):
         if meters < limit:
-            return f"{meters * factor:.2g} {unit}"
-    return f"{meters:.3g} m"
+            return f"{_digits(meters * factor, 2)} {unit}"
+    return f"{_digits(meters, 3)} m"
+
+
+def speed(meters_per_second: float) -> str:
+    """Return a speed with two digits: "0.46 m/s", "280 m/s"."""
+    return f"{_digits(meters_per_second, 2)} m/s"
+
+
+def _digits(value: float, count: int) -> str:
+    """The value rounded to so many digits, never in the form 2.8e+02."""
+    return f"{float(f'{value:.{count}g}'):.10f}".rstrip("0").rstrip(".")
 
 
 def plural(count: int, noun: str) -> str:

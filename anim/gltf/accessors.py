@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -43,6 +45,14 @@ class Accessors:
 
         Raises FormatError for NaN or infinity.
         """
+        values = self._located(index, self._floats)
+        if not np.isfinite(values).all():
+            row = int(np.argwhere(~np.isfinite(values))[0][0])
+            raise FormatError(f"holds NaN or infinity (element {row})", where=f"accessor {index}")
+        return values
+
+    def unchecked(self, index: int) -> Floats:
+        """Return what `floats` does, without looking for NaN: for callers whose own types do."""
         return self._located(index, self._floats)
 
     def integers(self, index: int) -> Ints:
@@ -64,52 +74,34 @@ class Accessors:
 
     def _raw(self, index: int) -> NDArray[Any]:
         about = self._accessors[index]
-        kind = about["type"]
-        if kind not in layout.COMPONENTS:
-            raise FormatError(f"has type '{kind}' (expected one of {', '.join(layout.COMPONENTS)})")
-        dtype = np.dtype(DTYPES[about["componentType"]])
-        columns, rows, column = layout.element(about["componentType"], kind)
-        count = about["count"]
+        form = _form(about["componentType"], about["type"])
         if "bufferView" in about:
-            base = self._dense(about, dtype, (columns, rows, column))
+            number = about["bufferView"]
+            stride = self._views[number].get("byteStride", form.columns * form.column)
+            base = _strided(self._view(number), about.get("byteOffset", 0), about["count"], stride, form)
         else:
-            base = np.broadcast_to(np.zeros((), dtype), (count, columns * rows))
-        return self._with_sparse(base, about, dtype, (columns, rows, column)) if "sparse" in about else base
+            base = np.broadcast_to(np.zeros((), form.dtype), (about["count"], form.columns * form.rows))
+        return self._with_sparse(base, about, form) if "sparse" in about else base
 
-    def _dense(self, about: Json, dtype: np.dtype[Any], shape: tuple[int, int, int]) -> NDArray[Any]:
-        number = about["bufferView"]
-        stride = self._views[number].get("byteStride", shape[0] * shape[2])
-        return _strided(self._view(number), about.get("byteOffset", 0), about["count"], stride, dtype, shape)
-
-    def _with_sparse(
-        self, base: NDArray[Any], about: Json, dtype: np.dtype[Any], shape: tuple[int, int, int]
-    ) -> NDArray[Any]:
+    def _with_sparse(self, base: NDArray[Any], about: Json, form: Form) -> NDArray[Any]:
         sparse = about["sparse"]
         count, where, values = sparse["count"], sparse["indices"], sparse["values"]
-        kind = np.dtype(DTYPES[where["componentType"]])
+        whole = _form(where["componentType"], "SCALAR")
         view = self._view(where["bufferView"])
-        places = _strided(view, where.get("byteOffset", 0), count, kind.itemsize, kind, (1, 1, kind.itemsize))[:, 0]
-        places = places.astype(np.int64)
+        places = _strided(view, where.get("byteOffset", 0), count, whole.column, whole)[:, 0].astype(np.int64)
         if places[-1] >= about["count"] or (np.diff(places) <= 0).any():
             raise FormatError("sparse indices are not increasing, or beyond its count")
         view = self._view(values["bufferView"])
-        new = _strided(view, values.get("byteOffset", 0), count, shape[0] * shape[2], dtype, shape)
         full = base.copy()
-        full[places] = new
+        full[places] = _strided(view, values.get("byteOffset", 0), count, form.columns * form.column, form)
         full.flags.writeable = False
         return full
 
     def _floats(self, index: int) -> Floats:
         raw = self._raw(index)
-        if raw.dtype.kind == "f":
-            values = raw.astype(np.float64)
-            if not np.isfinite(values).all():
-                row = int(np.argwhere(~np.isfinite(values))[0][0])
-                raise FormatError(f"holds NaN or infinity (element {row})")
-            return values
         values = raw.astype(np.float64)
-        if self._accessors[index].get("normalized"):
-            values = denormalized(values, raw.dtype)
+        if raw.dtype.kind != "f" and self._accessors[index].get("normalized"):
+            return denormalized(values, raw.dtype)
         return values
 
     def _view(self, number: int) -> Bytes:
@@ -147,14 +139,29 @@ def _slice(data: Bytes, place: Json) -> Bytes:
     return data[start : start + place["byteLength"]]
 
 
-def _strided(
-    view: Bytes, offset: int, count: int, stride: int, dtype: np.dtype[Any], shape: tuple[int, int, int]
-) -> NDArray[Any]:
-    """Elements (count, columns × rows) as a view into the bytes; `stride` and column distance in bytes."""
-    columns, rows, column = shape
-    size = dtype.itemsize
-    if columns == 1:
-        array: NDArray[Any] = np.ndarray((count, rows), dtype, view, offset, (stride, size))
+@dataclass(frozen=True, slots=True)
+class Form:
+    """How one element lies in memory: columns of rows numbers, `column` bytes from column to column."""
+
+    dtype: np.dtype[Any]
+    columns: int
+    rows: int
+    column: int
+
+
+@cache
+def _form(component_type: int, kind: str) -> Form:
+    if kind not in layout.COMPONENTS:
+        raise FormatError(f"has type '{kind}' (expected one of {', '.join(layout.COMPONENTS)})")
+    return Form(np.dtype(DTYPES[component_type]), *layout.element(component_type, kind))
+
+
+def _strided(view: Bytes, offset: int, count: int, stride: int, form: Form) -> NDArray[Any]:
+    """Elements (count, columns × rows) as a view into the bytes; `stride` in bytes from element to element."""
+    size = form.dtype.itemsize
+    if form.columns == 1:
+        array: NDArray[Any] = np.ndarray((count, form.rows), form.dtype, view, offset, (stride, size))
         return array
-    array = np.ndarray((count, columns, rows), dtype, view, offset, (stride, column, size))
-    return array.reshape(count, columns * rows)
+    shape = (count, form.columns, form.rows)
+    array = np.ndarray(shape, form.dtype, view, offset, (stride, form.column, size))
+    return array.reshape(count, form.columns * form.rows)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from anim import arrays
 from anim.arrays import Floats
-from anim.errors import AnimError, FormatError
+from anim.errors import AnimError, FormatError, RangeError, ShapeError
 from anim.gltf import targets
 from anim.gltf.accessors import FLOAT, Accessors
 from anim.gltf.document import Document, Json, items
@@ -35,6 +37,8 @@ class Reader:
         try:
             return self._track(animation["samplers"][channel["sampler"]], node, path, address)
         except AnimError as error:
+            if isinstance(error, RangeError | ShapeError):  # of the file, not of a caller
+                error = FormatError(error.problem, where=error.where)
             raise error.at(f"track {number} ({self._target_label(node, path, address)})", ": ") from None
 
     def _track(self, sampler: Json, node: int | None, path: str, address: str | None) -> Track:
@@ -48,7 +52,7 @@ class Reader:
         cubic = interpolation is Interpolation.CUBICSPLINE
         if cubic and len(times) < 2:
             raise FormatError("CUBICSPLINE with one key (expected at least two)")
-        values = self._accessors.floats(sampler["output"])
+        values = self._accessors.unchecked(sampler["output"])
         rows = len(times) * (3 if cubic else 1)
         if width is None:  # a pointer: an array of elements per key where the count says so
             width = values.size // rows
@@ -57,7 +61,7 @@ class Reader:
                 f"output accessor {sampler['output']} has {values.size} numbers (expected {rows * (width or 1)} for "
                 f"{len(times)} keys{' with tangents' if cubic else ''} of {width or 'at least one'})"
             )
-        storage = Storage(output["componentType"], bool(output.get("normalized", False)), output["type"])
+        storage = _storage(output["componentType"], bool(output.get("normalized")), output["type"])
         if not cubic:
             keys = values.reshape(len(times), width)
             return Track(node, path, interpolation, times, keys, pointer=address, storage=storage)
@@ -105,3 +109,8 @@ class Reader:
             return address or "no target"
         name = self._nodes[node].get("name", "") if node < len(self._nodes) else ""
         return f"node {node}{f' {name!r}' if name else ''}, {path}"
+
+
+@cache
+def _storage(component_type: int, normalized: bool, element: str) -> Storage:
+    return Storage(component_type, normalized, element)

@@ -58,6 +58,11 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     return tuple(_clip(i, animation, reader) for i, animation in enumerate(items(document.json, "animations")))
 
 
+def names(document: Document) -> tuple[str, ...]:
+    """Return the names of the animations, empty where one has none, without reading them."""
+    return tuple(animation.get("name", "") for animation in items(document.json, "animations"))
+
+
 def scene(document: Document, accessors: Accessors | None = None) -> Scene:
     """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
 

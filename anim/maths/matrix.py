@@ -43,21 +43,27 @@ def apply(matrix: Floats, points: Floats) -> Floats:
     return moved
 
 
-def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, float]:
-    """Return translation (3,), unit quaternion (4,), scale (3,) and shear of one affine matrix (3, 4).
+def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return translation (..., 3), unit quaternion (..., 4), scale (..., 3) and shear (...) of matrices (..., 3, 4).
 
-    shear: the largest cosine between two axes; the parts give the matrix back where it is 0. A mirroring matrix gets
-    a negative x scale. An axis of length 0 gets scale 0 and any direction.
+    shear: the largest cosine between two axes; the parts give the matrix back where it is 0, and are the nearest
+    rotation with the axes' lengths elsewhere. A mirroring matrix gets a negative x scale. An axis of length 0 gets
+    scale 0 and a direction that completes the others.
     """
-    axes = matrix[:, :3].T
-    scale: Floats = np.sqrt((axes * axes).sum(axis=1))
-    directions = _completed(axes / np.where(scale > 0, scale, 1)[:, None], scale)
-    cosines = directions @ directions.T
-    shear = float(np.abs(cosines - np.diag(np.diag(cosines))).max())
-    if np.linalg.det(directions) < 0:
-        scale[0], directions[0] = -scale[0], -directions[0]
-    rotation = quaternion.from_matrix(_nearest_rotation(directions.T))
-    return matrix[:, 3].copy(), rotation, scale, shear
+    axes = np.swapaxes(matrix[..., :3], -1, -2)  # rows are the axes
+    scale: Floats = np.sqrt((axes * axes).sum(axis=-1))
+    directions = axes / np.where(scale > 0, scale, 1)[..., None]
+    if not scale.all():
+        directions = _completed(directions, scale)
+    cosines = directions @ np.swapaxes(directions, -1, -2)
+    shear: Floats = np.abs(cosines * (1 - np.eye(3))).max(axis=(-1, -2))
+    mirror = np.where(np.linalg.det(directions) < 0, -1.0, 1.0)
+    scale[..., 0] *= mirror
+    directions[..., 0, :] *= mirror[..., None]
+    rotations = np.swapaxes(directions, -1, -2)
+    if (shear > 1e-9).any():
+        rotations = _nearest_rotation(rotations)
+    return matrix[..., 3].copy(), quaternion.from_matrix(rotations), scale, shear
 
 
 def chained(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
@@ -72,13 +78,24 @@ def chained(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
 
 
 def _completed(directions: Floats, scale: Floats) -> Floats:
-    """Directions with those of zero length replaced, so that all three are orthogonal."""
-    for i in np.flatnonzero(scale == 0):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        normal = np.cross(directions[j], directions[k])
-        length = np.linalg.norm(normal)
-        directions[i] = normal / length if length > 0 else np.eye(3)[i]
-    return directions
+    """Directions (..., 3, 3) in rows, those of zero length replaced so that all three are orthogonal."""
+    flat, lengths = directions.reshape(-1, 3, 3).copy(), scale.reshape(-1, 3)
+    for n in np.flatnonzero((lengths == 0).any(axis=1)):
+        for i in np.flatnonzero(lengths[n] == 0).tolist():
+            normal = np.cross(flat[n, (i + 1) % 3], flat[n, (i + 2) % 3])
+            length = np.linalg.norm(normal)
+            flat[n, i] = normal / length if length > 0 else _orthogonal(flat[n], i)
+    return flat.reshape(directions.shape)
+
+
+def _orthogonal(rows: Floats, missing: int) -> Floats:
+    """A unit vector at a right angle to the rows that are there."""
+    there = [row for i, row in enumerate(rows) if i != missing and row.any()]
+    if not there:
+        return np.asarray(np.eye(3)[missing])
+    axis = np.eye(3)[np.argmin(np.abs(there[0]))]
+    normal = np.cross(there[0], axis)
+    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _nearest_rotation(matrix: Floats) -> Floats:

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, sorted_unique
 from anim.maths import matrix
 from anim.measure.surface import Surface, diagonal, placed, surfaces
 from anim.model import Clip, Kind, Pose, Scene, Track
-from anim.sampling import pose, sample
+from anim.sampling import pose
 from anim.sampling.pose import world_by_node
+from anim.sampling.track import sample
 
 NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
 SLACK = 1.02  # a bound this close to what was found is as good as found
@@ -71,10 +72,10 @@ class Ruler:
 
 def check_times(*clips: Clip) -> Floats:
     """Return every key time of the clips and the middle of every gap, in seconds, increasing."""
-    axes = {id(track.times): track.times for clip in clips for track in clip.tracks}
+    axes = [times for clip in clips for times in clip.axes]
     if not axes:
         return np.zeros(1)
-    keys = np.unique(np.concatenate(list(axes.values())))
+    keys = sorted_unique(np.concatenate(axes))
     return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
 
 
@@ -87,7 +88,7 @@ class _Part:
         self._share = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
         self._used: list[int] = []
         corners = []
-        for joint in np.unique(surface.joints[surface.weights > 0]).tolist():
+        for joint in sorted(set(surface.joints[surface.weights > 0].tolist())):
             carried = surface.points[((surface.joints == joint) & (surface.weights > 0)).any(axis=1)]
             self._used.append(joint)
             corners.append(_corners(carried.min(axis=0), carried.max(axis=0)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.model.track import Track
 
@@ -19,18 +20,22 @@ class Clip:
     tracks: tuple[Track, ...]
 
     def __post_init__(self) -> None:
-        seen: set[tuple[int | None, str]] = set()
-        for track in self.tracks:
-            if track.node is not None and track.target in seen:
-                raise FormatError(f"two tracks for the same target {track.target}", where=f"clip '{self.name}'")
-            seen.add(track.target)
+        targets = [(track.node, track.path) for track in self.tracks if track.node is not None]
+        if len(set(targets)) < len(targets):
+            node, path = next(target for target in targets if targets.count(target) > 1)
+            raise FormatError(f"two tracks for node {node}, {path}", where=f"clip '{self.name}'")
+
+    @property
+    def axes(self) -> tuple[Floats, ...]:
+        """The distinct arrays of key times, in the order of the tracks."""
+        return tuple({id(track.times): track.times for track in self.tracks}.values())
 
     @property
     def start(self) -> float:
         """Time of the first key, in seconds; 0 where there is no track."""
-        return min((float(track.times[0]) for track in self.tracks), default=0.0)
+        return min((float(times[0]) for times in self.axes), default=0.0)
 
     @property
     def end(self) -> float:
         """Time of the last key, in seconds: glTF's length of the animation, which always starts at 0."""
-        return max((float(track.times[-1]) for track in self.tracks), default=0.0)
+        return max((float(times[-1]) for times in self.axes), default=0.0)

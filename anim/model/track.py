@@ -70,21 +70,15 @@ class Track:
         set_field = object.__setattr__
         set_field(self, "times", arrays.times(self.times))
         set_field(self, "values", arrays.floats(self.values, "K C", name="values"))
-        shape = (len(self.times), WIDTHS.get(self.path, self.values.shape[1]))
+        shape = (len(self.times), WIDTHS.get(self.path, int(self.values.shape[1])))
         if self.values.shape != shape:
             raise ShapeError(f"values have shape {self.values.shape} (expected {shape})")
-        if (self.in_tangents is None) != (self.out_tangents is None):
-            raise ShapeError("one of in and out tangents is missing")
-        if (self.in_tangents is not None) != (self.interpolation is Interpolation.CUBICSPLINE):
-            raise ShapeError(f"{self.interpolation} {'has' if self.in_tangents is not None else 'lacks'} tangents")
-        for name in ("in_tangents", "out_tangents"):
-            tangents = getattr(self, name)
-            if tangents is None:
-                continue
-            tangents = arrays.floats(tangents, "K C", name=name)
-            if tangents.shape != shape:
-                raise ShapeError(f"{name} have shape {tangents.shape} (expected {shape})")
-            set_field(self, name, tangents)
+        cubic = self.interpolation is Interpolation.CUBICSPLINE
+        if (self.in_tangents is not None) is not cubic or (self.out_tangents is not None) is not cubic:
+            raise ShapeError(f"{self.interpolation} with {'one or no' if cubic else 'in or out'} tangents")
+        if self.in_tangents is not None and self.out_tangents is not None:
+            set_field(self, "in_tangents", _tangents(self.in_tangents, shape, "in tangents"))
+            set_field(self, "out_tangents", _tangents(self.out_tangents, shape, "out tangents"))
 
     @property
     def target(self) -> tuple[int | None, str]:
@@ -95,6 +89,13 @@ class Track:
     def kind(self) -> Kind:
         """How values may be interpolated: see `kind_of`."""
         return kind_of(self)
+
+
+def _tangents(values: Floats, shape: tuple[int, int], name: str) -> Floats:
+    tangents = arrays.floats(values, "K C", name=name)
+    if tangents.shape != shape:
+        raise ShapeError(f"{name} have shape {tangents.shape} (expected {shape})")
+    return tangents
 
 
 def kind_of(track: Track) -> Kind:

@@ -19,13 +19,12 @@ class Selection:
     nodes: Sequence[str] = ()
     paths: Sequence[str] = ()
 
-    def chosen_clips(self, clips: Sequence[Clip]) -> list[int]:
+    def chosen_clips(self, names: Sequence[str]) -> list[int]:
         """Return the numbers of the clips that are meant; a clip without a name is called by its number, "3".
 
         Raises NotFoundError for a glob that matches no clip, and says which name is near.
         """
-        names = [clip.name or str(i) for i, clip in enumerate(clips)]
-        return _matching(self.clips, names, "clip")
+        return _matching(self.clips, [name or str(i) for i, name in enumerate(names)], "clip")
 
     def chosen_nodes(self, skeleton: Skeleton) -> list[int]:
         """Return the numbers of the nodes that are meant; a node without a name is called by its number."""

@@ -2,6 +2,5 @@
 
 from anim.sampling.pose import pose, rest, world_matrices
 from anim.sampling.times import grid
-from anim.sampling.track import sample
 
-__all__ = ["grid", "pose", "rest", "sample", "world_matrices"]
+__all__ = ["grid", "pose", "rest", "world_matrices"]

@@ -37,4 +37,4 @@ def grid(start: float, end: float, *, fps: float) -> Floats:
 
 def key_times(seconds: Floats) -> Floats:
     """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
-    return np.unique(np.asarray(seconds, np.float64).astype(np.float32)).astype(np.float64)
+    return arrays.sorted_unique(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64))

@@ -1,0 +1,80 @@
+"""Names with arguments, "spring(100, 10)": how eases and tangent rules are asked for in text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Generic, TypeVar
+
+from anim.errors import RangeError
+
+T = TypeVar("T")
+
+CALL = re.compile(r"\s*([A-Za-z][\w -]*?)\s*(?:\(([^()]*)\))?\s*")
+WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+|\d+")
+SUGGESTIONS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Maker(Generic[T]):
+    """One name that takes arguments: how to write it, and what makes the thing of the argument texts."""
+
+    usage: str
+    make: Callable[[tuple[str, ...]], T]
+
+
+def resolve(text: str, ready: Mapping[str, T], makers: Mapping[str, Maker[T]], *, kind: str) -> T:
+    """Return what `text` names: an entry of `ready`, or one made by `makers` with the arguments in parentheses.
+
+    kind: what the table holds, "ease", for the messages. Case and spaces around names and arguments do not matter.
+    Raises RangeError for an unknown name, with the nearest ones, and for wrong arguments, with the usage.
+    resolve("back-out(3)", ...) → makers["back-out"].make(("3",))
+    """
+    call = CALL.fullmatch(text)
+    if call is None:
+        raise RangeError(f"can't read {kind} {text!r} (expected a name or name(number, ...))")
+    name, inside = call[1].lower(), call[2]
+    if inside is None and name in ready:
+        return ready[name]
+    if name not in makers:
+        if name in ready:
+            raise RangeError(f"{kind} '{name}' takes no arguments (got {inside!r})")
+        raise RangeError(f"no {kind} is called {call[1]!r}", help=_suggestion(call[1], [*ready, *makers]))
+    maker = makers[name]
+    if inside is None:
+        raise RangeError(f"{kind} '{name}' needs arguments", help=f"write {maker.usage}")
+    try:
+        return maker.make(tuple(part.strip() for part in inside.split(",")) if inside.strip() else ())
+    except RangeError as error:
+        error.help = error.help or f"write {maker.usage}"
+        raise error.at(f"{kind} {text!r}", separator="") from None
+
+
+def numbers(arguments: tuple[str, ...], count: int) -> tuple[float, ...]:
+    """Return the arguments as `count` floats; fractions such as 1/3 are numbers. Raises RangeError if they aren't."""
+    if len(arguments) != count:
+        raise RangeError(f"number of arguments is {len(arguments)} (expected {count})")
+    return tuple(number(argument) for argument in arguments)
+
+
+def number(text: str) -> float:
+    """Return the float that a text spells, "0.25", "-1e-3" or "1/3". Raises RangeError if it spells none."""
+    above, slash, below = text.partition("/")
+    try:
+        return float(above) / float(below) if slash else float(above)
+    except (ValueError, ZeroDivisionError):
+        raise RangeError(f"{text!r} is not a number") from None
+
+
+def _suggestion(name: str, known: list[str]) -> str:
+    """Return "did you mean ...?": names of the same words in any order and style (easeInOutQuad), or near spellings."""
+    words = {word.lower() for word in WORD.findall(name)}
+    same = [k for k in known if words in (set(k.split("-")), set(k.split("-")) | {"ease"})]
+    family = [k for k in known if k.startswith(f"{name.lower()}-")]
+    near = get_close_matches(name.lower(), known, n=SUGGESTIONS, cutoff=0.6)
+    found = dict.fromkeys(same or (*family, *near))
+    if not found:
+        return f"one of {', '.join(dict.fromkeys(known))}"
+    return f"did you mean {' or '.join(repr(k) for k in [*found][:SUGGESTIONS])}?"

@@ -1,0 +1,118 @@
+"""The type of an ease: how far a motion has come at a share u of its time, and the exact cubics if it has some."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import hermite
+
+Function: TypeAlias = Callable[[Floats], Floats]
+
+EXTENT_SAMPLES = 4097  # finds an extremum of curvature c to within c · 8e-9
+ROUNDING = 1e-9  # overshoots smaller than this are rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One cubic of an ease, from u = `start` to `end`: its end values and its end slopes per u of the whole ease.
+
+    On a segment of duration t_d from v0 to v1 the key values are v0 + value · (v1 − v0) and the CUBICSPLINE tangents
+    slope · (v1 − v0) / t_d. Where one piece's value1 is not the next one's value0, the ease jumps.
+    """
+
+    start: float
+    end: float
+    value0: float
+    value1: float
+    slope0: float
+    slope1: float
+
+
+@dataclass(frozen=True, slots=True)
+class Easing:
+    """One ease: functions of u (any shape, each in 0 … 1) with value(0) = 0 and value(1) = 1.
+
+    value: the share of the way. Steps, which jump, give the value after the jump; jump-start ones begin above 0.
+    derivative: slope per u; ±inf where the curve is vertical; of either side at a breakpoint.
+    breakpoints: interior u, increasing, where it is not smooth, or where its exact form needs a key.
+    exact: the cubics that it consists of, covering 0 … 1 in order, or None if it is not piecewise cubic.
+    """
+
+    name: str
+    value: Function
+    derivative: Function
+    breakpoints: tuple[float, ...] = ()
+    exact: tuple[Piece, ...] | None = None
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """The least and the greatest value on the way, sampled: (0, 1) unless it overshoots."""
+        values = self.value(np.linspace(0, 1, EXTENT_SAMPLES))
+        low, high = float(values.min()), float(values.max())
+        return (low if low < -ROUNDING else 0.0), (high if high > 1 + ROUNDING else 1.0)
+
+    @property
+    def overshoots(self) -> bool:
+        """Whether it leaves 0 … 1 on the way."""
+        return self.extent != (0.0, 1.0)
+
+    @property
+    def stepped(self) -> bool:
+        """Whether it only holds and jumps, so that a STEP sampler is its exact form."""
+        return self.exact is not None and all(p.value0 == p.value1 and p.slope0 == p.slope1 == 0 for p in self.exact)
+
+
+def spelled(name: str, *arguments: float) -> str:
+    """Return the name with its arguments, as it is asked for: spelled("spring", 100, 10) → spring(100, 10)."""
+    return f"{name}({', '.join(f'{argument:.15g}' for argument in arguments)})"
+
+
+def evaluate(pieces: tuple[Piece, ...], u: Floats) -> Floats:
+    """Return the values at u (any shape, in 0 … 1) of cubics that cover 0 … 1; after the jump where there is one.
+
+    evaluate((Piece(0, 1, 0, 1, 0, 0),), 0.5) → 0.5
+    """
+    columns = [(p.start, p.end - p.start, p.value0, p.value1, p.slope0, p.slope1) for p in pieces]
+    start, length, value0, value1, slope0, slope1 = np.array(columns).T
+    at = np.clip(np.searchsorted(start, u, side="right") - 1, 0, len(pieces) - 1)
+    local = (u - start[at]) / length[at]
+    return hermite.evaluate(local, value0[at], length[at] * slope0[at], value1[at], length[at] * slope1[at])
+
+
+def mirrored(ease: Easing, name: str) -> Easing:
+    """Return the ease run backwards from its end, 1 − f(1 − u): the out form of an in form, and the other way."""
+    exact = None if ease.exact is None else tuple(_mirror(piece) for piece in reversed(ease.exact))
+    return Easing(
+        name,
+        lambda u: 1 - ease.value(1 - u),
+        lambda u: ease.derivative(1 - u),
+        tuple(1 - b for b in reversed(ease.breakpoints)),
+        exact,
+    )
+
+
+def doubled(ease: Easing, name: str) -> Easing:
+    """Return the in-out form of an in form: half of it up to u = ½, then the same mirrored. A breakpoint lies at ½."""
+
+    def value(u: Floats) -> Floats:
+        half = ease.value(np.where(u < 0.5, 2 * u, 2 - 2 * u)) / 2
+        return np.where(u < 0.5, half, 1 - half)
+
+    def derivative(u: Floats) -> Floats:
+        return ease.derivative(np.where(u < 0.5, 2 * u, 2 - 2 * u))
+
+    halves = tuple(b / 2 for b in ease.breakpoints)
+    exact = None
+    if ease.exact is not None:
+        first = tuple(Piece(p.start / 2, p.end / 2, p.value0 / 2, p.value1 / 2, p.slope0, p.slope1) for p in ease.exact)
+        exact = first + tuple(_mirror(piece) for piece in reversed(first))
+    return Easing(name, value, derivative, (*halves, 0.5, *(1 - b for b in reversed(halves))), exact)
+
+
+def _mirror(p: Piece) -> Piece:
+    return Piece(1 - p.end, 1 - p.start, 1 - p.value1, 1 - p.value0, p.slope1, p.slope0)

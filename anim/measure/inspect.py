@@ -1,0 +1,256 @@
+"""What is in a file, and is it healthy? Facts per clip, track and skin, and findings that say what to do."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import sorted_unique
+from anim.errors import AnimError
+from anim.gltf import read
+from anim.gltf.accessors import Accessors
+from anim.gltf.document import Document, items
+from anim.measure import advice, findings, footprint, rate, travel
+from anim.measure.findings import Finding
+from anim.measure.tracks import TrackStats, stats
+from anim.model import Clip, Scene, Skeleton, Track
+from anim.model.scene import Instance
+
+
+@dataclass(frozen=True, slots=True)
+class TrackFacts:
+    """One track: what it moves, its keys, and what they tell (see `measure.tracks`)."""
+
+    target: str
+    path: str
+    interpolation: str
+    keys: int
+    start_s: float
+    end_s: float
+    constant: bool
+    no_effect: bool
+    redundant_keys: int
+    non_unit_keys: int
+    sign_flips: int
+    wide_steps: int
+    widest_step_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClipFacts:
+    """One clip. duration_s: from its first to its last key; players count from 0 to end_s.
+
+    frame_rate_fps, frame_rate_regular: the estimate and the share of keys on its grid; None where it is open.
+    data_bytes, json_bytes, share: what it costs, and that as a share of the file; what clips share counts in each.
+    seam_m, seam_speed_m_per_s: from end to start, the root's way taken off; root_*: that way.
+    """
+
+    index: int
+    name: str
+    start_s: float
+    end_s: float
+    duration_s: float
+    tracks: dict[str, int]
+    interpolations: dict[str, int]
+    keys: int
+    frame_rate_fps: float | None
+    frame_rate_regular: float | None
+    data_bytes: int
+    json_bytes: int
+    share: float
+    constant_tracks: int
+    no_effect_tracks: int
+    redundant_keys: int
+    non_unit_rotations: int
+    sign_flips: int
+    wide_steps: int
+    widest_step_rad: float
+    seam_m: float
+    seam_speed_m_per_s: float
+    root: str
+    root_distance_m: float
+    root_speed_m_per_s: float
+    track_list: tuple[TrackFacts, ...] = field(default=(), repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class SkinFacts:
+    """One skin on the meshes that use it; None where their vertices can't be read.
+
+    unused_joints: neither carry a vertex nor have a joint below them that does. most_influences: of any vertex.
+    off_sums: vertices whose weights don't sum to 1, and by how much at worst.
+    """
+
+    index: int
+    name: str
+    joints: int
+    vertices: int | None
+    unused_joints: int | None
+    most_influences: int | None
+    mean_influences: float | None
+    off_sums: int | None
+    worst_sum_error: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """A whole file. animation_data_bytes and animation_json_bytes count what clips share once."""
+
+    generator: str
+    extensions_used: tuple[str, ...]
+    nodes: int
+    meshes: int
+    vertices: int | None
+    animation_data_bytes: int
+    animation_json_bytes: int
+    clips: tuple[ClipFacts, ...]
+    skins: tuple[SkinFacts, ...]
+    findings: tuple[Finding, ...]
+
+
+def inspect(document: Document, *, file_bytes: int, chosen: Iterable[int] | None = None, tracks: bool = False) -> Facts:
+    """Return the facts of a document.
+
+    file_bytes: the size that shares refer to. chosen: numbers of the clips to look at, None for all.
+    tracks: list every track too. Raises FormatError where animations can't be read; vertices that can't be read
+    only become a finding.
+    """
+    json = document.json
+    accessors = Accessors(document)
+    clips = read.clips(document, accessors)
+    skeleton = read.skeleton(document)
+    numbers = list(range(len(clips)) if chosen is None else chosen)
+    looked_at = [clips[i] for i in numbers]
+    counted = stats([track for clip in looked_at for track in clip.tracks], skeleton)
+    ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
+    ways = travel.travels(skeleton, looked_at)
+    costs = [footprint.footprint(document, [i]) for i in range(len(clips))]
+    clip_facts = tuple(
+        _clip(i, clip, ways[n], skeleton, counted[ends[n] : ends[n + 1]], costs[i], file_bytes, tracks=tracks)
+        for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
+    )
+    cost = footprint.of_all(document, costs)
+    scene, hidden = _scene(document, accessors)
+    skins = tuple(_skin(i, document, scene) for i in range(len(items(json, "skins"))))
+    return Facts(
+        str(json["asset"].get("generator", "")),
+        tuple(json.get("extensionsUsed", ())),
+        len(skeleton),
+        len(items(json, "meshes")),
+        scene.vertex_count if scene is not None else None,
+        cost.data,
+        cost.json,
+        clip_facts,
+        skins,
+        (*findings.of_json(json), *hidden, *advice.of_clips(clip_facts), *advice.of_skins(skins)),
+    )
+
+
+def _clip(
+    number: int,
+    clip: Clip,
+    way: travel.Travel,
+    skeleton: Skeleton,
+    counted: TrackStats,
+    cost: footprint.Footprint,
+    file_bytes: int,
+    *,
+    tracks: bool,
+) -> ClipFacts:
+    estimated = rate.estimate(sorted_unique(np.concatenate(clip.axes))) if clip.axes else None
+    return ClipFacts(
+        index=number,
+        name=clip.name,
+        start_s=clip.start,
+        end_s=clip.end,
+        duration_s=clip.end - clip.start,
+        tracks=dict(Counter(track.path for track in clip.tracks)),
+        interpolations=dict(Counter(str(track.interpolation) for track in clip.tracks)),
+        keys=sum(len(track.times) for track in clip.tracks),
+        frame_rate_fps=estimated.fps if estimated else None,
+        frame_rate_regular=estimated.regular if estimated else None,
+        data_bytes=cost.data,
+        json_bytes=cost.json,
+        share=cost.total / file_bytes if file_bytes else 0.0,
+        constant_tracks=int(counted.constant.sum()),
+        no_effect_tracks=int(counted.no_effect.sum()),
+        redundant_keys=int(counted.redundant.sum()),
+        non_unit_rotations=int(counted.non_unit.sum()),
+        sign_flips=int(counted.flips.sum()),
+        wide_steps=int(counted.wide.sum()),
+        widest_step_rad=float(counted.widest.max(initial=0.0)),
+        seam_m=way.seam,
+        seam_speed_m_per_s=way.speed_seam,
+        root=(skeleton.names[way.root] or f"node {way.root}") if way.root >= 0 else "",
+        root_distance_m=way.distance,
+        root_speed_m_per_s=way.speed,
+        track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
+    )
+
+
+def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackFacts:
+    target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
+    return TrackFacts(
+        target or "",
+        track.path,
+        str(track.interpolation),
+        len(track.times),
+        float(track.times[0]),
+        float(track.times[-1]),
+        bool(facts.constant[i]),
+        bool(facts.no_effect[i]),
+        int(facts.redundant[i]),
+        int(facts.non_unit[i]),
+        int(facts.flips[i]),
+        int(facts.wide[i]),
+        float(facts.widest[i]),
+    )
+
+
+def _scene(document: Document, accessors: Accessors) -> tuple[Scene | None, list[Finding]]:
+    try:
+        return read.scene(document, accessors), []
+    except AnimError as error:
+        advice_text = "skins are counted without their vertices"
+        return None, [Finding("vertices-unread", findings.Severity.WARNING, "meshes", str(error), advice_text)]
+
+
+def _skin(number: int, document: Document, scene: Scene | None) -> SkinFacts:
+    about = items(document.json, "skins")[number]
+    name, joints = about.get("name", ""), about["joints"]
+    nodes = items(document.json, "nodes")
+    using = [i for i in scene.instances if nodes[i.node].get("skin") == number] if scene is not None else []
+    if scene is None or not using:
+        return SkinFacts(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
+    counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
+    sums = np.concatenate([np.abs(i.mesh.weights.sum(axis=1) - 1) for i in using])
+    unused = len(joints) - len(_useful(using, joints, scene.skeleton))
+    return SkinFacts(
+        number,
+        name,
+        len(joints),
+        len(counts),
+        unused,
+        int(counts.max(initial=0)),
+        float(counts.mean()) if len(counts) else 0.0,
+        int((sums > WEIGHT_SUM).sum()),
+        float(sums.max(initial=0.0)),
+    )
+
+
+WEIGHT_SUM = 1e-3  # a sum of weights further off 1 than this is seen as a dent or a bulge
+
+
+def _useful(instances: list[Instance], joints: list[int], skeleton: Skeleton) -> set[int]:
+    """Joints of a skin that carry a vertex, and those above them."""
+    useful: set[int] = set()
+    for instance in instances:
+        carrying = set(instance.mesh.joints[instance.mesh.weights > 0].tolist())
+        for node in (joints[j] for j in sorted(carrying)):
+            while node >= 0 and node not in useful:
+                useful.add(node)
+                node = int(skeleton.parents[node])
+    return useful & set(joints)

@@ -1,0 +1,87 @@
+"""Where a clip leads: how far its end is from its start, in pose and speed, and how far its root travels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Clip, Pose, Skeleton
+from anim.sampling import pose
+from anim.sampling.pose import world_by_node
+
+STEP = 1 / 240  # s; speeds at the ends are taken over this time, or a quarter of a shorter clip
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """The seam between a clip's end and start, and the way of its root.
+
+    seam: m, the largest distance of any node between end and start, the root's own way taken off.
+    speed_seam: m/s, the largest difference of any node's velocity between end and start.
+    root: number of the node whose way was taken, −1 where no translation moves. distance: m. speed: m/s.
+    """
+
+    seam: float
+    speed_seam: float
+    root: int
+    distance: float
+    speed: float
+
+
+def travels(skeleton: Skeleton, clips: Sequence[Clip]) -> list[Travel]:
+    """Return one Travel per clip; a clip without time between start and end has none."""
+    if not len(skeleton) or not clips:
+        return [Travel(0.0, 0.0, -1, 0.0, 0.0) for _ in clips]
+    poses = [pose(skeleton, clip, _ends(clip)) for clip in clips]
+    joined = Pose(
+        np.concatenate([each.times for each in poses]),
+        np.concatenate([each.translation for each in poses]),
+        np.concatenate([each.rotation for each in poses]),
+        np.concatenate([each.scale for each in poses]),
+    )
+    places = world_by_node(skeleton, joined)[..., 3].reshape(len(skeleton), len(clips), 4, 3)
+    depth = _depths(skeleton)
+    return [_travel(clip, places[:, i], depth) for i, clip in enumerate(clips)]
+
+
+def _ends(clip: Clip) -> Floats:
+    step = min(STEP, (clip.end - clip.start) / 4)
+    return np.array([clip.start, clip.start + step, clip.end - step, clip.end])
+
+
+def _travel(clip: Clip, places: Floats, depth: Floats) -> Travel:
+    """places: (N, 4, 3) at start, just after it, just before the end, and at the end."""
+    duration = clip.end - clip.start
+    if duration <= 0:
+        return Travel(0.0, 0.0, -1, 0.0, 0.0)
+    step = min(STEP, duration / 4)
+    away = places[:, 3] - places[:, 0]
+    root = _root(clip, depth)
+    own = away[root] if root >= 0 else np.zeros(3)
+    speeds = ((places[:, 3] - places[:, 2]) - (places[:, 1] - places[:, 0])) / step
+    distance = float(np.linalg.norm(own))
+    return Travel(_longest(away - own), _longest(speeds), root, distance, distance / duration)
+
+
+def _root(clip: Clip, depth: Floats) -> int:
+    """The moved node nearest to the root of the hierarchy: what carries a character along."""
+    moved = [
+        track.node
+        for track in clip.tracks
+        if track.path == "translation" and track.node is not None and (track.values != track.values[0]).any()
+    ]
+    return min(moved, key=lambda node: (depth[node], node), default=-1)
+
+
+def _longest(vectors: Floats) -> float:
+    return float(np.sqrt((vectors * vectors).sum(axis=1)).max())
+
+
+def _depths(skeleton: Skeleton) -> Floats:
+    depth = np.zeros(len(skeleton))
+    for level, nodes in enumerate(skeleton.levels()):
+        depth[nodes] = level
+    return depth

@@ -1,0 +1,167 @@
+"""`gltf-anim sample`: the pose of every node at chosen times."""
+
+from __future__ import annotations
+
+import io
+import json
+from enum import StrEnum
+from pathlib import PurePath
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from anim.arrays import Floats, sorted_unique
+from anim.gltf import read
+from anim.model import Clip, Skeleton
+from anim.ops.selection import Selection
+from anim.sampling.sample import Sampled
+from anim.sampling.sample import sample as sampled
+from anim.sampling.times import grid
+from cli import options, streams, tables
+from cli.errors import UsageError
+
+SCHEMA = 1
+
+
+class Format(StrEnum):
+    """What the product looks like."""
+
+    JSON = "json"
+    CSV = "csv"
+    NPZ = "npz"
+
+
+class Space(StrEnum):
+    """Whose axes the transforms are in."""
+
+    LOCAL = "local"
+    WORLD = "world"
+
+
+Product = Annotated[
+    str, typer.Argument(metavar="OUT", help="A .json, .csv or .npz file, '-' for stdout.", show_default=False)
+]
+
+
+def sample(
+    input: options.Input = "-",
+    output: Product = "-",
+    *,
+    at: Annotated[
+        list[float] | None, typer.Option("--at", metavar="S", help="A time in seconds; may be repeated.")
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option("--fps", metavar="N", help="All frames from the clip's start to its end.")
+    ] = None,
+    space: Annotated[
+        Space, typer.Option("--space", help="local: in the parent's space. world: in the scene's.")
+    ] = Space.LOCAL,
+    format: Annotated[
+        Format | None, typer.Option("--format", help="Default: by OUT's ending, else json.", show_default=False)
+    ] = None,
+    clip: options.Clips = None,
+    node: options.Nodes = None,
+) -> None:
+    """Give the pose of every node at chosen times: for scripts and plots.
+
+    Without --at and --fps at the clip's own key times. Before its first and after its last key a clip holds still.
+    Rotations are unit quaternions x, y, z, w. JSON and NPZ also hold morph weights and KHR_animation_pointer values;
+    NPZ holds one clip, and in world space the matrices too.
+    """
+    if at and fps is not None:
+        raise UsageError("--at and --fps exclude each other")
+    chosen_format = format or _format_of(output)
+    with streams.source(input) as source:
+        document = source.document
+        selection = Selection(clip or (), node or ())
+        clips, skeleton = read.clips(document), read.skeleton(document)
+        numbers = selection.chosen_clips(read.names(document))
+        nodes = selection.chosen_nodes(skeleton)
+        taken = [
+            (i, clips[i], sampled(skeleton, clips[i], _times(clips[i], at, fps), space=space.value)) for i in numbers
+        ]
+    if chosen_format is Format.NPZ:
+        streams.write_bytes([_npz(taken, skeleton, nodes)], output)
+    else:
+        write = _json if chosen_format is Format.JSON else _csv
+        streams.write_text(write(taken, skeleton, nodes, space), output)
+
+
+Taken = list[tuple[int, Clip, Sampled]]
+
+
+def _format_of(output: str) -> Format:
+    ending = PurePath(output).suffix.lower().lstrip(".")
+    return Format(ending) if ending in list(Format) else Format.JSON
+
+
+def _times(clip: Clip, at: list[float] | None, fps: float | None) -> Floats:
+    if at:
+        return np.array(at, np.float64)
+    if fps is not None:
+        return grid(clip.start, clip.end, fps=fps)
+    return sorted_unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+
+
+def _json(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> str:
+    clips = []
+    for number, clip, poses in taken:
+        listed = [_node(i, skeleton, poses) for i in nodes]
+        about: dict[str, Any] = {"clip": clip.name, "index": number, "times_s": poses.times.tolist(), "nodes": listed}
+        if poses.pointers:
+            about["pointers"] = {pointer: values.tolist() for pointer, values in poses.pointers.items()}
+        clips.append(about)
+    return json.dumps({"schema": SCHEMA, "space": str(space), "clips": clips}, allow_nan=False) + "\n"
+
+
+def _node(i: int, skeleton: Skeleton, poses: Sampled) -> dict[str, Any]:
+    about: dict[str, Any] = {
+        "index": i,
+        "name": skeleton.names[i],
+        "translation_m": poses.translation[:, i].tolist(),
+        "rotation_xyzw": poses.rotation[:, i].tolist(),
+        "scale": poses.scale[:, i].tolist(),
+    }
+    if i in poses.weights:
+        about["weights"] = poses.weights[i].tolist()
+    return about
+
+
+def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> str:
+    header = ["clip", "time_s", "node", "name", "tx_m", "ty_m", "tz_m", "qx", "qy", "qz", "qw", "sx", "sy", "sz"]
+    rows: list[list[tables.Cell]] = []
+    for number, clip, poses in taken:
+        joined = np.concatenate((poses.translation, poses.rotation, poses.scale), axis=2)
+        for f, time in enumerate(poses.times.tolist()):
+            rows += [[clip.name or str(number), time, i, skeleton.names[i], *joined[f, i].tolist()] for i in nodes]
+    del space
+    return tables.comma_separated(header, rows)
+
+
+def _npz(taken: Taken, skeleton: Skeleton, nodes: list[int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    if len(taken) != 1:
+        raise UsageError(f"NPZ holds one clip, but {len(taken)} are chosen", help="choose one with --clip")
+    _, clip, poses = taken[0]
+    arrays: dict[str, Any] = {
+        "clip": np.array(clip.name),
+        "times_s": poses.times,
+        "names": np.array([skeleton.names[i] for i in nodes]),
+        "nodes": np.array(nodes),
+        "parents": skeleton.parents,
+        "translation_m": poses.translation[:, nodes],
+        "rotation_xyzw": poses.rotation[:, nodes],
+        "scale": poses.scale[:, nodes],
+    }
+    if poses.world is not None:
+        arrays["world_from_node"] = _four_rows(poses.world[:, nodes])
+    arrays |= {f"weights_{i}": values for i, values in poses.weights.items() if i in nodes}
+    arrays |= {f"pointer{pointer.replace('/', '.')}": values for pointer, values in poses.pointers.items()}
+    out = io.BytesIO()
+    np.savez(out, **arrays)
+    return np.frombuffer(out.getvalue(), np.uint8)
+
+
+def _four_rows(matrices: Floats) -> Floats:
+    last = np.broadcast_to(np.array([0.0, 0.0, 0.0, 1.0]), (*matrices.shape[:-2], 1, 4))
+    return np.concatenate((matrices, last), axis=-2)

@@ -1,0 +1,42 @@
+"""Tables that a person likes to read, and the same rows as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+Cell = str | int | float | bool | None
+
+
+def text(header: Sequence[str], rows: Sequence[Sequence[Cell]], *, left: int = 1, indent: str = "  ") -> str:
+    """Return rows under a header, columns aligned: the first `left` ones to the left, numbers to the right.
+
+    A column in which every cell is empty is left out.
+    """
+    cells = [[_shown(cell) for cell in row] for row in rows]
+    kept = [i for i in range(len(header)) if any(row[i] for row in cells)]
+    widths = {i: max(len(header[i]), *(len(row[i]) for row in cells)) for i in kept}
+    lines = []
+    for row in [list(header), *cells]:
+        padded = [row[i].ljust(widths[i]) if i < left else row[i].rjust(widths[i]) for i in kept]
+        lines.append((indent + "  ".join(padded)).rstrip())
+    return "\n".join(lines) + "\n"
+
+
+def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
+    """Return one CSV table with a header line; empty cells for None, "true" and "false" for booleans."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(["" if c is None else str(c).lower() if isinstance(c, bool) else c for c in row])
+    return out.getvalue()
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None or cell is False:
+        return ""
+    if cell is True:
+        return "yes"
+    return f"{cell:g}" if isinstance(cell, float) else str(cell)
