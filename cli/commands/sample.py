@@ -128,15 +128,19 @@ def _node(i: int, skeleton: Skeleton, poses: Sampled) -> dict[str, Any]:
     return about
 
 
-def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> str:
+def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], _: Space) -> str:
     header = ["clip", "time_s", "node", "name", "tx_m", "ty_m", "tz_m", "qx", "qy", "qz", "qw", "sx", "sy", "sz"]
     rows: list[list[tables.Cell]] = []
     for number, clip, poses in taken:
         joined = np.concatenate((poses.translation, poses.rotation, poses.scale), axis=2)
         for f, time in enumerate(poses.times.tolist()):
-            rows += [[clip.name or str(number), time, i, skeleton.names[i], *joined[f, i].tolist()] for i in nodes]
-    del space
+            rows += [[clip.name or str(number), time, i, skeleton.names[i], *_short(joined[f, i])] for i in nodes]
     return tables.comma_separated(header, rows)
+
+
+def _short(values: Floats) -> list[float]:
+    """Nine digits: all that a float32 file can mean."""
+    return [float(f"{value:.9g}") + 0.0 for value in values.tolist()]
 
 
 def _npz(taken: Taken, skeleton: Skeleton, nodes: list[int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
