@@ -15,7 +15,7 @@ from anim.model import Clip, Scene, Skeleton
 from anim.ops.selection import Selection
 from cli import report, streams
 
-Change = Callable[[Clip, frozenset[int]], Clip]
+Change = Callable[[Clip, frozenset[int], Skeleton], Clip]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ def edit(
 ) -> None:
     """Change the selected clips of one file and write it; one line on stderr says what came of it.
 
-    change: gets a clip and the numbers of its selected tracks, returns the new clip.
+    change: gets a clip, the numbers of its selected tracks and the skeleton, returns the new clip.
     measure: compare the motion of the written file with that of the input, on the surface.
     """
     began = time.perf_counter()
@@ -65,7 +65,7 @@ def edit(
 
 def _changed(clip: Clip, number: int, skeleton: Skeleton, selection: Selection, change: Change) -> Clip:
     try:
-        return change(clip, selection.chosen_tracks(clip, skeleton))
+        return change(clip, selection.chosen_tracks(clip, skeleton), skeleton)
     except AnimError as error:
         raise error.at(read.label(clip.name, number)) from None
 

@@ -29,6 +29,8 @@ class Path(StrEnum):
 
 
 Paths = Annotated[list[Path] | None, typer.Option("--path", help="Only tracks of this property; may be repeated.")]
+From = Annotated[float | None, typer.Option("--from", metavar="S", help="From so many seconds of the clip on.")]
+To = Annotated[float | None, typer.Option("--to", metavar="S", help="Up to so many seconds of the clip.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do everything but write.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more: one line per clip.")]

@@ -12,6 +12,8 @@ from anim.model import Clip, Pose, Skeleton
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 
+PATH_SAMPLES = 65
+ONWARD = 0.7
 STEP = 1 / 240  # s; speeds at the ends are taken over this time, or a quarter of a shorter clip
 
 
@@ -45,6 +47,22 @@ def travels(skeleton: Skeleton, clips: Sequence[Clip]) -> list[Travel]:
     places = world_by_node(skeleton, joined)[..., 3].reshape(len(skeleton), len(clips), 4, 3)
     depth = _depths(skeleton)
     return [_travel(clip, places[:, i], depth) for i, clip in enumerate(clips)]
+
+
+def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
+    """Return the node whose way carries a character along, −1 where none does.
+
+    It is the moved node nearest to the root, if others hang on it and its way leads somewhere: at least ONWARD of the
+    length of its path lies between its ends.
+    """
+    root = _root(clip, _depths(skeleton)) if len(skeleton) else -1
+    if root < 0 or not (skeleton.parents == root).any() or clip.end <= clip.start:
+        return -1
+    times = np.linspace(clip.start, clip.end, PATH_SAMPLES)
+    path = world_by_node(skeleton, pose(skeleton, clip, times))[root, :, :, 3]
+    steps = np.diff(path, axis=0)
+    length = float(np.sqrt((steps * steps).sum(axis=1)).sum())
+    return root if length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length else -1
 
 
 def _ends(clip: Clip) -> Floats:

@@ -51,7 +51,7 @@ def resample(
         input,
         output,
         Selection(clip or (), node or (), path or ()),
-        lambda each, tracks: resampled(each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks),
+        lambda each, tracks, _: resampled(each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks),
         Voice(quiet, verbose),
         dry_run=dry_run,
     )

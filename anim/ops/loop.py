@@ -1,0 +1,128 @@
+"""A clip whose end meets its start, in value and in speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.errors import RangeError
+from anim.maths import hermite, quaternion
+from anim.model import Clip, Interpolation, Kind, Track
+from anim.sampling.slopes import rates
+from anim.sampling.track import sample
+
+SPARSE = 6  # keys that a blend needs at least; sparser LINEAR tracks get more
+
+
+def with_last_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
+    """Return the clip one frame longer, its last key the first one again: for a loop that lacks its last frame."""
+    end = clip.end + 1 / fps
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    return Clip(clip.name, tuple(_extended(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks)))
+
+
+def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> Clip:
+    """Return the clip with its last `blend` seconds bent so that it ends as it starts, in value and speed.
+
+    To the motion a correction is added that grows from nothing: a cubic with the gap in value and in speed at its end;
+    for rotations a turn. STEP tracks end on their first value. Tracks not in `tracks` keep their end: a root that
+    travels.
+    Raises RangeError unless 0 < blend ≤ the clip's duration.
+    """
+    if not 0 < blend <= clip.end - clip.start:
+        raise RangeError(f"blend is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)")
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    return Clip(clip.name, tuple(_closed(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
+
+
+def _extended(track: Track, clip: Clip, end: float) -> Track:
+    if len(track.times) == 1 or track.times[-1] < clip.end - 1e-6:
+        return track
+    first = sample(track, np.array([clip.start]))
+    if track.kind is Kind.ROTATION:
+        first = first * np.where(quaternion.dot(first, track.values[-1:]) < 0, -1.0, 1.0)
+    times, values = np.append(track.times, end), np.concatenate((track.values, first))
+    if track.in_tangents is None or track.out_tangents is None:
+        return replace(track, times=times, values=values)
+    chord = (values[-1:] - values[-2:-1]) / (times[-1] - times[-2])
+    leaving = np.concatenate((track.out_tangents[:-1], track.in_tangents[-1:], np.zeros_like(chord)))
+    arriving = np.concatenate((track.in_tangents, track.out_tangents[:1]))
+    return replace(track, times=times, values=values, in_tangents=arriving, out_tangents=leaving)
+
+
+def _closed(track: Track, clip: Clip, blend: float) -> Track:
+    if len(track.times) == 1:
+        return track
+    ends = np.array([clip.start, clip.end])
+    first, last = sample(track, ends)
+    if track.interpolation is Interpolation.STEP:
+        return replace(track, values=np.concatenate((track.values[:-1], first[None])))
+    gap = _gap(track, first, last)
+    speed = (rates(track, ends[:1], before=False) - rates(track, ends[1:], before=True))[0]
+    if not gap.any() and not speed.any():
+        return track
+    correction = _Correction(clip.end - blend, clip.end, gap, speed)
+    return _bent_spline(track, correction) if track.in_tangents is not None else _bent_lines(track, correction)
+
+
+def _gap(track: Track, first: Floats, last: Floats) -> Floats:
+    if track.kind is Kind.ROTATION:
+        return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(last), first))
+    return first - last
+
+
+class _Correction:
+    """What is added from `start` to `end`: nothing and at rest at first, `gap` with `speed` (per second) at last."""
+
+    def __init__(self, start: float, end: float, gap: Floats, speed: Floats) -> None:
+        self.start, self.end = start, end
+        self._duration = end - start
+        self._piece = (np.zeros_like(gap), np.zeros_like(gap), gap, speed * self._duration)
+
+    def value(self, times: Floats) -> Floats:
+        return np.where(self._inside(times), hermite.evaluate(self._share(times), *self._piece), 0.0)
+
+    def slope(self, times: Floats) -> Floats:
+        slopes = hermite.first_derivative(self._share(times), *self._piece) / self._duration
+        return np.where(self._inside(times), slopes, 0.0)
+
+    def _share(self, times: Floats) -> Floats:
+        return np.clip((times - self.start) / self._duration, 0.0, 1.0)[:, None]
+
+    def _inside(self, times: Floats) -> Bools:
+        return (times > self.start)[:, None]
+
+
+def _bent_lines(track: Track, correction: _Correction) -> Track:
+    times = _times(track, correction)
+    values = _bent(track, sample(track, times), correction.value(times))
+    return replace(track, times=times, values=values)
+
+
+def _times(track: Track, correction: _Correction) -> Floats:
+    """The track's keys, with the ends of the blend and, where keys are sparse in it, some between."""
+    inside = (track.times > correction.start) & (track.times < correction.end)
+    more = [correction.start, correction.end]
+    if int(inside.sum()) < SPARSE:
+        more += np.linspace(correction.start, correction.end, 2 * SPARSE).tolist()
+    times = np.unique(np.concatenate((track.times, more)))
+    return times[np.concatenate(([True], np.diff(times) > 1e-5))]
+
+
+def _bent(track: Track, values: Floats, added: Floats) -> Floats:
+    if track.kind is not Kind.ROTATION:
+        return values + added
+    return quaternion.align_signs(quaternion.multiply(values, quaternion.from_rotation_vector(added)))
+
+
+def _bent_spline(track: Track, correction: _Correction) -> Track:
+    times = _times(track, correction)
+    before = rates(track, times, before=True) + correction.slope(times)
+    after = rates(track, times, before=False) + correction.slope(times)
+    values = _bent(track, sample(track, times), correction.value(times))
+    if track.kind is Kind.ROTATION:
+        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    before[0], after[-1] = 0.0, 0.0
+    return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)

@@ -1,0 +1,115 @@
+"""A motion that is given by a function, as keys: pieces are halved until what lies between keys is near enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import hermite, quaternion
+
+SAMPLES = np.array([0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97])  # of a piece; errors hide at ½
+WIDEST_TURN = np.radians(120)  # of one piece: beyond, players and splines of quaternions go wrong
+SHORTEST = 1e-5  # s; two float32 times below a minute are still apart by more than this
+LEVELS = 24  # halvings of a piece at most
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A motion over time as functions.
+
+    values: times (F,) s → values (F, C), unit quaternions where `rotation`.
+    rates: times (F,), before → change per second just before or just after: (F, C), angular velocity (F, 3) in rad/s
+    along the body's own axes for rotations.
+    """
+
+    values: Callable[[Floats], Floats]
+    rates: Callable[[Floats, bool], Floats]
+    rotation: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """Keys: times (K,) s, values (K, C), tangents (K, C) per second."""
+
+    times: Floats
+    values: Floats
+    in_tangents: Floats
+    out_tangents: Floats
+
+
+def cubic_keys(motion: Motion, corners: Floats, *, tolerance: float) -> Keys:
+    """Return CUBICSPLINE keys that follow `motion` within `tolerance`: value units, or radians for rotations.
+
+    corners: (K,) s, increasing: where keys must lie, both ends among them; between two the motion must be smooth.
+    """
+    times = _halved(motion, corners, tolerance, _cubic_piece)
+    values = _values(motion, times)
+    before, after = motion.rates(times, True), motion.rates(times, False)
+    if motion.rotation:
+        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    before[0], after[-1] = 0.0, 0.0
+    return Keys(times, values, before, after)
+
+
+def linear_keys(motion: Motion, corners: Floats, *, tolerance: float) -> Keys:
+    """Return LINEAR keys that follow `motion` within `tolerance`; tangents are 0 and unused."""
+    times = _halved(motion, corners, tolerance, _straight_piece)
+    values = _values(motion, times)
+    return Keys(times, values, np.zeros_like(values), np.zeros_like(values))
+
+
+Between = Callable[[Motion, Floats, Floats], Floats]  # starts, ends (P,) → values (P, S, C) at SAMPLES
+
+
+def _halved(motion: Motion, corners: Floats, tolerance: float, between: Between) -> Floats:
+    done = [corners]
+    start, end = corners[:-1], corners[1:]
+    for _ in range(LEVELS):
+        wide = end - start > SHORTEST
+        start, end = start[wide], end[wide]
+        if not len(start):
+            break
+        bad = _off(motion, start, end, between) > tolerance
+        middle = (start[bad] + end[bad]) / 2
+        done.append(middle)
+        start, end = np.concatenate((start[bad], middle)), np.concatenate((middle, end[bad]))
+    return np.sort(np.concatenate(done))
+
+
+def _off(motion: Motion, start: Floats, end: Floats, between: Between) -> Floats:
+    """How far each piece is off at worst (P,); infinite where it turns too far."""
+    at = start[:, None] + (end - start)[:, None] * SAMPLES
+    true = motion.values(at.reshape(-1)).reshape(*at.shape, -1)
+    given = between(motion, start, end)
+    if not motion.rotation:
+        return np.asarray(np.abs(given - true).max(axis=(1, 2), initial=0.0))
+    off = quaternion.angle_between(given, true).max(axis=1)
+    turned = quaternion.angle_between(true[:, 1:], true[:, :-1]).sum(axis=1)
+    return np.where(turned > WIDEST_TURN, np.inf, off)
+
+
+def _cubic_piece(motion: Motion, start: Floats, end: Floats) -> Floats:
+    a, b = motion.values(start), motion.values(end)
+    leaving, arriving = motion.rates(start, False), motion.rates(end, True)
+    if motion.rotation:
+        b = b * np.where(quaternion.dot(a, b) < 0, -1.0, 1.0)[:, None]
+        leaving, arriving = quaternion.derivative(a, leaving), quaternion.derivative(b, arriving)
+    duration = (end - start)[:, None]
+    piece = (each[:, None] for each in (a, duration * leaving, b, duration * arriving))
+    result = hermite.evaluate(SAMPLES[None, :, None], *piece)
+    return quaternion.normalize(result) if motion.rotation else result
+
+
+def _straight_piece(motion: Motion, start: Floats, end: Floats) -> Floats:
+    a, b = motion.values(start)[:, None], motion.values(end)[:, None]
+    if motion.rotation:
+        return quaternion.slerp(a, b, np.broadcast_to(SAMPLES, (len(start), len(SAMPLES))))
+    return np.asarray(a + SAMPLES[None, :, None] * (b - a))
+
+
+def _values(motion: Motion, times: Floats) -> Floats:
+    values = motion.values(times)
+    return quaternion.align_signs(values) if motion.rotation else values

@@ -1,0 +1,152 @@
+"""Seconds of a clip moved, stretched, turned round: keys keep their values, tangents follow by the chain rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+from anim.model import Clip, Interpolation, Track
+
+JUMP = 1e-6  # s; how long a reversed STEP track shows the value that it ended on for an instant
+
+
+def retime(
+    clip: Clip,
+    *,
+    speed: float | None = None,
+    duration: float | None = None,
+    reverse: bool = False,
+    ping_pong: bool = False,
+    offset: float = 0.0,
+    tracks: frozenset[int] | None = None,
+) -> Clip:
+    """Return the clip played faster or slower, backwards, there and back, later: in that order.
+
+    These are seconds of the clip; how many frames a display shows of them is not touched. Exact for every
+    interpolation: values stay, tangents are divided by what stretches time.
+
+    speed: > 0; 0.25 takes four times as long. duration: seconds from first to last key, > 0. Not both.
+    The clip's start stays where it is, but for `offset` seconds, which must not lead below 0.
+    Raises RangeError for values out of range.
+    (keys 0, 1 s; speed 0.25) → keys 0, 4 s
+    """
+    if speed is not None and duration is not None:
+        raise RangeError("speed and duration exclude each other")
+    factor = _factor(clip, speed, duration)
+    start, end = clip.start, clip.start + (clip.end - clip.start) * factor
+    if start + offset < 0:
+        raise RangeError(f"an offset of {offset:g} s leads to {start + offset:g} s (glTF's time starts at 0)")
+    steps: list[Callable[[Track], Track]] = []
+    if factor != 1:
+        steps.append(lambda track: stretched(track, start, factor))
+    if reverse:
+        steps.append(lambda track: reversed_track(track, start, end))
+    if ping_pong:
+        steps.append(lambda track: there_and_back(track, start, end))
+    if offset:
+        steps.append(lambda track: shifted(track, offset))
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    return Clip(clip.name, tuple(_all(steps, t) if i in chosen else t for i, t in enumerate(clip.tracks)))
+
+
+def stretched(track: Track, start: float, factor: float) -> Track:
+    """Return the track with every time `factor` times as far from `start`."""
+    times = start + (track.times - start) * factor
+    if track.in_tangents is None or track.out_tangents is None:
+        return replace(track, times=times)
+    return replace(track, times=times, in_tangents=track.in_tangents / factor, out_tangents=track.out_tangents / factor)
+
+
+def shifted(track: Track, offset: float) -> Track:
+    """Return the track `offset` seconds later."""
+    return replace(track, times=np.maximum(track.times + offset, 0.0))
+
+
+def reversed_track(track: Track, start: float, end: float) -> Track:
+    """Return the track as it runs from `end` back to `start` (s, of the clip); twice reversed it is itself again.
+
+    What STEP holds from a key to the next it holds between the same two moments; the value that it ends on shows first,
+    for a microsecond where it ended at `end`.
+    """
+    times = start + end - track.times[::-1]
+    if track.interpolation is Interpolation.STEP:
+        return _reversed_step(track, times, start)
+    values = track.values[::-1]
+    if track.in_tangents is None or track.out_tangents is None:
+        return replace(track, times=times, values=values)
+    return replace(
+        track, times=times, values=values, in_tangents=-track.out_tangents[::-1], out_tangents=-track.in_tangents[::-1]
+    )
+
+
+def there_and_back(track: Track, start: float, end: float) -> Track:
+    """Return the track followed by itself reversed, from `end` to twice as far from `start` (s, of the clip)."""
+    if len(track.times) == 1:
+        return track
+    back = shifted(reversed_track(track, start, end), end - start)
+    if track.interpolation is not Interpolation.STEP:
+        return _joined(track, back, drop_first=bool(track.times[-1] == end))
+    first_of_back = int(np.searchsorted(back.times, max(end, float(track.times[-1])), side="right"))
+    return _joined(track, _without_start(back, first_of_back), drop_first=False)
+
+
+def _all(steps: list[Callable[[Track], Track]], track: Track) -> Track:
+    for step in steps:
+        track = step(track)
+    return track
+
+
+def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
+    if speed is not None:
+        if not (math.isfinite(speed) and speed > 0):
+            raise RangeError(f"speed is {speed:g} (expected a number above 0; --reverse turns it round)")
+        return 1 / speed
+    if duration is None:
+        return 1.0
+    if not (math.isfinite(duration) and duration > 0):
+        raise RangeError(f"duration is {duration:g} s (expected a number above 0)")
+    own = clip.end - clip.start
+    if own == 0:
+        raise RangeError("the clip has no duration, so it can't be stretched to one")
+    return duration / own
+
+
+def _reversed_step(track: Track, times: Floats, start: float) -> Track:
+    values = np.concatenate((track.values[-2::-1], track.values[:1]))
+    if len(track.times) > 1 and (track.values[-1] != track.values[-2]).any():
+        shown = start if times[0] - start > JUMP else float(times[0])
+        times = np.concatenate(([shown, max(float(times[0]), shown + JUMP)], times[1:]))
+        values = np.concatenate((track.values[-1:], values))
+    return replace(track, times=times, values=values)
+
+
+def _joined(track: Track, back: Track, *, drop_first: bool) -> Track:
+    """One track after the other; at the turn the tangents of both sides meet in one key where times do."""
+    skip = 1 if drop_first else 0
+    times = np.concatenate((track.times, back.times[skip:]))
+    values = np.concatenate((track.values, back.values[skip:]))
+    if track.in_tangents is None or track.out_tangents is None:
+        return replace(track, times=times, values=values)
+    assert back.in_tangents is not None
+    assert back.out_tangents is not None
+    leaving, arriving = track.out_tangents.copy(), back.in_tangents.copy()
+    if drop_first:
+        leaving[-1] = back.out_tangents[0]
+    else:
+        leaving[-1], arriving[0] = 0.0, 0.0
+    return replace(
+        track,
+        times=times,
+        values=values,
+        in_tangents=np.concatenate((track.in_tangents, arriving[skip:])),
+        out_tangents=np.concatenate((leaving, back.out_tangents[skip:])),
+    )
+
+
+def _without_start(track: Track, first: int) -> Track:
+    return replace(track, times=track.times[first:], values=track.values[first:])

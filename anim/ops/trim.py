@@ -1,0 +1,123 @@
+"""A part of a clip, with exact new ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Kind, Track
+from anim.ops import refine
+from anim.ops.retime import shifted
+from anim.sampling.slopes import rates
+from anim.sampling.track import sample
+
+ANGLE_TOLERANCE = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
+
+
+def trim(
+    clip: Clip,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    rebase: bool = False,
+    tracks: frozenset[int] | None = None,
+) -> Clip:
+    """Return what the clip shows from `start` to `end` seconds; keys between stay, those at the ends are exact.
+
+    New end keys have the value, and under CUBICSPLINE the tangent, that the track has there; a cut piece of a rotation
+    spline gets keys more where renormalized cubics need them. A track with no key in between becomes one key.
+    start, end: by default the clip's own; times beyond it are brought back to it.
+    rebase: move all so that the part starts at 0 s. Raises RangeError for an empty part.
+    (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
+    """
+    first = clip.start if start is None else max(start, clip.start)
+    last = clip.end if end is None else min(end, clip.end)
+    if not last > first:
+        raise RangeError(
+            f"nothing between {first:g} s and {last:g} s (the clip has {clip.start:g} s to {clip.end:g} s)"
+        )
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    new = [_trimmed(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
+    if rebase:
+        new = [shifted(track, -first) if i in chosen else track for i, track in enumerate(new)]
+    return Clip(clip.name, tuple(new))
+
+
+def _trimmed(track: Track, start: float, end: float) -> Track:
+    inner = (track.times > start) & (track.times < end)
+    if len(track.times) == 1 or not (inner.any() or _changes(track, start, end)):
+        return _single(track, start)
+    if track.interpolation is Interpolation.CUBICSPLINE:
+        return _cut_spline(track, start, end, inner)
+    times = np.concatenate(([start], track.times[inner], [end]))
+    values = np.concatenate((sample(track, times[:1]), track.values[inner], sample(track, times[-1:])))
+    if track.kind is Kind.ROTATION:
+        values = quaternion.align_signs(values)
+    return replace(track, times=times, values=values)
+
+
+def _changes(track: Track, start: float, end: float) -> bool:
+    """Whether a track without a key in between differs between its ends or moves there."""
+    ends = sample(track, np.array([start, end]))
+    moving = track.interpolation is not Interpolation.STEP and bool(rates(track, np.array([start]), before=False).any())
+    return moving or bool((ends[0] != ends[1]).any())
+
+
+def _single(track: Track, start: float) -> Track:
+    values = sample(track, np.array([start]))
+    linear = Interpolation.LINEAR if track.interpolation is Interpolation.CUBICSPLINE else track.interpolation
+    return replace(
+        track, interpolation=linear, times=np.array([start]), values=values, in_tangents=None, out_tangents=None
+    )
+
+
+def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Track:
+    times = np.concatenate(([start], track.times[inner], [end]))
+    if track.kind is Kind.ROTATION:
+        times = _with_cuts(track, times)
+    values = sample(track, times)
+    before, after = rates(track, times, before=True), rates(track, times, before=False)
+    if track.kind is Kind.ROTATION:
+        values = quaternion.align_signs(values)
+        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    exact = np.isin(times, track.times)
+    _restore(track, times, exact, values, before, after)
+    before[0], after[-1] = 0.0, 0.0
+    return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)
+
+
+def _with_cuts(track: Track, times: Floats) -> Floats:
+    """The times with more of them in the cut pieces at both ends, where a rotation's cubic is normalized anew."""
+    motion = refine.Motion(
+        lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
+    )
+    parts = [times]
+    for piece in (times[:2], times[-2:]):
+        if not np.isin(piece, track.times).all():
+            parts.append(refine.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE).times)
+    return np.unique(np.concatenate(parts))
+
+
+def _restore(
+    track: Track,
+    times: Floats,
+    exact: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    values: Floats,
+    before: Floats,
+    after: Floats,
+) -> None:
+    """Keys that were there keep what they had, to the bit, where nothing had to be turned round."""
+    assert track.in_tangents is not None
+    assert track.out_tangents is not None
+    at = np.searchsorted(track.times, times[exact])
+    signs = np.ones(len(at))
+    if track.kind is Kind.ROTATION:
+        signs = np.where(quaternion.dot(values[exact], track.values[at]) < 0, -1.0, 1.0)
+    values[exact] = track.values[at] * signs[:, None]
+    before[exact] = track.in_tangents[at] * signs[:, None]
+    after[exact] = track.out_tangents[at] * signs[:, None]

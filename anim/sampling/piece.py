@@ -1,0 +1,67 @@
+"""One piece of a track, from key k to key k + 1, as a curve of its own that goes on beyond both ends."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.maths import hermite, quaternion
+from anim.model import Interpolation, Kind, Track
+
+
+def values(track: Track, left: Ints, share: Floats) -> Floats:
+    """Return the values (F, C) at a share (F,) of the way through pieces `left` (F,); rotations are unit.
+
+    A share below 0 or above 1 is where the piece's own line, arc or cubic leads: nothing is clamped.
+    """
+    start, end = track.values[left], track.values[left + 1]
+    if track.interpolation is Interpolation.STEP:
+        result = np.where(share[:, None] < 1, start, end)
+    elif track.interpolation is Interpolation.CUBICSPLINE:
+        result = hermite.evaluate(share[:, None], *_cubic(track, left))
+    elif track.kind is Kind.ROTATION:
+        return quaternion.slerp(quaternion.normalize(start), quaternion.normalize(end), share)
+    else:
+        return np.asarray(start + share[:, None] * (end - start))
+    return quaternion.normalize(result) if track.kind is Kind.ROTATION else result
+
+
+def rates(track: Track, left: Ints, share: Floats) -> Floats:
+    """Return the change per share of a piece (F, C); of rotations the turn (F, 3) in rad about the node's own axes."""
+    rotation = track.kind is Kind.ROTATION
+    if track.interpolation is Interpolation.STEP:
+        return np.zeros((len(left), 3 if rotation else track.values.shape[1]))
+    if track.interpolation is Interpolation.CUBICSPLINE:
+        slope = hermite.first_derivative(share[:, None], *_cubic(track, left))
+        if not rotation:
+            return slope
+        raw = hermite.evaluate(share[:, None], *_cubic(track, left))
+        # q / |q| turns with ω = 2 vec(q* q′) / |q|²: the part of q′ along q only changes the length
+        turned = quaternion.multiply(quaternion.conjugate(raw), slope)[:, :3]
+        return np.asarray(2 * turned / quaternion.dot(raw, raw)[:, None])
+    start, end = track.values[left], track.values[left + 1]
+    if rotation:
+        return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(start), end))
+    return np.asarray(end - start)
+
+
+def fastest(track: Track, pieces: Ints) -> float:
+    """Return the greatest change per share of a piece anywhere in `pieces`: length of the vector, or angle in rad."""
+    left = np.repeat(pieces, len(_SHARES))
+    found = rates(track, left, np.tile(_SHARES, len(pieces)))
+    return float(np.sqrt((found * found).sum(axis=1)).max(initial=0.0))
+
+
+_SHARES = np.linspace(0, 1, 9)
+
+
+def _cubic(track: Track, left: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+    assert track.in_tangents is not None
+    assert track.out_tangents is not None
+    duration = (track.times[left + 1] - track.times[left])[:, None]
+    return (
+        track.values[left],
+        duration * track.out_tangents[left],
+        track.values[left + 1],
+        duration * track.in_tangents[left + 1],
+    )

@@ -1,0 +1,66 @@
+"""`gltf-anim retime`: seconds of a clip stretched, turned round, warped."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from anim.curves.easing import parse
+from anim.model import Clip, Skeleton
+from anim.ops.retime import retime as retimed
+from anim.ops.selection import Selection
+from anim.ops.warp import warp
+from cli import options
+from cli.edit import edit
+from cli.errors import UsageError
+from cli.report import Voice
+
+
+def retime(
+    input: options.Input = "-",
+    output: options.Output = "-",
+    *,
+    speed: Annotated[
+        float | None, typer.Option("--speed", metavar="N", help="Times as fast: 0.25 takes four times as long.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", metavar="S", help="Seconds from first to last key.")
+    ] = None,
+    reverse: Annotated[bool, typer.Option("--reverse", help="Play it backwards.")] = False,
+    ping_pong: Annotated[bool, typer.Option("--ping-pong", help="There and back: twice as long.")] = False,
+    warp_ease: Annotated[
+        str | None, typer.Option("--warp", metavar="EASE", help="Run through the whole clip with an ease.")
+    ] = None,
+    offset: Annotated[float, typer.Option("--offset", metavar="S", help="Start so many seconds later.")] = 0.0,
+    clip: options.Clips = None,
+    node: options.Nodes = None,
+    path: options.Paths = None,
+    dry_run: options.DryRun = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Change when things happen: faster, slower, backwards, there and back, later.
+
+    These are the clip's own seconds; a display's frames only sample them. Values stay and tangents follow by the chain
+    rule, so all but --warp is exact. In the order: --warp, --speed or --duration, --reverse, --ping-pong, --offset.
+    """
+    if speed is None and duration is None and not (reverse or ping_pong or offset or warp_ease):
+        raise UsageError("nothing to do", help="give --speed, --duration, --reverse, --ping-pong, --warp or --offset")
+    easing = parse(warp_ease) if warp_ease is not None else None
+
+    def change(each: Clip, tracks: frozenset[int], _: Skeleton) -> Clip:
+        if easing is not None and each.end > each.start:
+            each = warp(each, easing=easing, tracks=tracks)
+        return retimed(
+            each,
+            speed=speed,
+            duration=duration,
+            reverse=reverse,
+            ping_pong=ping_pong,
+            offset=offset,
+            tracks=tracks,
+        )
+
+    selection = Selection(clip or (), node or (), path or ())
+    edit(input, output, selection, change, Voice(quiet, verbose), dry_run=dry_run, measure=False)

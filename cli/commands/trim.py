@@ -1,0 +1,44 @@
+"""`gltf-anim trim`: a part of a clip with exact ends."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from anim.ops.selection import Selection
+from anim.ops.trim import trim as trimmed
+from cli import options
+from cli.edit import edit
+from cli.errors import UsageError
+from cli.report import Voice
+
+
+def trim(
+    input: options.Input = "-",
+    output: options.Output = "-",
+    *,
+    start: options.From = None,
+    end: options.To = None,
+    rebase: Annotated[bool, typer.Option("--rebase", help="Move the part to start at 0 s.")] = False,
+    clip: options.Clips = None,
+    dry_run: options.DryRun = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Keep the part of a clip from --from to --to seconds.
+
+    Keys in between stay as they are; new keys at both ends have exactly the value and tangent that the motion has
+    there. Without --rebase the part stays at its seconds: players hold its first pose until then.
+    """
+    if start is None and end is None:
+        raise UsageError("nothing to cut", help="give --from, --to or both, in seconds")
+    edit(
+        input,
+        output,
+        Selection(clip or ()),
+        lambda each, tracks, _: trimmed(each, start=start, end=end, rebase=rebase, tracks=tracks),
+        Voice(quiet, verbose),
+        dry_run=dry_run,
+        measure=False,
+    )

@@ -1,0 +1,37 @@
+"""Numbers with units, as options take them: lengths, angles, shares."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from cli.errors import UsageError
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
+ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+
+
+def share(text: str, option: str) -> float:
+    """Return a share of something: "0.1%" or a bare number, above 0. Raises UsageError otherwise.
+
+    share("0.1%", "--tolerance") → 0.001
+    """
+    value, unit = _split(text, option)
+    if unit not in ("", "%") or value <= 0:
+        raise UsageError(f"{option} is '{text}' (expected a share above 0, like 0.1% or 0.001)")
+    return value / 100 if unit else value
+
+
+def angle(text: str, option: str) -> float:
+    """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises UsageError otherwise, or without unit."""
+    value, unit = _split(text, option)
+    if unit not in ANGLES or value <= 0:
+        raise UsageError(f"{option} is '{text}' (expected an angle above 0 with its unit, like 0.05deg or 0.001rad)")
+    return value * ANGLES[unit]
+
+
+def _split(text: str, option: str) -> tuple[float, str]:
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise UsageError(f"{option} is '{text}' (expected a number with a unit)")
+    return float(match[1]), match[2]
