@@ -126,8 +126,10 @@ class _Part:
             grown = (reach @ self._extents).max(axis=0)
             centers = (corners[:, :1] + corners[:, -1:]) / 2
             corners = corners + np.sign(corners - centers) * grown
-        points = np.einsum("jfik,jck->jfci", moved[..., :3], corners) + moved[..., None, :, 3]
-        bounds = np.sqrt((points * points).sum(axis=-1).max(axis=-1))
+        points = moved[..., :3] @ np.swapaxes(corners, -1, -2)[:, None]  # (J, F, 3, 8)
+        points += moved[..., 3, None]
+        points *= points
+        bounds = np.sqrt(points.sum(axis=-2).max(axis=-1))
         if len(self._extents):
             stretched = np.sqrt((matrix.multiply(new_world[nodes], bind)[..., :3] ** 2).sum(axis=(-1, -2)))
             bounds = bounds + stretched * np.linalg.norm(difference @ self._extents, axis=1)

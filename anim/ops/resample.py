@@ -7,8 +7,8 @@ from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Track
 from anim.sampling import slopes
+from anim.sampling.batch import batches
 from anim.sampling.times import grid, key_times
-from anim.sampling.track import sample
 
 KEEP = "keep"
 INTERPOLATIONS = (KEEP, "step", "linear", "cubicspline")
@@ -33,29 +33,27 @@ def resample(
         raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
     times = key_times(grid(clip.start, clip.end, fps=fps))
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
-    new = (
-        _resampled(track, times, interpolation, snap) if i in chosen else track for i, track in enumerate(clip.tracks)
-    )
+    goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
+    goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
+    values = _sampled([clip.tracks[i] for i in goals], times)
+    new = list(clip.tracks)
+    for (i, goal), sampled in zip(goals.items(), values, strict=True):
+        new[i] = _keyed(clip.tracks[i], goal, times, sampled)
     return Clip(clip.name, tuple(new))
 
 
-def _resampled(track: Track, times: Floats, interpolation: str, snap: bool) -> Track:
-    goal = track.interpolation if interpolation == KEEP else Interpolation(interpolation.upper())
+def _goal(track: Track, interpolation: str) -> Interpolation:
     if track.kind is Kind.DISCRETE:
-        goal = Interpolation.STEP
-    if len(track.times) == 1 or _is_constant(track):
-        return track
-    if goal is Interpolation.STEP and track.interpolation is Interpolation.STEP and not snap:
-        return track
-    values = sample(track, times)
-    if track.kind is Kind.ROTATION:
-        values = quaternion.align_signs(values)
-    tangents: tuple[Floats | None, Floats | None] = (None, None)
-    if goal is Interpolation.CUBICSPLINE and len(times) > 1:
-        tangents = slopes.tangents(track, times, values)
-    elif goal is Interpolation.CUBICSPLINE:
-        goal = Interpolation.LINEAR
-    return Track(track.node, track.path, goal, times, values, *tangents, pointer=track.pointer, storage=track.storage)
+        return Interpolation.STEP
+    return track.interpolation if interpolation == KEEP else Interpolation(interpolation.upper())
+
+
+def _is_sampled(track: Track) -> bool:
+    return len(track.times) > 1 and not _is_constant(track)
+
+
+def _holds(track: Track, goal: Interpolation) -> bool:
+    return goal is Interpolation.STEP and track.interpolation is Interpolation.STEP
 
 
 def _is_constant(track: Track) -> bool:
@@ -63,3 +61,23 @@ def _is_constant(track: Track) -> bool:
     if track.in_tangents is None or track.out_tangents is None:
         return same
     return same and not track.in_tangents[1:].any() and not track.out_tangents[:-1].any()
+
+
+def _sampled(tracks: list[Track], times: Floats) -> list[Floats]:
+    """The values (F, C) of each track at `times`, rotations sign-continuous; tracks on one time axis at once."""
+    found: dict[int, Floats] = {}
+    for batch in batches(tracks):
+        values = batch.sample(times)
+        if batch.kind is Kind.ROTATION:
+            values = quaternion.align_signs(values)
+        found.update((id(track), values[:, g]) for g, track in enumerate(batch.tracks))
+    return [found[id(track)] for track in tracks]
+
+
+def _keyed(track: Track, goal: Interpolation, times: Floats, values: Floats) -> Track:
+    tangents: tuple[Floats | None, Floats | None] = (None, None)
+    if goal is Interpolation.CUBICSPLINE and len(times) > 1:
+        tangents = slopes.tangents(track, times, values)
+    elif goal is Interpolation.CUBICSPLINE:
+        goal = Interpolation.LINEAR
+    return Track(track.node, track.path, goal, times, values, *tangents, pointer=track.pointer, storage=track.storage)
