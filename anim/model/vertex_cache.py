@@ -1,0 +1,86 @@
+"""VertexCache: where every vertex is at every frame, handed out in chunks so that no length is too long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from anim import arrays
+from anim.arrays import AnyArray, Floats, Ints
+from anim.errors import ShapeError
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some frames in a row: `first` is the number of the first, positions (n, V, 3) m and normals (n, V, 3) float32."""
+
+    first: int
+    positions: AnyArray
+    normals: AnyArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The vertices and faces of one primitive within a cache: half-open ranges, and what it was called.
+
+    vertices: (first, beyond the last) of V; faces: the same of T. material: its number in the file, −1 for none.
+    """
+
+    name: str
+    vertices: tuple[int, int]
+    faces: tuple[int, int]
+    node: int = -1
+    material: int = -1
+
+
+Chunks: TypeAlias = Callable[[], Iterator[Chunk]]
+
+
+@dataclass(frozen=True, slots=True)
+class VertexCache:
+    """F frames of V vertices, always in the same order, with the triangles that join them.
+
+    times: (F,) s, increasing. faces: (T, 3). chunks: called for a new pass over all frames, in order, each frame once.
+    rest: (V, 3) m, the mesh at rest in the same order, or None. has_normals: whether every chunk carries them.
+    parts: the primitives, in order, covering all vertices; empty where unknown. up: "y" or "z".
+    """
+
+    times: Floats
+    vertex_count: int
+    faces: Ints
+    chunks: Chunks
+    rest: Floats | None = None
+    has_normals: bool = False
+    parts: tuple[Part, ...] = field(default=())
+    up: str = "y"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", arrays.times(self.times))
+        arrays.check_shape(self.faces, "T 3", name="faces")
+        if self.faces.size and int(self.faces.max()) >= self.vertex_count:
+            raise ShapeError(f"a face uses vertex {int(self.faces.max())} of {self.vertex_count}")
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames."""
+        return len(self.times)
+
+    def whole(self) -> Chunk:
+        """Return all frames at once: 12 bytes times F times V, so for short or small caches only."""
+        chunks = list(self.chunks())
+        normals = [each.normals for each in chunks if each.normals is not None]
+        joined = np.concatenate(normals) if len(normals) == len(chunks) else None
+        return Chunk(0, np.concatenate([each.positions for each in chunks]), joined)
+
+
+def from_arrays(
+    times: Floats, positions: AnyArray, faces: Ints, *, normals: AnyArray | None = None, rest: Floats | None = None
+) -> VertexCache:
+    """Return a cache of frames that are in memory: positions and normals (F, V, 3)."""
+    chunk = Chunk(0, np.asarray(positions, np.float32), None if normals is None else np.asarray(normals, np.float32))
+    return VertexCache(
+        times, positions.shape[1], faces, lambda: iter((chunk,)), rest=rest, has_normals=normals is not None
+    )
