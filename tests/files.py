@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,13 @@ def opened_path(path: Path) -> Document:
 
 def opened_fixture(name: str) -> Document:
     """Return the document of a fixture, with what lies beside it."""
-    data, *beside = fixtures.build_files(name).items()
-    return opened(data[1], dict(beside))
+    files = _built(name)
+    return opened(next(iter(files.values())), files)
+
+
+@cache
+def _built(name: str) -> dict[str, bytes]:
+    return fixtures.build_files(name)
 
 
 def joined(pieces: Sequence[Bytes]) -> bytes:

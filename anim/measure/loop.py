@@ -116,7 +116,7 @@ def _points(skeleton: Skeleton, clip: Clip, times: Floats, root: int) -> Floats:
     world = world_by_node(skeleton, pose(skeleton, clip, times))
     places = world[..., 3]
     if root >= 0:
-        places = places - (places[root] - places[root, :1])
+        places = places - skeleton.below(root)[:, None, None] * (places[root] - places[root, :1])
     lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2, keepdims=True))
     axes = LEVER * _size(places) * np.swapaxes(world[..., :3] / np.where(lengths > 0, lengths, 1), -1, -2)
     points = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)

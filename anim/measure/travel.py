@@ -46,7 +46,7 @@ def travels(skeleton: Skeleton, clips: Sequence[Clip]) -> list[Travel]:
     )
     places = world_by_node(skeleton, joined)[..., 3].reshape(len(skeleton), len(clips), 4, 3)
     depth = _depths(skeleton)
-    return [_travel(clip, places[:, i], depth) for i, clip in enumerate(clips)]
+    return [_travel(skeleton, clip, places[:, i], depth) for i, clip in enumerate(clips)]
 
 
 def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
@@ -70,7 +70,7 @@ def _ends(clip: Clip) -> Floats:
     return np.array([clip.start, clip.start + step, clip.end - step, clip.end])
 
 
-def _travel(clip: Clip, places: Floats, depth: Floats) -> Travel:
+def _travel(skeleton: Skeleton, clip: Clip, places: Floats, depth: Floats) -> Travel:
     """places: (N, 4, 3) at start, just after it, just before the end, and at the end."""
     duration = clip.end - clip.start
     if duration <= 0:
@@ -79,9 +79,10 @@ def _travel(clip: Clip, places: Floats, depth: Floats) -> Travel:
     away = places[:, 3] - places[:, 0]
     root = _root(clip, depth)
     own = away[root] if root >= 0 else np.zeros(3)
+    carried = away - skeleton.below(root)[:, None] * own if root >= 0 else away
     speeds = ((places[:, 3] - places[:, 2]) - (places[:, 1] - places[:, 0])) / step
     distance = float(np.linalg.norm(own))
-    return Travel(_longest(away - own), _longest(speeds), root, distance, distance / duration)
+    return Travel(_longest(carried), _longest(speeds), root, distance, distance / duration)
 
 
 def _root(clip: Clip, depth: Floats) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim import arrays
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.errors import FormatError, ShapeError
 
 
@@ -47,6 +47,14 @@ class Skeleton:
     def label(self, node: int) -> str:
         """Return how messages call a node: "node 7 'hip'"."""
         return f"node {node} '{self.names[node]}'" if self.names[node] else f"node {node}"
+
+    def below(self, node: int) -> Bools:
+        """Return which nodes (N,) are `node` or hang on it."""
+        found = np.zeros(len(self.parents), np.bool_)
+        found[node] = True
+        for level in self.levels()[1:]:
+            found[level] |= found[self.parents[level]]
+        return found
 
     def levels(self) -> list[Ints]:
         """Return the nodes of each depth, roots first: children never come before their parents.

@@ -111,7 +111,7 @@ def _restore(
     before: Floats,
     after: Floats,
 ) -> None:
-    """Keys that were there keep what they had, to the bit, where nothing had to be turned round."""
+    """Keys that were there keep what they had, to the bit but for signs; on the side of a cut the tangent is new."""
     assert track.in_tangents is not None
     assert track.out_tangents is not None
     at = np.searchsorted(track.times, times[exact])
@@ -119,5 +119,6 @@ def _restore(
     if track.kind is Kind.ROTATION:
         signs = np.where(quaternion.dot(values[exact], track.values[at]) < 0, -1.0, 1.0)
     values[exact] = track.values[at] * signs[:, None]
-    before[exact] = track.in_tangents[at] * signs[:, None]
-    after[exact] = track.out_tangents[at] * signs[:, None]
+    whole_before, whole_after = exact & np.insert(exact[:-1], 0, False), exact & np.append(exact[1:], False)
+    before[whole_before] = (track.in_tangents[at] * signs[:, None])[whole_before[exact]]
+    after[whole_after] = (track.out_tangents[at] * signs[:, None])[whole_after[exact]]

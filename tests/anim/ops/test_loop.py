@@ -1,0 +1,101 @@
+"""Loops: what kind a clip is, and that closing it leaves no seam."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fixtures
+from anim.errors import RangeError
+from anim.gltf import read
+from anim.maths import quaternion
+from anim.measure.loop import LoopKind, best_ranges
+from anim.measure.loop import loop as judged
+from anim.measure.travel import traveling_root
+from anim.model import Clip, Skeleton, Track
+from anim.ops.loop import loop, with_last_frame
+from anim.ops.trim import trim
+from anim.sampling.slopes import rates
+from anim.sampling.track import sample
+from tests.anim.ops.tracks import TRACKS
+from tests.files import opened
+
+
+def _walk() -> tuple[Skeleton, Clip]:
+    document = opened(fixtures.build("biped"))
+    return read.skeleton(document), next(clip for clip in read.clips(document) if clip.name == "walk")
+
+
+SKELETON, WALK = _walk()
+
+
+def test_the_walk_is_closed() -> None:
+    assert judged(SKELETON, WALK).kind is LoopKind.CLOSED
+
+
+def test_without_its_last_frame_it_is_open_by_one() -> None:
+    cut = trim(WALK, end=23 / 24)
+    found = judged(SKELETON, cut)
+    assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
+    closed = with_last_frame(cut, fps=found.fps)
+    assert closed.end == pytest.approx(1.0, abs=1e-6)
+    assert judged(SKELETON, closed).kind is LoopKind.CLOSED
+    assert judged(SKELETON, closed).seam < 1e-6
+
+
+def test_half_a_walk_is_no_loop() -> None:
+    assert judged(SKELETON, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
+
+
+def test_blend_closes_it() -> None:
+    half = trim(WALK, end=0.5)
+    closed = loop(half, blend=0.25)
+    assert judged(SKELETON, closed).seam < 1e-9
+    early = np.linspace(0, 0.24, 50)
+    for old, new in zip(half.tracks, closed.tracks, strict=True):
+        np.testing.assert_allclose(sample(new, early), sample(old, early), atol=1e-9)
+
+
+@pytest.mark.parametrize("key", ["cubic", "turning", "linear", "slerp", "step"])
+def test_ends_meet_in_value_and_splines_in_speed(key: str) -> None:
+    new = loop(Clip("", (TRACKS[key],)), blend=1.0).tracks[0]
+    first, last = sample(new, np.array([0.0, 3.0]))
+    assert min(np.abs(first - last).max(), np.abs(first + last).max()) < 1e-9
+    if key in ("cubic", "turning"):
+        start, end = rates(new, np.array([0.0]), before=False), rates(new, np.array([3.0]), before=True)
+        np.testing.assert_allclose(end, start, atol=0.05 * np.abs(start).max() if key == "turning" else 1e-9)
+
+
+def test_blend_longer_than_the_clip_is_refused() -> None:
+    with pytest.raises(RangeError, match="blend"):
+        loop(WALK, blend=1.5)
+
+
+def test_the_best_part_of_two_walks_is_one_walk() -> None:
+    twice = Clip("", tuple(Track(t.node, t.path, t.interpolation, _lap(t.times), _again(t)) for t in WALK.tracks))
+    best = best_ranges(SKELETON, twice, shortest=0.8)[0]
+    assert best.end - best.start == pytest.approx(1.0, abs=1e-3)
+    assert best.seam < 1e-4
+
+
+def test_a_root_that_walks_on_travels_and_one_that_sways_does_not() -> None:
+    assert traveling_root(SKELETON, WALK) == -1
+    hips = next(i for i, t in enumerate(WALK.tracks) if t.path == "translation")
+    track = WALK.tracks[hips]
+    on = track.values + np.array([0, 0, 1.4]) * track.times[:, None]
+    moved = Track(track.node, track.path, track.interpolation, track.times, on)
+    walking = Clip("", (*WALK.tracks[:hips], moved, *WALK.tracks[hips + 1 :]))
+    root = traveling_root(SKELETON, walking)
+    assert root == track.node
+    found = judged(SKELETON, walking, root=root)
+    assert found.kind is LoopKind.CLOSED
+    assert found.travel == pytest.approx(1.4, abs=1e-6)
+
+
+def _lap(times: np.ndarray) -> np.ndarray:
+    return times if len(times) == 1 else np.concatenate((times, times[1:] + 1.0))
+
+
+def _again(track: Track) -> np.ndarray:
+    values = track.values if len(track.times) == 1 else np.concatenate((track.values, track.values[1:]))
+    return quaternion.align_signs(values) if track.path == "rotation" else values

@@ -1,0 +1,28 @@
+"""Fixtures for all tests: real files of others, which lie beside the repository or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.files import ASSETS, BAD_INPUTS, SHARED
+
+
+@pytest.fixture(scope="session")
+def asset() -> Callable[[str], Path]:
+    """The path of a file in shared/assets by its name there; skips the test where it is absent."""
+    return lambda name: _found(ASSETS / name)
+
+
+@pytest.fixture(scope="session")
+def bad_input() -> Callable[[str], Path]:
+    """The path of a file in shared/bad-inputs by its name there; skips the test where it is absent."""
+    return lambda name: _found(BAD_INPUTS / name)
+
+
+def _found(path: Path) -> Path:
+    if not path.is_file():
+        pytest.skip(f"{path.relative_to(SHARED.parent)} is not there")
+    return path
