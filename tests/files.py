@@ -10,8 +10,9 @@ import numpy as np
 
 import fixtures
 from anim.errors import FormatError
-from anim.gltf import container
+from anim.gltf import container, read
 from anim.gltf.document import Bytes, Document
+from anim.model import Clip
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 ASSETS = SHARED / "assets"
@@ -81,3 +82,8 @@ def _on_disk(path: Path) -> Bytes:
     if not path.is_file():
         raise FormatError(f"'{path.name}' is not beside the file")
     return np.fromfile(path, np.uint8)
+
+
+def clips_of(data: bytes) -> tuple[Clip, ...]:
+    """Return the clips in the bytes of a file that needs no other."""
+    return read.clips(opened(data))

@@ -45,11 +45,11 @@ def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> Ro
         raise RangeError(f"'{easing.name}' jumps (expected a continuous ease; write STEP keys)")
     turn = quat.rotation_vector(quat.multiply(quat.conjugate(q0), q1))
     angle = float(np.sqrt(turn @ turn))
-    ends, rate0, rate1, error = _turn_pieces(easing, float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP, tolerance)
+    ends, rate0, rate1, error = turn_pieces(easing, float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP, tolerance)
     if angle > 0:
         error = _error(easing, angle, ends, rate0, rate1)
     if error > tolerance:
-        ends, rate0, rate1, error = _turn_pieces(easing, angle, tolerance)
+        ends, rate0, rate1, error = turn_pieces(easing, angle, tolerance)
     rotations = quat.multiply(q0, quat.from_rotation_vector(easing.value(ends)[:, None] * turn))
     rotations[0], rotations[-1] = q0, q1 if quat.dot(q0, q1) >= 0 else -q1
     in_tangents = quat.derivative(rotations, np.append(0.0, rate1)[:, None] * turn)
@@ -57,8 +57,27 @@ def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> Ro
     return RotationKeys(ends, rotations, in_tangents, out_tangents, error)
 
 
+@dataclass(frozen=True, slots=True)
+class TurnPieces:
+    """Cubics for turns of up to one angle: key u (P + 1,), rates e′ (P,) at which pieces leave and arrive, and error.
+
+    Tangents per u are ½ q ⊗ (rate · turn). error: the greatest angle in radians off the eased turn.
+    """
+
+    u: Floats
+    leaving: Floats
+    arriving: Floats
+    error: float
+
+
+def turn_pieces_for(easing: Easing, angle: float, tolerance: float) -> TurnPieces:
+    """Return the fewest cubics for a turn by `angle` radians; turns up to the next multiple of π/32 share one fit."""
+    rounded = float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP
+    return TurnPieces(*turn_pieces(easing, rounded, tolerance))
+
+
 @lru_cache(maxsize=1024)
-def _turn_pieces(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
+def turn_pieces(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
     """Return key u (K,), the rates e′ (K − 1,) at which pieces leave and arrive, and the angle that they are off."""
     edges = (0.0, *easing.breakpoints, 1.0)
     if angle == 0:

@@ -118,7 +118,9 @@ class _Job:
     def _motion(self, track: Track, inside: Bools) -> tuple[refine.Motion, Floats, float]:
         """The eased track as functions of time, with the times where it is not smooth, and how near to follow it."""
         allowed, speed = self._allowed(track, inside)
-        cubics = cubic_pieces(self.easing, tolerance=max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE))
+        near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
+        near = 2.0 ** math.floor(math.log2(near))  # few different fits for many tracks
+        cubics = cubic_pieces(self.easing, tolerance=max(near, MIN_TOLERANCE))
         breaks = np.array([p.start for p in cubics[1:]])
         starts, durations = track.times[:-1][inside], np.diff(track.times)[inside]
         corners = np.concatenate((track.times, (starts[:, None] + durations[:, None] * breaks).reshape(-1)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.curves.ease import Easing, Piece, evaluate
 from anim.curves.easing import EASINGS
 from anim.curves.fit import cubic_pieces
-from anim.curves.fit_rotation import fit_rotation
+from anim.curves.fit_rotation import ANGLE_STEP, TurnPieces, turn_pieces_for
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Kind, Track
 from anim.ops.assemble import JUMP, Pieces, joined
@@ -25,12 +26,15 @@ def eased_pieces(track: Track, inside: Bools, easing: Easing, tolerance: float, 
 
     tolerance: share of a piece's range, where the ease is not cubic. angle_tolerance: radians, for rotations.
     """
-    if track.kind is Kind.ROTATION:
-        q = quaternion.normalize(track.values)
-        eases = (easing if eased else EASINGS["linear"] for eased in inside.tolist())
-        return joined([_turn(track, q, k, each, angle_tolerance) for k, each in enumerate(eases)])
-    cubics = cubic_pieces(easing, tolerance=tolerance)
-    return joined([_move(track, k, cubics if eased else LINE) for k, eased in enumerate(inside.tolist())])
+    parts = []
+    for which, each in ((np.flatnonzero(inside), easing), (np.flatnonzero(~inside), EASINGS["linear"])):
+        if not len(which):
+            continue
+        if track.kind is Kind.ROTATION:
+            parts += _turns(track, which, each, angle_tolerance)
+        else:
+            parts.append(_moves(track, which, cubic_pieces(each, tolerance=tolerance)))
+    return _in_order(joined(parts))
 
 
 def stepped_pieces(track: Track, inside: Bools, easing: Easing, *, angle_tolerance: float) -> Pieces:
@@ -97,35 +101,60 @@ def _columns(cubics: Sequence[Piece]) -> Floats:
     return np.array([(p.start, p.end, p.value0, p.value1, p.slope0, p.slope1) for p in cubics])
 
 
-def _move(track: Track, k: int, cubics: Sequence[Piece]) -> Pieces:
-    duration, way = track.times[k + 1] - track.times[k], track.values[k + 1] - track.values[k]
+def _moves(track: Track, left: Ints, cubics: Sequence[Piece]) -> Pieces:
+    """The pieces left → left + 1 (S,) of a vector track, each as these cubics."""
+    duration = (track.times[left + 1] - track.times[left])[:, None]
+    start, way = track.values[left][:, None], (track.values[left + 1] - track.values[left])[:, None]
     rows = _columns(cubics)
-    at = track.times[k] + duration * rows[:, :2]
-    value = track.values[k] + rows[:, 2:4, None] * way
-    slope = rows[:, 4:, None] * (way / duration)
-    value[0, 0], value[-1, 1], at[-1, 1] = track.values[k], track.values[k + 1], track.times[k + 1]
-    return Pieces(at[:, 0], at[:, 1], value[:, 0], value[:, 1], slope[:, 0], slope[:, 1])
+    at = track.times[left][:, None, None] + duration[..., None] * rows[:, :2]
+    value = start[:, None] + rows[:, 2:4].T[None, :, :, None] * way[:, None]  # (S, 2, P, C)
+    slope = rows[:, 4:].T[None, :, :, None] * (way / duration[..., None])[:, None]
+    value[:, 0, 0], value[:, 1, -1], at[:, -1, 1] = track.values[left], track.values[left + 1], track.times[left + 1]
+    flat = (each.reshape(-1, value.shape[-1]) for each in (value[:, 0], value[:, 1], slope[:, 0], slope[:, 1]))
+    return Pieces(at[..., 0].reshape(-1), at[..., 1].reshape(-1), *flat)
 
 
-def _turn(track: Track, q: Floats, k: int, easing: Easing, tolerance: float) -> Pieces:
-    duration = track.times[k + 1] - track.times[k]
-    keys = fit_rotation(q[k], q[k + 1], easing, tolerance)
-    at = track.times[k] + duration * keys.u
-    at[-1] = track.times[k + 1]
-    r, leaving, arriving = keys.rotations, keys.out_tangents / duration, keys.in_tangents / duration
-    return Pieces(at[:-1], at[1:], r[:-1], r[1:], leaving[:-1], arriving[1:])
+def _turns(track: Track, left: Ints, easing: Easing, tolerance: float) -> list[Pieces]:
+    """The pieces left → left + 1 (S,) of a rotation track, each turned along its own arc; like angles share a fit."""
+    q = quaternion.normalize(track.values)
+    turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(q[left]), q[left + 1]))
+    angle = np.sqrt((turn * turn).sum(axis=1))
+    shared = np.ceil(angle / ANGLE_STEP)
+    parts = []
+    for group in (np.flatnonzero(shared == each) for each in sorted(set(shared.tolist()))):
+        fitted = turn_pieces_for(easing, float(angle[group].max()), tolerance)
+        parts.append(_turned(track, q, left[group], turn[group], easing.value(fitted.u), fitted))
+    return parts
+
+
+def _turned(track: Track, q: Floats, left: Ints, turn: Floats, shares: Floats, fitted: TurnPieces) -> Pieces:
+    duration = (track.times[left + 1] - track.times[left])[:, None]
+    at = track.times[left][:, None] + duration * fitted.u
+    at[:, -1] = track.times[left + 1]
+    r = quaternion.multiply(q[left][:, None], quaternion.from_rotation_vector(shares[:, None] * turn[:, None]))
+    speed = (turn / duration)[:, None]
+    leaving = quaternion.derivative(r[:, :-1], fitted.leaving[:, None] * speed)
+    arriving = quaternion.derivative(r[:, 1:], fitted.arriving[:, None] * speed)
+    values = (each.reshape(-1, 4) for each in (r[:, :-1], r[:, 1:], leaving, arriving))
+    return Pieces(at[:, :-1].reshape(-1), at[:, 1:].reshape(-1), *values)
+
+
+def _in_order(pieces: Pieces) -> Pieces:
+    order = np.argsort(pieces.start, kind="stable")
+    return Pieces(*(getattr(pieces, each.name)[order] for each in fields(Pieces)))
 
 
 def _unchanged(track: Track, k: int, angle_tolerance: float) -> Pieces:
     if track.interpolation is Interpolation.LINEAR:
+        here = np.array([k])
         if track.kind is Kind.ROTATION:
-            return _turn(track, quaternion.normalize(track.values), k, EASINGS["linear"], angle_tolerance)
-        return _move(track, k, LINE)
+            return _turns(track, here, EASINGS["linear"], angle_tolerance)[0]
+        return _moves(track, here, LINE)
     assert track.in_tangents is not None
     assert track.out_tangents is not None
-    here, there = slice(k, k + 1), slice(k + 1, k + 2)
-    ends = (track.times[here], track.times[there], track.values[here], track.values[there])
-    return Pieces(*ends, track.out_tangents[here], track.in_tangents[there])
+    a, b = slice(k, k + 1), slice(k + 1, k + 2)
+    ends = (track.times[a], track.times[b], track.values[a], track.values[b])
+    return Pieces(*ends, track.out_tangents[a], track.in_tangents[b])
 
 
 def _still(start: Floats, end: Floats, value0: Floats, value1: Floats) -> Pieces:

@@ -54,12 +54,19 @@ def warp(
         raise RangeError(f"the range from {first:g} s to {last:g} s is empty")
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     new = []
+    corners: dict[
+        tuple[int, tuple[Piece, ...]], Floats
+    ] = {}  # tracks on one time axis under one map share the search for keys
     for i, track in enumerate(clip.tracks):
-        if i not in chosen or len(track.times) == 1:
+        if i not in chosen or len(track.times) == 1 or not _moves(track):
             new.append(track)
             continue
         allowed = angle_tolerance if track.kind is Kind.ROTATION else tolerance * _extent(track)
-        new.append(_warped(track, _map(track, easing, first, last, allowed), allowed))
+        times = _map(track, easing, first, last, allowed)
+        key = (id(track.times), times.cubics)
+        if key not in corners:
+            corners[key] = times.reaching(track.times)
+        new.append(_warped(track, times, corners[key], allowed))
     return Clip(clip.name, tuple(new))
 
 
@@ -106,16 +113,18 @@ def _map(track: Track, easing: Easing, start: float, end: float, allowed: float)
     """The map for one track: an ease that is no cubic is followed so closely that its error stays half of `allowed`."""
     if track.interpolation is Interpolation.STEP:
         return TimeMap(cubic_pieces(easing, tolerance=TOLERANCE), easing.value, start, end)
-    speeds = [
-        piece.fastest(track, np.array([k])) / (track.times[k + 1] - track.times[k]) for k in range(len(track.times) - 1)
-    ]
-    near = allowed / 2 / max(max(speeds) * (end - start), allowed)
+    near = allowed / 2 / max(piece.fastest_per_second(track) * (end - start), allowed)
+    near = 2.0 ** math.floor(math.log2(max(near, MIN_TOLERANCE)))  # few different fits for many tracks
     cubics = cubic_pieces(easing, tolerance=max(near, MIN_TOLERANCE))
     return TimeMap(cubics, lambda u: evaluate(cubics, u), start, end)
 
 
-def _warped(track: Track, times: TimeMap, allowed: float) -> Track:
-    corners = times.reaching(track.times)
+def _moves(track: Track) -> bool:
+    changes = (track.values != track.values[0]).any()
+    return bool(changes) or (track.in_tangents is not None and piece.fastest_per_second(track) > 0)
+
+
+def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float) -> Track:
     old = times.old(corners)
     inside = (old >= track.times[0] - 1e-9) & (old <= track.times[-1] + 1e-9)
     corners = corners[inside | np.append(inside[1:], False) | np.insert(inside[:-1], 0, False)]

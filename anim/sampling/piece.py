@@ -52,6 +52,14 @@ def fastest(track: Track, pieces: Ints) -> float:
     return float(np.sqrt((found * found).sum(axis=1)).max(initial=0.0))
 
 
+def fastest_per_second(track: Track) -> float:
+    """Return the greatest rate of change of the track per second: length of the vector, or angular speed in rad/s."""
+    left = np.repeat(np.arange(len(track.times) - 1), len(_SHARES))
+    found = rates(track, left, np.tile(_SHARES, len(track.times) - 1))
+    duration = track.times[left + 1] - track.times[left]
+    return float((np.sqrt((found * found).sum(axis=1)) / duration).max(initial=0.0))
+
+
 _SHARES = np.linspace(0, 1, 9)
 
 

@@ -1,0 +1,45 @@
+"""Running the command line in this process, and the files that its tests take."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import fixtures
+from cli import main
+from tests.cli.running import Run
+
+Call = Callable[..., Run]
+Find = Callable[[str], Path]  # `asset` and `bad_input` of tests/conftest.py
+Fixture = Callable[[str], Path]
+
+
+@pytest.fixture
+def call(capsysbinary: pytest.CaptureFixture[bytes], monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Run one command line in this process: call("convert", path, "-", stdin=b"") → Run."""
+
+    def called(*args: str | Path, stdin: bytes = b"") -> Run:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin)))
+        capsysbinary.readouterr()
+        code = main.run([str(arg) for arg in args])
+        out, err = capsysbinary.readouterr()
+        return Run(code, out, err.decode())
+
+    return called
+
+
+@pytest.fixture
+def fixture(tmp_path: Path) -> Fixture:
+    """Write a fixture with what lies beside it into the test's folder, and give its path."""
+
+    def written(name: str) -> Path:
+        files = fixtures.build_files(name)
+        for file, data in files.items():
+            (tmp_path / file).write_bytes(data)
+        return tmp_path / next(iter(files))
+
+    return written

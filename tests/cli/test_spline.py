@@ -1,0 +1,35 @@
+"""`gltf-anim spline`: the files that it writes, and what it says."""
+
+from __future__ import annotations
+
+from anim.curves.tangents import TANGENTS
+from anim.model import Interpolation
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import refusal
+from tests.files import clips_of
+
+
+def test_list_shows_every_rule(call: Call) -> None:
+    names = {line.split()[0] for line in call("spline", "--list").text.splitlines() if line.strip()}
+    assert set(TANGENTS) <= names
+
+
+def test_keys_stay_and_become_splines(call: Call, fixture: Fixture) -> None:
+    path = fixture("biped")
+    before, after = clips_of(path.read_bytes())[0], clips_of(call("spline", path, "--clip", "walk", "-q").product())[0]
+    for old, new in zip(before.tracks, after.tracks, strict=True):
+        assert new.interpolation is Interpolation.CUBICSPLINE
+        assert len(new.times) == len(old.times)
+
+
+def test_an_approximating_rule_says_how_far_keys_move(call: Call, fixture: Fixture) -> None:
+    assert "keys move by up to" in call("spline", fixture("biped"), "-", "--tangents", "bspline").err
+    assert "keys move" not in call("spline", fixture("biped"), "-", "--tangents", "natural").err
+
+
+def test_says_how_far_the_motion_moved(call: Call, fixture: Fixture) -> None:
+    assert "max " in call("spline", fixture("biped"), "-").err.splitlines()[-1]
+
+
+def test_unknown_rule_is_refused(call: Call, fixture: Fixture) -> None:
+    assert "'catmul-rom'" in refusal(call("spline", fixture("biped"), "--tangents", "catmul-rom"), 2)

@@ -1,0 +1,28 @@
+"""`gltf-anim trim`: the part that it keeps."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import refusal
+from tests.files import clips_of
+
+
+@pytest.mark.parametrize(
+    ("options", "start", "end"),
+    [
+        (["--from", "0.25", "--to", "0.8"], 0.25, 0.8),
+        (["--from", "0.25", "--to", "0.8", "--rebase"], 0, 0.55),
+        (["--to", "0.5"], 0, 0.5),
+        (["--from", "0.5", "--to", "9"], 0.5, 1),
+    ],
+)
+def test_seconds(call: Call, fixture: Fixture, options: list[str], start: float, end: float) -> None:
+    clip = clips_of(call("trim", fixture("biped"), "--clip", "walk", "-q", *options).product())[0]
+    assert (clip.start, clip.end) == pytest.approx((start, end), abs=1e-6)
+
+
+@pytest.mark.parametrize(("options", "words"), [([], "nothing to cut"), (["--from", "8"], "nothing between")])
+def test_refusals(call: Call, fixture: Fixture, options: list[str], words: str) -> None:
+    assert words in refusal(call("trim", fixture("biped"), *options), 2)
