@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Interpolation, Kind, Track
+from anim.sampling.times import apart
 
 JUMP = 1e-6  # s; a jump takes at least this long, so that it does not become a denormal number near 0 s
 SAME = 1e-9  # of the largest value; where pieces meet nearer than this they meet
@@ -47,7 +48,7 @@ def spline_track(track: Track, pieces: Pieces) -> Track:
     jumps = _jumps(pieces)
     if len(jumps):
         times, values, before, after = _with_jumps(jumps, pieces, times, values, before, after)
-    kept = _apart(times)
+    kept = apart(times)
     in_tangents = before[kept]
     return replace(
         track,
@@ -70,7 +71,7 @@ def step_track(track: Track, pieces: Pieces) -> Track:
 
 def held(track: Track, times: Floats, values: Floats, interpolation: Interpolation) -> Track:
     """Return `track` with these keys and no tangents; keys too near for float32 go."""
-    kept = _apart(times)
+    kept = apart(times)
     return replace(
         track,
         interpolation=interpolation,
@@ -120,15 +121,3 @@ def _with_jumps(
         np.insert(before, at, arriving, axis=0),
         np.insert(after, at, still, axis=0),
     )
-
-
-def _apart(times: Floats) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Numbers of the keys to keep so that float32 times increase: the first, the last, and what is apart from both."""
-    stored = times.astype(np.float32)
-    kept = [0]
-    for i in range(1, len(times)):
-        if stored[i] > stored[kept[-1]]:
-            kept.append(i)
-        elif i == len(times) - 1 and len(kept) > 1:
-            kept[-1] = i
-    return np.array(kept)

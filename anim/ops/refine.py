@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import hermite, quaternion
+from anim.sampling.times import apart
 
 SAMPLES = np.array([0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97])  # of a piece; errors hide at ½
 WIDEST_TURN = np.radians(120)  # of one piece: beyond, players and splines of quaternions go wrong
@@ -76,7 +77,8 @@ def _halved(motion: Motion, corners: Floats, tolerance: float, between: Between)
         middle = (start[bad] + end[bad]) / 2
         done.append(middle)
         start, end = np.concatenate((start[bad], middle)), np.concatenate((middle, end[bad]))
-    return np.sort(np.concatenate(done))
+    times = np.sort(np.concatenate(done))
+    return times[apart(times)]
 
 
 def _off(motion: Motion, start: Floats, end: Floats, between: Between) -> Floats:

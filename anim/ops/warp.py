@@ -19,6 +19,7 @@ from anim.ops.assemble import held
 from anim.ops.eased import slope
 from anim.sampling import piece
 from anim.sampling.slopes import rates
+from anim.sampling.times import apart
 from anim.sampling.track import sample
 
 TOLERANCE = 1e-3  # of a track's range, where no cubic is exact
@@ -65,7 +66,8 @@ def warp(
         times = _map(track, easing, first, last, allowed)
         key = (id(track.times), times.cubics)
         if key not in corners:
-            corners[key] = times.reaching(track.times)
+            reached = times.reaching(track.times)
+            corners[key] = reached[apart(reached)]
         new.append(_warped(track, times, corners[key], allowed))
     return Clip(clip.name, tuple(new))
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from anim import arrays
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 
 SLIVER = 1e-3  # frames; a last step shorter than this is float32 rounding of the end, not a frame
@@ -38,3 +38,20 @@ def grid(start: float, end: float, *, fps: float) -> Floats:
 def key_times(seconds: Floats) -> Floats:
     """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
     return arrays.sorted_unique(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64))
+
+
+def apart(seconds: Floats) -> Ints:
+    """Return the numbers of the times (K,), not decreasing, to keep so that they increase as float32.
+
+    The first and the last stay; of times that fall together the first does, at the end the last.
+    """
+    stored = seconds.astype(np.float32)
+    if len(stored) < 2 or (np.diff(stored) > 0).all():
+        return np.arange(len(stored))
+    kept = [0]
+    for i in range(1, len(stored)):
+        if stored[i] > stored[kept[-1]]:
+            kept.append(i)
+        elif i == len(stored) - 1 and len(kept) > 1:
+            kept[-1] = i
+    return np.array(kept)
