@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -11,12 +11,16 @@ import typer
 
 from anim.errors import AnimError
 from anim.gltf import read
+from anim.measure.continuity import continuity as continuity_of
+from anim.measure.findings import Finding, Severity
 from anim.measure.inspect import Facts
 from anim.measure.inspect import inspect as facts_of
 from anim.ops.selection import Selection
 from cli import errors, inspection, options, streams, tables
+from cli.inspection import Smoothness
 
 SCHEMA = 1
+LOST = "put it there, or mend the URI"
 
 
 class Format(StrEnum):
@@ -29,13 +33,16 @@ class Format(StrEnum):
 
 def inspect(
     inputs: Annotated[
-        list[str] | None, typer.Argument(metavar="[FILE]...", help="Files, '-' for stdin.", show_default=False)
+        list[str] | None, typer.Argument(metavar="FILE", help="Files, '-' for stdin.", show_default=False)
     ] = None,
     *,
     format: Annotated[
         Format, typer.Option("--format", help="Text to read, or one JSON or CSV document.")
     ] = Format.TEXT,
     tracks: Annotated[bool, typer.Option("--tracks", help="List every track, not only clips.")] = False,
+    continuity: Annotated[
+        bool, typer.Option("--continuity", help="Say how smooth every track is at its keys: jumps, C0, G1, C1, C2.")
+    ] = False,
     clip: options.Clips = None,
     quiet: options.Quiet = False,
 ) -> int:
@@ -45,38 +52,62 @@ def inspect(
     tracks that do nothing, keys that say nothing, the seam of a loop, the speed of the root. Per skin: joints,
     influences, weights. Below: findings, with what to do. With several files a bad one is reported and the others go
     on; the exit code is the worst.
+
+    --continuity counts, per track, the keys between its ends by what jumps there: the value (jump), the speed (C0, or
+    G1 where the direction goes on), the acceleration (C1), or nothing (C2), and names the largest jump of each.
     """
     del quiet
     selection = Selection(clip or ())
     worst = 0
     done: list[tuple[str, int, Facts]] = []
+    smooth: list[Smoothness] = []
     for path in inputs or [streams.PIPE]:
         try:
-            done.append(_inspected(path, selection, tracks=tracks))
+            inspected, tracks_of_clips = _inspected(path, selection, tracks=tracks, continuity=continuity)
+            done.append(inspected)
+            smooth.append(tracks_of_clips)
         except AnimError as error:
             if len(inputs or ()) < 2:
                 raise
             worst = max(worst, errors.reported(error))
     if format is Format.JSON:
-        streams.write_text(_json(done))
+        streams.write_text(_json(done, smooth))
     elif format is Format.CSV:
-        header, rows = inspection.track_rows(done) if tracks else inspection.clip_rows(done)
+        if continuity:
+            header, rows = inspection.continuity_rows(done, smooth)
+        else:
+            header, rows = inspection.track_rows(done) if tracks else inspection.clip_rows(done)
         streams.write_text(tables.comma_separated(header, rows))
     else:
         for i, (name, size, facts) in enumerate(done):
-            streams.write_text(("\n" if i else "") + inspection.page(name, size, facts, tracks=tracks))
+            page = inspection.page(name, size, facts, smooth[i], tracks=tracks)
+            streams.write_text(("\n" if i else "") + page)
     return worst
 
 
-def _inspected(path: str, selection: Selection, *, tracks: bool) -> tuple[str, int, Facts]:
+def _inspected(
+    path: str, selection: Selection, *, tracks: bool, continuity: bool
+) -> tuple[tuple[str, int, Facts], Smoothness]:
     with streams.source(path) as source:
         chosen = selection.chosen_clips(read.names(source.document)) if selection.clips else None
         facts = facts_of(source.document, file_bytes=source.size, chosen=chosen, tracks=tracks)
-        return source.name, source.size, facts
+        lost = (
+            Finding("missing-file", Severity.WARNING, *each, LOST)
+            for each in streams.missing(source.document, source.folder)
+        )
+        facts = replace(facts, findings=(*facts.findings, *lost))
+        smooth: Smoothness = ()
+        if continuity:
+            clips, skeleton = read.clips(source.document), read.skeleton(source.document)
+            smooth = tuple(continuity_of(clips[each.index], skeleton) for each in facts.clips)
+        return (source.name, source.size, facts), smooth
 
 
-def _json(done: list[tuple[str, int, Facts]]) -> str:
+def _json(done: list[tuple[str, int, Facts]], smooth: list[Smoothness]) -> str:
     files = [{"file": name, "bytes": size, **_plain(asdict(facts))} for name, size, facts in done]
+    for file, of_clips in zip(files, smooth, strict=True):
+        for clip, tracks in zip(file["clips"], of_clips, strict=False):
+            clip["continuity"] = [inspection.continuity_json(track) for track in tracks]
     return json.dumps({"schema": SCHEMA, "files": files}, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
 

@@ -1,0 +1,1 @@
+"""Pictures: values in, the bytes of a figure out."""

@@ -1,0 +1,149 @@
+"""A sheet of panels, laid out in inches from its top left corner, and its bytes as PNG or SVG.
+
+One look for all pictures: ink on white, hairlines instead of boxes, words beside what they name, and colors that
+people with color-blind eyes tell apart (Okabe & Ito 2008), of which x, y, z get the usual red, green, blue.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from anim.errors import RangeError, UnsupportedError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = ("png", "svg")
+INK, SOFT, HAIR, FAINT, PAPER = "#1f2328", "#6a737d", "#c9ced4", "#eceef1", "#ffffff"
+COLORS = ("#d55e00", "#009e73", "#0072b2", "#cc79a7", "#e69f00", "#56b4e9", "#8a6d00", "#7a7f87")
+ACCENT = "#0072b2"
+SPEED = "#4b5563"
+DPI = 110
+TITLE, TEXT, SMALL = 10.0, 8.5, 7.5  # points
+LINE = 1.5
+POINTS = 72  # per inch
+
+_STYLE: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Helvetica Neue", "Arial"],
+    "font.size": TEXT,
+    "text.color": INK,
+    "text.hinting": "no_hinting",  # hinted strokes make bold letters uneven
+    "axes.unicode_minus": True,
+    "axes.linewidth": 0.6,
+    "lines.solid_capstyle": "round",
+    "lines.solid_joinstyle": "round",
+    "svg.fonttype": "none",  # text stays text: it can be searched, and is drawn in the reader's own sharpness
+    "svg.hashsalt": "gltf-anim",
+    "path.simplify": True,
+    "agg.path.chunksize": 0,
+}
+INSTALL = "pip install 'gltf-anim[plot]'"
+
+
+class Sheet:
+    """A figure of fixed size in inches; x and y count from its top left corner."""
+
+    def __init__(self, width: float, height: float) -> None:
+        from matplotlib.figure import Figure
+
+        self.width, self.height = width, height
+        self.figure = Figure(figsize=(width, height), dpi=DPI, facecolor=PAPER)
+
+    def panel(self, x: float, y: float, width: float, height: float) -> Axes:
+        """Return new axes with hairlines at the ticks of y and nothing else; its top left corner lies at x, y."""
+        rect = (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height)
+        axes = self.figure.add_axes(rect)
+        axes.set_facecolor("none")
+        for side in ("top", "left", "right"):
+            axes.spines[side].set_visible(False)
+        axes.spines["bottom"].set_color(HAIR)
+        axes.grid(axis="y", color=FAINT, linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.tick_params(axis="both", length=0, labelsize=SMALL, labelcolor=SOFT, color=HAIR, pad=4)
+        return axes
+
+    def text(self, x: float, y: float, words: str, **style: Any) -> float:
+        """Write words whose first baseline lies at x, y, and return their width in inches."""
+        style = {"fontsize": TEXT, "va": "baseline", "ha": "left", "parse_math": False, **style}
+        self.figure.text(x / self.width, 1 - y / self.height, words, **style)
+        return text_width(words, style["fontsize"], style.get("weight", "normal"))
+
+    def line(self, x: Sequence[float], y: Sequence[float], **style: Any) -> None:
+        """Draw a line through points of the sheet."""
+        from matplotlib.lines import Line2D
+
+        across = [each / self.width for each in x]
+        down = [1 - each / self.height for each in y]
+        self.figure.add_artist(Line2D(across, down, **style))
+
+    def render(self, kind: str) -> bytes:
+        """Return the figure as a file, the same bytes every time: no date, no program version, fixed names inside."""
+        out = io.BytesIO()
+        metadata = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
+        self.figure.savefig(out, format=kind, dpi=DPI, metadata=metadata, facecolor=PAPER)
+        return out.getvalue()
+
+
+@contextmanager
+def style(kind: str) -> Iterator[None]:
+    """Draw inside in the house style, whatever the user's matplotlibrc says.
+
+    kind: "png" or "svg", RangeError for another. Raises UnsupportedError where matplotlib is not installed.
+    """
+    if kind not in FORMATS:
+        raise RangeError(f"format is '{kind}' (expected {' or '.join(FORMATS)})")
+    try:
+        import matplotlib
+    except ImportError:
+        raise UnsupportedError("pictures need matplotlib, which is not installed", help=INSTALL) from None
+    defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if not name.startswith("backend")}
+    with matplotlib.rc_context({**defaults, **_STYLE}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)  # names in all scripts
+        yield
+
+
+def text_width(words: str, points: float, weight: str = "normal") -> float:
+    """Return how wide words are in the style's font, in inches."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(weight=weight, size=points)
+    width, _, _ = text_to_path.get_text_width_height_descent(words, font, ismath=False)
+    return float(width) / POINTS
+
+
+def short(number: float) -> str:
+    """Return a number with three digits, never in the form 1e+02: "0.0123", "12.3", "1230"."""
+    return f"{float(f'{number:.3g}'):.12f}".rstrip("0").rstrip(".").replace("-", "−")
+
+
+def spread(places: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+    """Return places moved apart to at least `gap`, as little as that takes, within low … high where they fit.
+
+    spread([1, 1, 5], 2, 0, 9) → [0, 2, 5]
+    """
+    order = sorted(range(len(places)), key=lambda i: places[i])
+    groups: list[list[float]] = []  # middle of each group of labels that touch, and how many they are
+    for i in order:
+        groups.append([places[i], 1])
+        while True:
+            middle, count = groups[-1]
+            half = gap * (count - 1) / 2
+            groups[-1][0] = middle = min(max(middle, low + half), max(high - half, low + half))
+            if len(groups) == 1 or groups[-2][0] + gap * (groups[-2][1] - 1) / 2 + gap <= middle - half + 1e-9:
+                break
+            other = groups.pop(-2)
+            total = other[1] + count
+            groups[-1] = [(other[0] * other[1] + middle * count) / total, total]
+    result = [0.0] * len(places)
+    at = 0
+    for middle, count in groups:
+        for k in range(int(count)):
+            result[order[at]] = middle + gap * (k - (count - 1) / 2)
+            at += 1
+    return result

@@ -1,0 +1,161 @@
+"""`gltf-anim plot`: see the curves of tracks, of eases, and of tangent rules."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import PurePath
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from anim.arrays import Floats
+from anim.curves.easing import parse
+from anim.ops.selection import Selection
+from anim.show import plot as tracks
+from anim.show.chosen import Chosen, choose
+from anim.show.chosen import compare as compared
+from anim.show.eases import eases
+from anim.show.through import through as curves_through
+from cli import options, streams
+from cli.errors import UsageError
+from cli.report import Voice, plural
+
+
+class Format(StrEnum):
+    """What the picture is written as."""
+
+    PNG = "png"
+    SVG = "svg"
+
+
+def plot(
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[IN] [OUT]",
+            help="A .glb or .gltf file and a .png or .svg file, '-' for pipes. With --ease or --through only OUT.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    compare: Annotated[
+        str | None, typer.Option("--compare", metavar="FILE", help="Draw the same tracks of a second file on top.")
+    ] = None,
+    ease: Annotated[
+        list[str] | None, typer.Option("--ease", metavar="NAME", help="Draw this ease instead; may be repeated.")
+    ] = None,
+    through: Annotated[
+        str | None,
+        typer.Option("--through", metavar="LIST", help="Draw curves through values, 0,0.9,0.2,1, or time:value pairs."),
+    ] = None,
+    tangents: Annotated[
+        list[str] | None,
+        typer.Option("--tangents", metavar="NAME", help="Rule for --through, also linear and step; may be repeated."),
+    ] = None,
+    format: Annotated[
+        Format | None, typer.Option("--format", help="Default: by OUT's ending, else png.", show_default=False)
+    ] = None,
+    limit: Annotated[int, typer.Option("--limit", metavar="N", help="At most so many tracks.")] = tracks.LIMIT,
+    clip: options.Clips = None,
+    node: options.Nodes = None,
+    path: options.Paths = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """See the curves of tracks, of eases, and of tangent rules.
+
+    Tracks: values with their keys and tangent handles, and the speed below; a rotation also as the angle from its first
+    key. Tracks that never move are left out where others do. --compare draws a second file over the first, matched by
+    clip, node and path, and how far they are apart.
+
+    --ease draws eases side by side: f(t), f′(t), and the tempo as evenly timed dots. --through draws curves through
+    values, one second apart unless given as time:value, with their overshoot, and says how smooth each rule is.
+    Same input and options, same bytes. Needs matplotlib: pip install 'gltf-anim[plot]'.
+    """
+    voice = Voice(quiet)
+    if ease and through is not None:
+        raise UsageError("--ease and --through exclude each other")
+    if tangents and through is None:
+        raise UsageError("--tangents needs --through (expected values for the curve to go through)")
+    alone = bool(ease) or through is not None
+    if alone and (compare is not None or clip or node or path):
+        raise UsageError("--clip, --node, --path and --compare need tracks, but --ease and --through read no file")
+    source, output = _places(files or [], alone=alone)
+    kind = _format(format, output)
+    streams.check_output(output)
+    if ease:
+        picture = eases([parse(name) for name in ease], kind=kind)
+    elif through is not None:
+        times, values = _keys(through)
+        picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
+    else:
+        picture = _tracks(source, Selection(clip or (), node or (), path or ()), compare, kind, limit, voice)
+    streams.write_bytes([np.frombuffer(picture, np.uint8)], output)
+
+
+def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
+    """Input and output; one file alone is the input, or the output where there is no input."""
+    most = 1 if alone else 2
+    if len(files) > most:
+        raise UsageError(f"{len(files)} files are named (expected {'OUT' if alone else 'IN and OUT'})")
+    if alone:
+        return "", files[0] if files else streams.PIPE
+    return (files[0] if files else streams.PIPE), (files[1] if len(files) > 1 else streams.PIPE)
+
+
+def _format(chosen: Format | None, output: str) -> str:
+    ending = PurePath(output).suffix.lower().lstrip(".")
+    if chosen is not None:
+        return chosen.value
+    if output == streams.PIPE:
+        return Format.PNG.value
+    if ending not in list(Format):
+        raise UsageError(f"{output}: is no .png or .svg file", help="name OUT so, or say --format png or svg")
+    return ending
+
+
+def _keys(text: str) -> tuple[Floats, Floats]:
+    """Times and values of "0,0.9,0.2,1" or "0:0,0.5:0.9,2:1"."""
+    pairs = [part.rpartition(":") for part in text.split(",")]
+    timed = {bool(colon) for _, colon, _ in pairs}
+    try:
+        values = np.array([float(value) for _, _, value in pairs])
+        times = np.array([float(time) if colon else float(i) for i, (time, colon, _) in enumerate(pairs)])
+    except ValueError:
+        raise UsageError(f"--through can't read '{text}' (expected 0,0.9,0.2,1 or time:value,…)") from None
+    if len(timed) > 1 or len(values) < 2:
+        raise UsageError(f"--through has '{text}' (expected two or more values, all of them with a time or none)")
+    return times, values
+
+
+def _tracks(source: str, selection: Selection, other: str | None, kind: str, limit: int, voice: Voice) -> bytes:
+    if limit < 1:
+        raise UsageError(f"--limit is {limit} (expected 1 or more)")
+    if source == other == streams.PIPE:
+        raise UsageError("IN and --compare can't both be stdin")
+    names = None
+    with streams.source(source) as opened:
+        chosen, name = choose(opened.document, selection, limit=limit), opened.name
+    if other is not None:
+        with streams.source(other) as opened:
+            chosen, alone = compared(chosen, opened.document)
+        names = tracks.Names(PurePath(name).name, PurePath(opened.name).name)
+        if alone:
+            voice.say(f"note: {plural(alone, 'track')} of {name} {'is' if alone == 1 else 'are'} not in {opened.name}")
+    _say_left_out(chosen, voice)
+    title = PurePath(name).stem
+    clips = {each.clip for each in chosen.shown}
+    title = f"{title}: {clips.pop()}" if len(clips) == 1 else title
+    return tracks.plot(chosen.shown, title=title, kind=kind, names=names, note=_count(chosen))
+
+
+def _count(chosen: Chosen) -> str:
+    return f"{len(chosen.shown)} of {plural(len(chosen.shown) + chosen.more, 'track')}" if chosen.more else ""
+
+
+def _say_left_out(chosen: Chosen, voice: Voice) -> None:
+    if chosen.more:
+        voice.say(
+            f"note: drew the first {len(chosen.shown)} of {len(chosen.shown) + chosen.more} tracks that move; choose "
+            "with --clip, --node and --path, or raise --limit"
+        )
