@@ -14,14 +14,16 @@ from enum import Enum
 from typing import Any
 
 import typer
+from typer import TyperException
 
 
 class Plain:
     """Converts the value of one parameter: what typer asks of its own converters."""
 
-    def __init__(self, kind: type, *, many: bool) -> None:
+    def __init__(self, kind: type, *, many: bool, limits: tuple[float | None, float | None] = (None, None)) -> None:
         self._kind = kind
         self._many = many
+        self._least, self._most = limits
 
     def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
         """Return `value` as the parameter's type, a list where it may be repeated; None stays None."""
@@ -40,26 +42,55 @@ class Plain:
             raise typer.BadParameter(_refusal(value, self._kind), ctx=ctx, param=param) from None
         if isinstance(converted, float) and not math.isfinite(converted):
             raise typer.BadParameter(f"'{value}' is no finite number", ctx=ctx, param=param)
+        if self._least is not None and converted < self._least:
+            raise typer.BadParameter(f"{value} is too small (expected at least {self._least:g})", ctx=ctx, param=param)
+        if self._most is not None and converted > self._most:
+            raise typer.BadParameter(f"{value} is too large (expected at most {self._most:g})", ctx=ctx, param=param)
         return converted
 
 
 def quicken(command: Any) -> Any:
-    """Return the command, its parameters of plain types, and its --help, made to convert themselves."""
+    """Return the command, its parameters of plain types, and its --help, made to convert themselves.
+
+    What --help says of their types is made plain too, and every refusal knows which command it is about.
+    """
     for param in command.params:
         _quickened(param)
-    help_option = command.get_help_option
+    help_option, parse = command.get_help_option, command.parse_args
     command.get_help_option = lambda ctx: _quickened(help_option(ctx))
+    command.parse_args = lambda ctx, args: _parsed(parse, ctx, args)
     return command
 
 
+def _parsed(parse: Any, ctx: Any, args: list[str]) -> Any:
+    try:
+        return parse(ctx, args)
+    except TyperException as error:
+        if getattr(error, "ctx", None) is None:
+            error.ctx = ctx  # type: ignore[attr-defined]
+        raise
+
+
 def _quickened(param: Any) -> Any:
-    plain = _plain(getattr(getattr(param, "type_descriptor", None), "annotation", None))
-    if plain is not None:
-        param.get_runtime_param = lambda: plain
+    descriptor = getattr(param, "type_descriptor", None)
+    plain = _plain(descriptor) if descriptor is not None else None
+    if plain is None:
+        return param
+    shown = param.display_type_rich
+    is_argument = param.param_type_name == "argument"
+    param.get_runtime_param = lambda: plain
+    param.display_type_rich = lambda ctx: "" if is_argument else _type_shown(shown(ctx))
     return param
 
 
-def _plain(annotation: Any) -> Plain | None:
+def _type_shown(words: str) -> str:
+    """What --help calls a type: "<list[a|b]>" → "<a|b>", "<float>" → "N"."""
+    plain = words.replace("list[", "").replace("]", "")
+    return {"<str>": "TEXT", "<int>": "N", "<float>": "N"}.get(plain, plain)
+
+
+def _plain(descriptor: Any) -> Plain | None:
+    annotation, about = descriptor.annotation, descriptor.parameter_info
     kinds = [annotation]
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
         kinds = [kind for kind in typing.get_args(annotation) if kind is not type(None)]
@@ -69,7 +100,7 @@ def _plain(annotation: Any) -> Plain | None:
     if typing.get_origin(kind) is list:
         kind, many = typing.get_args(kind)[0], True
     known = isinstance(kind, type) and (kind in (str, int, float, bool) or issubclass(kind, Enum))
-    return Plain(kind, many=many) if known else None
+    return Plain(kind, many=many, limits=(about.min, about.max)) if known and not about.clamp else None
 
 
 def _refusal(value: str, kind: type) -> str:

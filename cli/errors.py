@@ -10,6 +10,7 @@ from typing import Any
 from typer import TyperException
 
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
+from cli.tables import one_line
 
 PROGRAM = "gltf-anim"
 DONE, BUG, USAGE, FORMAT, UNSUPPORTED, NOT_FOUND, CHECK = range(7)
@@ -42,7 +43,7 @@ def guarded(job: Callable[[], Any]) -> int:
     except AnimError as error:
         return reported(error)
     except TyperException as error:
-        _say(_usage(error), "")
+        _say(*_usage(error))
         return USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -64,17 +65,29 @@ def reported(error: AnimError) -> int:
     return code
 
 
-def _usage(error: TyperException) -> str:
+def _usage(error: TyperException) -> tuple[str, str]:
+    """What is wrong with the command line, in our words, and what to do about it."""
     context = getattr(error, "ctx", None)
     command = getattr(context, "info_name", None)
-    words = " ".join(error.format_message().split())
-    words = words[:1].lower() + words[1:].rstrip()
+    near = getattr(error, "possibilities", None) or ()
+    words = " ".join((error.args[0] if near else error.format_message()).split())
+    words, found, suggestion = words.partition("Did you mean")
     at = f"{command}: " if command and command != PROGRAM else ""
-    hint = f" (see '{getattr(context, 'command_path', PROGRAM)} --help')"
-    return at + words.rstrip(".") + hint
+    problem = at + words[:1].lower() + words[1:].rstrip(" .")
+    if found:
+        return problem, f"did you mean{suggestion}"
+    if near:
+        return problem, f"did you mean {' or '.join(repr(each) for each in sorted(near))}?"
+    if getattr(error, "option_name", "") in ("-o", "--out", "--output") and _has_output(context):
+        return problem, "the output is the second name, without an option: IN OUT"
+    return problem, f"{getattr(context, 'command_path', PROGRAM)} --help"
+
+
+def _has_output(context: Any) -> bool:
+    return any(param.name == "output" for param in context.command.params)
 
 
 def _say(problem: str, hint: str) -> None:
-    sys.stderr.write(f"{PROGRAM}: {problem}\n")
+    sys.stderr.write(f"{PROGRAM}: {one_line(problem)}\n")
     if hint:
-        sys.stderr.write(f"help: {hint}\n")
+        sys.stderr.write(f"help: {one_line(hint)}\n")

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 from anim.measure.continuity import Grade, Largest, Seam, TrackContinuity
+from anim.measure.facts import ClipFacts, Facts, SkinFacts, TrackFacts
 from anim.measure.findings import Finding
-from anim.measure.inspect import ClipFacts, Facts, SkinFacts, TrackFacts
 from cli import tables
 from cli.report import length, plural, size, speed
 from cli.tables import Cell

@@ -6,8 +6,8 @@ import mmap
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from anim.gltf.document import Bytes, Document, items
 from cli.errors import UsageError
 
 PIPE = "-"
+OTHERS = frozenset((".bin", ".bvh", ".csv", ".dae", ".fbx", ".json", ".npz", ".obj", ".usd", ".usda", ".usdc", ".usdz"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +35,24 @@ class Source:
 @contextmanager
 def source(path: str) -> Iterator[Source]:
     """Give the document at `path`, "-" for stdin; errors raised inside name the input."""
-    name = "stdin" if path == PIPE else path
+    name = _called(path)
     try:
         data = _stdin() if path == PIPE else _mapped(Path(path))
         folder = None if path == PIPE else Path(path).parent
         document = container.read(data, None if folder is None else lambda address: _beside(folder, address))
         yield Source(document, name, len(data) + _external_size(document), folder)
+    except UsageError:
+        raise
+    except AnimError as error:
+        raise error.at(name, ": ") from None
+
+
+@contextmanager
+def content(path: str) -> Iterator[tuple[Bytes, str]]:
+    """Give the bytes at `path`, "-" for stdin, and what messages call them; errors raised inside name the input."""
+    name = _called(path)
+    try:
+        yield _stdin() if path == PIPE else _mapped(Path(path)), name
     except UsageError:
         raise
     except AnimError as error:
@@ -58,8 +71,8 @@ def write(document: Document, path: str, beside: Path | None, *, dry_run: bool =
         files = container.gltf(document, target.stem, keep_external=same_folder)
         pieces = {target.parent / name: content for name, content in files.items()}
         if not dry_run:
-            for file, content in pieces.items():
-                _replace(target if file.suffix == ".gltf" and file.stem == target.stem else file, content)
+            own = target.with_suffix(".gltf")  # x.GLTF stays that
+            _replace_all({target if file == own else file: content for file, content in pieces.items()})
         return sum(len(piece) for content in pieces.values() for piece in content)
     content = container.glb(document)
     if not dry_run:
@@ -70,31 +83,38 @@ def write(document: Document, path: str, beside: Path | None, *, dry_run: bool =
 def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
     """Write pieces to a file, whole or not at all, or to stdout for "-"; never binary to a terminal."""
     if path == PIPE:
-        if sys.stdout.isatty():
-            raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
-        out = sys.stdout.buffer
-        for piece in pieces:
-            out.write(piece.data)
-        out.flush()
+        _no_terminal()
+        _to_stdout(pieces)
     else:
         _replace(Path(path), list(pieces))
 
 
 def write_text(text: str, path: str = PIPE) -> None:
-    """Write a text product to a file, whole or not at all, or to stdout."""
+    """Write a text product to a file, whole or not at all, or to stdout: UTF-8 whatever the locale.
+
+    Half a surrogate pair, which JSON names can hold and UTF-8 can't, becomes \\ud83d: what JSON itself calls it.
+    """
+    content = np.frombuffer(text.encode(errors="backslashreplace"), np.uint8)
     if path == PIPE:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+        _to_stdout([content])
     else:
-        _replace(Path(path), [np.frombuffer(text.encode(), np.uint8)])
+        _replace(Path(path), [content])
 
 
 def check_output(path: str) -> None:
-    """Raise UsageError at once, before any work, where `path` can't be written."""
+    """Raise UsageError at once, before any work, where a glTF can't be written to `path`."""
     if path == PIPE:
-        if sys.stdout.isatty():
-            raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
-        return
+        _no_terminal()
+    else:
+        check_file(path)
+        if (ending := Path(path).suffix.lower()) in OTHERS:
+            raise UsageError(f"{path}: glTF is no {ending} (expected .glb or .gltf)")
+
+
+def check_file(path: str) -> None:
+    """Raise UsageError at once, before any work, where no file can be written at `path`."""
+    if not path:
+        raise UsageError("the output has an empty name")
     target = Path(path)
     if target.is_dir():
         raise UsageError(f"{path}: is a folder (expected a file name)")
@@ -102,13 +122,40 @@ def check_output(path: str) -> None:
         raise UsageError(f"{path}: there is no folder '{target.parent}'")
 
 
+def _called(path: str) -> str:
+    """What messages call an input."""
+    return "stdin" if path == PIPE else path or "''"
+
+
+def _no_terminal() -> None:
+    if sys.stdout is not None and sys.stdout.isatty():
+        raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
+
+
+def _to_stdout(pieces: Iterable[Bytes]) -> None:
+    if sys.stdout is None:
+        raise UsageError("stdout is closed", help="name an output file")
+    out = sys.stdout.buffer
+    try:
+        for piece in pieces:
+            out.write(piece.data)
+        out.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or what is left fails once more at exit
+        raise UsageError(f"stdout: can't be written ({(error.strerror or str(error)).lower()})") from None
+
+
 def _stdin() -> Bytes:
+    if sys.stdin is None:
+        raise UsageError("stdin is closed: name a file, or pipe a GLB into stdin")
     if sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a GLB into stdin")
     return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
 
 
 def _mapped(path: Path) -> Bytes:
+    if path.is_dir():
+        raise FormatError("is a folder", help=f"name the files: {path}/*.glb")
     try:
         with path.open("rb") as file:
             if not path.is_file() or os.fstat(file.fileno()).st_size == 0:
@@ -119,17 +166,23 @@ def _mapped(path: Path) -> Bytes:
 
 
 def _beside(folder: Path, address: str) -> Bytes:
-    """Bytes of a file in or below the folder; links that lead out of it are refused."""
+    """Bytes of a file in or below the folder."""
+    path = _place(folder, address)
+    try:
+        return _mapped(path)
+    except FormatError as error:
+        raise error.at(f"'{address}'", " ") from None
+
+
+def _place(folder: Path, address: str) -> Path:
+    """Where a file in or below the folder lies; links that lead out of it are refused."""
     path = folder / address
     root = folder.resolve()
     if root not in path.resolve().parents:
         raise FormatError(f"'{address}' leads out of the file's folder (only files beside it are read)")
     if not path.exists():
         raise FormatError(f"'{address}' is not beside the file", help=f"put it into '{folder}'")
-    try:
-        return _mapped(path)
-    except FormatError as error:
-        raise error.at(f"'{address}'", " ") from None
+    return path
 
 
 def _external_size(document: Document) -> int:
@@ -137,33 +190,38 @@ def _external_size(document: Document) -> int:
 
 
 def _replace(path: Path, pieces: list[Bytes]) -> None:
-    """Write a temporary neighbour and rename it over `path`, unless the bytes are there already."""
-    path = Path(os.path.realpath(path))
+    _replace_all({path: pieces})
+
+
+def _replace_all(files: Mapping[Path, list[Bytes]]) -> None:
+    """Write temporary neighbours and rename them, once all are whole, over files whose bytes differ."""
+    waiting: dict[Path, str] = {}
+    named = next(iter(files))
     try:
-        if path.exists() and not path.is_file():  # /dev/null, a named pipe
-            with path.open("wb") as file:
-                file.writelines(piece.data for piece in pieces)
-            return
-        if _is_same(path, pieces):
-            return
-        _write_neighbor(path, pieces)
+        for named, pieces in files.items():
+            path = Path(os.path.realpath(named))
+            if path.exists() and not os.access(path, os.W_OK):
+                raise UsageError(f"{named}: is read-only")
+            if path.exists() and not path.is_file():  # /dev/null, a named pipe
+                with path.open("wb") as file:
+                    file.writelines(piece.data for piece in pieces)
+            elif not _is_same(path, pieces):
+                handle, waiting[path] = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+                with os.fdopen(handle, "wb") as file:
+                    file.writelines(piece.data for piece in pieces)
+                os.chmod(waiting[path], mode_of(path))
+        for path, temporary in waiting.items():
+            os.replace(temporary, path)
     except OSError as error:
-        raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
+        raise UsageError(f"{named}: can't be written ({(error.strerror or str(error)).lower()})") from None
+    finally:
+        for temporary in waiting.values():
+            with suppress(FileNotFoundError):
+                os.unlink(temporary)
 
 
-def _write_neighbor(path: Path, pieces: list[Bytes]) -> None:
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.writelines(piece.data for piece in pieces)
-        os.chmod(temporary, _mode(path))
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
-
-
-def _mode(path: Path) -> int:
+def mode_of(path: Path) -> int:
+    """Return the permissions that a file at `path` has or would get."""
     if path.exists():
         return path.stat().st_mode & 0o7777
     umask = os.umask(0)
@@ -176,6 +234,19 @@ def _is_same(path: Path, pieces: list[Bytes]) -> bool:
         return False
     with path.open("rb") as file:
         return all(file.read(len(piece)) == piece.tobytes() for piece in pieces)
+
+
+def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:
+    """Yield place and problem of every buffer and image that can't be found from the input's folder."""
+    for kind in ("buffer", "image"):
+        for i, about in enumerate(items(document.json, f"{kind}s")):
+            address = about.get("uri")
+            if folder is None or address is None or uri.is_data(address):
+                continue
+            try:
+                _place(folder, uri.relative_path(address))
+            except FormatError as error:
+                yield f"{kind} {i}", error.problem
 
 
 def stays_in(folder: Path | None, output: str) -> bool:

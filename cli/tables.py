@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Sequence
 
@@ -26,6 +25,8 @@ def text(header: Sequence[str], rows: Sequence[Sequence[Cell]], *, left: int = 1
 
 def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
     """Return one CSV table with a header line; empty cells for None, "true" and "false" for booleans."""
+    import csv
+
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)
@@ -34,9 +35,16 @@ def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> st
     return out.getvalue()
 
 
+def one_line(words: str) -> str:
+    """Return words as they can be shown to a person: line breaks and terminal codes of a name become \\n, \\x1b."""
+    if words.isprintable():
+        return words
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
+
+
 def _shown(cell: Cell) -> str:
     if cell is None or cell is False:
         return ""
     if cell is True:
         return "yes"
-    return f"{cell:g}" if isinstance(cell, float) else str(cell)
+    return f"{cell:g}" if isinstance(cell, float) else one_line(str(cell))

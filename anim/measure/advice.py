@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING
 
+from anim.measure.facts import ClipFacts, SkinFacts
 from anim.measure.findings import Finding, Severity
-
-if TYPE_CHECKING:
-    from anim.measure.inspect import ClipFacts, SkinFacts
 
 MANY_INFLUENCES = 4  # what most players evaluate per vertex
 IRREGULAR = 0.9  # share of keys on the grid below which a rate is no rate
@@ -44,7 +41,7 @@ def of_skins(skins: Iterable[SkinFacts]) -> Iterator[Finding]:
             yield Finding("many-influences", Severity.WARNING, where, problem, "many players use the first four only")
 
 
-_Rule = tuple[str, Severity, "Callable[[ClipFacts], int]", str, str]
+_Rule = tuple[str, Severity, Callable[[ClipFacts], int], str, str]
 
 _CLIP_RULES: tuple[_Rule, ...] = (
     (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,101 +13,11 @@ from anim.gltf import read
 from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document, items
 from anim.measure import advice, findings, footprint, rate, travel
+from anim.measure.facts import ClipFacts, Facts, SkinFacts, TrackFacts
 from anim.measure.findings import Finding
 from anim.measure.tracks import TrackStats, stats
 from anim.model import Clip, Scene, Skeleton, Track
 from anim.model.scene import Instance
-
-
-@dataclass(frozen=True, slots=True)
-class TrackFacts:
-    """One track: what it moves, its keys, and what they tell (see `measure.tracks`)."""
-
-    target: str
-    path: str
-    interpolation: str
-    keys: int
-    start_s: float
-    end_s: float
-    constant: bool
-    no_effect: bool
-    redundant_keys: int
-    non_unit_keys: int
-    sign_flips: int
-    wide_steps: int
-    widest_step_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class ClipFacts:
-    """One clip. duration_s: from its first to its last key; players count from 0 to end_s.
-
-    frame_rate_fps, frame_rate_regular: the estimate and the share of keys on its grid; None where it is open.
-    data_bytes, json_bytes, share: what it costs, and that as a share of the file; what clips share counts in each.
-    seam_m, seam_speed_m_per_s: from end to start, the root's way taken off; root_*: that way.
-    """
-
-    index: int
-    name: str
-    start_s: float
-    end_s: float
-    duration_s: float
-    tracks: dict[str, int]
-    interpolations: dict[str, int]
-    keys: int
-    frame_rate_fps: float | None
-    frame_rate_regular: float | None
-    data_bytes: int
-    json_bytes: int
-    share: float
-    constant_tracks: int
-    no_effect_tracks: int
-    redundant_keys: int
-    non_unit_rotations: int
-    sign_flips: int
-    wide_steps: int
-    widest_step_rad: float
-    seam_m: float
-    seam_speed_m_per_s: float
-    root: str
-    root_distance_m: float
-    root_speed_m_per_s: float
-    track_list: tuple[TrackFacts, ...] = field(default=(), repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class SkinFacts:
-    """One skin on the meshes that use it; None where their vertices can't be read.
-
-    unused_joints: neither carry a vertex nor have a joint below them that does. most_influences: of any vertex.
-    off_sums: vertices whose weights don't sum to 1, and by how much at worst.
-    """
-
-    index: int
-    name: str
-    joints: int
-    vertices: int | None
-    unused_joints: int | None
-    most_influences: int | None
-    mean_influences: float | None
-    off_sums: int | None
-    worst_sum_error: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """A whole file. animation_data_bytes and animation_json_bytes count what clips share once."""
-
-    generator: str
-    extensions_used: tuple[str, ...]
-    nodes: int
-    meshes: int
-    vertices: int | None
-    animation_data_bytes: int
-    animation_json_bytes: int
-    clips: tuple[ClipFacts, ...]
-    skins: tuple[SkinFacts, ...]
-    findings: tuple[Finding, ...]
 
 
 def inspect(document: Document, *, file_bytes: int, chosen: Iterable[int] | None = None, tracks: bool = False) -> Facts:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -100,15 +100,7 @@ class _Job:
 
     def _followed(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        keys = refine.cubic_keys(motion, corners, tolerance=tolerance)
-        return replace(
-            track,
-            interpolation=Interpolation.CUBICSPLINE,
-            times=keys.times,
-            values=keys.values,
-            in_tangents=keys.in_tangents,
-            out_tangents=keys.out_tangents,
-        )
+        return refine.spline_track(track, refine.cubic_keys(motion, corners, tolerance=tolerance))
 
     def _sampled(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import hermite, quaternion
+from anim.model import Interpolation, Track
 from anim.sampling.times import apart
 
 SAMPLES = np.array([0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97])  # of a piece; errors hide at ½
@@ -39,6 +40,18 @@ class Keys:
     values: Floats
     in_tangents: Floats
     out_tangents: Floats
+
+
+def spline_track(track: Track, keys: Keys) -> Track:
+    """Return `track` with these keys as CUBICSPLINE."""
+    return replace(
+        track,
+        interpolation=Interpolation.CUBICSPLINE,
+        times=keys.times,
+        values=keys.values,
+        in_tangents=keys.in_tangents,
+        out_tangents=keys.out_tangents,
+    )
 
 
 def cubic_keys(motion: Motion, corners: Floats, *, tolerance: float) -> Keys:

@@ -134,15 +134,7 @@ def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float) -> Tr
         values = sample(track, times.old(np.append((corners[:-1] + corners[1:]) / 2, corners[-1])))
         return _without_repeats(held(track, corners, values, Interpolation.STEP))
     motion = _motion(track, times)
-    keys = refine.cubic_keys(motion, corners, tolerance=allowed / 2)
-    return replace(
-        track,
-        interpolation=Interpolation.CUBICSPLINE,
-        times=keys.times,
-        values=keys.values,
-        in_tangents=keys.in_tangents,
-        out_tangents=keys.out_tangents,
-    )
+    return refine.spline_track(track, refine.cubic_keys(motion, corners, tolerance=allowed / 2))
 
 
 def _motion(track: Track, times: TimeMap) -> refine.Motion:

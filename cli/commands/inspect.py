@@ -12,8 +12,8 @@ import typer
 from anim.errors import AnimError
 from anim.gltf import read
 from anim.measure.continuity import continuity as continuity_of
+from anim.measure.facts import Facts
 from anim.measure.findings import Finding, Severity
-from anim.measure.inspect import Facts
 from anim.measure.inspect import inspect as facts_of
 from anim.ops.selection import Selection
 from cli import errors, inspection, options, streams, tables

@@ -12,6 +12,7 @@ import numpy as np
 import typer
 
 from anim.arrays import Floats, sorted_unique
+from anim.errors import NotFoundError
 from anim.gltf import read
 from anim.model import Clip, Skeleton
 from anim.ops.selection import Selection
@@ -58,7 +59,7 @@ def sample(
         Space, typer.Option("--space", help="local: in the parent's space. world: in the scene's.")
     ] = Space.LOCAL,
     format: Annotated[
-        Format | None, typer.Option("--format", help="Default: by OUT's ending, else json.", show_default=False)
+        Format | None, typer.Option("--format", help="Default: by OUT's ending; json for '-'.", show_default=False)
     ] = None,
     clip: options.Clips = None,
     node: options.Nodes = None,
@@ -71,7 +72,11 @@ def sample(
     """
     if at and fps is not None:
         raise UsageError("--at and --fps exclude each other")
+    if fps is not None and fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     chosen_format = format or _format_of(output)
+    if output != streams.PIPE:
+        streams.check_file(output)
     with streams.source(input) as source:
         document = source.document
         selection = Selection(clip or (), node or ())
@@ -93,7 +98,11 @@ Taken = list[tuple[int, Clip, Sampled]]
 
 def _format_of(output: str) -> Format:
     ending = PurePath(output).suffix.lower().lstrip(".")
-    return Format(ending) if ending in list(Format) else Format.JSON
+    if not ending:  # stdout, a named pipe
+        return Format.JSON
+    if ending not in list(Format):
+        raise UsageError(f"{output}: no format is called .{ending} (expected .json, .csv or .npz)", help="or --format")
+    return Format(ending)
 
 
 def _times(clip: Clip, at: list[float] | None, fps: float | None) -> Floats:
@@ -133,7 +142,7 @@ def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], _: Space) -> str:
     rows: list[list[tables.Cell]] = []
     for number, clip, poses in taken:
         joined = np.concatenate((poses.translation, poses.rotation, poses.scale), axis=2)
-        for f, time in enumerate(poses.times.tolist()):
+        for f, time in enumerate(_short(poses.times)):
             rows += [[clip.name or str(number), time, i, skeleton.names[i], *_short(joined[f, i])] for i in nodes]
     return tables.comma_separated(header, rows)
 
@@ -144,6 +153,8 @@ def _short(values: Floats) -> list[float]:
 
 
 def _npz(taken: Taken, skeleton: Skeleton, nodes: list[int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    if not taken:
+        raise NotFoundError("there is no clip")
     if len(taken) != 1:
         raise UsageError(f"NPZ holds one clip, but {len(taken)} are chosen", help="choose one with --clip")
     _, clip, poses = taken[0]

@@ -1,0 +1,114 @@
+"""Where a character's soles are, and how far a motion must be moved for them to stand on the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.maths import matrix
+from anim.model import Instance, Scene
+from anim.sampling import rest, world_matrices
+
+LOWEST = 5.0  # percentile of the lowest point's height that is taken for the floor
+DOWN = 0.03  # share of the height that the lowest point may be above it while a foot is down
+WINDOW, STEP = 0.1, 1 / 120  # s
+DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+
+
+@dataclass(frozen=True, slots=True)
+class Soles:
+    """Points fixed to foot joints: nodes (P,), points (P, 3) in the node's space. floor: world height at rest."""
+
+    nodes: Ints
+    points: Floats
+    floor: float
+
+    def heights(self, world: Floats) -> Floats:
+        """Return the height (F, P) of each point under world matrices (F, N, 3, 4)."""
+        mine = world[:, self.nodes]
+        return np.asarray((mine[:, :, 1, :3] * self.points).sum(axis=-1) + mine[:, :, 1, 3])
+
+
+def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> Soles:
+    """Return the outermost points of the skin on feet and toes, and where the floor is: the lowest of all at rest.
+
+    positions: (N, 3) of all nodes at rest. roles: (role, node). Without skin there, the joints themselves; without
+    feet, all nodes.
+    """
+    world = world_matrices(scene.skeleton, rest(scene.skeleton))[0]
+    feet = {node for role, node in roles if role.endswith(("foot", "toe"))}
+    below = {node for node in range(len(scene.skeleton)) if _is_below(scene, node, feet)} or set(range(len(world)))
+    nodes, points, lowest = list[int](), list[Floats](), [float(positions[sorted(below), 1].min())]
+    for instance in scene.instances:
+        if instance.skin is None or not instance.mesh.joints.shape[1]:
+            continue
+        placed, holder = _placed(instance, world)
+        lowest.append(float(placed[:, 1].min()))
+        for node in sorted(below):
+            mine = placed[holder == node]
+            if len(mine):
+                outer = mine[np.unique((mine @ DIRECTIONS.T).argmax(axis=0))]
+                nodes += [node] * len(outer)
+                points.append(outer)
+    if not nodes:
+        nodes, points = sorted(below), [positions[sorted(below)]]
+    numbers = np.array(nodes, np.int64)
+    return Soles(numbers, _in_space_of(world[numbers], np.concatenate(points)), min(lowest))
+
+
+def heights_above_contact(times: Floats, source: Floats, target: Floats, floor: float, scale: float) -> Floats:
+    """Return by how much the target stands too high (F,), in metres, smooth in time.
+
+    While a foot of the source is down, the target's lowest sole belongs as far above its floor as the source's lowest
+    node is above the ground, times scale; in between, while it jumps, what is too high at take-off goes over into what
+    is too high at landing.
+    times: (F,) s. source: heights (F, N) of the source's nodes. target: heights (F, P) of the target's soles; floor:
+    of its rest.
+    """
+    lowest = source.min(axis=1)
+    ground = float(np.percentile(lowest, LOWEST))
+    height = float(np.median(np.ptp(source, axis=1))) or 1.0
+    down = lowest - ground <= DOWN * height
+    above = target.min(axis=1) - floor - scale * np.maximum(lowest - ground, 0.0)
+    return _smoothed(times, np.interp(times, times[down], above[down]))
+
+
+def _smoothed(times: Floats, values: Floats) -> Floats:
+    """Values (F,) under a Hann window of WINDOW seconds, ends held."""
+    count = int(np.ceil((times[-1] - times[0]) / STEP)) + 1
+    if count < 3:
+        return values
+    half = round(WINDOW / STEP / 2)
+    grid = times[0] + STEP * np.arange(-half, count + half)
+    window = np.hanning(2 * half + 3)[1:-1]
+    even = np.convolve(np.interp(grid, times, values), window / window.sum(), mode="valid")
+    return np.interp(times, grid[half : half + len(even)], even)
+
+
+def _placed(instance: Instance, world: Floats) -> tuple[Floats, Ints]:
+    """Vertices (V, 3) of a skinned mesh at rest, and the node (V,) that holds each most."""
+    assert instance.skin is not None
+    mesh, skin = instance.mesh, instance.skin
+    moves = matrix.multiply(world[skin.joints], skin.inverse_bind)
+    rows = np.einsum("vi,vijk->vjk", mesh.weights, moves[mesh.joints])
+    placed = (rows[:, :, :3] @ mesh.positions[:, :, None])[:, :, 0] + rows[:, :, 3]
+    most = mesh.joints[np.arange(len(placed)), mesh.weights.argmax(axis=1)]
+    return placed, skin.joints[most]
+
+
+def _is_below(scene: Scene, node: int, nodes: set[int]) -> bool:
+    """Whether a node is one of `nodes` or hangs below one."""
+    while node >= 0 and node not in nodes:
+        node = int(scene.skeleton.parents[node])
+    return node >= 0
+
+
+def _in_space_of(world: Floats, points: Floats) -> Floats:
+    whole = np.tile(np.eye(4), (len(world), 1, 1))
+    whole[:, :3] = world
+    inverse = np.linalg.inv(whole)
+    return np.asarray((inverse[:, :3, :3] @ points[:, :, None])[:, :, 0] + inverse[:, :3, 3])

@@ -1,0 +1,66 @@
+"""The formats of Euler tracks: by name, by file ending, and by their first bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from anim.errors import FormatError, RangeError
+from anim.exchange import bvh, csv, json
+from anim.exchange.bvh import BvhPosition
+from anim.exchange.convention import NOTHING, Stated
+from anim.exchange.motion import Convention, EulerMotion
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a reader may need to be told: the convention, and what BVH's position channels mean."""
+
+    stated: Stated = NOTHING
+    bvh_position: BvhPosition = BvhPosition.REPLACE
+
+
+@dataclass(frozen=True, slots=True)
+class TrackFormat:
+    """One format: bytes → motion and motion → bytes.
+
+    suffix: of its files. begins: whether these first bytes are of it, asked in the table's order.
+    has_units: whether lengths come out in metres; otherwise in the file's own, unknown unit.
+    """
+
+    suffix: str
+    read: Callable[[bytes, Reading], EulerMotion]
+    write: Callable[[EulerMotion, Convention], bytes]
+    begins: Callable[[bytes], bool]
+    has_units: bool
+
+
+def _read_bvh(data: bytes, reading: Reading) -> EulerMotion:
+    if reading.stated != NOTHING:
+        raise RangeError("a BVH says the order of every joint itself (no --order, --frame or --unit)")
+    return bvh.read(data, position=reading.bvh_position)
+
+
+TRACK_FORMATS = {
+    "bvh": TrackFormat(".bvh", _read_bvh, bvh.write, lambda head: head.upper().startswith(b"HIERARCHY"), False),
+    "json": TrackFormat(
+        ".json", lambda data, reading: json.read(data, reading.stated), json.write, lambda head: head[:1] == b"{", True
+    ),
+    "csv": TrackFormat(
+        ".csv", lambda data, reading: csv.read(data, reading.stated), csv.write, lambda head: b"," in head, True
+    ),
+}
+
+
+def of_path(path: str) -> TrackFormat | None:
+    """Return the format that a file's ending names, None where it names none."""
+    return next((each for each in TRACK_FORMATS.values() if path.lower().endswith(each.suffix)), None)
+
+
+def of_content(data: bytes) -> TrackFormat:
+    """Return the format of a file by its first bytes. Raises FormatError where it is none of them."""
+    head = data[:4096].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+    for each in TRACK_FORMATS.values():
+        if each.begins(head):
+            return each
+    raise FormatError(f"starts with {data[:12]!r} (expected {', '.join(TRACK_FORMATS)})" if data else "is empty")

@@ -1,0 +1,122 @@
+"""Where keys must stand so that what a player makes between them follows a path within a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints, sorted_unique
+from anim.errors import RangeError
+from anim.maths import quaternion
+
+MAX_TURN = np.radians(120)  # of a piece; beyond half a turn slerp goes the other way round
+MAX_TRAVEL = np.radians(360)  # of all axes in a piece before it is sampled, so that no turn hides between samples
+ROUNDING = 1e-4  # share of a piece that float32 times make it longer or shorter
+SAMPLES = np.arange(1, 16) / 16
+SAFETY = 1.02  # the greatest error lies between samples
+MOST_PIECES = 64  # that one piece is split into at a time
+MAX_KEYS = 2_000_000
+ROUNDS = 40
+
+Travel: TypeAlias = Callable[[Floats, Floats], Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A value (..., C) at any times (...) in seconds.
+
+    value(times, before): before asks for the value just before each time, where it jumps.
+    travel(a, b): a bound (B,) of how far its angles run in radians from a to b (B,); 0 for a path of no angles.
+    turns: whether values are unit quaternions, hence errors angles.
+    """
+
+    value: Callable[[Floats, bool], Floats]
+    travel: Travel
+    turns: bool
+
+
+def keys(path: Path, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
+    """Return key times (K,) and values (K, C) whose slerp, or lerp, follows the path within `tolerance`.
+
+    knots: (T,) float32-exact times between which the path is smooth; each one is a key. Where the value jumps, a key
+    stands at the float32 time just before too. No piece turns by more than 120°; signs are continuous.
+    tolerance: radians for rotations, the value's own unit otherwise; > 0.
+    XYZ (0, 0, 0) → (90°, 90°, 0) at 0.1° → 15 keys
+    Source: the chord of a piece of length h is off by about h² · α / 8, so an error e wants √(e / tolerance) pieces.
+    Raises RangeError for over two million keys.
+    """
+    times = _followed(path, knots, tolerance) if len(knots) > 1 else knots
+    values = path.value(times, False)
+    earlier = np.nextafter(times[1:].astype(np.float32), np.float32(0)).astype(np.float64)
+    arriving = path.value(times[1:], True)
+    jumps = np.flatnonzero((_distance(path, arriving, values[1:]) > 1e-7) & (earlier > times[:-1]))
+    times = np.insert(times, jumps + 1, earlier[jumps])
+    values = np.insert(values, jumps + 1, arriving[jumps], axis=0)
+    return times, quaternion.align_signs(values) if path.turns else values
+
+
+def _followed(path: Path, knots: Floats, tolerance: float) -> Floats:
+    a, b = _split(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL))
+    found = [knots]
+    for _ in range(ROUNDS):
+        found.append(a)
+        pieces = _wanted(path, a, b, tolerance)
+        again: Bools = (pieces > 1) & (_middle(a, b) > a) & (_middle(a, b) < b)
+        if not again.any():
+            break
+        if pieces[again].sum() + sum(map(len, found)) > MAX_KEYS:
+            raise RangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
+        a, b = _split(a[again], b[again], pieces[again])
+    return sorted_unique(np.concatenate(found))
+
+
+def _wanted(path: Path, a: Floats, b: Floats, tolerance: float) -> Ints:
+    """How many pieces (B,) each should become; 1 where it is good."""
+    u = np.concatenate(([0.0], SAMPLES, [1.0]))
+    at = a[:, None] + (b - a)[:, None] * u
+    at[:, -1] = b
+    values = path.value(at, False)
+    values[:, -1] = path.value(b, True)
+    start, end = values[:, :1], values[:, -1:]
+    if path.turns:
+        chord = quaternion.slerp(start, end, SAMPLES[None])
+        steps = quaternion.angle_between(values[:, 1:], values[:, :-1]).sum(axis=1)
+        turns = np.ceil(steps / MAX_TURN - ROUNDING)
+    else:
+        chord = start + (end - start) * SAMPLES[None, :, None]
+        turns = np.ones(len(a))
+    error = _distance(path, chord, values[:, 1:-1]).max(axis=1) * SAFETY
+    bent = np.ceil(np.sqrt(error / tolerance) - 1e-9)
+    pieces: Ints = np.clip(np.where(turns > 1, turns, bent), 1, MOST_PIECES).astype(np.int64)
+    return pieces
+
+
+def _split(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]:
+    """Ends of all pieces, evenly split at times that float32 holds; pieces of no length are left out."""
+    counts = np.maximum(pieces, 1)
+    if counts.sum() > MAX_KEYS:
+        raise RangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")
+    counts = counts.astype(np.int64)
+    piece = np.repeat(np.arange(len(a)), counts)
+    step = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+    length = (b - a)[piece] / counts[piece]
+    starts = np.where(step == 0, a[piece], _stored(a[piece] + step * length))
+    last = step == counts[piece] - 1
+    ends = np.where(last, b[piece], _stored(a[piece] + (step + 1) * length))
+    some = ends > starts
+    return starts[some], ends[some]
+
+
+def _middle(a: Floats, b: Floats) -> Floats:
+    return _stored((a + b) / 2)
+
+
+def _stored(times: Floats) -> Floats:
+    return np.asarray(times.astype(np.float32).astype(np.float64))
+
+
+def _distance(path: Path, p: Floats, q: Floats) -> Floats:
+    return quaternion.angle_between(p, q) if path.turns else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))

@@ -1,0 +1,49 @@
+"""Which joint of a person a name means, in the words of the tools that people's skeletons come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from anim.exchange.names import Name
+
+# Stems by role, the surest first: CMU, Mixamo, Biped (3ds Max), Rigify, Unreal, VRM, Poser, KayKit, Quaternius.
+MIDDLE = {
+    "hips": ("hips", "pelvis", "hip"),
+    "spine": ("spine", "spine1", "abdomen", "lowerback", "waist", "torso"),
+    "chest": ("chest", "upperchest", "spine3", "spine2", "spine1", "thorax", "ribcage", "torso"),
+    "neck": ("neck", "neck1", "neck01"),
+    "head": ("head",),
+}
+SIDED = {
+    "shoulder": ("shoulder", "collar", "clavicle", "collarbone"),
+    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "armupper", "bicep"),
+    "lower_arm": ("lowerarm", "lowarm", "forearm", "elbow", "armlower"),
+    "hand": ("hand", "wrist"),
+    "upper_leg": ("upperleg", "upleg", "thigh", "hip", "legupper"),
+    "lower_leg": ("lowerleg", "lowleg", "leg", "shin", "calf", "knee", "leglower"),
+    "foot": ("foot", "ankle"),
+    "toe": ("toes", "toe", "toebase", "ball", "toe0"),
+}
+PERSON = ("hips", "left_upper_leg", "right_upper_leg", "left_foot", "right_foot")
+
+
+def roles(names: Sequence[Name], chosen: Sequence[int]) -> dict[str, int]:
+    """Return the nodes by role ("left_upper_arm"), for those of `chosen` whose names say it; each node at most once.
+
+    roles of CMU's names → {"hips": 0, "left_upper_leg": 2, …}
+    """
+    found: dict[str, int] = {}
+    taken: set[int] = set()
+    wanted = [(role, "", stems) for role, stems in MIDDLE.items()]
+    wanted += [(role, side, stems) for side in ("left", "right") for role, stems in SIDED.items()]
+    by_name: dict[Name, int] = {}
+    for node in chosen:
+        by_name.setdefault(names[node], node)
+    for role, side, stems in wanted:
+        for stem in stems:
+            node = by_name.get(Name(side, stem), -1)
+            if node >= 0 and node not in taken:
+                found[f"{side}_{role}" if side else role] = node
+                taken.add(node)
+                break
+    return found

@@ -1,0 +1,141 @@
+"""A glTF clip → a motion such as BVH holds: no rest rotation, no scale, frames on an even grid, End Sites."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from anim.arrays import Floats, sorted_unique
+from anim.errors import RangeError, UnsupportedError
+from anim.exchange.curve import Curve, Mode, uniform_modes
+from anim.exchange.motion import EulerMotion, EulerNode
+from anim.exchange.to_euler import FILE_LOCK, unique_names
+from anim.exchange.turns import world_rotations
+from anim.maths import euler, quaternion
+from anim.maths.euler import Frame
+from anim.model import Clip, Skeleton
+from anim.sampling import pose, rest, world_matrices
+
+EVEN = 1e-3  # share of a frame by which frames may be off an even grid
+MAX_FRAMES = 10_000_000
+ROUNDING = 2e-7  # share of a time that float32 may be off
+STILL = 1e-5  # share of the skeleton's size by which an offset may differ and still be one
+END = "_end"  # a leaf of this name that nothing moves is where its parent ends
+
+
+def to_bvh(
+    skeleton: Skeleton,
+    clip: Clip,
+    *,
+    order: str,
+    fps: float | None = None,
+    joints: Collection[int] = (),
+    meters_per_unit: float = 1.0,
+) -> EulerMotion:
+    """Return the clip with angles seen from the rest pose along world axes, so that all zero is the rest pose.
+
+    Every joint stands where it stands in the glTF, at every frame: joints that move in their parent, and roots, have
+    translation curves too. Frame k lies at the clip's start + k / fps, the last at or behind its end.
+    fps: None for the grid of the keys. Raises RangeError where they have none.
+    joints: nodes to write, with what lies between them; empty for all. Lengths are divided by meters_per_unit.
+    """
+    shown, times = _frames(clip, fps)
+    chosen = _chosen(skeleton, clip, joints)
+    if not chosen:
+        raise UnsupportedError("there is no node to write")
+    moving, still = pose(skeleton, clip, times), rest(skeleton)
+    places, home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
+    turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
+    turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
+    size = float(np.ptp(home[chosen], axis=0).max()) or 1.0
+    numbers = {node: i for i, node in enumerate(chosen)}
+    names = unique_names(skeleton)
+    nodes = []
+    for node in chosen:
+        parent = _above(skeleton, node, numbers)
+        above = (np.zeros(3), turns[node][:1] * 0 + [0, 0, 0, 1], np.zeros(3))
+        if parent >= 0:
+            above = (home[parent], turns[parent], places[:, parent])
+        offset, turn, path = _seen_from((home[node], turns[node], places[:, node]), above)
+        moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * size)
+        end = parent >= 0 and not moved and _is_end(skeleton, clip, node, numbers)
+        angles = euler.continuous(turn, order=order, frame=Frame.INTRINSIC, lock=FILE_LOCK)
+        nodes.append(
+            EulerNode(
+                names[node],
+                numbers.get(parent, -1),
+                offset / meters_per_unit,
+                order,
+                Frame.INTRINSIC,
+                np.zeros(3),
+                (None, None, None) if end else tuple(_curves(shown, angles)),
+                dict(enumerate(_curves(shown, path / meters_per_unit))) if moved else {},
+                end=end,
+            )
+        )
+    return EulerMotion(tuple(nodes), sampled=True)
+
+
+Placed = tuple[Floats, Floats, Floats]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
+
+
+def _seen_from(node: Placed, parent: Placed) -> Placed:
+    """The same from the parent: offset at rest, turn, and offset at all times."""
+    back = quaternion.conjugate(parent[1])
+    return node[0] - parent[0], quaternion.multiply(back, node[1]), quaternion.rotate(back, node[2] - parent[2])
+
+
+def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
+    """Frame times (F,) on an even grid from 0, and where to sample the clip for them: at its keys where they meet."""
+    start, end = clip.start, clip.end
+    arrays = {id(track.times): track.times for track in clip.tracks}
+    keys: Floats = sorted_unique(np.concatenate([*arrays.values()])) if arrays else np.zeros(1)
+    if fps is not None:
+        if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
+            raise RangeError(f"fps is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
+        shown = np.arange(int(np.ceil((end - start) * fps - EVEN)) + 1) / fps
+    else:
+        step = (end - start) / max(len(keys) - 1, 1)
+        shown = np.asarray(np.arange(len(keys)) * step, np.float64)
+        if np.abs(keys - start - shown).max() > EVEN * step + ROUNDING * end:
+            raise RangeError("keys stand on no even grid, as a BVH needs", help="give --fps")
+        return shown, keys
+    at = start + shown
+    nearest = keys[np.clip(np.searchsorted(keys, at - ROUNDING * at), 0, len(keys) - 1)]
+    return shown, np.where(np.abs(nearest - at) <= ROUNDING * at, nearest, at)
+
+
+def _chosen(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
+    """Nodes to write, parents first: the joints, what lies between them, and leaves that mark where they end."""
+    wanted = set(joints) or set(range(len(skeleton)))
+    top = set(wanted)
+    for node in list(wanted):
+        path = []
+        at = int(skeleton.parents[node])
+        while at >= 0 and at not in top:
+            path.append(at)
+            at = int(skeleton.parents[at])
+        if at >= 0:
+            wanted.update(path)
+    wanted |= {n for n in range(len(skeleton)) if _is_end(skeleton, clip, n, wanted)}
+    return [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
+
+
+def _is_end(skeleton: Skeleton, clip: Clip, node: int, among: Collection[int]) -> bool:
+    parent = int(skeleton.parents[node])
+    leaf = not (skeleton.parents == node).any()
+    named = parent >= 0 and skeleton.names[node].casefold().endswith(END)
+    return named and leaf and parent in among and all(track.node != node for track in clip.tracks)
+
+
+def _above(skeleton: Skeleton, node: int, among: Collection[int]) -> int:
+    parent = int(skeleton.parents[node])
+    while parent >= 0 and parent not in among:
+        parent = int(skeleton.parents[parent])
+    return parent
+
+
+def _curves(times: Floats, values: Floats) -> list[Curve]:
+    modes = uniform_modes(len(times), Mode.LINEAR)
+    return [Curve(times, column, modes) for column in values.T]

@@ -1,0 +1,189 @@
+"""`gltf-anim from-euler`: BVH, CSV and JSON curves become glTF."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anim.errors import FormatError
+from anim.exchange import aliases, formats
+from anim.exchange.bvh import BvhPosition
+from anim.exchange.convention import Stated
+from anim.exchange.formats import Reading
+from anim.exchange.from_euler import from_euler as converted_from
+from anim.exchange.gimbal import gimbal
+from anim.exchange.local import extent, skeleton
+from anim.exchange.motion import EulerMotion, Unit, scaled, turned_up
+from anim.exchange.onto import onto as put_onto
+from anim.exchange.recorded import Keys
+from anim.exchange.retarget import Floor
+from anim.exchange.sticks import sticks
+from anim.exchange.units import guess_unit
+from anim.gltf import author, read
+from anim.gltf.document import Document
+from anim.maths.euler import ORDERS, Frame
+from cli import conversion, options, report, streams, units
+from cli.conversion import Conversion
+from cli.errors import CheckError, UsageError
+
+Order = StrEnum("Order", {order: order for order in ORDERS})  # type: ignore[misc]
+
+
+class Up(StrEnum):
+    """Which axis of the source points up."""
+
+    Y = "y"
+    Z = "z"
+
+
+class Mesh(StrEnum):
+    """What body a new skeleton gets."""
+
+    NONE = "none"
+    STICKS = "sticks"
+
+
+class Format(StrEnum):
+    """What the report looks like."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+def from_euler(
+    source: Annotated[
+        str, typer.Argument(metavar="SOURCE", help="A .bvh, .csv or .json file, '-' for stdin.", show_default=False)
+    ] = "-",
+    output: options.Output = "-",
+    *,
+    order: Annotated[Order | None, typer.Option("--order", help="Order of the axes as written (CSV, JSON).")] = None,
+    frame: Annotated[
+        Frame | None, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+    ] = None,
+    unit: Annotated[Unit | None, typer.Option("--unit", help="Unit of the angles (CSV, JSON).")] = None,
+    keys: Annotated[Keys, typer.Option("--keys", help="Where keys stand; auto keeps recordings' grid.")] = Keys.AUTO,
+    tolerance: Annotated[
+        str, typer.Option("--tolerance", metavar="ANGLE", help="The most that slerp may leave the Euler motion.")
+    ] = "0.05deg",
+    scale: Annotated[
+        float | None, typer.Option("--scale", metavar="N", help="Meters per unit of length; for BVH guessed.")
+    ] = None,
+    up: Annotated[Up, typer.Option("--up", help="Axis of the source that points up.")] = Up.Y,
+    bvh_position: Annotated[
+        BvhPosition, typer.Option("--bvh-position", help="BVH positions replace the OFFSET, or add to it.")
+    ] = BvhPosition.REPLACE,
+    mesh: Annotated[Mesh, typer.Option("--mesh", help="Body of the new skeleton.")] = Mesh.NONE,
+    onto: Annotated[
+        str | None, typer.Option("--onto", metavar="FILE", help="Put the motion on this character, a glTF.")
+    ] = None,
+    alias: Annotated[
+        str | None, typer.Option("--alias", metavar="FILE", help="--onto: names, CSV 'source,target' or JSON.")
+    ] = None,
+    fail_unmatched: Annotated[
+        int | None, typer.Option("--fail-unmatched", metavar="N", help="Exit 6 if over N joints are unmatched.", min=0)
+    ] = None,
+    floor: Annotated[
+        Floor, typer.Option("--floor", help="--onto: soles on the floor, or heights scaled and no more.")
+    ] = Floor.CONTACT,
+    rest_at: Annotated[
+        float | None, typer.Option("--rest-at", metavar="S", help="--onto: when the source stands in its rest pose.")
+    ] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Name of the clip; else the file's.")] = None,
+    format: Annotated[Format, typer.Option("--format", help="Report as text on stderr, or JSON.")] = Format.TEXT,
+    dry_run: options.DryRun = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Turn Euler tracks into glTF: BVH, or CSV or JSON curves.
+
+    Every axis is evaluated on its own keys, the axes are combined as --order and --frame say, and keys are placed so
+    that slerp follows the motion between them too. A BVH says its order itself, and keeps its frames. Without --onto a
+    skeleton is made; with it, joints are matched by name and the motion is put on the character, with regard to both
+    rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints.
+    """
+    began = time.perf_counter()
+    voice = report.Voice(quiet, verbose)
+    limit = units.angle(tolerance, "--tolerance")
+    _check(output, format, scale, onto, mesh, dry_run=dry_run)
+    with streams.content(source) as (data, called):
+        kind = formats.of_path(source) or formats.of_content(data.tobytes())
+        motion = kind.read(data.tobytes(), Reading(Stated(order and str(order), frame, unit), bvh_position))
+        motion = turned_up(motion) if up is Up.Z else motion
+        meters, words = _meters_per_unit(motion, scale, known=kind.has_units)
+        clip = name or (Path(source).stem if source != streams.PIPE else "motion")
+        converted = converted_from(scaled(motion, meters), tolerance=limit, keys=keys, name=clip)
+        if not converted.clip.tracks:
+            raise FormatError("no curve has a key: there is no motion in it")
+    rows = () if quiet and format is Format.TEXT else gimbal(motion, converted.clip)
+    made = Conversion(kind.suffix[1:], motion, converted, meters, words, rows)
+    if onto is None:
+        bodies = [sticks(converted.skeleton, converted.ends)] if mesh is Mesh.STICKS else []
+        document = author.author(converted.skeleton, [converted.clip], bodies)
+        before, size = len(data), streams.write(document, output, None, dry_run=dry_run)
+    else:
+        with streams.source(onto) as character:
+            made, document = _onto(made, character.document, _aliases(alias), floor, rest_at, fail_unmatched)
+            before, size = character.size, streams.write(document, output, character.folder, dry_run=dry_run)
+    if format is Format.JSON:
+        streams.write_text(conversion.as_json(made))
+    for line in conversion.lines(made, verbose=verbose):
+        voice.say(line)
+    parts = [f"{called if output == streams.PIPE else output}  {report.change(before, size)}", conversion.counts(made)]
+    ending = " (dry run: nothing written)" if dry_run else ""
+    voice.say(f"{', '.join(parts)}, {time.perf_counter() - began:.1f} s{ending}")
+
+
+def _check(output: str, format: Format, scale: float | None, onto: str | None, mesh: Mesh, *, dry_run: bool) -> None:
+    """Refuse at once what can't be done."""
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
+        raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
+    if onto is not None and mesh is not Mesh.NONE:
+        raise UsageError("--mesh makes a body for a new skeleton (--onto has one)")
+    if format is Format.JSON and output == streams.PIPE and not dry_run:
+        raise UsageError("--format json and the GLB both want stdout", help="name an output file, or add --dry-run")
+    if not dry_run:
+        streams.check_output(output)
+
+
+def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str]:
+    """Meters per unit of the motion, and the words that say where that comes from."""
+    height = extent(skeleton(motion))
+    if scale is not None:
+        return scale, f"{scale:g} m per unit (--scale): the skeleton measures {report.length(height * scale)}"
+    if known:
+        return 1.0, ""
+    guess = guess_unit(height)
+    measures = f"the skeleton then measures {report.length(guess.height)}"
+    return guess.scale, f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
+
+
+def _aliases(path: str | None) -> dict[str, str]:
+    if path is None:
+        return {}
+    with streams.content(path) as (data, _):
+        return aliases.read(data.tobytes())
+
+
+def _onto(
+    made: Conversion,
+    document: Document,
+    names: dict[str, str],
+    floor: Floor,
+    rest_at: float | None,
+    fail_unmatched: int | None,
+) -> tuple[Conversion, Document]:
+    scene = read.scene(document)
+    done = put_onto(made.converted, scene, aliases=names, nested=made.motion.nested, floor=floor, rest_at=rest_at)
+    left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
+    if fail_unmatched is not None and len(left) > fail_unmatched:
+        raise CheckError(
+            f"{len(left)} joints without a partner (limit {fail_unmatched}): {conversion.listed(left)}",
+            help="name partners in an --alias file; an empty target leaves a joint out",
+        )
+    return replace(made, onto=done, character=scene.skeleton), author.add_clips(document, [done.clip])

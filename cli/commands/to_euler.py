@@ -1,0 +1,146 @@
+"""`gltf-anim to-euler`: a clip as Euler curves: BVH, CSV or JSON."""
+
+from __future__ import annotations
+
+import math
+import time
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from anim.errors import NotFoundError
+from anim.exchange.formats import TRACK_FORMATS, TrackFormat, of_path
+from anim.exchange.motion import Convention, EulerMotion, Unit
+from anim.exchange.to_bvh import to_bvh
+from anim.exchange.to_euler import to_euler as curves_of
+from anim.gltf import read
+from anim.gltf.document import Document, items
+from anim.maths.euler import ORDERS, Frame
+from anim.model import Clip
+from anim.ops.selection import Selection
+from cli import options, report, streams, units
+from cli.errors import UsageError
+
+Order = StrEnum("Order", {order: order for order in ORDERS})  # type: ignore[misc]
+Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
+ZXY = Order("ZXY")
+CENTIMETERS = 0.01  # m per unit of a BVH, unless told
+
+
+def to_euler(
+    input: options.Input = "-",
+    output: Annotated[
+        str, typer.Argument(metavar="OUT", help="A .bvh, .csv or .json file, '-' for stdout.", show_default=False)
+    ] = "-",
+    *,
+    order: Annotated[Order, typer.Option("--order", help="Order of the axes as written.")] = ZXY,
+    frame: Annotated[
+        Frame, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+    ] = Frame.INTRINSIC,
+    unit: Annotated[Unit, typer.Option("--unit", help="Unit of the angles; BVH has degrees.")] = Unit.DEG,
+    fps: Annotated[
+        float | None, typer.Option("--fps", metavar="N", help="Frames per second; else the source's keys.")
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option("--tolerance", metavar="ANGLE", help="CSV, JSON: add keys where curves leave the motion by more."),
+    ] = None,
+    scale: Annotated[float, typer.Option("--scale", metavar="N", help="BVH: meters per unit of length.")] = CENTIMETERS,
+    format: Annotated[
+        Format | None, typer.Option("--format", help="Default: by OUT's ending; bvh for '-'.", show_default=False)
+    ] = None,
+    clip: options.Clips = None,
+    dry_run: options.DryRun = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Write a clip as Euler curves that run on without jumps: BVH, or CSV or JSON curves.
+
+    Every key gets the equivalent angles nearest to the key before, also through gimbal lock. BVH holds the joints of
+    the skins (or all nodes) as they stand in the rest pose, angles seen from there, frames on an even grid. CSV and
+    JSON hold every node's own angles, with its rest and its parent, and are what from-euler reads.
+    """
+    began = time.perf_counter()
+    voice = report.Voice(quiet)
+    kind = _kind(output, format)
+    limit = None if tolerance is None else units.angle(tolerance, "--tolerance")
+    _check(kind, unit, frame, scale, limit)
+    if output != streams.PIPE and not dry_run:
+        streams.check_file(output)
+    convention = Convention(str(order), frame, unit)
+    with streams.source(input) as source:
+        chosen = _only(read.clips(source.document), clip)
+        motion, words = _motion(source.document, chosen, kind, convention, fps, limit, scale)
+        data = kind.write(motion, convention)
+    if not dry_run:
+        streams.write_text(data.decode(), output)
+    name = source.name if output == streams.PIPE else output
+    ending = " (dry run: nothing written)" if dry_run else ""
+    voice.say(
+        f"{name}  {report.change(source.size, len(data))}, {report.plural(len(motion.nodes), 'node')}, "
+        f"{words}{time.perf_counter() - began:.1f} s{ending}"
+    )
+
+
+def _kind(output: str, format: Format | None) -> TrackFormat:
+    if format is not None:
+        return TRACK_FORMATS[str(format)]
+    found = of_path(output)
+    if found is None and output != streams.PIPE:
+        known = ", ".join(each.suffix for each in TRACK_FORMATS.values())
+        raise UsageError(f"'{output}' names no format (expected {known}, or --format)")
+    return found or TRACK_FORMATS["bvh"]
+
+
+def _check(kind: TrackFormat, unit: Unit, frame: Frame, scale: float, limit: float | None) -> None:
+    if not (math.isfinite(scale) and scale > 0):
+        raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
+    if kind is not TRACK_FORMATS["bvh"]:
+        return
+    if unit is not Unit.DEG or frame is not Frame.INTRINSIC:
+        raise UsageError(
+            "a BVH's angles are intrinsic, in degrees", help="an extrinsic order is an intrinsic one reversed"
+        )
+    if limit is not None:
+        raise UsageError("--tolerance adds keys, but a BVH's frames stand on a grid", help="give --fps")
+
+
+def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
+    chosen = Selection(globs or ()).chosen_clips([each.name for each in clips])
+    if len(chosen) != 1:
+        names = ", ".join(f"'{clips[i].name or i}'" for i in chosen[:8])
+        raise NotFoundError(
+            f"{report.plural(len(chosen), 'clip')} to choose from (expected one)",
+            help=f"--clip one of {names}" if chosen else "",
+        )
+    return clips[chosen[0]]
+
+
+def _motion(
+    document: Document,
+    clip: Clip,
+    kind: TrackFormat,
+    convention: Convention,
+    fps: float | None,
+    limit: float | None,
+    scale: float,
+) -> tuple[EulerMotion, str]:
+    """The motion to write, and words on what it lost."""
+    skeleton = read.skeleton(document)
+    if kind is TRACK_FORMATS["bvh"]:
+        joints = {joint for skin in items(document.json, "skins") for joint in skin["joints"]}
+        return to_bvh(skeleton, clip, order=convention.order, fps=fps, joints=joints, meters_per_unit=scale), ""
+    holders = {i for i, node in enumerate(items(document.json, "nodes")) if "skin" in node}
+    found = curves_of(
+        skeleton,
+        clip,
+        order=convention.order,
+        frame=convention.frame,
+        fps=fps,
+        tolerance=limit,
+        without=holders,
+    )
+    words = f"between keys off by up to {math.degrees(found.deviation):.2g}°, " if found.deviation else ""
+    if found.left_out:
+        words += f"left out: {found.left_out[0]}{', …' if len(found.left_out) > 1 else ''}, "
+    return found.motion, words

@@ -1,0 +1,229 @@
+"""A motion on other characters: joints point the same way, soles stand on the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.errors import NotFoundError
+from anim.exchange import bvh
+from anim.exchange.curve import linear
+from anim.exchange.from_euler import Converted, from_euler
+from anim.exchange.local import extent, skeleton
+from anim.exchange.motion import Convention, EulerMotion, EulerNode, Unit, scaled
+from anim.exchange.onto import Onto, onto
+from anim.exchange.retarget import Floor
+from anim.exchange.to_bvh import to_bvh
+from anim.exchange.units import guess_unit
+from anim.gltf import author, read
+from anim.gltf.document import Document
+from anim.maths import quaternion
+from anim.maths.euler import Frame
+from anim.model import Clip, Scene, Skeleton
+from anim.sampling import pose, world_matrices
+from tests.files import glb_of, opened, opened_fixture, opened_path
+
+CESIUM = {
+    "Hips": "Skeleton_torso_joint_1", "Spine": "Skeleton_torso_joint_2", "Spine1": "torso_joint_3",
+    "Neck": "Skeleton_neck_joint_1", "Head": "Skeleton_neck_joint_2",
+    "LeftUpLeg": "leg_joint_L_1", "LeftLeg": "leg_joint_L_2", "LeftFoot": "leg_joint_L_3",
+    "LeftToeBase": "leg_joint_L_5",
+    "RightUpLeg": "leg_joint_R_1", "RightLeg": "leg_joint_R_2", "RightFoot": "leg_joint_R_3",
+    "RightToeBase": "leg_joint_R_5", "LeftArm": "Skeleton_arm_joint_L__4_", "LeftForeArm": "Skeleton_arm_joint_L__3_",
+    "LeftHand": "Skeleton_arm_joint_L__2_", "RightArm": "Skeleton_arm_joint_R",
+    "RightForeArm": "Skeleton_arm_joint_R__2_",
+    "RightHand": "Skeleton_arm_joint_R__3_",
+}  # fmt: skip
+Find = Callable[[str], Path]
+BVH = Convention("ZXY", Frame.INTRINSIC, Unit.DEG)
+
+
+def _recorded(name: str, asset: Find) -> Converted:
+    motion = bvh.read(asset(f"bvh/{name}").read_bytes())
+    return from_euler(scaled(motion, guess_unit(extent(skeleton(motion))).scale), tolerance=1e-3, name="cmu")
+
+
+def _character(name: str, asset: Find) -> Document:
+    return opened_fixture("biped") if name == "biped" else opened_path(asset(name))
+
+
+def _on(document: Document, source: Converted, aliases: dict[str, str], floor: Floor = Floor.CONTACT) -> Onto:
+    return onto(source, read.scene(document), aliases=aliases, nested=True, floor=floor)
+
+
+def _lowest(scene: Scene, clip: Clip, times: Floats) -> tuple[Floats, float]:
+    """Height of the lowest vertex at each time by a plain weighted sum, and the height of the figure."""
+    world = world_matrices(scene.skeleton, pose(scene.skeleton, clip, times))
+    lowest, highest = np.full(len(times), np.inf), -np.inf
+    for instance in scene.instances:
+        if instance.skin is None:
+            continue
+        mesh = instance.mesh
+        points = np.concatenate((mesh.positions, np.ones((len(mesh.positions), 1))), axis=1)
+        for f in range(len(times)):
+            heights = np.zeros(len(points))
+            for k in range(mesh.joints.shape[1]):
+                for j in np.unique(mesh.joints[:, k]):
+                    bind = np.vstack((instance.skin.inverse_bind[j], (0, 0, 0, 1)))
+                    row = world[f, instance.skin.joints[j], 1] @ bind
+                    mine = mesh.joints[:, k] == j
+                    heights[mine] += mesh.weights[mine, k] * (points[mine] @ row)
+            lowest[f] = min(lowest[f], heights.min())
+            highest = max(highest, heights.max() - heights.min()) if f == 0 else highest
+    return lowest, highest
+
+
+CHARACTERS = pytest.mark.parametrize(
+    ("name", "aliases", "least"), [("biped", {}, 21), ("CesiumMan.glb", CESIUM, 19), ("Knight.glb", {}, 18)]
+)
+
+
+@CHARACTERS
+def test_soles_stand_on_the_floor(name: str, aliases: dict[str, str], least: int, asset: Find) -> None:
+    """While the recorded feet are down, the lowest vertex is within 2 % of the height of the floor."""
+    source, document = _recorded("cmu_01_01.bvh", asset), _character(name, asset)
+    scene = read.scene(document)
+    done = _on(document, source, aliases)
+    assert len(done.matching.pairs) >= least
+    times = done.clip.tracks[0].times[120::60]
+    theirs = world_matrices(source.skeleton, pose(source.skeleton, source.clip, times))[..., 1, 3].min(axis=1)
+    down = theirs - np.percentile(theirs, 5) < 0.01
+    assert down.mean() > 0.3
+    lowest, height = _lowest(scene, done.clip, times)
+    assert np.abs(lowest[down]).max() < 0.02 * height
+    assert lowest[~down].max() > 0.02 * height  # it jumps
+
+
+@CHARACTERS
+def test_a_walk_is_on_the_floor_in_every_frame(name: str, aliases: dict[str, str], least: int, asset: Find) -> None:
+    source, document = _recorded("freebvh.bvh", asset), _character(name, asset)
+    named = {f"mixamorig:{joint}": node for joint, node in aliases.items()}
+    done = _on(document, source, named)
+    assert len(done.matching.pairs) >= least
+    lowest, height = _lowest(read.scene(document), done.clip, done.clip.tracks[0].times)
+    assert np.abs(lowest).max() < 0.01 * height
+
+
+@pytest.mark.parametrize("name", ["biped", "Knight.glb"])
+def test_arms_and_legs_point_as_the_recorded_ones(name: str, asset: Find) -> None:
+    source, document = _recorded("cmu_01_01.bvh", asset), _character(name, asset)
+    bones = read.skeleton(document)
+    done = _on(document, source, {})
+    times = source.clip.tracks[0].times[::300]
+    one = world_matrices(source.skeleton, pose(source.skeleton, source.clip, times))[..., 3]
+    two = world_matrices(bones, pose(bones, done.clip, times))[..., 3]
+    for side in ("left", "right"):
+        for a, b in (
+            ("upper_arm", "lower_arm"),
+            ("lower_arm", "hand"),
+            ("upper_leg", "lower_leg"),
+            ("lower_leg", "foot"),
+        ):
+            ways = []
+            for places, roles in ((one, done.matching.source_roles), (two, done.matching.target_roles)):
+                way = places[:, roles[f"{side}_{b}"]] - places[:, roles[f"{side}_{a}"]]
+                ways.append(way / np.linalg.norm(way, axis=1, keepdims=True))
+            np.testing.assert_allclose(ways[0], ways[1], atol=1e-5)
+
+
+def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
+    """Frame 0 of this recording is the pose of all zeros, but for legs and thumbs: for the others nothing changes."""
+    source, document = _recorded("cmu_01_01.bvh", asset), _character("biped", asset)
+    scene = read.scene(document)
+    one, two = (onto(source, scene, aliases={}, nested=True, floor=Floor.KEEP, rest_at=at).clip for at in (None, 0.0))
+    for a, b in zip(one.tracks, two.tracks, strict=True):
+        name = scene.skeleton.names[a.node or 0]
+        if not name.endswith(("leg", "foot", "toe")):
+            np.testing.assert_allclose(b.values, a.values, atol=1e-6, err_msg=name)
+    turned = onto(source, scene, aliases={}, nested=True, floor=Floor.KEEP, rest_at=5.0).clip
+    bones = scene.skeleton
+    hips = bones.names.index("hips")
+    at_rest = pose(bones, turned, np.array([5.0])).rotation[0, hips]
+    assert quaternion.angle_between(at_rest, bones.rotation[hips]) < 1e-6
+
+
+def test_feet_that_are_flat_stay_flat(asset: Find) -> None:
+    """In CMU's rest pose, frame 0 turned off, the biped stands with its soles down although its foot slopes more."""
+    source, document = _recorded("cmu_01_01.bvh", asset), _character("biped", asset)
+    still = Converted(source.skeleton, Clip("rest", source.clip.tracks[:1]), source.ends)
+    done = _on(document, still, {})
+    bones = read.skeleton(document)
+    foot = bones.names.index("left_foot")
+    world = world_matrices(bones, pose(bones, done.clip, np.zeros(1)))
+    np.testing.assert_allclose(world[0, foot, :, :3], np.eye(3), atol=1e-6)
+
+
+def test_a_characters_own_motion_comes_back(asset: Find) -> None:
+    """walk → BVH → the same figure: every joint where it was."""
+    document = opened_fixture("biped")
+    bones, walk = read.skeleton(document), read.clips(document)[0]
+    joints = set(document.json["skins"][0]["joints"])
+    text = bvh.write(to_bvh(bones, walk, order="YZX", joints=joints, fps=30), BVH)
+    done = _on(document, from_euler(bvh.read(text), tolerance=1e-3), {}, Floor.KEEP)
+    assert not done.matching.unmatched
+    times = np.arange(int(walk.end * 30)) / 30
+    before, after = (world_matrices(bones, pose(bones, clip, times))[..., 3] for clip in (walk, done.clip))
+    np.testing.assert_allclose(after, before, atol=2e-5)
+    assert done.scale == pytest.approx(1, abs=1e-5)
+
+
+def test_the_clip_is_added_and_nothing_else(asset: Find) -> None:
+    document = opened_fixture("biped")
+    done = _on(document, _recorded("cmu_01_01.bvh", asset), {})
+    written = opened(glb_of(author.add_clips(document, [done.clip])))
+    assert [clip.name for clip in read.clips(written)] == ["walk", "wave", "jump", "cmu"]
+    for key in ("nodes", "meshes", "skins", "materials", "scenes"):
+        assert written.json[key] == document.json[key]
+
+
+def _tail(turn: Floats) -> Skeleton:
+    """Three joints in a row, no person's, at rest along x, the whole turned."""
+    return Skeleton(
+        ("tail1", "tail2", "tail3"), np.array([-1, 0, 1]), np.array([[0, 0, 0], [1.0, 0, 0], [1, 0, 0]]),
+        np.array([turn, [0, 0, 0, 1], [0, 0, 0, 1]]), np.ones((3, 3)),
+    )  # fmt: skip
+
+
+def test_other_chains_point_alike() -> None:
+    times = np.array((0.0, 1.0))
+    curve = linear(times, np.radians((0.0, 50.0)))
+    nodes = tuple(
+        EulerNode(f"Tail.{i + 1}", i - 1, np.array((2.0 * (i > 0), 0, 0)), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
+        for i in range(3)
+    )
+    source = from_euler(EulerMotion(nodes), tolerance=1e-4)
+    target = _tail(quaternion.from_rotation_vector(np.array((0, 1.2, 0))))
+    done = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP)
+    one, two = (
+        world_matrices(bones, pose(bones, clip, np.array((0.5,))))[0, :, :, 3]
+        for bones, clip in ((source.skeleton, source.clip), (target, done.clip))
+    )
+    np.testing.assert_allclose(np.diff(two, axis=0), np.diff(one, axis=0) / 2, atol=1e-6)
+    assert done.scale == pytest.approx(0.5)
+
+
+def test_curves_without_a_hierarchy_are_the_nodes_own() -> None:
+    curve = linear(np.array((0.0, 1.0)), np.array((0.0, 0.5)))
+    node = EulerNode("tail2", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
+    source = from_euler(EulerMotion((node,), nested=False), tolerance=1e-4)
+    done = onto(source, Scene(_tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=False)
+    assert [(track.node, track.path) for track in done.clip.tracks] == [(1, "rotation")]
+
+
+def test_strangers_are_refused() -> None:
+    node = EulerNode("wing", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),))
+    source = from_euler(EulerMotion((node,)), tolerance=1e-4)
+    with pytest.raises(NotFoundError, match="no joint of the motion"):
+        onto(source, Scene(_tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True)
+
+
+def test_units_are_guessed_by_height() -> None:
+    assert guess_unit(172).unit == "centimeters"
+    assert guess_unit(1.8).scale == 1
+    assert guess_unit(66).unit == "inches"
+    assert guess_unit(1720).unit == "millimeters"
+    assert guess_unit(0).scale == 1

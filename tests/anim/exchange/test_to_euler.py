@@ -1,0 +1,124 @@
+"""Curves out of glTF clips, and BVH there and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+from anim.exchange import bvh
+from anim.exchange.from_euler import from_euler
+from anim.exchange.local import rest_positions, rotation_at
+from anim.exchange.motion import Convention, EulerMotion, Unit, scaled
+from anim.exchange.to_bvh import to_bvh
+from anim.exchange.to_euler import to_euler
+from anim.gltf import author, read
+from anim.maths import euler, quaternion
+from anim.maths.euler import ORDERS, Frame
+from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.sampling import pose, world_matrices
+from anim.sampling.track import sample
+from tests.files import glb_of, opened, opened_fixture, opened_path
+
+BVH = Convention("ZXY", Frame.INTRINSIC, Unit.DEG)
+ONE = Skeleton(("a",), np.array([-1]), np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.ones((1, 3)))
+
+
+def _values(motion: EulerMotion, node: int = 0) -> Floats:
+    return np.stack([curve.values for curve in motion.nodes[node].rotation if curve is not None], axis=-1)
+
+
+def _turning(seed: int = 3) -> Clip:
+    random = np.random.default_rng(seed)
+    q = quaternion.align_signs(quaternion.normalize(random.normal(size=(20, 4))))
+    return Clip("c", (Track(0, "rotation", Interpolation.LINEAR, np.arange(20.0), q),))
+
+
+@pytest.mark.parametrize("frame", Frame)
+@pytest.mark.parametrize("order", ORDERS)
+def test_curves_are_the_rotation_at_every_key(order: str, frame: Frame) -> None:
+    clip = _turning()
+    found = to_euler(ONE, clip, order=order, frame=frame)
+    made = rotation_at(found.motion.nodes[0], clip.tracks[0].times)
+    assert quaternion.angle_between(made, clip.tracks[0].values).max() < 1e-6
+    assert np.abs(np.diff(_values(found.motion), axis=0)).max() < 1.5 * np.pi
+
+
+def test_keys_are_added_until_straight_curves_follow() -> None:
+    clip = _turning()
+    coarse, fine = to_euler(ONE, clip, order="XYZ"), to_euler(ONE, clip, order="XYZ", tolerance=0.01)
+    at = np.linspace(0, 19, 5001)
+    off = quaternion.angle_between(rotation_at(fine.motion.nodes[0], at), sample(clip.tracks[0], at)).max()
+    assert off < 0.02
+    assert fine.deviation <= 0.01 < coarse.deviation
+
+
+def test_there_and_back_is_the_same_clip() -> None:
+    document = opened_fixture("biped")
+    skeleton, clips = read.skeleton(document), read.clips(document)
+    walk = next(clip for clip in clips if clip.name == "walk")
+    motion = to_euler(skeleton, walk, order="YZX", frame=Frame.EXTRINSIC).motion
+    back = from_euler(motion, tolerance=1e-3)
+    assert back.skeleton.names == skeleton.names
+    np.testing.assert_allclose(rest_positions(back.skeleton), rest_positions(skeleton), atol=1e-9)
+    before, after = (pose(skeleton, clip, walk.tracks[0].times) for clip in (walk, back.clip))
+    np.testing.assert_allclose(after.translation, before.translation, atol=1e-6)
+    assert quaternion.angle_between(after.rotation, before.rotation).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["cmu_01_01.bvh", "freebvh.bvh", "example.bvh"])
+def test_bvh_there_and_back(name: str, asset: Callable[[str], Path]) -> None:
+    """Angles within 1e-4° of the source's, as rotations always, as numbers (up to whole turns) away from lock."""
+    first = bvh.read(asset(f"bvh/{name}").read_bytes())
+    converted = from_euler(scaled(first, 0.05), tolerance=1e-3)
+    document = opened(glb_of(author.author(converted.skeleton, [converted.clip])))
+    order = first.nodes[0].order
+    motion = to_bvh(read.skeleton(document), read.clips(document)[0], order=order, meters_per_unit=0.05)
+    second = bvh.read(bvh.write(motion, BVH))
+    assert [n.name for n in second.nodes if not n.end] == [n.name for n in first.nodes if not n.end]
+    assert [n.end for n in second.nodes] == [n.end for n in first.nodes]
+    for one, two in zip(first.nodes, second.nodes, strict=True):
+        np.testing.assert_allclose(two.translation, one.translation, atol=2e-5)
+        if one.end:
+            continue
+        times = one.rotation[0].times if one.rotation[0] is not None else np.zeros(1)
+        q, p = rotation_at(one, times), rotation_at(two, times)
+        assert np.degrees(quaternion.angle_between(q, p).max()) < 1e-4
+        a, b = (np.degrees(np.stack([c.values for c in n.rotation if c is not None], axis=-1)) for n in (one, two))
+        free = np.degrees(euler.distance_to_lock(q, order=order)) > 10
+        same = np.abs(np.mod(b - a + 180, 360) - 180).max(axis=-1)
+        other = np.abs(np.mod(b - (a * [1, -1, 1] + 180) + 180, 360) - 180).max(axis=-1)
+        assert np.minimum(same, other)[free].max(initial=0) < 1e-4
+
+
+@pytest.mark.parametrize("name", ["CesiumMan.glb", "Fox.glb", "Knight.glb"])
+def test_a_bvh_of_any_skeleton_puts_joints_where_they_are(name: str, asset: Callable[[str], Path]) -> None:
+    document = opened_path(asset(name))
+    skeleton, clip = read.skeleton(document), read.clips(document)[0]
+    joints = {joint for skin in document.json["skins"] for joint in skin["joints"]}
+    motion = to_bvh(skeleton, clip, order="ZXY", fps=30, joints=joints)
+    back = from_euler(bvh.read(bvh.write(motion, BVH)), tolerance=1e-3)
+    times = clip.start + np.arange(int((clip.end - clip.start) * 30)) / 30
+    expected = world_matrices(skeleton, pose(skeleton, clip, times))[..., 3]
+    found = world_matrices(back.skeleton, pose(back.skeleton, back.clip, times - clip.start))[..., 3]
+    size = float(np.ptp(expected[0], axis=0).max())
+    for number, label in enumerate(back.skeleton.names):
+        if number not in back.ends:
+            assert np.abs(found[:, number] - expected[:, skeleton.names.index(label)]).max() < 1e-4 * size
+
+
+def test_uneven_keys_want_a_frame_rate() -> None:
+    times = np.array((0.0, 0.1, 0.5))
+    clip = Clip("c", (Track(0, "rotation", Interpolation.LINEAR, times, np.tile((0, 0, 0, 1.0), (3, 1))),))
+    with pytest.raises(RangeError, match="no even grid"):
+        to_bvh(ONE, clip, order="XYZ")
+    assert len(to_bvh(ONE, clip, order="XYZ", fps=10).nodes[0].moves[0].times) == 6
+
+
+def test_what_has_no_place_is_named() -> None:
+    clip = Clip("c", (Track(0, "weights", Interpolation.LINEAR, np.zeros(1), np.zeros((1, 2))),))
+    assert to_euler(ONE, clip, order="XYZ").left_out == ("weights of 'a'",)

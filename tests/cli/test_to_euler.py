@@ -1,0 +1,84 @@
+"""`to-euler`: a clip as BVH, CSV or JSON curves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from anim.exchange import bvh
+from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.running import help_line, refusal
+
+
+@pytest.mark.parametrize("suffix", ["bvh", "csv", "json"])
+def test_the_ending_says_the_format(suffix: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    path = tmp_path / f"walk.{suffix}"
+    run = call("to-euler", fixture("biped"), path, "--clip", "walk")
+    assert run.code == 0, run.err
+    assert run.out == b""
+    start = {
+        "bvh": "HIERARCHY\nROOT hips",
+        "csv": "# order=ZXY frame=intrinsic unit=deg\n#node,hips",
+        "json": '{\n "schema"',
+    }
+    assert path.read_text().startswith(start[suffix])
+    assert call("from-euler", path, tmp_path / "back.glb").code == 0
+
+
+def test_bvh_on_stdout(call: Call, fixture: Fixture) -> None:
+    run = call("to-euler", fixture("biped"), "--clip", "walk", "--fps", "24", "--order", "YXZ", "--scale", "1")
+    motion = bvh.read(run.product())
+    assert [node.name for node in motion.nodes][:2] == ["hips", "spine"]
+    assert {node.order for node in motion.nodes if not node.end} == {"YXZ"}
+    assert motion.nodes[0].moves[1].values[0] == pytest.approx(0.93, abs=0.1)
+
+
+def test_a_tolerance_adds_keys(call: Call, fixture: Fixture) -> None:
+    plain, fine = (
+        json.loads(call("to-euler", fixture("biped"), "--clip", "wave", "--format", "json", *more).product())
+        for more in ((), ("--tolerance", "0.01deg"))
+    )
+    count = [sum(len(c["times"]) for n in f["nodes"] for c in n.get("curves", {}).values()) for f in (plain, fine)]
+    assert count[1] > count[0]
+    assert all(node["name"] != "body" for node in plain["nodes"])
+
+
+def test_the_clip_must_be_one(call: Call, fixture: Fixture) -> None:
+    run = call("to-euler", fixture("biped"), "-")
+    assert "3 clips to choose from (expected one)" in refusal(run, 5)
+    assert help_line(run) == "--clip one of 'walk', 'wave', 'jump'"
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("--frame", "extrinsic"), "a BVH's angles are intrinsic"),
+        (("--unit", "rad"), "a BVH's angles are intrinsic"),
+        (("--tolerance", "1deg"), "--tolerance adds keys"),
+        (("--scale", "-1"), "--scale is -1"),
+        (("--fps", "0"), "fps is 0"),
+        (("--format", "fbx"), "to-euler"),
+    ],
+)
+def test_refusals(call: Call, fixture: Fixture, args: tuple[str, ...], words: str) -> None:
+    run = call("to-euler", fixture("biped"), "-", "--clip", "walk", *args)
+    assert words in refusal(run, 2)
+
+
+def test_an_unknown_ending_is_refused(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("to-euler", fixture("biped"), tmp_path / "walk.fbx", "--clip", "walk")
+    assert "names no format (expected .bvh, .json, .csv, or --format)" in refusal(run, 2)
+
+
+def test_dry_run_writes_nothing(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("to-euler", fixture("biped"), tmp_path / "walk.bvh", "--clip", "walk", "--dry-run")
+    assert run.code == 0
+    assert "nothing written" in run.err
+    assert not (tmp_path / "walk.bvh").exists()
+
+
+def test_real_characters(call: Call, asset: Find) -> None:
+    run = call("to-euler", asset("Fox.glb"), "-", "--clip", "Run", "--fps", "24")
+    assert len(bvh.read(run.product()).nodes) >= 24
