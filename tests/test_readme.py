@@ -23,10 +23,12 @@ COMMANDS = [
 PYTHON = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "biped.glb").write_bytes(fixtures.build("biped"))
-    return tmp_path
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all commands: some read what an earlier one wrote, as a reader would."""
+    folder = tmp_path_factory.mktemp("readme")
+    (folder / "biped.glb").write_bytes(fixtures.build("biped"))
+    return folder
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -44,6 +46,15 @@ def test_example_runs(example: str, folder: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=folder, capture_output=True, text=True, env=_environment()
     )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("kind", ["csv", "json"])
+def test_curve_examples_are_read(kind: str, folder: Path) -> None:
+    (content,) = re.findall(rf"```{kind}\n(.*?)```", TEXT, re.DOTALL)
+    (folder / f"curves.{kind}").write_text(content)
+    command = [sys.executable, "-m", "cli.main", "from-euler", f"curves.{kind}", "curves.glb"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=_environment())
     assert done.returncode == 0, done.stderr
 
 
