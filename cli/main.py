@@ -51,6 +51,67 @@ COMMANDS = {
             "cat walk.glb | gltf-anim resample --fps 30 | gltf-anim inspect",
         ),
     ),
+    "from-euler": Row(
+        "Turn Euler tracks (BVH, CSV, JSON curves) into glTF.",
+        (
+            "gltf-anim from-euler walk.bvh walk.glb --mesh sticks",
+            "gltf-anim from-euler walk.bvh hero-walk.glb --onto hero.glb --fail-unmatched 12",
+            "gltf-anim from-euler curves.csv door.glb --order XYZ --frame extrinsic --unit deg",
+        ),
+    ),
+    "to-euler": Row(
+        "Write a clip as Euler curves: BVH, CSV or JSON.",
+        (
+            "gltf-anim to-euler hero.glb walk.bvh --clip walk --fps 30",
+            "gltf-anim to-euler door.glb door.csv --order XYZ --frame extrinsic",
+            "gltf-anim to-euler door.glb door.json --tolerance 0.1deg",
+        ),
+    ),
+    "ease": Row(
+        "Give motion another tempo between the same keys.",
+        (
+            "gltf-anim ease --list",
+            "gltf-anim ease poses.glb eased.glb --ease smoothstep",
+            "gltf-anim ease walk.glb slow-in.glb --per range --ease 'cubic-bezier(.2, 0, 0, 1)' --clip walk",
+        ),
+    ),
+    "spline": Row(
+        "Join keys by a smooth curve, by a choice of tangent rules.",
+        (
+            "gltf-anim spline poses.glb smooth.glb",
+            "gltf-anim spline walk.glb loop.glb --tangents natural --cyclic",
+            "gltf-anim spline face.glb face2.glb --tangents monotone --path weights",
+        ),
+    ),
+    "retime": Row(
+        "Stretch, reverse or warp the seconds of clips.",
+        (
+            "gltf-anim retime walk.glb slow.glb --speed 0.25",
+            "gltf-anim retime walk.glb back.glb --reverse --clip walk",
+            "gltf-anim retime walk.glb pendulum.glb --warp sine-in-out --ping-pong",
+        ),
+    ),
+    "trim": Row(
+        "Keep a part of a clip, with exact ends.",
+        ("gltf-anim trim walk.glb step.glb --from 0.25 --to 0.75 --rebase",),
+    ),
+    "loop": Row(
+        "Say whether a clip loops, and close it.",
+        (
+            "gltf-anim loop walk.glb",
+            "gltf-anim loop walk.glb --find --format json",
+            "gltf-anim loop walk.glb closed.glb --blend 0.2",
+        ),
+    ),
+    "plot": Row(
+        "See the curves of tracks, of eases, and of tangent rules.",
+        (
+            "gltf-anim plot walk.glb walk.png --clip walk --node 'Hip*'",
+            "gltf-anim plot walk.glb walk.svg --compare walk30.glb --path rotation",
+            "gltf-anim plot --ease smoothstep --ease 'cubic-bezier(.2,0,0,1)' eases.svg",
+            "gltf-anim plot --through 0,0.9,0.2,1 --tangents catmull-rom --tangents natural curve.svg",
+        ),
+    ),
     "convert": Row(
         "Change between .glb and .gltf, and nothing else.",
         ("gltf-anim convert walk.glb walk.gltf", "gltf-anim convert scene/walk.gltf - | gltf-anim inspect"),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 
 from cli.errors import UsageError
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
 
@@ -20,6 +22,17 @@ def share(text: str, option: str) -> float:
     if unit not in ("", "%") or value <= 0:
         raise UsageError(f"{option} is '{text}' (expected a share above 0, like 0.1% or 0.001)")
     return value / 100 if unit else value
+
+
+def meters(text: str, option: str, diagonal: Callable[[], float]) -> float:
+    """Return a length above 0 in metres: "0.5mm", "2cm", bare metres, or "0.1%" of what `diagonal` gives.
+
+    Raises UsageError otherwise.
+    """
+    value, unit = _split(text, option)
+    if (unit not in LENGTHS and unit != "%") or value <= 0:
+        raise UsageError(f"{option} is '{text}' (expected a length above 0, like 0.5mm, 2cm or 0.1%)")
+    return value / 100 * diagonal() if unit == "%" else value * LENGTHS[unit]
 
 
 def angle(text: str, option: str) -> float:

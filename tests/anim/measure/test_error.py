@@ -14,7 +14,7 @@ from anim.gltf import read
 from anim.gltf.document import Document
 from anim.measure.error import NOISE, SLACK, MotionError, Ruler, check_times
 from anim.measure.surface import diagonal
-from anim.model import Clip, Instance, Mesh, Pose, Scene, Track
+from anim.model import Clip, Instance, Mesh, Pose, Scene, Skin, Track
 from anim.ops.resample import resample
 from anim.sampling import pose, world_matrices
 from tests.clips import STEP, about, clip, skeleton, track
@@ -178,6 +178,20 @@ def test_weights_that_do_not_sum_to_1_count_as_they_are() -> None:
     found = Ruler(heavy).error(before, after)
     truth = _brute(heavy, before, after, check_times(before, after))
     assert truth - 1e-12 <= found.max_error <= SLACK * truth + NOISE * diagonal(heavy)
+
+
+def test_heavy_weights_widen_the_bound_too() -> None:
+    """A time whose bound is 1.41 times its truth, then one whose bound is 1.3: neither may hide the other."""
+    corners = [[1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0], [0, -1.0, 0]]
+    mesh = replace(_points(corners).instances[0].mesh, joints=np.zeros((4, 1), np.int64), weights=np.full((4, 1), 3.0))
+    skin = Skin(np.array([0]), np.eye(4)[None, :3])
+    scene = Scene(skeleton([-1]), (Instance(0, mesh, skin, NOTHING),))
+    before = clip(track("rotation", [0, 1], about("z", [0, 0]), STEP), track("translation", [0], [[0, 0, 0]]))
+    after = clip(
+        track("rotation", [0, 1], about("z", [np.degrees(0.01), 0]), STEP),
+        track("translation", [0, 1], np.array([[0, 0, 0], [0.013, 0, 0]]), STEP),
+    )
+    assert Ruler(scene).error(before, after).max_error == pytest.approx(3 * 0.013, rel=0.02)
 
 
 def test_times_that_are_looked_at() -> None:

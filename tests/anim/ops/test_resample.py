@@ -166,10 +166,13 @@ def test_what_never_changes_stays(made: Track) -> None:
     assert resample(clip(made, replace(TURN, node=1)), fps=30).tracks[0] is made
 
 
-def test_equal_keys_with_tangents_are_not_constant() -> None:
-    bump = track("weights", [0, 1], [[1], [1]], CUBICSPLINE, tangents=([[0], [-1]], [[1], [0]]))
-    (made,) = resample(clip(bump), fps=2).tracks
-    np.testing.assert_allclose(made.values[:, 0], [1, 1.25, 1])
+@pytest.mark.parametrize(
+    ("arriving", "leaving", "middle"), [([0, -1], [1, 0], 1.25), ([0, -1], [0, 0], 1.125), ([0, 0], [1, 0], 1.125)]
+)
+def test_equal_keys_with_tangents_are_not_constant(arriving: list[float], leaving: list[float], middle: float) -> None:
+    sides = np.reshape(arriving, (2, 1)), np.reshape(leaving, (2, 1))
+    (made,) = resample(clip(track("weights", [0, 1], [[1], [1]], CUBICSPLINE, tangents=sides)), fps=2).tracks
+    np.testing.assert_allclose(made.values[:, 0], [1, middle, 1])
 
 
 # Goals

@@ -1,0 +1,26 @@
+"""Clip: its span, and one track for each property."""
+
+from __future__ import annotations
+
+import pytest
+
+from anim.errors import FormatError
+from tests.clips import clip, track
+
+
+def test_start_and_end_are_those_of_the_widest_tracks() -> None:
+    walk = clip(track("scale", [0.5, 1], [[1, 1, 1]] * 2), track("translation", [0.25, 0.75], [[0, 0, 0]] * 2))
+    assert (walk.start, walk.end) == (0.25, 1.0)
+    assert (clip().start, clip().end) == (0.0, 0.0)
+
+
+def test_a_property_has_one_track() -> None:
+    one, other = track("scale", [0], [[1, 1, 1]]), track("scale", [1], [[2, 2, 2]])
+    with pytest.raises(FormatError, match=r"clip 'walk': two tracks .*0.*scale"):
+        clip(one, other, name="walk")
+    clip(one, track("scale", [1], [[2, 2, 2]], node=1), track("translation", [1], [[2, 2, 2]]))
+
+
+def test_a_pointer_may_have_two_since_real_files_do() -> None:
+    one = track("/materials/0/alphaCutoff", [0], [[1]])
+    assert len(clip(one, one).tracks) == 2

@@ -1,0 +1,50 @@
+"""Skeleton: a forest, level by level."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.errors import FormatError, RangeError, ShapeError
+from anim.model import Skeleton
+from tests.clips import skeleton
+
+
+def test_levels_hold_every_node_once_and_parents_first() -> None:
+    #   1       4
+    #  / \      |
+    # 3   0     5
+    #     |
+    #     2
+    found = [sorted(level.tolist()) for level in skeleton([1, -1, 0, 1, -1, 4]).levels()]
+    assert found == [[1, 4], [0, 3, 5], [2]]
+    assert skeleton([]).levels() == []
+
+
+@pytest.mark.parametrize("parents", [[0], [1, 0], [-1, 2, 3, 1], [1, 2, 2]])
+def test_cycles_are_refused(parents: list[int]) -> None:
+    with pytest.raises(FormatError, match="cycle"):
+        skeleton(parents)
+
+
+@pytest.mark.parametrize("parents", [[-2], [1], [-1, 5]])
+def test_parents_exist(parents: list[int]) -> None:
+    with pytest.raises(FormatError, match="does not exist"):
+        skeleton(parents)
+
+
+def test_rows_are_counted() -> None:
+    with pytest.raises(ShapeError, match="translation has 2 rows for 1"):
+        skeleton([-1], translation=np.zeros((2, 3)))
+    with pytest.raises(ShapeError, match="rotation"):
+        skeleton([-1], rotation=np.zeros((1, 3)))
+    with pytest.raises(RangeError, match="scale"):
+        skeleton([-1], scale=[[1, 1, float("nan")]])
+
+
+def test_labels() -> None:
+    none = np.zeros((2, 3))
+    nodes = Skeleton(("hip", ""), np.array([-1, -1]), none, np.tile([0, 0, 0, 1.0], (2, 1)), none)
+    assert nodes.label(0) == "node 0 'hip'"
+    assert nodes.label(1) == "node 1"
+    assert len(nodes) == 2

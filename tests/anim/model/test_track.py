@@ -1,0 +1,91 @@
+"""Track: its invariants, its target and its kind."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.errors import RangeError, ShapeError
+from anim.model import FLOAT32, Kind, Storage, Track
+from tests.clips import CUBICSPLINE, LINEAR, STEP, track
+
+BYTES = Storage(5121, False, "SCALAR")
+FRACTIONS = Storage(5121, True, "SCALAR")
+
+
+def test_keys_are_read_only_float64() -> None:
+    made = track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]], CUBICSPLINE, tangents=(np.zeros((2, 3)), np.ones((2, 3))))
+    for array in (made.times, made.values, made.in_tangents, made.out_tangents):
+        assert array is not None
+        assert array.dtype == np.float64
+        assert not array.flags.writeable
+    with pytest.raises(FrozenInstanceError):
+        made.node = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("scale", [0, 1], [[1, 1, 1]]), ShapeError, r"\(1, 3\) \(expected \(2, 3\)\)"),
+        (("scale", [0], [[1, 1]]), ShapeError, r"\(1, 2\) \(expected \(1, 3\)\)"),
+        (("translation", [0], [[1, 1, 1, 1]]), ShapeError, r"\(1, 4\)"),
+        (("rotation", [0], [[1, 1, 1]]), ShapeError, r"\(1, 3\) \(expected \(1, 4\)\)"),
+        (("weights", [0], [1]), ShapeError, r"shape \(1,\)"),
+        (("weights", [0], [["heavy"]]), ShapeError, "no number"),
+        (("weights", [], np.zeros((0, 1))), RangeError, "empty"),
+        (("weights", [-1], [[1]]), RangeError, "start at -1"),
+        (("weights", [0, 0], [[1], [1]]), RangeError, "not increasing"),
+        (("weights", [0], [[float("nan")]]), RangeError, "nan"),
+        (("weights", [0], [[1]], CUBICSPLINE), ShapeError, "tangents"),
+    ],
+)
+def test_keys_that_can_not_be_are_refused(arguments: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        track(*arguments)
+
+
+@pytest.mark.parametrize("mode", [STEP, LINEAR])
+def test_only_splines_have_tangents(mode: Any) -> None:
+    with pytest.raises(ShapeError, match="tangents"):
+        track("weights", [0], [[1]], mode, tangents=([[0]], [[0]]))
+
+
+@pytest.mark.parametrize("sides", [(np.zeros((2, 1)), None), (None, np.zeros((2, 1)))])
+def test_tangents_come_in_pairs(sides: Any) -> None:
+    with pytest.raises(ShapeError, match="tangents"):
+        Track(0, "weights", CUBICSPLINE, np.arange(2.0), np.zeros((2, 1)), *sides)
+
+
+@pytest.mark.parametrize("bad", [np.zeros((1, 1)), np.zeros((2, 2)), np.zeros(2), [[0], [float("inf")]]])
+def test_tangents_have_the_values_shape(bad: Any) -> None:
+    for sides in ((bad, np.zeros((2, 1))), (np.zeros((2, 1)), bad)):
+        with pytest.raises((ShapeError, RangeError), match="tangents"):
+            track("weights", [0, 1], [[1], [2]], CUBICSPLINE, tangents=sides)
+
+
+@pytest.mark.parametrize(
+    ("path", "width", "mode", "storage", "kind"),
+    [
+        ("translation", 3, LINEAR, FLOAT32, Kind.VECTOR),
+        ("rotation", 4, STEP, FLOAT32, Kind.ROTATION),
+        ("weights", 4, LINEAR, FRACTIONS, Kind.VECTOR),
+        ("/materials/0/pbrMetallicRoughness/baseColorFactor", 4, LINEAR, FLOAT32, Kind.VECTOR),
+        ("/extensions/EXT_lights_image_based/lights/0/rotation", 4, LINEAR, FLOAT32, Kind.ROTATION),
+        ("/materials/0/extensions/KHR_texture_transform/rotation", 1, LINEAR, FLOAT32, Kind.VECTOR),
+        ("/nodes/0/extensions/KHR_node_visibility/visible", 1, STEP, BYTES, Kind.DISCRETE),
+        ("/materials/0/alphaCutoff", 1, STEP, FLOAT32, Kind.VECTOR),
+        ("/materials/0/alphaCutoff", 1, STEP, FRACTIONS, Kind.VECTOR),
+        ("/materials/0/alphaCutoff", 1, LINEAR, BYTES, Kind.VECTOR),
+    ],
+)
+def test_kinds(path: str, width: int, mode: Any, storage: Storage, kind: Kind) -> None:
+    values = np.tile([0.0, 0, 0, 1][-width:], (1, 1))
+    assert track(path, [0], values, mode, storage=storage).kind is kind
+
+
+def test_targets() -> None:
+    assert track("scale", [0], [[1, 1, 1]], node=3).target == (3, "scale")
+    assert track("/materials/0/alphaCutoff", [0], [[1]]).target == (None, "/materials/0/alphaCutoff")

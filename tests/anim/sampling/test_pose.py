@@ -1,0 +1,130 @@
+"""Poses and world matrices against a plain recursion with 4×4 products."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from anim.arrays import Floats
+from anim.gltf import read
+from anim.model import Clip, Skeleton
+from anim.sampling import pose, rest, world_matrices
+from anim.sampling.track import sample
+from fixtures.broken.pieces import text
+from tests.clips import about, clip, skeleton, track
+from tests.files import opened, opened_fixture
+
+RNG = np.random.default_rng(5)
+
+
+def test_what_no_track_moves_is_at_rest() -> None:
+    nodes = skeleton([-1, 0], translation=[[1, 2, 3], [4, 5, 6]], scale=[[1, 1, 1], [2, 2, 2]])
+    found = pose(nodes, clip(track("translation", [0, 1], [[0, 0, 0], [2, 2, 2]], node=1)), np.array([0.5, 9.0]))
+    assert found.translation.tolist() == [[[1, 2, 3], [1, 1, 1]], [[1, 2, 3], [2, 2, 2]]]
+    assert found.scale.tolist() == [[[1, 1, 1], [2, 2, 2]]] * 2
+    assert found.rotation.tolist() == [[[0, 0, 0, 1]] * 2] * 2
+    assert found.times.tolist() == [0.5, 9.0]
+    assert found.weights == {}
+
+
+def test_every_track_lands_at_its_node_and_part() -> None:
+    document = opened_fixture("interpolations")
+    (walk,) = read.clips(document)
+    at = np.linspace(0, 2.5, 26)
+    found = pose(read.skeleton(document), walk, at)
+    for each in walk.tracks:
+        assert each.node is not None
+        part: Floats = getattr(found, each.path)
+        np.testing.assert_array_equal(part[:, each.node], sample(each, at))
+
+
+def test_weights_are_by_node() -> None:
+    document = opened_fixture("morph_cube")
+    for each in read.clips(document):
+        at = np.array([0.0, 0.25, 0.75])
+        found = pose(read.skeleton(document), each, at)
+        assert list(found.weights) == [each.tracks[0].node]
+        np.testing.assert_array_equal(found.weights[0], sample(each.tracks[0], at))
+
+
+def test_pointers_at_node_properties_move_the_node_and_others_nothing() -> None:
+    document = opened_fixture("pointer")
+    nodes, clips = read.skeleton(document), {each.name: each for each in read.clips(document)}
+    at = np.array([0.0, 0.5])
+    np.testing.assert_allclose(pose(nodes, clips["turn"], at).rotation[1, 0], about("y", 90), atol=1e-7)
+    assert list(pose(nodes, clips["weights"], at).weights) == [0]
+    for name in ("color", "blink", "light"):
+        found = pose(nodes, clips[name], at)
+        np.testing.assert_array_equal(found.rotation, np.tile(nodes.rotation, (2, 1, 1)))
+
+
+@pytest.mark.parametrize("name", ["biped", "interpolations", "arm"])
+def test_world_matrices_of_clips(name: str) -> None:
+    document = opened_fixture(name)
+    nodes = read.skeleton(document)
+    for each in read.clips(document):
+        _check_world(nodes, each, np.linspace(each.start, each.end, 7))
+
+
+@pytest.mark.parametrize("trial", range(5))
+def test_world_matrices_of_random_forests(trial: int) -> None:
+    """Parents in any order of numbers, uneven and mirroring scales."""
+    n = 12
+    order = RNG.permutation(n)
+    parents = np.full(n, -1)
+    for i in range(1, n):
+        parents[order[i]] = order[RNG.integers(0, i)] if RNG.random() < 0.8 else -1
+    rest_pose = {"translation": RNG.normal(size=(n, 3)), "scale": RNG.normal(size=(n, 3))}
+    nodes = skeleton(parents.tolist(), rotation=_quaternions(n), **rest_pose)
+    tracks = [track("rotation", [0, 1], _quaternions(2), node=i) for i in range(0, n, 2)]
+    tracks += [track("translation", [0, 2], RNG.normal(size=(2, 3)), node=i) for i in range(0, n, 3)]
+    _check_world(nodes, clip(*tracks), np.array([0.0, 0.3, 1.5]))
+
+
+def test_a_sheared_matrix_stands_whole_in_the_chain() -> None:
+    sheared = np.array([[1, 0.5, 0, 1], [0, 2, 0.25, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]])
+    nodes = [
+        {"children": [1], "translation": [1, 0, 0], "rotation": about("z", 90).tolist()},
+        {"children": [2], "matrix": sheared.T.ravel().tolist()},
+        {"translation": [0, 1, 0], "scale": [2, 2, 2]},
+    ]
+    document = opened(text({"nodes": nodes}))
+    found = world_matrices(read.skeleton(document), rest(read.skeleton(document)))[0]
+    turned = np.array([[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    child = np.array([[2, 0, 0, 0], [0, 2, 0, 1], [0, 0, 2, 0], [0, 0, 0, 1.0]])
+    np.testing.assert_allclose(found[1], (turned @ sheared)[:3], atol=1e-15)
+    np.testing.assert_allclose(found[2], (turned @ sheared @ child)[:3], atol=1e-15)
+
+
+def test_no_nodes_and_no_times_are_fine() -> None:
+    nothing = skeleton([])
+    assert world_matrices(nothing, rest(nothing)).shape == (1, 0, 3, 4)
+    one = skeleton([-1])
+    moved = clip(track("translation", [0], [[1, 2, 3]]))
+    assert world_matrices(one, pose(one, moved, np.empty(0))).shape == (0, 1, 3, 4)
+
+
+def _check_world(nodes: Skeleton, moved: Clip, at: Floats) -> None:
+    found = world_matrices(nodes, pose(nodes, moved, at))
+    for frame, t in enumerate(at):
+        for node in range(len(nodes)):
+            np.testing.assert_allclose(found[frame, node], _world(nodes, moved, node, float(t))[:3], atol=1e-12)
+
+
+def _world(nodes: Skeleton, moved: Clip, node: int, t: float) -> Floats:
+    """world_from_node as a 4×4 product from the root down, by scipy's rotations."""
+    parts = {"translation": nodes.translation[node], "rotation": nodes.rotation[node], "scale": nodes.scale[node]}
+    for each in moved.tracks:
+        if each.node == node:
+            parts[each.path] = sample(each, np.array([t]))[0]
+    local = np.eye(4)
+    local[:3, :3] = Rotation.from_quat(parts["rotation"]).as_matrix() @ np.diag(parts["scale"])
+    local[:3, 3] = parts["translation"]
+    parent = int(nodes.parents[node])
+    return local if parent < 0 else np.asarray(_world(nodes, moved, parent, t) @ local)
+
+
+def _quaternions(n: int) -> Floats:
+    q = RNG.normal(size=(n, 4))
+    return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))

@@ -1,0 +1,89 @@
+"""The gate: what comes through is float64, of the named shape, finite and read-only."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim import arrays
+from anim.errors import RangeError, ShapeError
+
+
+@pytest.mark.parametrize("values", [[[0, 1, 2]], ((0, 1, 2),), np.array([[0, 1, 2]], np.int8), np.zeros((1, 3), "f4")])
+def test_anything_with_numbers_becomes_float64(values: Any) -> None:
+    found = arrays.floats(values, "K 3")
+    assert found.dtype == np.float64
+    assert found.tolist() == np.asarray(values).tolist()
+    assert not found.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("shape", "good", "bad"),
+    [
+        ("K", [(0,), (4,)], [(), (4, 1)]),
+        ("K 3", [(0, 3), (2, 3)], [(3,), (2, 4), (3, 2), (1, 2, 3)]),
+        ("F N 4", [(1, 2, 4), (0, 0, 4)], [(2, 4), (1, 2, 3)]),
+        ("3 3", [(3, 3)], [(3, 4), (4, 3)]),
+        ("", [()], [(1,)]),
+    ],
+)
+def test_shapes(shape: str, good: list[tuple[int, ...]], bad: list[tuple[int, ...]]) -> None:
+    for each in good:
+        arrays.check_shape(np.zeros(each), shape)
+    for each in bad:
+        with pytest.raises(ShapeError, match="values has shape"):
+            arrays.check_shape(np.zeros(each), shape, name="values")
+
+
+@pytest.mark.parametrize("values", [["a"], [None, "b"], [[1], [1, 2]], [1j], {"a": 1}])
+def test_what_is_no_number_is_refused(values: Any) -> None:
+    with pytest.raises(ShapeError):
+        arrays.floats(values, "K")
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
+def test_the_first_number_that_is_not_finite_is_named(bad: float) -> None:
+    values: list[list[float]] = [[1, 2], [bad, bad]]
+    with pytest.raises(RangeError, match=r"values holds -?(nan|inf) at \[1, 0\]"):
+        arrays.floats(values, "K 2", name="values")
+
+
+@pytest.mark.parametrize("values", [[3.4e38, 3.4e38], [1e150, -1e150], [5e-324]])
+def test_large_and_small_numbers_are_finite(values: list[float]) -> None:
+    assert arrays.floats(values, "K").tolist() == values
+
+
+def test_times_by_hand() -> None:
+    assert arrays.times([0, 0.5, 2]).tolist() == [0, 0.5, 2]
+    assert arrays.times([3.0]).tolist() == [3.0]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([], "empty"),
+        ([-0.5, 1], r"start at -0.5 s"),
+        ([0, 1, 1], r"not increasing at key 2 \(1 s after 1 s\)"),
+        ([0, 2, 1, 0], r"not increasing at key 2 \(1 s after 2 s\)"),
+        ([0, float("nan")], "nan"),
+    ],
+)
+def test_times_that_can_not_be_are_refused(values: list[float], message: str) -> None:
+    with pytest.raises(RangeError, match=message):
+        arrays.times(values)
+
+
+def test_checked_times_are_the_same_object_again() -> None:
+    once = arrays.times([0, 1, 2])
+    assert arrays.times(once) is once
+
+
+def test_read_only_leaves_the_callers_array_alone() -> None:
+    mine = np.zeros(3)
+    theirs = arrays.read_only(mine)
+    with pytest.raises(ValueError, match="read-only"):
+        theirs[0] = 1
+    mine[0] = 1
+    assert arrays.read_only(theirs) is theirs

@@ -1,0 +1,115 @@
+"""What a run imports: little to show help, and nothing heavy that a command doesn't need."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cli import main
+from tests.cli.running import ENVIRONMENT, ROOT, built
+
+# Runs one command line and says on stderr which modules it left behind.
+SCRIPT = """
+import json, os, sys
+from cli import main
+code = main.run(json.loads(sys.argv[1]))
+sys.stdout.flush()
+print(json.dumps([code, sorted(sys.modules)]), file=sys.stderr)
+"""
+NEVER = {
+    "pydantic",
+    "pydantic_core",
+    "rich",
+    "trimesh",
+    "pygltflib",
+    "numba",
+    "matplotlib",
+    "PIL",
+    "mujoco",
+    "pxr",
+    "dask",
+}
+HEAVY = NEVER | {"scipy", "meshopt"}
+STARTING = {"asyncio", "http", "multiprocessing", "unittest", "urllib.request", "xml"}
+
+
+def modules(*line: str | Path, stdin: bytes = b"") -> set[str]:
+    """The modules that one command line imports, in a process of its own."""
+    run = subprocess.run(
+        [sys.executable, "-c", SCRIPT, json.dumps([str(arg) for arg in line])],
+        cwd=ROOT,
+        env=ENVIRONMENT,
+        input=stdin,
+        capture_output=True,
+        check=True,
+    )
+    code, names = json.loads(run.stderr.splitlines()[-1])
+    assert code == 0, run.stderr
+    return set(names)
+
+
+def tops(names: set[str]) -> set[str]:
+    return {name.split(".")[0] for name in names}
+
+
+@pytest.mark.parametrize("line", [["--help"], ["--version"], []])
+def test_help_imports_no_command_and_no_numbers(line: list[str]) -> None:
+    names = modules(*line)
+    assert not tops(names) & (HEAVY | {"numpy"})
+    assert not names & STARTING
+    assert not {name for name in names if name.startswith("cli.commands.")}
+
+
+@pytest.mark.parametrize("command", main.COMMANDS)
+def test_the_help_of_a_command_imports_that_command_only(command: str) -> None:
+    names = modules(command, "--help")
+    assert not tops(names) & HEAVY
+    own = f"cli.commands.{command.replace('-', '_')}"
+    assert {name for name in names if name.startswith("cli.commands.")} == {own}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ["inspect", "--tracks"],
+        ["inspect", "--format", "json"],
+        ["sample", "--at", "0", "--space", "world", "--format", "csv"],
+        ["resample", "--fps", "12"],
+        ["resample", "--fps", "12", "--interpolation", "cubicspline", "--clip", "walk"],
+        ["convert", "-", "-"],
+    ],
+)
+def test_a_run_imports_nothing_heavy(line: list[str]) -> None:
+    assert not tops(modules(*line, stdin=built("biped"))) & HEAVY
+
+
+def test_a_wrong_command_line_imports_nothing_heavy_either() -> None:
+    script = SCRIPT.replace("code = main", "code = 0 * main")
+    for line in (["resampel"], ["resample", "--fps", "x"]):
+        run = subprocess.run(
+            [sys.executable, "-c", script, json.dumps(line)], cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=True
+        )
+        assert not tops(set(json.loads(run.stderr.splitlines()[-1])[1])) & HEAVY
+
+
+@pytest.mark.xfail(strict=True, reason="typer imports every command whose name fits, for the words beside it")
+def test_completion_of_a_command_imports_none() -> None:
+    environment = {
+        **ENVIRONMENT,
+        "_GLTF_ANIM_COMPLETE": "complete_bash",
+        "COMP_WORDS": "gltf-anim re",
+        "COMP_CWORD": "1",
+    }
+    script = (
+        "import sys, atexit; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); sys.argv = ['gltf-anim']; "
+    )
+    script += "from cli import main; main.run([])"
+    run = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    assert "resample" in run.stdout.split()
+    assert not {"numpy", "pydantic"} & set(run.stderr.split())
