@@ -47,6 +47,9 @@ def guarded(job: Callable[[], Any]) -> int:
         return USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
+    except RecursionError:
+        _say("the input is nested too deep", "")
+        return FORMAT
     except MemoryError:
         _say("out of memory", "")
         return UNSUPPORTED

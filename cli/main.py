@@ -8,6 +8,7 @@ import importlib
 import os
 import signal
 import sys
+from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
 import typer
@@ -47,7 +48,7 @@ COMMANDS = {
         "Put the keys of clips on a regular grid of frames.",
         (
             "gltf-anim resample walk.glb walk30.glb --fps 30",
-            "gltf-anim resample walk.glb walk.glb --fps 24 --clip 'idle*' --dry-run",
+            "gltf-anim resample hero.glb hero.glb --fps 24 --clip 'Run*' --dry-run",
             "cat walk.glb | gltf-anim resample --fps 30 | gltf-anim inspect",
         ),
     ),
@@ -184,8 +185,9 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that temporary files are cleared away
     gc.disable()  # one short job over many long-lived objects: collecting only costs time
     code = run(sys.argv[1:])
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, AttributeError):  # closed by whoever started us
+            stream.flush()
     os._exit(code)  # without taking all those objects apart first
 
 

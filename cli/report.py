@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 
 
@@ -16,12 +17,13 @@ class Voice:
     def say(self, line: str) -> None:
         """Write a line to stderr, unless quiet."""
         if not self.quiet:
-            sys.stderr.write(line + "\n")
+            with suppress(OSError, AttributeError):  # nobody listens
+                sys.stderr.write(line + "\n")
 
     def detail(self, line: str) -> None:
         """Write a line to stderr only where details are wanted."""
-        if self.verbose and not self.quiet:
-            sys.stderr.write(line + "\n")
+        if self.verbose:
+            self.say(line)
 
 
 def size(count: int) -> str:
@@ -36,9 +38,9 @@ def size(count: int) -> str:
 
 
 def change(before: int, after: int) -> str:
-    """Return "42.3 kB → 9.1 kB (-78 %)"."""
-    percent = f"{100 * (after - before) / before:+.0f} %" if before else "new"
-    return f"{size(before)} → {size(after)} ({percent})"
+    """Return "42.3 kB → 9.1 kB (-78 %)", without the percentage where it rounds to 0."""
+    percent = round(100 * (after - before) / before) if before else 0
+    return f"{size(before)} → {size(after)}" + (f" ({percent:+d} %)" if percent else "")
 
 
 def length(meters: float) -> str:

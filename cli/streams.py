@@ -177,11 +177,17 @@ def _beside(folder: Path, address: str) -> Bytes:
 def _place(folder: Path, address: str) -> Path:
     """Where a file in or below the folder lies; links that lead out of it are refused."""
     path = folder / address
-    root = folder.resolve()
-    if root not in path.resolve().parents:
+    try:
+        outside = folder.resolve() not in path.resolve().parents
+        there, regular = path.exists(), path.is_file()
+    except (OSError, RuntimeError, ValueError) as error:  # a name too long, a loop of links, half a character
+        raise FormatError(f"'{address[:60]}' can't be looked up ({str(error).lower()[:60]})") from None
+    if outside:
         raise FormatError(f"'{address}' leads out of the file's folder (only files beside it are read)")
-    if not path.exists():
+    if not there:
         raise FormatError(f"'{address}' is not beside the file", help=f"put it into '{folder}'")
+    if not regular:
+        raise FormatError(f"'{address}' is no file")
     return path
 
 

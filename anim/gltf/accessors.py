@@ -62,6 +62,12 @@ class Accessors:
             raise FormatError("holds floats (expected integers)", where=f"accessor {index}")
         return raw.astype(np.int64)
 
+    def numbers_of_things(self, index: int) -> Ints:
+        """Return what `integers` does. Raises FormatError for signed types, which can't number vertices or joints."""
+        if self.raw(index).dtype.kind == "i":
+            raise FormatError("holds signed integers (expected unsigned ones)", where=f"accessor {index}")
+        return self.integers(index)
+
     def matrices(self, index: int) -> Floats:
         """Return MAT4 as (count, 4, 4) for column vectors: glTF's column-major order is transposed here only."""
         return self.floats(index).reshape(-1, 4, 4).transpose(0, 2, 1)
@@ -99,7 +105,8 @@ class Accessors:
 
     def _floats(self, index: int) -> Floats:
         raw = self._raw(index)
-        values = raw.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signaling NaN; whoever gets the numbers looks for it
+            values = raw.astype(np.float64)
         if raw.dtype.kind != "f" and self._accessors[index].get("normalized"):
             return denormalized(values, raw.dtype)
         return values

@@ -6,13 +6,16 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
-from anim.gltf import compact, references
+from anim.gltf import compact, ranges, references
 from anim.gltf.document import Buffer, Bytes, Document, Json, items
 from anim.gltf.encode import Numbers
 from anim.gltf.ranges import Shift
 from anim.gltf.slots import Slots
 
+# What stands where a number is left over; on the next write it is free again.
 EMPTY_ACCESSOR: Json = {"componentType": 5121, "count": 1, "type": "SCALAR"}
+EMPTY_VIEW_KEYS = {"buffer", "byteLength"}
+LEAST = 4  # bytes of a buffer that nothing is left of: glTF knows none without
 
 
 class Place(int):
@@ -28,11 +31,16 @@ def assemble(
     """
     outside = references.outside(document.json, replaced)
     old_views = items(document.json, "bufferViews")
-    freed = _accessors_of(document.json, replaced) - outside.accessors - _still_named(animations)
-    unused = compact.unused_views(document, freed, outside)
-    shift = compact.shifts(document, freed, unused, outside)
+    freed = _accessors_of(document.json, replaced) | _placeholders(document.json)
+    freed = freed - outside.accessors - _still_named(animations)
+    unused = compact.unused_views(document, freed, outside) | _empty_views(document.json, outside)
+    shift = compact.shifts(document, freed, unused, outside, references.frozen_buffers(document.json))
     data, offsets = _joined(contents)
     target = _target_buffer(document, shift)
+    shift = [
+        moved if data and i == target else _leaving_some(moved, document.buffers[i].byte_length)
+        for i, moved in enumerate(shift)
+    ]
     buffers = _rebuilt(document, shift, target, data)
 
     view_slots = Slots(len(old_views), unused, 1 if data else 0)
@@ -54,6 +62,21 @@ def assemble(
 def _accessors_of(json: Json, animations: Set[int]) -> set[int]:
     found = items(json, "animations")
     return {sampler[key] for i in animations for sampler in found[i]["samplers"] for key in ("input", "output")}
+
+
+def _placeholders(json: Json) -> set[int]:
+    return {i for i, accessor in enumerate(items(json, "accessors")) if accessor == EMPTY_ACCESSOR}
+
+
+def _empty_views(json: Json, outside: references.References) -> set[int]:
+    named = {view for accessor in items(json, "accessors") for view in references.views_of(accessor)} | outside.views
+    views = enumerate(items(json, "bufferViews"))
+    return {i for i, view in views if view.keys() == EMPTY_VIEW_KEYS and view["byteLength"] == 1 and i not in named}
+
+
+def _leaving_some(shift: Shift, length: int) -> Shift:
+    """The same, but that a buffer which would end up empty keeps its first bytes."""
+    return shift if shift(length) else Shift(ranges.difference(shift.dropped, [(0, LEAST)]))
 
 
 def _still_named(animations: Sequence[Json]) -> set[int]:
@@ -116,5 +139,7 @@ def _described(old: list[Json], buffers: list[Buffer]) -> list[Json]:
 
 
 def _set_list(json: Json, key: str, objects: list[Json]) -> None:
-    if objects or key in json:
+    if objects:
         json[key] = objects
+    elif json.get(key):
+        del json[key]

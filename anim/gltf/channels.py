@@ -26,6 +26,7 @@ class Reader:
         self._meshes = items(document.json, "meshes")
         self._accessors = accessors
         self._times: dict[int, Floats] = {}
+        self._values: dict[int, Floats] = {}
 
     def track(self, animation: Json, number: int) -> Track | None:
         """Return a channel of `animation` as a track, None where it has no target that is understood."""
@@ -52,7 +53,9 @@ class Reader:
         cubic = interpolation is Interpolation.CUBICSPLINE
         if cubic and len(times) < 2:
             raise FormatError("CUBICSPLINE with one key (expected at least two)")
-        values = self._accessors.unchecked(sampler["output"])
+        values = self._values.get(sampler["output"])
+        if values is None:
+            values = self._values[sampler["output"]] = self._accessors.unchecked(sampler["output"])
         rows = len(times) * (3 if cubic else 1)
         if width is None:  # a pointer: an array of elements per key where the count says so
             width = values.size // rows
@@ -64,8 +67,12 @@ class Reader:
         storage = _storage(output["componentType"], bool(output.get("normalized")), output["type"])
         if not cubic:
             keys = values.reshape(len(times), width)
+            if path == "rotation":
+                _check_rotations(keys)
             return Track(node, path, interpolation, times, keys, pointer=address, storage=storage)
         parts = values.reshape(len(times), 3, width)
+        if path == "rotation":
+            _check_rotations(parts[:, 1])
         return Track(
             node, path, interpolation, times, parts[:, 1], parts[:, 0], parts[:, 2], pointer=address, storage=storage
         )
@@ -109,6 +116,11 @@ class Reader:
             return address or "no target"
         name = self._nodes[node].get("name", "") if node < len(self._nodes) else ""
         return f"node {node}{f' {name!r}' if name else ''}, {path}"
+
+
+def _check_rotations(keys: Floats) -> None:
+    if not keys.any(axis=1).all():
+        raise FormatError(f"rotation at key {int(keys.any(axis=1).argmin())} is zero (expected a unit quaternion)")
 
 
 @cache

@@ -20,10 +20,13 @@ def unused_views(document: Document, freed: Set[int], outside: References) -> se
     return theirs - others - outside.views
 
 
-def shifts(document: Document, freed: Set[int], unused: Set[int], outside: References) -> list[Shift]:
+def shifts(
+    document: Document, freed: Set[int], unused: Set[int], outside: References, frozen: Set[int] = frozenset()
+) -> list[Shift]:
     """Return, for each buffer, where its bytes go when freed accessors and unused views are dropped.
 
     A view that freed accessors share with others loses their bytes too, unless someone refers to the view itself.
+    frozen: buffers in which nothing may move.
     """
     dropped: list[list[Range]] = [[] for _ in document.buffers]
     needed: list[list[Range]] = [[] for _ in document.buffers]
@@ -40,8 +43,8 @@ def shifts(document: Document, freed: Set[int], unused: Set[int], outside: Refer
             dropped[buffer] += free
             needed[buffer] += ranges.difference([place], free)
     return [
-        Shift(_droppable(d, n, b.byte_length) if b.has_data else [])
-        for d, n, b in zip(dropped, needed, document.buffers, strict=True)
+        Shift(_droppable(d, n, b.byte_length) if b.has_data and i not in frozen else [])
+        for i, (d, n, b) in enumerate(zip(dropped, needed, document.buffers, strict=True))
     ]
 
 

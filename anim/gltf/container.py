@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import count
 from typing import TypeAlias
 
 import numpy as np
@@ -30,7 +31,7 @@ def read(data: Bytes, resolve: Resolve | None = None) -> Document:
     resolve: gives the bytes of a file beside the input by its relative path; None where there is no such place.
     Raises FormatError with what is wrong and where.
     """
-    head = data[:64].tobytes()
+    head = data[:4096].tobytes()
     if head[:4] == MAGIC:
         return _read_glb(data, resolve)
     if head.startswith(LFS_POINTER):
@@ -58,6 +59,8 @@ def glb(document: Document) -> list[Bytes]:
     pieces = [_chunk_head(0, JSON_CHUNK), *_padded(text.dump(content), b" ")]
     pieces[0] = _chunk_head(_size(pieces[1:]), JSON_CHUNK)
     chunks: list[tuple[int, list[Bytes]]] = []
+    if described and document.buffers[0].byte_length > MAX_GLB:
+        raise _too_large(document.buffers[0].byte_length)
     if described:
         chunks.append((BIN_CHUNK, _padded(document.buffers[0].data, b"\0")))
     chunks += [(kind, [_bytes(content)]) for kind, content in document.chunks]
@@ -65,7 +68,7 @@ def glb(document: Document) -> list[Bytes]:
         pieces += [_chunk_head(_size(body), kind), *body]
     total = 12 + _size(pieces)
     if total > MAX_GLB:
-        raise UnsupportedError(f"a GLB can't hold {total} bytes (its limit is {MAX_GLB})", help="write a .gltf")
+        raise _too_large(total)
     return [_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
 
 
@@ -78,13 +81,15 @@ def gltf(document: Document, stem: str, *, keep_external: bool = False) -> dict[
     content = dict(document.json)
     described = items(content, "buffers")
     files: dict[str, list[Bytes]] = {}
+    taken = {uri.relative_path(b.uri) for b in document.buffers if keep_external and _stays(b) and b.uri is not None}
     beside = []
     for i, (about, buffer) in enumerate(zip(described, document.buffers, strict=True)):
         about = dict(about)
         if buffer.uri is not None and uri.is_data(buffer.uri):
             about["uri"] = _kept_data_uri(buffer)
-        elif buffer.has_data and not (keep_external and buffer.uri is not None and not buffer.replaced):
-            name = f"{stem}.bin" if i == 0 else f"{stem}-{i}.bin"
+        elif buffer.has_data and not (keep_external and _stays(buffer)):
+            name = next(n for n in _names(stem, i) if n not in taken)
+            taken.add(name)
             about["uri"] = uri.from_path(name)
             files[name] = [buffer.data]
         beside.append(about)
@@ -92,6 +97,21 @@ def gltf(document: Document, stem: str, *, keep_external: bool = False) -> dict[
         content["buffers"] = beside
     files[f"{stem}.gltf"] = [_bytes(text.dump(content, indent=document.indent) + b"\n")]
     return files
+
+
+def _too_large(size: int) -> UnsupportedError:
+    return UnsupportedError(f"a GLB can't hold {size} bytes (its limit is {MAX_GLB})", help="write a .gltf")
+
+
+def _stays(buffer: Buffer) -> bool:
+    """Whether a buffer is a file of its own that has not changed."""
+    return buffer.uri is not None and not uri.is_data(buffer.uri) and not buffer.replaced
+
+
+def _names(stem: str, number: int) -> Iterator[str]:
+    """File names for a buffer, the best first."""
+    yield f"{stem}.bin" if number == 0 else f"{stem}-{number}.bin"
+    yield from (f"{stem}-{number}-{k}.bin" for k in count(1))
 
 
 def _read_glb(data: Bytes, resolve: Resolve | None) -> Document:

@@ -73,7 +73,11 @@ def values(track: Track) -> Numbers:
         integers = _integers(rows, np.dtype(DTYPES[kind]), normalized)
         if integers is not None:
             return Numbers(integers.tobytes(), kind, element, normalized)
-    return Numbers(rows.astype("<f4").tobytes(), FLOAT, element)
+    with np.errstate(over="ignore"):
+        stored = rows.astype("<f4")
+    if np.isinf(stored).any():
+        raise RangeError(f"a value of {float(np.abs(rows).max()):.3g} is too large for float32")
+    return Numbers(stored.tobytes(), FLOAT, element)
 
 
 def _integers(rows: Floats, dtype: np.dtype[Any], normalized: bool) -> NDArray[Any] | None:

@@ -15,8 +15,7 @@ def parents(json: Json) -> list[int]:
             if parent[child] >= 0:
                 raise FormatError(f"has two parents ({parent[child]} and {i})", where=f"nodes[{child}]")
             parent[child] = i
-    for i in range(len(nodes)):
-        _check_reaches_root(i, parent)
+    _check_forest(nodes, parent)
     return parent
 
 
@@ -39,9 +38,10 @@ def check(json: Json) -> None:
             )
 
 
-def _check_reaches_root(node: int, parent: list[int]) -> None:
-    at, steps = node, 0
-    while at >= 0:
-        at, steps = parent[at], steps + 1
-        if steps > len(parent):
-            raise FormatError("lies on a cycle (expected trees)", where=f"nodes[{node}]")
+def _check_forest(nodes: list[Json], parent: list[int]) -> None:
+    reached = [i for i, above in enumerate(parent) if above < 0]
+    for node in reached:  # grows while it is gone through
+        reached.extend(nodes[node].get("children", ()))
+    if len(reached) < len(nodes):
+        lost = min(set(range(len(nodes))) - set(reached))
+        raise FormatError("lies on a cycle (expected trees)", where=f"nodes[{lost}]")

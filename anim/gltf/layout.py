@@ -10,7 +10,7 @@ from anim.gltf.document import Json, items
 COMPONENT_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes by componentType
 COMPONENTS = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4)}  # (columns, rows) by type
 COMPONENTS |= {"MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4)}
-MAX_ZERO_FILLED = 2**26  # components of an accessor without data; its size is bounded by nothing in the file
+MAX_ZERO_FILLED = 2**23  # components of an accessor without data; its size is bounded by nothing in the file
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 

@@ -44,8 +44,13 @@ def outside(json: Json, replaced: Iterable[int]) -> References:
             accessors |= {sampler["input"], sampler["output"]}
     views = {image["bufferView"] for image in items(json, "images") if "bufferView" in image}
     views |= set(_of_draco(json))
-    unknown = set(_numbers_of_unknown(json))
+    unknown = set(_whole_numbers(list(_unknown_parts(json))))
     return References(frozenset(accessors | unknown), frozenset(views | unknown))
+
+
+def frozen_buffers(json: Json) -> set[int]:
+    """Return the buffers that unknown extensions or extras point into by themselves: nothing in them may move."""
+    return {part["buffer"] for part in _objects(list(_unknown_parts(json))) if type(part.get("buffer")) is int}
 
 
 def views_of(accessor: Json) -> list[int]:
@@ -85,25 +90,32 @@ def _of_draco(json: Json) -> Iterator[int]:
         yield from _whole_numbers(primitive.get("extensions", {}).get("KHR_draco_mesh_compression", {}))
 
 
-def _numbers_of_unknown(value: Any) -> Iterator[int]:
-    """Whole numbers anywhere inside extras and extensions that are not known to be harmless."""
+def _unknown_parts(value: Any) -> Iterator[Any]:
+    """Extras, and extensions that are not known to be harmless, wherever they stand."""
     if isinstance(value, list):
         for item in value:
             if isinstance(item, dict | list):
-                yield from _numbers_of_unknown(item)
+                yield from _unknown_parts(item)
         return
     for key, item in value.items():
         if key == "extras":
-            yield from _whole_numbers(item)
+            yield item
         elif key == "extensions" and isinstance(item, dict):
             for name, extension in item.items():
-                yield from _whole_numbers(extension) if name not in HARMLESS else _numbers_inside(extension)
+                if name not in HARMLESS:
+                    yield extension
+                elif isinstance(extension, dict | list):
+                    yield from _unknown_parts(extension)
         elif isinstance(item, dict | list):
-            yield from _numbers_of_unknown(item)
+            yield from _unknown_parts(item)
 
 
-def _numbers_inside(extension: Any) -> Iterator[int]:
-    return _numbers_of_unknown(extension) if isinstance(extension, dict | list) else iter(())
+def _objects(value: Any) -> Iterator[Json]:
+    if isinstance(value, dict):
+        yield value
+    if isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _objects(item)
 
 
 def _whole_numbers(value: Any) -> Iterator[int]:

@@ -15,6 +15,7 @@ from anim.gltf import hierarchy, layout, targets
 from anim.gltf.document import Json
 
 Check = Callable[[Any], None]
+LARGEST = 3.4e38  # what float32 holds
 
 TOP_ARRAYS = frozenset(
     """
@@ -58,6 +59,8 @@ def check(json: Json) -> None:
     if "asset" not in json:
         raise FormatError("has no 'asset' (every glTF names its version there)")
     _named("asset", rules.pop("asset"), json["asset"])
+    for key in ("extensionsUsed", "extensionsRequired"):
+        _named(key, _list_of(_text), json.get(key, []))
     for key, rule in rules.items():
         _check_each(json.get(key, []), rule, key)
     layout.check(json)
@@ -117,7 +120,13 @@ def _rules(counts: Mapping[str, int]) -> dict[str, Check]:
     )  # fmt: skip
     attributes = _map_of(index("accessors"))
     primitive = Rule(
-        {"attributes": attributes, "indices": index("accessors"), "targets": _list_of(attributes), "mode": _whole(0)},
+        {
+            "attributes": attributes,
+            "indices": index("accessors"),
+            "targets": _list_of(attributes),
+            "mode": _whole(0),
+            "extensions": Rule({}),
+        },
         ("attributes",),
     )
     node = Rule(
@@ -219,7 +228,7 @@ def _whole(least: int) -> Check:
 def _one_of(*allowed: int) -> Check:
     def check_one(value: Any) -> None:
         if type(value) is not int or value not in allowed:
-            raise FormatError(f"is {value!r} (expected one of {', '.join(map(str, allowed))})")
+            raise FormatError(f"is {_name(value)} (expected one of {', '.join(map(str, allowed))})")
 
     return check_one
 
@@ -230,7 +239,7 @@ def _numbers(count: int | None) -> Check:
         if count is not None and len(value) != count:
             raise FormatError(f"has {len(value)} numbers (expected {count})")
         for item in value:
-            if (type(item) is not float and type(item) is not int) or not -1e308 < item < 1e308:
+            if (type(item) is not float and type(item) is not int) or not -LARGEST < item < LARGEST:
                 raise FormatError(f"holds {_name(item)} (expected finite numbers)")
 
     return check_numbers
@@ -258,7 +267,7 @@ def _check_type(value: Any, kind: type, words: str, where: str = "") -> None:
 
 def _name(value: Any) -> str:
     words = {dict: "an object", list: "an array", str: "a string", bool: "a boolean", type(None): "null"}
-    return words.get(type(value), repr(value))
+    return words.get(type(value), repr(value)[:60])
 
 
 def _check_channels(animation: Json) -> None:
@@ -279,6 +288,9 @@ def _check_mesh(mesh: Json) -> None:
     counts = {len(primitive.get("targets", ())) for primitive in mesh["primitives"]}
     if len(counts) > 1:
         raise FormatError(f"primitives have different numbers of morph targets ({sorted(counts)})")
+    targets_there = max(counts, default=0)
+    if len(mesh.get("weights", ())) not in (0, targets_there):
+        raise FormatError(f"has {len(mesh['weights'])} weights for {targets_there} morph targets")
 
 
 def _check_skin(skin: Json) -> None:

@@ -10,7 +10,7 @@ from anim.gltf.document import Json, items
 from anim.model.track import PATHS
 
 EXTENSION = "KHR_animation_pointer"
-_NODE_PROPERTY = re.compile(r"/nodes/(\d+)/(translation|rotation|scale|weights)")
+_NODE_PROPERTY = re.compile(r"/nodes/(0|[1-9][0-9]{0,8})/(translation|rotation|scale|weights)")
 
 Target: TypeAlias = tuple[int | None, str, str | None]  # node, path, pointer
 

@@ -6,7 +6,7 @@ import json
 import re
 from typing import Any, NoReturn
 
-from anim.errors import FormatError, RangeError
+from anim.errors import FormatError
 from anim.gltf.document import Json
 
 
@@ -34,7 +34,7 @@ def parse(raw: bytes) -> Json:
 def dump(content: Json, indent: int | None = None) -> bytes:
     """Return `content` as UTF-8: without any spaces, or with `indent` spaces a level and plain lists on one line.
 
-    Raises RangeError for a number that JSON can't hold.
+    Raises FormatError for a number that JSON can't hold.
     """
     try:
         if indent:
@@ -44,8 +44,8 @@ def dump(content: Json, indent: int | None = None) -> bytes:
         return written.encode("utf-8")
     except UnicodeEncodeError:  # a lone surrogate, which only an escape can carry
         return json.dumps(content, separators=(",", ":"), indent=indent, allow_nan=False).encode("ascii")
-    except ValueError as error:
-        raise RangeError(f"a number can't be written as JSON ({error})") from None
+    except ValueError as error:  # a number like 1e999, which was read as infinity
+        raise FormatError(f"a number can't be written as JSON ({str(error).lower()})") from None
 
 
 def indent_of(raw: bytes) -> int | None:

@@ -31,7 +31,10 @@ def decode_data(uri: str) -> bytes:
     media = (match[1] or "").lower()
     if media not in BUFFER_TYPES:
         raise FormatError(f"data URI has media type '{media}' (expected {' or '.join(BUFFER_TYPES)})")
-    payload = unquote_to_bytes(uri[match.end() :])
+    try:
+        payload = unquote_to_bytes(uri[match.end() :])
+    except UnicodeEncodeError:
+        raise FormatError("data URI holds half of a surrogate pair") from None
     if not match[3]:
         return payload
     try:
@@ -54,7 +57,7 @@ def relative_path(uri: str) -> str:
     if _SCHEME.match(uri):
         raise FormatError(f"URI '{_short(uri)}' has a scheme (only files beside this one are read)")
     path = unquote(uri)
-    if not path or "\0" in path:
+    if not path or "\0" in path or not path.isprintable():
         raise FormatError(f"URI '{_short(uri)}' names no file")
     if path[0] in "/\\" or _SCHEME.match(path):
         raise FormatError(f"URI '{_short(uri)}' is absolute (only files beside this one are read)")

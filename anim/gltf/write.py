@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 
-from anim.errors import AnimError
+from anim.errors import AnimError, RangeError
 from anim.gltf import encode, targets
 from anim.gltf.assemble import Place, assemble
 from anim.gltf.document import Document, Json, items
@@ -25,7 +25,7 @@ def replace_clips(document: Document, clips: Mapping[int, Clip]) -> Document:
 
     Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
     channel get one. Names, extras and extensions of animations, channels and samplers stay.
-    Raises RangeError where keys fall together in float32.
+    Raises RangeError where keys fall together in float32, or no channel is left.
     """
     if not clips:
         return document
@@ -77,6 +77,10 @@ def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
             channels.append({**channel, "sampler": samplers.new(queue.popleft(), channel["sampler"])})
     for queue in waiting.values():
         channels += [{"sampler": samplers.new(track, None), "target": _target(track)} for track in queue]
+    if not channels:
+        if animation["channels"]:
+            raise RangeError(f"clip '{clip.name}' has no track left (glTF knows no animation without channels)")
+        return animation
     replaced = {**animation, "channels": channels, "samplers": samplers.list}
     if clip.name != animation.get("name", ""):
         replaced["name"] = clip.name

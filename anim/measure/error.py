@@ -19,9 +19,10 @@ from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.track import sample
 
+SIDES = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])  # of a box's corners
 NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
 SLACK = 1.02  # a bound this close to what was found is as good as found
-MAX_SEARCHED = 48  # times per surface at which all vertices are gone through
+MAX_SEARCHED = 4_000_000  # vertices gone through per surface; beyond, the bound of what is left is reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +107,8 @@ class _Part:
         best, best_frame = 0.0, int(by_frame.argmax())
         order = np.argsort(by_frame)[::-1]
         for count, frame in enumerate(order.tolist()):
-            if by_frame[frame] <= max(best * SLACK, floor) or count == MAX_SEARCHED:
-                best = max(best, min(float(by_frame[frame]), floor) if count < MAX_SEARCHED else float(by_frame[frame]))
+            if by_frame[frame] <= max(best * SLACK, floor) or count * len(surface.points) > MAX_SEARCHED:
+                best = max(best, float(by_frame[frame]))
                 break
             size = self._searched(frame, old, new, old_world, new_world)
             if size > best:
@@ -123,9 +124,7 @@ class _Part:
         corners = self._corners
         difference, reach = self._weight_ranges(old, new)
         if len(self._extents):
-            grown = (reach @ self._extents).max(axis=0)
-            centers = (corners[:, :1] + corners[:, -1:]) / 2
-            corners = corners + np.sign(corners - centers) * grown
+            corners = corners + SIDES * (reach @ self._extents).max(axis=0)
         points = moved[..., :3] @ np.swapaxes(corners, -1, -2)[:, None]  # (J, F, 3, 8)
         points += moved[..., 3, None]
         points *= points
@@ -153,8 +152,7 @@ class _Part:
 
 
 def _corners(low: Floats, high: Floats) -> Floats:
-    box = np.stack((low, high))
-    return np.array([[box[i, 0], box[j, 1], box[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    return np.where(SIDES < 0, low, high)
 
 
 def _pointer_error(before: Clip, after: Clip, times: Floats) -> tuple[float, str]:
@@ -173,6 +171,6 @@ def _pointer_error(before: Clip, after: Clip, times: Floats) -> tuple[float, str
 def _relative_difference(old: Track, new: Track, times: Floats) -> float:
     a, b = sample(old, times), sample(new, times)
     if old.kind is Kind.ROTATION:
-        return float(min(np.abs(a - b).max(), np.abs(a + b).max()))
+        return float(np.minimum(np.abs(a - b).max(axis=1), np.abs(a + b).max(axis=1)).max())
     extent = float((a.max(axis=0) - a.min(axis=0)).max())
     return float(np.abs(a - b).max()) / (extent or max(float(np.abs(a).max()), 1e-30))

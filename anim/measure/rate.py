@@ -32,6 +32,8 @@ def estimate(times: Floats) -> Rate | None:
         return None
     steps = np.diff(times)
     typical = float(np.median(steps))
+    if len(times) > 4 and steps[-1] < (1 - ON_GRID) * typical:  # a clip may end between two frames
+        times, steps = times[:-1], steps[:-1]
     if (np.abs(steps - typical) < ON_GRID * typical).all():
         fps = _rounded((len(times) - 1) / float(times[-1] - times[0]))
         return Rate(fps, float(_regular(times, np.array([fps]))[0]))

@@ -14,6 +14,7 @@ from anim.model import Interpolation, Kind, Skeleton, Track
 FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two stored values are the same
 REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing
 UNIT = 1e-3  # a quaternion whose length is further off 1 than this was not meant
+UNIT_BYTE = 0.00769  # the same for quaternions in normalized bytes, by the Khronos validator
 WIDE_STEP = np.radians(170.0)  # rad; from here on players disagree about which way round is shorter
 
 
@@ -71,7 +72,8 @@ def _count(group: _Group, skeleton: Skeleton, result: TrackStats, numbers: Ints)
     values = group.values
     if group.kind is Kind.ROTATION:
         lengths = np.sqrt(quaternion.dot(values, values))
-        result.non_unit[numbers] = (np.abs(lengths - 1) > UNIT).sum(axis=0)
+        bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in group.tracks])
+        result.non_unit[numbers] = (np.abs(lengths - 1) > np.where(bytes_only, UNIT_BYTE, UNIT)).sum(axis=0)
         values = values / np.where(lengths > 0, lengths, 1)[..., None]
         dots = quaternion.dot(values[1:], values[:-1])
         angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))

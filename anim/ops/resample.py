@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Track
 from anim.sampling import slopes
-from anim.sampling.batch import batches
+from anim.sampling.batch import Batch, batches
 from anim.sampling.times import grid, key_times
 
 KEEP = "keep"
+UNIT = 1e-6  # of a squared length; what rounding to float32 leaves
 INTERPOLATIONS = (KEEP, "step", "linear", "cubicspline")
 
 
@@ -36,7 +41,7 @@ def resample(
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
     values = _sampled([clip.tracks[i] for i in goals], times)
-    new = list(clip.tracks)
+    new = [_kept(t, _goal(t, interpolation)) if i in chosen else t for i, t in enumerate(clip.tracks)]
     for (i, goal), sampled in zip(goals.items(), values, strict=True):
         new[i] = _keyed(clip.tracks[i], goal, times, sampled)
     return Clip(clip.name, tuple(new))
@@ -46,6 +51,13 @@ def _goal(track: Track, interpolation: str) -> Interpolation:
     if track.kind is Kind.DISCRETE:
         return Interpolation.STEP
     return track.interpolation if interpolation == KEEP else Interpolation(interpolation.upper())
+
+
+def _kept(track: Track, goal: Interpolation) -> Track:
+    """A track whose keys stay, with the interpolation that was asked for where it says the same without tangents."""
+    if goal is track.interpolation or goal is Interpolation.CUBICSPLINE or _is_sampled(track):
+        return track
+    return replace(track, interpolation=goal, in_tangents=None, out_tangents=None)
 
 
 def _is_sampled(track: Track) -> bool:
@@ -69,15 +81,39 @@ def _sampled(tracks: list[Track], times: Floats) -> list[Floats]:
     for batch in batches(tracks):
         values = batch.sample(times)
         if batch.kind is Kind.ROTATION:
-            values = quaternion.align_signs(values)
+            values = quaternion.align_signs(_with_keys(batch, times, values))
         found.update((id(track), values[:, g]) for g, track in enumerate(batch.tracks))
     return [found[id(track)] for track in tracks]
+
+
+def _with_keys(batch: Batch, times: Floats, values: Floats) -> Floats:
+    """Sampled rotations, at keys the key's own numbers where they are unit already: normalizing changes last bits."""
+    at = np.minimum(np.searchsorted(batch.times, times), len(batch.times) - 1)
+    own = batch.values[at]
+    unit = np.abs(quaternion.dot(own, own) - 1) < UNIT
+    exact = (batch.times[at] == times)[:, None] & unit
+    return np.where(exact[..., None], own, values)
 
 
 def _keyed(track: Track, goal: Interpolation, times: Floats, values: Floats) -> Track:
     tangents: tuple[Floats | None, Floats | None] = (None, None)
     if goal is Interpolation.CUBICSPLINE and len(times) > 1:
-        tangents = slopes.tangents(track, times, values)
+        tangents = _tangents(track, times, values)
     elif goal is Interpolation.CUBICSPLINE:
         goal = Interpolation.LINEAR
     return Track(track.node, track.path, goal, times, values, *tangents, pointer=track.pointer, storage=track.storage)
+
+
+def _tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Tangents of the new keys; a piece that was there from key to key keeps its own, to the bit."""
+    before, after = slopes.tangents(track, times, values)
+    if track.in_tangents is None or track.out_tangents is None:
+        return before, after
+    at = np.minimum(np.searchsorted(track.times, times), len(track.times) - 1)
+    same = track.times[at] == times
+    whole = np.flatnonzero(same[:-1] & same[1:] & (np.diff(at) == 1))
+    signs = np.where(quaternion.dot(values, track.values[at]) < 0, -1.0, 1.0) if track.kind is Kind.ROTATION else 1.0
+    own = np.broadcast_to(np.asarray(signs), (len(times),))[:, None]
+    after[whole] = (track.out_tangents[at] * own)[whole]
+    before[whole + 1] = (track.in_tangents[at] * own)[whole + 1]
+    return before, after

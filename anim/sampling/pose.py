@@ -13,26 +13,38 @@ from anim.sampling.track import Located, locate
 
 def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
     """Return the local transforms of all nodes at times `at` (F,) in seconds; what no track moves stays at rest."""
-    at = np.asarray(at, np.float64)
-    frames, nodes = len(at), len(skeleton)
-    parts = {
-        "translation": _at_rest(skeleton.translation, frames),
-        "rotation": _at_rest(skeleton.rotation, frames),
-        "scale": _at_rest(skeleton.scale, frames),
-    }
-    weights: dict[int, Floats] = {}
-    places: dict[int, Located] = {}
-    for batch in batches(track for track in clip.tracks if track.node is not None and track.node < nodes):
-        place = places.get(id(batch.times))
-        if place is None:
-            place = places[id(batch.times)] = locate(batch.times, at)
-        values = batch.sample(at, place)
-        numbers = [track.node for track in batch.tracks if track.node is not None]
-        if batch.tracks[0].path == "weights":
-            weights.update((node, values[:, i]) for i, node in enumerate(numbers))
-        else:
-            parts[batch.tracks[0].path][:, numbers] = values
-    return Pose(at, parts["translation"], parts["rotation"], parts["scale"], weights)
+    return Poses(skeleton, clip).at(at)
+
+
+class Poses:
+    """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked once."""
+
+    def __init__(self, skeleton: Skeleton, clip: Clip) -> None:
+        self._skeleton = skeleton
+        nodes = len(skeleton)
+        self._batches = batches(track for track in clip.tracks if track.node is not None and track.node < nodes)
+
+    def at(self, at: Floats) -> Pose:
+        """Return the local transforms of all nodes at times `at` (F,) in seconds."""
+        at = np.asarray(at, np.float64)
+        parts = {
+            "translation": _at_rest(self._skeleton.translation, len(at)),
+            "rotation": _at_rest(self._skeleton.rotation, len(at)),
+            "scale": _at_rest(self._skeleton.scale, len(at)),
+        }
+        weights: dict[int, Floats] = {}
+        places: dict[int, Located] = {}
+        for batch in self._batches:
+            place = places.get(id(batch.times))
+            if place is None:
+                place = places[id(batch.times)] = locate(batch.times, at)
+            values = batch.sample(at, place)
+            numbers = [track.node for track in batch.tracks if track.node is not None]
+            if batch.tracks[0].path == "weights":
+                weights.update((node, values[:, i]) for i, node in enumerate(numbers))
+            else:
+                parts[batch.tracks[0].path][:, numbers] = values
+        return Pose(at, parts["translation"], parts["rotation"], parts["scale"], weights)
 
 
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:

@@ -14,7 +14,7 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 
-SLIVER = 1e-3  # frames; a last step shorter than this is float32 rounding of the end, not a frame
+SLIVER = 1e-3  # frames; a last step shorter than this, or than float32 tells apart at the end, is rounding
 MAX_FRAMES = 10_000_000
 
 
@@ -30,14 +30,15 @@ def grid(start: float, end: float, *, fps: float) -> Floats:
     frames = (end - start) * fps
     if frames > MAX_FRAMES:
         raise RangeError(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
-    whole = max(math.ceil(frames - SLIVER), 0)
+    sliver = max(SLIVER, 2 * float(np.spacing(np.float32(end))) * fps)
+    whole = max(math.ceil(frames - sliver), 1 if end > start else 0)
     times = start + np.arange(whole, dtype=np.float64) / fps
     return arrays.read_only(np.append(times, end)) if whole else arrays.read_only(np.array([start], np.float64))
 
 
 def key_times(seconds: Floats) -> Floats:
     """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
-    return arrays.sorted_unique(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64))
+    return arrays.read_only(arrays.sorted_unique(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
 
 
 def apart(seconds: Floats) -> Ints:

@@ -10,6 +10,8 @@ from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Kind, Track
 
+VANISHING = 1e-9  # a quaternion whose largest component is below this has no direction
+
 
 @dataclass(frozen=True, slots=True)
 class Located:
@@ -65,7 +67,13 @@ def interpolate(
         arriving, leaving = tangents
         duration = place.duration.reshape(shape)
         result = hermite.evaluate(u, start, duration * leaving[place.left], end, duration * arriving[place.right])
-        return quaternion.normalize(result) if kind is Kind.ROTATION else result
+        return _unit(result, start) if kind is Kind.ROTATION else result
     if kind is Kind.ROTATION:
         return quaternion.slerp(quaternion.normalize(start), quaternion.normalize(end), u[..., 0])
     return start + u * (end - start)
+
+
+def _unit(rotations: Floats, instead: Floats) -> Floats:
+    """The rotations at unit length; where a spline runs through zero there is none, and the left key's stands."""
+    lost = (np.abs(rotations).max(axis=-1) < VANISHING)[..., None]
+    return quaternion.normalize(np.where(lost, instead, rotations))

@@ -11,6 +11,7 @@ from anim.ops.resample import resample as resampled
 from anim.ops.selection import Selection
 from cli import options
 from cli.edit import edit
+from cli.errors import UsageError
 from cli.report import Voice
 
 
@@ -47,6 +48,8 @@ def resample(
     and a track that never changes keeps its keys. The last line says how far any vertex moved, measured on what was
     written.
     """
+    if not fps > 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     edit(
         input,
         output,

@@ -93,7 +93,7 @@ def test_sparse_indices_increase_and_stay_inside(rows: list[int]) -> None:
         ({"bufferView": 1}, r"accessors\[0\].bufferView: is 1"),
         ({"bufferView": -1}, r"accessors\[0\].bufferView: is -1"),
         ({"componentType": 5124}, r"accessors\[0\].componentType: is 5124"),
-        ({"componentType": "5126"}, r"accessors\[0\].componentType: is '5126'"),
+        ({"componentType": "5126"}, r"accessors\[0\].componentType: is a string"),
         ({"type": "VEC4"}, r"accessors\[0\].* ends at byte 32"),
         ({"type": 3}, r"accessors\[0\].type"),
         ({"normalized": 1}, r"accessors\[0\].normalized"),
@@ -194,13 +194,13 @@ def test_a_huge_sparse_count_is_refused_before_anything_is_allocated() -> None:
 
 
 def test_zeros_without_data_take_no_memory_until_they_are_wanted() -> None:
-    document = opened(text({"accessors": [{"componentType": FLOAT, "count": 10_000_000, "type": "VEC3"}]}))
+    document = opened(text({"accessors": [{"componentType": FLOAT, "count": 2_000_000, "type": "VEC3"}]}))
     tracemalloc.start()
     raw = Accessors(document).raw(0)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert raw.shape == (10_000_000, 3)
-    assert not raw[::1_000_000].any()
+    assert raw.shape == (2_000_000, 3)
+    assert not raw[::200_000].any()
     assert peak < 1e6
 
 
