@@ -59,6 +59,9 @@ def edit(
         if measure:
             edited = _measured(edited, document, accessors, skeleton, voice)
         size = streams.write(result, output, source.folder, dry_run=dry_run)
+    outside = "" if dry_run or output == streams.PIPE else streams.left_outside(result, source.folder, output)
+    if outside:
+        voice.say(f"{outside}; convert --embed takes them in")
     name = source.name if output == streams.PIPE else output
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 

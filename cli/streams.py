@@ -260,6 +260,14 @@ def stays_in(folder: Path | None, output: str) -> bool:
     return folder is not None and output != PIPE and Path(output).parent.resolve() == folder.resolve()
 
 
+def left_outside(document: Document, folder: Path | None, output: str) -> str:
+    """Return a note where images that the output refers to lie in another folder than it, else nothing."""
+    images = [image["uri"] for image in items(document.json, "images") if not uri.is_data(image.get("uri", "data:"))]
+    if not images or stays_in(folder, output):
+        return ""
+    return f"note: {len(images)} image{'s stay' if len(images) > 1 else ' stays'} outside ({images[0]}, …)"
+
+
 def with_images(document: Document, folder: Path | None) -> Document:
     """Return the document with its external images as data URIs. Raises FormatError for one that can't be read."""
     images = []

@@ -8,14 +8,13 @@ from enum import StrEnum
 import numpy as np
 
 from anim.arrays import Floats, sorted_unique
-from anim.measure import rate
+from anim.measure import levers, rate
 from anim.model import Clip, Skeleton
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 
 CLOSED = 1e-3  # of the skeleton's size; a seam below a thousandth is not seen
 ONE_FRAME = 1.6  # an open loop's seam against the motion per frame next to it: about one frame's worth
-LEVER = 0.05  # of the skeleton's size: how far from a node its turning counts
 MAX_FRAMES = 600  # looked at by `best_ranges`
 DEFAULT_FPS = 30.0
 
@@ -90,12 +89,12 @@ def _judged(skeleton: Skeleton, clip: Clip, start: float, end: float, root: int)
         return Loop(LoopKind.NOT_A_LOOP, start, end, 0.0, 0.0, "", 0.0, 0.0, fps)
     times = np.array([start, start + step, end - step, end])
     points = _points(skeleton, clip, times, root)
-    size = _size(points)
+    size = levers.size(points)
     off = np.linalg.norm(points[:, 3] - points[:, 0], axis=1)
     speeds = np.linalg.norm((points[:, 3] - points[:, 2]) - (points[:, 1] - points[:, 0]), axis=1) / step
     frame = float(max(_longest(points[:, 1] - points[:, 0]), _longest(points[:, 3] - points[:, 2])))
     seam = float(off.max())
-    worst = int(off.argmax()) // 4
+    worst = int(off.argmax()) // levers.PER_NODE
     kind = LoopKind.NOT_A_LOOP
     if seam <= CLOSED * size:
         kind = LoopKind.CLOSED
@@ -114,18 +113,10 @@ def _fps(clip: Clip) -> float:
 def _points(skeleton: Skeleton, clip: Clip, times: Floats, root: int) -> Floats:
     """Four points per node (4 N, F, 3): its place and one a lever away on each axis; the root's way taken off."""
     world = world_by_node(skeleton, pose(skeleton, clip, times))
-    places = world[..., 3]
     if root >= 0:
-        places = places - skeleton.below(root)[:, None, None] * (places[root] - places[root, :1])
-    lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2, keepdims=True))
-    axes = LEVER * _size(places) * np.swapaxes(world[..., :3] / np.where(lengths > 0, lengths, 1), -1, -2)
-    points = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)
-    return points.reshape(-1, len(times), 3)
-
-
-def _size(points: Floats) -> float:
-    first = points[:, 0]
-    return float(np.linalg.norm(first.max(axis=0) - first.min(axis=0))) or 1.0
+        way = world[root, :, :, 3] - world[root, :1, :, 3]
+        world[..., 3] -= skeleton.below(root)[:, None, None] * way
+    return levers.points(world)
 
 
 def _travel(skeleton: Skeleton, clip: Clip, times: Floats, root: int) -> float:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
+from anim.measure import levers
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 
-PATH_SAMPLES = 65
 ONWARD = 0.7
 STEP = 1 / 240  # s; speeds at the ends are taken over this time, or a quarter of a shorter clip
 
@@ -21,7 +21,8 @@ STEP = 1 / 240  # s; speeds at the ends are taken over this time, or a quarter o
 class Travel:
     """The seam between a clip's end and start, and the way of its root.
 
-    seam: m, the largest distance of any node between end and start, the root's own way taken off.
+    seam: m, the largest distance of any node, or of what turns with it, between end and start; the way of a root that
+    leads somewhere is taken off.
     speed_seam: m/s, the largest difference of any node's velocity between end and start.
     root: number of the node whose way was taken, −1 where no translation moves. distance: m. speed: m/s.
     """
@@ -44,9 +45,10 @@ def travels(skeleton: Skeleton, clips: Sequence[Clip]) -> list[Travel]:
         np.concatenate([each.rotation for each in poses]),
         np.concatenate([each.scale for each in poses]),
     )
-    places = world_by_node(skeleton, joined)[..., 3].reshape(len(skeleton), len(clips), 4, 3)
+    points = levers.points(world_by_node(skeleton, joined))
+    places = points.reshape(len(skeleton), levers.PER_NODE, len(clips), 4, 3)
     depth = _depths(skeleton)
-    return [_travel(skeleton, clip, places[:, i], depth) for i, clip in enumerate(clips)]
+    return [_travel(skeleton, clip, places[:, :, i], depth) for i, clip in enumerate(clips)]
 
 
 def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
@@ -56,13 +58,17 @@ def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
     length of its path lies between its ends.
     """
     root = _root(clip, _depths(skeleton)) if len(skeleton) else -1
-    if root < 0 or not (skeleton.parents == root).any() or clip.end <= clip.start:
-        return -1
-    times = np.linspace(clip.start, clip.end, PATH_SAMPLES)
-    path = world_by_node(skeleton, pose(skeleton, clip, times))[root, :, :, 3]
+    return root if _leads(skeleton, clip, root) else -1
+
+
+def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
+    """Whether the keys of a root's translation lead somewhere, and others hang on it."""
+    if root < 0 or not (skeleton.parents == root).any():
+        return False
+    path = next(t.values for t in clip.tracks if t.node == root and t.path == "translation")
     steps = np.diff(path, axis=0)
     length = float(np.sqrt((steps * steps).sum(axis=1)).sum())
-    return root if length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length else -1
+    return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length
 
 
 def _ends(clip: Clip) -> Floats:
@@ -71,16 +77,17 @@ def _ends(clip: Clip) -> Floats:
 
 
 def _travel(skeleton: Skeleton, clip: Clip, places: Floats, depth: Floats) -> Travel:
-    """places: (N, 4, 3) at start, just after it, just before the end, and at the end."""
+    """places: (N, 4 points, 4, 3) at start, just after it, just before the end, and at the end."""
     duration = clip.end - clip.start
     if duration <= 0:
         return Travel(0.0, 0.0, -1, 0.0, 0.0)
     step = min(STEP, duration / 4)
-    away = places[:, 3] - places[:, 0]
+    away = places[:, :, 3] - places[:, :, 0]
     root = _root(clip, depth)
-    own = away[root] if root >= 0 else np.zeros(3)
-    carried = away - skeleton.below(root)[:, None] * own if root >= 0 else away
-    speeds = ((places[:, 3] - places[:, 2]) - (places[:, 1] - places[:, 0])) / step
+    own = away[root, 0] if root >= 0 else np.zeros(3)
+    leads = _leads(skeleton, clip, root)
+    carried = away - skeleton.below(root)[:, None, None] * own if leads else away
+    speeds = ((places[:, :, 3] - places[:, :, 2]) - (places[:, :, 1] - places[:, :, 0])) / step
     distance = float(np.linalg.norm(own))
     return Travel(_longest(carried), _longest(speeds), root, distance, distance / duration)
 
@@ -96,7 +103,7 @@ def _root(clip: Clip, depth: Floats) -> int:
 
 
 def _longest(vectors: Floats) -> float:
-    return float(np.sqrt((vectors * vectors).sum(axis=1)).max())
+    return float(np.sqrt((vectors * vectors).sum(axis=-1)).max())
 
 
 def _depths(skeleton: Skeleton) -> Floats:

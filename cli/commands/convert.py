@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from anim.gltf.document import items
-from anim.gltf.uri import is_data
 from cli import options, report, streams
 
 
@@ -34,8 +32,8 @@ def convert(
         if embed:
             document = streams.with_images(document, source.folder)
         size = streams.write(document, output, source.folder, dry_run=dry_run)
-    outside = [image["uri"] for image in items(document.json, "images") if not is_data(image.get("uri", "data:"))]
-    if outside and not streams.stays_in(source.folder, output):
-        voice.say(f"note: {report.plural(len(outside), 'image')} stay outside ({outside[0]}, …); --embed takes them in")
+    outside = streams.left_outside(document, source.folder, output)
+    if outside:
+        voice.say(f"{outside}; --embed takes them in")
     name = source.name if output == streams.PIPE else output
     voice.say(f"{name}  {report.change(source.size, size)}, {time.perf_counter() - began:.1f} s")

@@ -17,6 +17,7 @@ from anim.measure.findings import Finding, Severity
 from anim.measure.inspect import inspect as facts_of
 from anim.ops.selection import Selection
 from cli import errors, inspection, options, streams, tables
+from cli.errors import CheckError
 from cli.inspection import Smoothness
 
 SCHEMA = 1
@@ -43,6 +44,10 @@ def inspect(
     continuity: Annotated[
         bool, typer.Option("--continuity", help="Say how smooth every track is at its keys: jumps, C0, G1, C1, C2.")
     ] = False,
+    fail_on: Annotated[
+        Severity | None,
+        typer.Option("--fail-on", help="Exit 6 where a finding is this bad or worse.", show_default=False),
+    ] = None,
     clip: options.Clips = None,
     quiet: options.Quiet = False,
 ) -> int:
@@ -51,7 +56,7 @@ def inspect(
     Per clip: length, tracks by path (translation/rotation/scale/weights/pointer), keys, estimated frame rate, bytes,
     tracks that do nothing, keys that say nothing, the seam of a loop, the speed of the root. Per skin: joints,
     influences, weights. Below: findings, with what to do. With several files a bad one is reported and the others go
-    on; the exit code is the worst.
+    on; the exit code is the worst. --fail-on makes it a gate.
 
     --continuity counts, per track, the keys between its ends by what jumps there: the value (jump), the speed (C0, or
     G1 where the direction goes on), the acceleration (C1), or nothing (C2), and names the largest jump of each.
@@ -82,7 +87,24 @@ def inspect(
         for i, (name, size, facts) in enumerate(done):
             page = inspection.page(name, size, facts, smooth[i], tracks=tracks)
             streams.write_text(("\n" if i else "") + page)
+    if fail_on is not None:
+        _check(done, fail_on)
     return worst
+
+
+def _check(done: list[tuple[str, int, Facts]], limit: Severity) -> None:
+    """Raise CheckError where a finding is as bad as `limit`, or worse."""
+    order = list(Severity)  # the worst first
+    bad = [
+        (name, each)
+        for name, _, facts in done
+        for each in facts.findings
+        if order.index(each.severity) <= order.index(limit)
+    ]
+    if bad:
+        name, first = bad[0]
+        more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+        raise CheckError(f"{name}: {first.severity} {first.name}: {first.where}: {first.problem}{more}")
 
 
 def _inspected(

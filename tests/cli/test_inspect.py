@@ -295,3 +295,13 @@ def test_known_numbers_of_known_files(call: Call, asset: Find) -> None:
         "image 7",
         "image 11",
     }
+
+
+def test_fail_on_makes_it_a_gate(call: Call, fixture: Fixture) -> None:
+    path = fixture("noop")
+    assert call("inspect", path, "--fail-on", "error").code == 0
+    run = call("inspect", path, "--fail-on", "warning", "--format", "json")
+    assert run.code == 6
+    assert run.json["files"]
+    assert run.err.startswith("gltf-anim: ")
+    assert "warning" in run.err

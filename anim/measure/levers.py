@@ -1,0 +1,28 @@
+"""Points that show where nodes are and how they are turned: each node's place, and the ends of short levers on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+
+LEVER = 0.05  # of the skeleton's size: how far from a node its turning counts
+PER_NODE = 4
+
+
+def points(world: Floats) -> Floats:
+    """Return four points per node (4 N, F, 3) in world space from world matrices (N, F, 3, 4).
+
+    The node's place, and one a lever away on each of its axes, so that a node which only turns moves too.
+    """
+    places = world[..., 3]
+    lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2, keepdims=True))
+    axes = LEVER * size(places) * np.swapaxes(world[..., :3] / np.where(lengths > 0, lengths, 1), -1, -2)
+    joined = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)
+    return joined.reshape(-1, world.shape[1], 3)
+
+
+def size(places: Floats) -> float:
+    """Return the diagonal of the box around the points (P, F, 3) in the first frame; 1 where it has none."""
+    first = places[:, 0]
+    return float(np.linalg.norm(first.max(axis=0) - first.min(axis=0))) or 1.0
