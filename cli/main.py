@@ -34,6 +34,7 @@ COMMANDS = {
             "gltf-anim inspect walk.glb",
             "gltf-anim inspect *.glb --format json > report.json",
             "gltf-anim inspect hero.glb --clip 'Run*' --tracks",
+            "gltf-anim inspect *.glb --fail-on error > health.txt",
         ),
     ),
     "sample": Row(
@@ -104,6 +105,14 @@ COMMANDS = {
             "gltf-anim loop walk.glb closed.glb --blend 0.2",
         ),
     ),
+    "bake": Row(
+        "Bake skinning by LBS, dual quaternions or centers of rotation to vertex caches.",
+        (
+            "gltf-anim bake walk.glb walk.npz --method dqs --fps 30",
+            "gltf-anim bake hero.glb 'caches/{clip}.pc2' --fps 24 --normals",
+            "gltf-anim bake face.glb face.npz --clip talk --mesh Head --space mesh",
+        ),
+    ),
     "plot": Row(
         "See the curves of tracks, of eases, and of tangent rules.",
         (
@@ -111,6 +120,30 @@ COMMANDS = {
             "gltf-anim plot walk.glb walk.svg --compare walk30.glb --path rotation",
             "gltf-anim plot --ease smoothstep --ease 'cubic-bezier(.2,0,0,1)' eases.svg",
             "gltf-anim plot --through 0,0.9,0.2,1 --tangents catmull-rom --tangents natural curve.svg",
+        ),
+    ),
+    "collapse": Row(
+        "Say where skin collapses when joints turn, and what other methods make of it.",
+        (
+            "gltf-anim collapse hero.glb",
+            "gltf-anim collapse hero.glb --clip 'Attack*' --method lbs --method cor --format json",
+            "gltf-anim collapse arm.glb --plot arm.png",
+        ),
+    ),
+    "convert-cache": Row(
+        "Change a vertex cache into another format, frame by frame.",
+        (
+            "gltf-anim convert-cache walk.npz walk.pc2 --up z --order blender",
+            "gltf-anim convert-cache walk.npz walk.glb --max-error 0.5mm --quantize",
+            "gltf-anim convert-cache walk.mdd walk.exr --preset godot --depth half",
+        ),
+    ),
+    "render": Row(
+        "Draw a clip as a filmstrip.",
+        (
+            "gltf-anim render walk.glb walk.png",
+            "gltf-anim render arm.glb twist.png --method lbs --method dqs --heat --clip twist",
+            "gltf-anim render walk.npz walk.webp --frames 24",
         ),
     ),
     "convert": Row(

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document, Json, items
-from anim.model import Mesh
+from anim.model import Mesh, Primitive
 
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
 HIDING = ("KHR_draco_mesh_compression",)  # extensions that keep a primitive's vertices from us
 
 
 class Meshes:
-    """Reads meshes of one document, each once per skin size."""
+    """Reads meshes of one document, each once per skin size. normals: whether to read those too."""
 
-    def __init__(self, document: Document, accessors: Accessors) -> None:
+    def __init__(self, document: Document, accessors: Accessors, *, normals: bool = False) -> None:
         self._meshes = items(document.json, "meshes")
         self._accessors = accessors
+        self._with_normals = normals
         self._done: dict[tuple[int, int], Mesh] = {}
 
     def mesh(self, number: int, *, joint_count: int) -> Mesh:
@@ -56,6 +59,9 @@ class Meshes:
             _stacked([part.weights for part in parts], influences, np.float64),
             np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
             np.array(about.get("weights", [0.0] * count), float),
+            _normals(parts),
+            _normal_targets(parts, count),
+            tuple(primitive for part in parts for primitive in part.primitives),
         )
 
     def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
@@ -69,17 +75,22 @@ class Meshes:
         if positions.shape[1] != 3:
             raise FormatError(f"POSITION has {positions.shape[1]} components (expected 3)")
         joints, weights = self._influences(attributes, len(positions), joint_count)
-        targets = [self._displacements(t, len(positions)) for t in primitive.get("targets", ())]
-        stacked = np.stack(targets) if targets else np.empty((0, len(positions), 3))
+        about = primitive.get("targets", ())
+        targets = self._displacements(about, "POSITION", len(positions))
         faces = self._faces(primitive, len(positions))
-        return Mesh("", positions, faces, joints, weights, stacked, np.zeros(len(targets)))
+        normals = self._normals(attributes, len(positions))
+        turned = self._with_normals and any("NORMAL" in target for target in about)
+        normal_targets = self._displacements(about, "NORMAL", len(positions)) if turned else None
+        part = Primitive(len(positions), len(faces), primitive.get("material", -1))
+        rest = np.zeros(len(targets))
+        return Mesh("", positions, faces, joints, weights, targets, rest, normals, normal_targets, (part,))
 
     def _influences(self, attributes: Json, vertices: int, joint_count: int) -> tuple[Ints, Floats]:
         joints: list[Ints] = []
         weights: list[Floats] = []
         while joint_count and f"JOINTS_{len(joints)}" in attributes and f"WEIGHTS_{len(joints)}" in attributes:
             k = len(joints)
-            joints.append(self._accessors.integers(attributes[f"JOINTS_{k}"]))
+            joints.append(self._accessors.numbers_of_things(attributes[f"JOINTS_{k}"]))
             weights.append(self._accessors.floats(attributes[f"WEIGHTS_{k}"]))
             if joints[k].shape != (vertices, 4) or weights[k].shape != (vertices, 4):
                 raise FormatError(f"JOINTS_{k} or WEIGHTS_{k} don't have 4 numbers for each of {vertices} vertices")
@@ -96,17 +107,29 @@ class Meshes:
             )
         return np.where(all_weights != 0, all_joints, 0), all_weights
 
-    def _displacements(self, target: Json, vertices: int) -> Floats:
-        if "POSITION" not in target:
-            return np.zeros((vertices, 3))
-        moved = self._accessors.floats(target["POSITION"])
-        if moved.shape != (vertices, 3):
-            raise FormatError(f"a morph target has {len(moved)} positions for {vertices} vertices")
-        return moved
+    def _normals(self, attributes: Json, vertices: int) -> Floats | None:
+        if not self._with_normals or "NORMAL" not in attributes:
+            return None
+        normals = self._accessors.floats(attributes["NORMAL"])
+        if normals.shape != (vertices, 3):
+            raise FormatError(f"NORMAL has shape {normals.shape} for {vertices} vertices (expected ({vertices}, 3))")
+        return normals
+
+    def _displacements(self, targets: Sequence[Json], attribute: str, vertices: int) -> Floats:
+        """What targets add to an attribute (M, V, 3); nothing where one doesn't have it."""
+        result = np.zeros((len(targets), vertices, 3))
+        for i, target in enumerate(targets):
+            if attribute in target:
+                moved = self._accessors.floats(target[attribute])
+                if moved.shape != (vertices, 3):
+                    noun = "positions" if attribute == "POSITION" else "normals"
+                    raise FormatError(f"a morph target has {len(moved)} {noun} for {vertices} vertices")
+                result[i] = moved
+        return result
 
     def _faces(self, primitive: Json, vertices: int) -> Ints:
         if "indices" in primitive:
-            indices = self._accessors.integers(primitive["indices"])[:, 0]
+            indices = self._accessors.numbers_of_things(primitive["indices"])[:, 0]
         else:
             indices = np.arange(vertices)
         return _triangles(indices, primitive.get("mode", TRIANGLES))
@@ -131,7 +154,22 @@ def _stacked(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarra
     return np.concatenate([np.empty((0, influences), dtype), *filled])
 
 
+def _normals(parts: list[Mesh]) -> Floats | None:
+    """Normals of all primitives, None where one has none: then they come from the faces."""
+    found = [part.normals for part in parts if part.normals is not None]
+    return np.concatenate([np.empty((0, 3)), *found]) if len(found) == len(parts) else None
+
+
+def _normal_targets(parts: list[Mesh], count: int) -> Floats | None:
+    if all(part.normal_targets is None for part in parts):
+        return None
+    filled = [np.zeros(p.targets.shape) if p.normal_targets is None else p.normal_targets for p in parts]
+    return np.concatenate([np.empty((count, 0, 3)), *filled], axis=1)
+
+
 def _nothing(targets: int) -> Mesh:
     none = np.empty((0, 0))
     faces = np.empty((0, 3), np.int64)
-    return Mesh("", np.empty((0, 3)), faces, none.astype(np.int64), none, np.empty((targets, 0, 3)), np.zeros(targets))
+    joints, positions = none.astype(np.int64), np.empty((0, 3))
+    displacements, part = np.empty((targets, 0, 3)), Primitive(0, 0)
+    return Mesh("", positions, faces, joints, none, displacements, np.zeros(targets), positions, None, (part,))

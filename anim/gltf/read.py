@@ -63,13 +63,14 @@ def names(document: Document) -> tuple[str, ...]:
     return tuple(animation.get("name", "") for animation in items(document.json, "animations"))
 
 
-def scene(document: Document, accessors: Accessors | None = None) -> Scene:
+def scene(document: Document, accessors: Accessors | None = None, *, normals: bool = False) -> Scene:
     """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
 
+    normals: read those of vertices and morph targets too.
     Raises UnsupportedError where vertices are hidden by an extension that is not handled (Draco).
     """
     accessors = accessors or Accessors(document)
-    meshes = Meshes(document, accessors)
+    meshes = Meshes(document, accessors, normals=normals)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
     nodes = items(document.json, "nodes")
     instances = []

@@ -2,7 +2,7 @@
 
 from anim.model.clip import Clip
 from anim.model.pose import Pose
-from anim.model.scene import Instance, Mesh, Scene, Skin
+from anim.model.scene import Instance, Mesh, Primitive, Scene, Skin
 from anim.model.skeleton import Skeleton
 from anim.model.track import FLOAT32, Interpolation, Kind, Storage, Track
 from anim.model.vertex_cache import Chunk, Part, VertexCache
@@ -17,6 +17,7 @@ __all__ = [
     "Mesh",
     "Part",
     "Pose",
+    "Primitive",
     "Scene",
     "Skeleton",
     "Skin",

@@ -28,11 +28,23 @@ class Skin:
 
 
 @dataclass(frozen=True, slots=True)
+class Primitive:
+    """How many vertices and faces of a mesh are one primitive's. material: its number in the file, −1 for none."""
+
+    vertices: int
+    faces: int
+    material: int = -1
+
+
+@dataclass(frozen=True, slots=True)
 class Mesh:
     """Vertices of all primitives of a glTF mesh, one after another.
 
     positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0, as stored.
-    targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3) or None where any lacks.
+    targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3), or None where any
+    lacks or they were not read.
+    normal_targets: (M, V, 3) what morph targets add to normals, or None where they add nothing.
+    primitives: in the order of the file; empty where unknown.
     """
 
     name: str
@@ -43,6 +55,8 @@ class Mesh:
     targets: Floats
     rest_weights: Floats
     normals: Floats | None = None
+    normal_targets: Floats | None = None
+    primitives: tuple[Primitive, ...] = ()
 
     def __post_init__(self) -> None:
         arrays.check_shape(self.positions, "V 3", name="positions")

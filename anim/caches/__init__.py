@@ -1,0 +1,1 @@
+"""VertexCache ↔ bytes: one file and one row of `formats.CACHE_FORMATS` for every format."""

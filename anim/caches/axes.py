@@ -1,0 +1,40 @@
+"""A cache with another axis up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import AnyArray
+from anim.errors import RangeError
+from anim.model import Chunk, VertexCache
+
+UPS = ("y", "z")
+
+
+def turned(cache: VertexCache, up: str) -> VertexCache:
+    """Return the cache with this axis up: "y" as in glTF, "z" as in Blender, where (x, y, z) becomes (x, −z, y).
+
+    Raises RangeError for another axis. The cache itself where nothing is to do.
+    """
+    if up not in UPS:
+        raise RangeError(f"up is '{up}' (expected y or z)")
+    if up == cache.up:
+        return cache
+    turn = _y_to_z if up == "z" else _z_to_y
+
+    def chunks() -> Iterator[Chunk]:
+        for chunk in cache.chunks():
+            yield Chunk(chunk.first, turn(chunk.positions), None if chunk.normals is None else turn(chunk.normals))
+
+    return replace(cache, chunks=chunks, rest=None if cache.rest is None else turn(cache.rest), up=up)
+
+
+def _y_to_z(points: AnyArray) -> AnyArray:
+    return np.stack((points[..., 0], -points[..., 2], points[..., 1]), axis=-1)
+
+
+def _z_to_y(points: AnyArray) -> AnyArray:
+    return np.stack((points[..., 0], points[..., 2], -points[..., 1]), axis=-1)

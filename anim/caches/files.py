@@ -1,0 +1,110 @@
+"""Where the bytes of a cache come from and go to: one main file and what lies beside it, by name.
+
+The library opens no paths: it asks these for binary files. `Memory` keeps them in a dict; the command line has ones for
+folders and pipes.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import PurePath
+from typing import BinaryIO, Protocol
+
+from anim.errors import FormatError
+
+PIECE = 1 << 24  # bytes that streaming readers and writers handle at a time, about
+
+
+class Inputs(Protocol):
+    """Files to read. main: the name of the one that was asked for."""
+
+    main: str
+
+    def open(self, name: str) -> BinaryIO:
+        """Return a file at its start, seekable. Raises FormatError where there is none of this name."""
+
+    def names(self) -> Sequence[str]:
+        """Return the names of all files beside the main one, itself among them, sorted."""
+
+
+class Outputs(Protocol):
+    """Files to write. main: the name that was asked for."""
+
+    main: str
+
+    def create(self, name: str) -> BinaryIO:
+        """Return an empty file, seekable, that becomes `name` when it is closed."""
+
+
+@dataclass
+class Memory:
+    """Files in a dict: Inputs and Outputs at once, for Python users and tests."""
+
+    main: str
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    def open(self, name: str) -> BinaryIO:
+        """Return a file at its start."""
+        if name not in self.files:
+            raise FormatError(f"'{name}' is not beside the file")
+        return io.BytesIO(self.files[name])
+
+    def names(self) -> Sequence[str]:
+        """Return the names of all files, sorted."""
+        return sorted(self.files)
+
+    def create(self, name: str) -> BinaryIO:
+        """Return an empty file."""
+        return _Kept(self.files, name)
+
+
+def beside(name: str, ending: str) -> str:
+    """Return the name of a companion: beside("walk.pc2", "-rest.ply") → "walk-rest.ply"."""
+    return PurePath(name).stem + ending
+
+
+def suffix(name: str) -> str:
+    """Return the ending that names a format: suffix("A/Walk.PC2") → ".pc2"."""
+    return PurePath(name).suffix.lower()
+
+
+def read_exactly(file: BinaryIO, count: int, what: str) -> bytes:
+    """Return the next `count` bytes. Raises FormatError where the file ends before."""
+    data = file.read(count)
+    if len(data) < count:
+        raise FormatError(f"is truncated: {what} has {len(data)} bytes of {count}")
+    return data
+
+
+def size_of(file: BinaryIO) -> int:
+    """Return the size of a seekable file in bytes; its place stays."""
+    at = file.tell()
+    size = file.seek(0, io.SEEK_END)
+    file.seek(at)
+    return size
+
+
+@contextmanager
+def whole(inputs: Inputs, name: str) -> Iterator[bytes]:
+    """Give all bytes of a file."""
+    with inputs.open(name) as file:
+        yield file.read()
+
+
+class _Kept(io.BytesIO):
+    """A file in memory whose bytes are put into a dict when it is closed without an error."""
+
+    def __init__(self, files: dict[str, bytes], name: str) -> None:
+        super().__init__()
+        self._files, self._name = files, name
+
+    def close(self) -> None:
+        if not self.closed:
+            self._files[self._name] = self.getvalue()
+        super().close()
+
+
+Sizes = Mapping[str, int]

@@ -1,0 +1,48 @@
+"""VertexCache ↔ .mdd, LightWave's point cache: big-endian, with the time of every frame.
+
+int32 frames, int32 points, float32 seconds of each frame, then float32 xyz of every point, frame by frame. A rest mesh
+in the same order of vertices lies beside it.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from anim.caches import raw, rest
+from anim.caches.files import Inputs, Outputs, read_exactly
+from anim.caches.settings import Reading, Writing, Written
+from anim.errors import FormatError
+from anim.model import VertexCache
+
+HEADER = struct.Struct(">ii")
+
+
+def read(inputs: Inputs, reading: Reading) -> VertexCache:
+    """Return the cache in the main file, with the faces of the rest mesh beside it where there is one."""
+    with inputs.open(inputs.main) as file:
+        frames, points = HEADER.unpack(read_exactly(file, HEADER.size, "the header"))
+        raw.check_size(file, HEADER.size + 4 * max(frames, 0), frames, points)
+        times = np.frombuffer(read_exactly(file, 4 * frames, "the list of times"), ">f4").astype(np.float64)
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise FormatError("times are not increasing")
+    beside = rest.read(inputs, points)
+    header = HEADER.size + 4 * frames
+    return VertexCache(
+        times - min(times[0], 0.0),
+        points,
+        beside.faces,
+        lambda: raw.chunks(inputs, header, frames, points, ">f4"),
+        rest=beside.positions,
+        up=beside.up,
+    )
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+    """Write the cache and a rest mesh beside it; times become float32."""
+    with outputs.create(outputs.main) as file:
+        file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
+        file.write(cache.times.astype(">f4").tobytes())
+        raw.write(cache, file, ">f4")
+    return Written(notes=rest.write(cache, outputs, writing.rest))

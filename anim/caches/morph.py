@@ -1,0 +1,182 @@
+"""VertexCache → .glb with morph targets: every viewer plays it, smoothly between frames.
+
+Three forms are tried, and the smallest that keeps every vertex of every frame within the limit is written:
+`keyframes`, one target for each frame that straight lines between others don't give; `basis`, few shapes (principal
+components) with a weight each per frame; `both`, the shapes of the kept frames. Between frames weights go in straight
+lines, and so do vertices, so the worst over the frames is the worst over all times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats, Ints
+from anim.caches import extent
+from anim.caches.basis import basis
+from anim.caches.files import Outputs
+from anim.caches.glb_file import VERTICES, GlbFile, primitive
+from anim.caches.reduce import kept_frames
+from anim.caches.settings import Writing, Written
+from anim.errors import RangeError, UnsupportedError
+from anim.model import VertexCache
+
+DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given
+MOST_BYTES = 1 << 30  # of positions, which are in memory here, three times over
+MOST_TARGETS = 1024
+SURE_TARGETS = 8  # what glTF promises; engines take more
+SHORT = 32767
+BATCH = 16  # frames compared at a time
+MARGIN = 0.98  # of the limit, what rounding to float32 may not eat
+NAME, EXTRAS = "cache", "gltf_anim"
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A way to say all frames. frames: (K,) which have a key. weights: (K, M). targets: (M, V, 3) float32."""
+
+    kind: str
+    base: AnyArray
+    targets: AnyArray
+    frames: Ints
+    weights: Floats
+
+    def size(self, *, quantize: bool) -> int:
+        """Bytes of the numbers in a file."""
+        return self.targets.size // 3 * (8 if quantize else 12) + 4 * self.weights.size + 4 * len(self.frames)
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+    """Write the smallest form within `writing.max_error` m, by default 0.1 % of the diagonal.
+
+    Raises UnsupportedError for caches over 1 GB, RangeError where no form keeps the limit.
+    """
+    if 12 * cache.frame_count * cache.vertex_count > MOST_BYTES:
+        raise UnsupportedError(
+            f"{cache.frame_count} frames of {cache.vertex_count} vertices are too many for morph targets",
+            help="choose fewer with --fps, or another layout or format",
+        )
+    whole = cache.whole()
+    limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * extent.diagonal(cache)
+    best: tuple[Form, float] | None = None
+    for form in _forms(whole.positions, cache.times, limit):
+        form = _stored(form, quantize=writing.quantize)
+        worst = _worst(whole.positions, cache.times, form)
+        is_smaller = best is None or form.size(quantize=writing.quantize) < best[0].size(quantize=writing.quantize)
+        if worst <= limit and is_smaller:
+            best = form, worst
+    if best is None:
+        raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help="allow more --max-error")
+    form, worst = best
+    _write(cache, whole.normals, form, outputs, quantize=writing.quantize)
+    return Written(worst, _notes(form, cache.frame_count))
+
+
+def _forms(positions: AnyArray, times: Floats, limit: float) -> Iterator[Form]:
+    """Forms that may be the smallest; the number of targets decides, nearly."""
+    limit *= MARGIN
+    kept = kept_frames(positions, times, limit)
+    fewest = len(kept) - 1
+    for name, share in (("basis", 0.0), ("both", 0.5)):
+        frames = kept_frames(positions, times, limit * share) if share else np.arange(len(positions))
+        if share and len(frames) == len(positions):
+            continue
+        found = basis(positions[frames], limit * (1 - share), most=min(fewest, MOST_TARGETS))
+        if found is not None:
+            fewest = len(found.shapes)
+            yield Form(name, found.base, found.shapes, frames, found.weights)
+    if len(kept) - 1 <= min(fewest + 1, MOST_TARGETS):
+        yield _one_hot(positions, kept)
+
+
+def _one_hot(positions: AnyArray, kept: Ints) -> Form:
+    base = positions[kept[0]]
+    weights = np.concatenate((np.zeros((1, len(kept) - 1)), np.eye(len(kept) - 1)))
+    return Form("keyframes", base, positions[kept[1:]] - base, kept, weights)
+
+
+def _stored(form: Form, *, quantize: bool) -> Form:
+    """The form as a file keeps it: targets rounded to shorts of ±1 m by their own factor, weights to float32."""
+    targets, weights = form.targets, form.weights
+    if quantize:
+        size = np.abs(targets).max(axis=(1, 2), initial=0.0)
+        size = np.where(size > 0, size, 1.0).astype(np.float64)
+        targets = (np.rint(targets / size[:, None, None] * SHORT) / SHORT).astype(np.float32)
+        weights = weights * size
+    return Form(form.kind, form.base, targets, form.frames, weights.astype(np.float32).astype(np.float64))
+
+
+def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
+    """Farthest that a vertex of any frame is from where a viewer puts it."""
+    keys = times[form.frames].astype(np.float32)  # as the file has them
+    flat = form.targets.reshape(len(form.targets), form.base.size)
+    worst = 0.0
+    for first in range(0, len(positions), BATCH):
+        rows = slice(first, first + BATCH)
+        weights = np.empty((len(times[rows]), len(flat)), np.float32)
+        for i, column in enumerate(form.weights.T):
+            weights[:, i] = np.interp(times[rows], keys, column)
+        placed = form.base + (weights @ flat).reshape(-1, *form.base.shape)
+        off = (placed - positions[rows]).astype(np.float64)
+        worst = max(worst, float(np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0))))
+    return worst
+
+
+def _write(cache: VertexCache, normals: AnyArray | None, form: Form, outputs: Outputs, *, quantize: bool) -> None:
+    from pygltflib import Animation, AnimationChannel, AnimationChannelTarget, AnimationSampler, Mesh, Node
+
+    file = GlbFile()
+    gltf = file.gltf
+    indices = file.add_indices(cache.faces, cache.vertex_count)
+    attributes = {"POSITION": file.add(form.base.astype("<f4"), target=VERTICES, bounds=True)}
+    turns = _normals(normals, form)
+    if turns is not None:
+        attributes["NORMAL"] = file.add(turns[0].astype("<f4"), target=VERTICES)
+    targets = []
+    for i, target in enumerate(form.targets):
+        rows = np.rint(target * SHORT).astype("<i2") if quantize else target.astype("<f4")
+        entry = {"POSITION": file.add(rows, target=VERTICES, normalized=quantize, bounds=True)}
+        if turns is not None:
+            entry["NORMAL"] = file.add(turns[1 + i].astype("<f4"), target=VERTICES)
+        targets.append(entry)
+    first = [float(weight) for weight in form.weights[0]]
+    gltf.meshes.append(Mesh(primitives=[primitive(attributes, indices, targets)], weights=first or None))
+    gltf.nodes.append(Node(name=NAME, mesh=0, extras={EXTRAS: {"cache": form.kind, "up": cache.up}}))
+    gltf.scenes[0].nodes.append(0)
+    if targets and len(form.frames) > 1:
+        sampler = AnimationSampler(
+            input=file.add(cache.times[form.frames].astype("<f4")[:, None], bounds=True),
+            output=file.add(form.weights.astype("<f4").reshape(-1, 1)),
+            interpolation="LINEAR",
+        )
+        channel = AnimationChannel(sampler=0, target=AnimationChannelTarget(node=0, path="weights"))
+        gltf.animations.append(Animation(name=NAME, channels=[channel], samplers=[sampler]))
+    if quantize and targets:
+        gltf.extensionsUsed = ["KHR_mesh_quantization"]
+        gltf.extensionsRequired = ["KHR_mesh_quantization"]
+    file.write(outputs, outputs.main)
+
+
+def _normals(normals: AnyArray | None, form: Form) -> AnyArray | None:
+    """Normals (1 + M, V, 3) of the base, unit, and of each target: the nearest that the weights allow."""
+    if normals is None:
+        return None
+    kept = normals[form.frames].astype(np.float64)
+    design = np.concatenate((np.ones((len(kept), 1)), form.weights), axis=1)
+    found, *_ = np.linalg.lstsq(design, kept.reshape(len(kept), -1), rcond=None)
+    solved: AnyArray = found.reshape(-1, *normals.shape[1:])
+    length = np.maximum(np.linalg.norm(solved[0], axis=1, keepdims=True), 1e-3)
+    solved /= length  # a base normal has to be unit; scaling all of a vertex's normals turns none of them
+    up = np.where(np.abs(np.linalg.norm(solved[0], axis=1, keepdims=True) - 1) < 1e-6, solved[0], (0.0, 1.0, 0.0))
+    solved[0] = up
+    return solved
+
+
+def _notes(form: Form, frames: int) -> tuple[str, ...]:
+    words = {"keyframes": "a target per kept frame", "basis": "shapes and weights", "both": "shapes of kept frames"}
+    notes = [f"{len(form.targets)} morph targets ({words[form.kind]}), {len(form.frames)} keys for {frames} frames"]
+    if len(form.targets) > SURE_TARGETS:
+        notes.append(f"glTF promises {SURE_TARGETS} targets at a time; three.js, Babylon.js and Blender take hundreds")
+    return tuple(notes)

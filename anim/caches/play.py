@@ -1,0 +1,40 @@
+"""A glTF document as it plays → VertexCache: skins by linear blend, morph targets, nodes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import NotFoundError
+from anim.gltf import read
+from anim.gltf.document import Document, items
+from anim.model import Clip, VertexCache
+from anim.sampling import grid
+from anim.skinning.bake import bake
+
+
+def play(document: Document, *, clip: int = 0, fps: float | None = None) -> VertexCache:
+    """Return every vertex of the file while a clip plays, in world space, nodes depth-first, primitives in order.
+
+    At `fps` frames per second, else at the clip's own keys; without clips the rest pose. A file that we wrote says
+    which axis is up. Raises NotFoundError where the file has no vertices.
+    """
+    scene, clips = read.scene(document), read.clips(document)
+    chosen = clips[clip] if clips else Clip("", ())
+    if not scene.vertex_count:
+        raise NotFoundError("has no mesh with vertices")
+    times = grid(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
+    return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document))
+
+
+def _keys(clip: Clip) -> Floats:
+    axes = clip.axes
+    return np.unique(np.concatenate(axes)) if axes else np.zeros(1)
+
+
+def _up(document: Document) -> str:
+    extras = [node.get("extras") for node in items(document.json, "nodes")]
+    said = [each.get("gltf_anim") for each in extras if isinstance(each, dict)]
+    return "z" if any(isinstance(each, dict) and each.get("up") == "z" for each in said) else "y"

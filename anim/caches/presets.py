@@ -1,0 +1,61 @@
+"""Whose axes a texture's positions have, and what that engine does to textures. Each only permutes, negates, scales."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import AnyArray
+from anim.errors import RangeError
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """One engine.
+
+    axes: which of glTF's x, y, z (0, 1, 2) become its x, y, z; signs: and turned round or not. per_meter: its units in
+    1 m. is_flipped: whether v counts from the bottom row where the engine's own loader has put the texture.
+    endings: the files it reads whole. advice: what to set, a line each.
+    """
+
+    axes: tuple[int, int, int]
+    signs: tuple[int, int, int]
+    per_meter: float
+    is_flipped: bool
+    endings: tuple[str, ...]
+    advice: tuple[str, ...] = ()
+
+
+NEAREST = "nearest filter, no mipmaps, no compression, no sRGB"
+PRESETS = {
+    "plain": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr", ".png"), (f"axes of glTF, v from the top; {NEAREST}",)),
+    "three": Preset(  # EXRLoader puts the last row first
+        (0, 1, 2), (1, 1, 1), 1.0, True, (".exr",), (f"EXRLoader, FloatType or HalfFloatType; {NEAREST}",)
+    ),
+    "godot": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr",), (f"import as lossless; {NEAREST}",)),
+    "unity": Preset((0, 1, 2), (-1, 1, 1), 1.0, False, (".exr", ".png"), (f"mesh through glTFast; {NEAREST}",)),
+    "unreal": Preset((0, 2, 1), (1, 1, 1), 100.0, False, (".exr", ".png"), (f"mesh through Interchange; {NEAREST}",)),
+}
+
+
+def preset(name: str, ending: str) -> Preset:
+    """Return the preset of this name. Raises RangeError for an unknown one, or an ending that the engine spoils."""
+    found = PRESETS.get(name)
+    if found is None:
+        raise RangeError(f"preset is '{name}' (expected {', '.join(PRESETS)})")
+    if ending not in found.endings:
+        raise RangeError(f"preset {name}: it cuts 16-bit PNG to 8 bits", help=f"write {found.endings[0]}")
+    return found
+
+
+def to_engine(points: AnyArray, preset: Preset, *, lengths: bool = True) -> AnyArray:
+    """Return points (..., 3) in m as the engine has them; with `lengths` off as directions, in no unit."""
+    scale = preset.per_meter if lengths else 1.0
+    return points[..., list(preset.axes)] * np.array(preset.signs, np.float64) * scale
+
+
+def from_engine(points: AnyArray, preset: Preset, *, lengths: bool = True) -> AnyArray:
+    """Return what `to_engine` was given."""
+    scale = preset.per_meter if lengths else 1.0
+    return (points / (np.array(preset.signs, np.float64) * scale))[..., list(np.argsort(preset.axes))]

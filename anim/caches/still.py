@@ -1,0 +1,117 @@
+"""One frame ↔ the bytes of an OBJ, PLY or STL file, vertices in their order, written by trimesh.
+
+A comment in the file (the header of an STL) keeps what these formats have no place for: "gltf-anim time=0.5 up=z".
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import AnyArray, Ints
+from anim.errors import FormatError
+
+STILLS = (".ply", ".obj", ".stl")
+OBJ_DIGITS = 9  # behind the point
+REMARK = re.compile(rb"gltf-anim ((?:[a-z]+=\S+ ?)+)")
+_TRIMESH = b"https://github.com/mikedh/trimesh"
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """positions (V, 3) float32, faces (T, 3), normals (V, 3) float32 or None, and the words of the remark."""
+
+    positions: AnyArray
+    faces: Ints
+    normals: AnyArray | None
+    remark: dict[str, str]
+
+
+def write(still: Still, ending: str) -> bytes:
+    """Return the bytes of a file: ".ply" binary, ".obj" text, ".stl" binary, which keeps no order of vertices."""
+    from trimesh import Trimesh
+    from trimesh.exchange import obj, ply, stl
+
+    normals = still.normals
+    export_obj: Any = obj.export_obj
+    mesh = Trimesh(still.positions, still.faces, vertex_normals=normals, process=False, validate=False)
+    remark = " ".join(["gltf-anim", *(f"{key}={value}" for key, value in still.remark.items())]).encode()
+    if ending == ".stl":
+        data = stl.export_stl(mesh)
+        return remark.ljust(80)[:80] + data[80:]
+    if ending == ".obj":
+        text = export_obj(mesh, include_normals=normals is not None, include_texture=False, digits=OBJ_DIGITS)
+        return _remarked(text.encode(), b"# ", remark)
+    return _remarked(ply.export_ply(mesh, vertex_normal=normals is not None), b"comment ", remark)
+
+
+def read(data: bytes, ending: str) -> Still:
+    """Return what a file holds, polygons cut into triangles. Raises FormatError for what trimesh can't read."""
+    positions, faces, normals = _read_obj(data) if ending == ".obj" else _read_by_trimesh(data, ending)
+    if not len(positions):
+        raise FormatError("has no vertices")
+    if not np.isfinite(positions).all():
+        raise FormatError("holds NaN or infinity")
+    if faces.size and (faces.min() < 0 or faces.max() >= len(positions)):
+        raise FormatError(f"a face uses vertex {faces.max()} of {len(positions)}")
+    return Still(positions.astype(np.float32), faces, normals, remark_of(data))
+
+
+def remark_of(head: bytes) -> dict[str, str]:
+    """Return the words of our remark in the first bytes of a file, none where there is no such."""
+    found = REMARK.search(head[:1024])
+    return dict(word.split("=", 1) for word in found[1].decode("ascii", "replace").split()) if found else {}
+
+
+def _remarked(data: bytes, opening: bytes, remark: bytes) -> bytes:
+    """The file with the comment that trimesh puts in replaced by ours; in front of all where there is none."""
+    if opening + _TRIMESH in data[:200]:
+        return data.replace(opening + _TRIMESH, opening + remark, 1)
+    first, _, others = data.partition(b"\n") if data.startswith(b"ply") else (b"", b"", data)
+    return b"".join((first + b"\n" if first else b"", opening, remark, b"\n", others))
+
+
+def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray | None]:
+    import trimesh
+
+    try:
+        mesh: Any = trimesh.load(io.BytesIO(data), file_type=ending[1:], process=False, validate=False)
+        positions = np.asarray(mesh.vertices)
+        faces: Ints = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64).reshape(-1, 3)
+    except Exception as error:  # trimesh raises whatever it met
+        raise FormatError(f"is no {ending} that can be read ({' '.join(str(error).split())[:120]})") from None
+    has_normals = ending == ".ply" and b"property float nx" in data[:1024] and "vertex_normals" in mesh._cache
+    return positions, faces, np.asarray(mesh.vertex_normals, np.float32) if has_normals else None
+
+
+def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
+    """Vertices of an OBJ in the order of its lines, which trimesh gives up where there are normals."""
+    rows: dict[bytes, list[list[float]]] = {b"v": [], b"vn": []}
+    faces: list[list[int]] = []
+    same_normals = True
+    try:
+        for line in data.splitlines():
+            words = line.split()
+            if words and words[0] in rows:
+                rows[words[0]].append([float(word) for word in words[1:4]])
+            elif words and words[0] == b"f":
+                corners = [word.split(b"/") for word in words[1:]]
+                numbers = [_index(corner[0], len(rows[b"v"])) for corner in corners]
+                same_normals &= all(len(corner) == 3 and corner[0] == corner[2] for corner in corners)
+                faces += [[numbers[0], numbers[i], numbers[i + 1]] for i in range(1, len(numbers) - 1)]
+        positions = np.array(rows[b"v"], np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise FormatError(f"is no .obj that can be read ({error})") from None
+    has_normals = same_normals and len(rows[b"vn"]) == len(rows[b"v"]) > 0
+    normals = np.array(rows[b"vn"], np.float32).reshape(-1, 3) if has_normals else None
+    return positions, np.array(faces, np.int64).reshape(-1, 3), normals
+
+
+def _index(word: bytes, count: int) -> int:
+    """A vertex by its number, from 1 on, or from the end where it is negative."""
+    number = int(word)
+    return number - 1 if number > 0 else count + number

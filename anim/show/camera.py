@@ -1,0 +1,86 @@
+"""A camera that looks at a whole motion from a three-quarter view."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+
+AZIMUTH, ELEVATION = 35.0, 14.0  # degrees: from the front (+Z) toward +X, and from above
+FIELD = 24.0  # degrees, from top to bottom: long enough a lens to keep proportions
+MARGIN = 0.06  # share of the picture that stays free on each side
+NARROWEST, WIDEST = 0.62, 1.78  # width by height of a picture
+SMALLEST = 1e-6  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Where it is and how it looks. eye: (3,) m. axes: rows right, up, back (3, 3). scale: pixels for a slope of 1.
+
+    width, height: of the picture in pixels.
+    """
+
+    eye: Floats
+    axes: Floats
+    scale: float
+    width: int
+    height: int
+
+    def project(self, points: Floats) -> Floats:
+        """Return x and y in pixels and nearness (1 / distance) of points (..., 3)."""
+        seen = (points - self.eye) @ self.axes.T
+        near = 1 / np.maximum(-seen[..., 2], SMALLEST)
+        x = self.width / 2 + self.scale * seen[..., 0] * near
+        y = self.height / 2 - self.scale * seen[..., 1] * near
+        return np.stack((x, y, near), axis=-1)
+
+    def rays(self) -> Floats:
+        """Return the direction (height, width, 3) of the ray through each pixel, not normalized."""
+        x = (np.arange(self.width) + 0.5 - self.width / 2) / self.scale
+        y = (self.height / 2 - np.arange(self.height) - 0.5) / self.scale
+        right, up, back = self.axes
+        rays: Floats = x[None, :, None] * right + y[:, None, None] * up - back
+        return rays
+
+
+def framed(points: Floats, *, height: int, azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Camera:
+    """Return the camera that just has all points (P, 3) in its picture; the picture is as wide as they ask for.
+
+    azimuth, elevation: degrees of the eye around the motion, from +Z toward +X, and above the horizon.
+    """
+    axes = _axes(math.radians(azimuth), math.radians(elevation))
+    seen = np.asarray(points, np.float64).reshape(-1, 3) @ axes.T
+    if not len(seen):
+        seen = np.zeros((1, 3))
+    middle = (seen.max(axis=0) + seen.min(axis=0)) / 2
+    reach = np.maximum(np.ptp(seen, axis=0), SMALLEST)
+    aspect = float(np.clip(reach[0] / reach[1], NARROWEST, WIDEST))
+    slope = math.tan(math.radians(FIELD) / 2) * (1 - 2 * MARGIN)
+    x, far_x = _fit(seen[:, 0], seen[:, 2], slope * aspect)
+    y, far_y = _fit(seen[:, 1], seen[:, 2], slope)
+    away = max(far_x, far_y, float(middle[2] + reach.max() * 1e-3))
+    width = max(round(height * aspect / 2) * 2, 2)
+    scale = height / 2 / math.tan(math.radians(FIELD) / 2)
+    return Camera(np.array([x, y, away]) @ axes, axes, scale, width, height)
+
+
+def _axes(azimuth: float, elevation: float) -> Floats:
+    back = np.array(
+        [
+            math.sin(azimuth) * math.cos(elevation),
+            math.sin(elevation),
+            math.cos(azimuth) * math.cos(elevation),
+        ]
+    )
+    right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
+    return np.stack((right, np.cross(back, right), back))
+
+
+def _fit(across: Floats, back: Floats, slope: float) -> tuple[float, float]:
+    """Where the eye has to be, sideways and backward, so that two planes through it hold all points between them."""
+    most = float((across + slope * back).max())
+    least = float((-across + slope * back).max())
+    return (most - least) / 2, (most + least) / (2 * slope)

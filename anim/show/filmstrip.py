@@ -1,0 +1,154 @@
+"""A motion as a filmstrip: one row for each clip or method, one camera for all, times under the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import AnyArray, Floats, Ints
+from anim.errors import RangeError
+from anim.show import glyphs, heat
+from anim.show.camera import AZIMUTH, ELEVATION, framed
+from anim.show.stage import Stage, draw, encoded, stage
+
+HEIGHT = 240  # pixels of a frame
+GAP, EDGE = 3, 12  # pixels between frames, and around all
+MAX_WIDTH = 1600  # pixels, beyond which frames go into another line
+PAPER, INK, FAINT = (0.93, 0.935, 0.94), (0.035, 0.038, 0.045), (0.19, 0.20, 0.22)  # linear
+LETTER = 2  # pixels of a dot of the font
+LOW = 8 + 7 * LETTER  # pixels from the bottom of a frame to the top of words in it
+BAR = 120, 8  # pixels of the heat's legend
+MOST_POINTS = 2_000_000  # that the camera is framed on
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One strip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
+
+    distances: (F, V) m, shown as heat instead of the colors where there are any. label: "dqs", "Walk".
+    """
+
+    label: str
+    times: Floats
+    positions: AnyArray
+    faces: Ints
+    colors: Floats
+    distances: AnyArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """height: pixels of a frame. azimuth, elevation: degrees of the camera around the motion."""
+
+    height: int = HEIGHT
+    azimuth: float = AZIMUTH
+    elevation: float = ELEVATION
+
+
+def filmstrip(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: Look = Look()) -> Image:
+    """Return the picture (H, W, 3) of all rows under each other; long ones go on in a next line.
+
+    around: (P, 3) m, all places that the motion reaches: what the camera is framed on.
+    Raises RangeError for pictures of less than 32 or more than 4096 pixels.
+    """
+    scenery = _scenery(around, look)
+    width, height = scenery.camera.width, scenery.camera.height
+    header, footer = _header_height(rows, title), glyphs.HEIGHT * LETTER + 2 * GAP
+    count = max(len(row.times) for row in rows)
+    lines = -(-count // max((MAX_WIDTH - 2 * EDGE) // (width + GAP), 1))
+    columns = -(-count // lines)
+    across = max(2 * EDGE + columns * (width + GAP) - GAP, _header_width(rows, title))
+    sheet = np.broadcast_to(PAPER, (header + lines * len(rows) * (height + footer) + EDGE - GAP, across, 3)).copy()
+    _write_header(sheet, rows, title)
+    for r, row in enumerate(rows):
+        for f, frame in enumerate(_frames(row, scenery, _most(rows))):
+            top = header + (f // columns * len(rows) + r) * (height + footer)
+            left = EDGE + f % columns * (width + GAP)
+            sheet[top : top + height, left : left + width] = frame
+            time = f"{row.times[f]:.2f} s"
+            middle = left + (width - glyphs.width(time, size=LETTER)) // 2
+            glyphs.write(sheet, time, middle, top + height + GAP, size=LETTER, color=FAINT)
+            if row.label and f % columns == 0:
+                glyphs.write(sheet, row.label, EDGE + 8, top + height - LOW, size=LETTER, color=INK)
+    return encoded(sheet)
+
+
+def moving(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: Look = Look()) -> Iterator[Image]:
+    """Yield a picture (H, W, 3) for every time, the rows side by side in it. All rows have the same times."""
+    scenery = _scenery(around, look)
+    width, height = scenery.camera.width, scenery.camera.height
+    header = _header_height(rows, title)
+    frames = [_frames(row, scenery, _most(rows)) for row in rows]
+    across = max(2 * EDGE + len(rows) * (width + GAP) - GAP, _header_width(rows, title))
+    for time, pictures in zip(rows[0].times, zip(*frames, strict=True), strict=True):
+        sheet = np.broadcast_to(PAPER, (header + height + EDGE, across, 3)).copy()
+        _write_header(sheet, rows, title)
+        for r, picture in enumerate(pictures):
+            left = EDGE + r * (width + GAP)
+            sheet[header : header + height, left : left + width] = picture
+            if rows[r].label:
+                glyphs.write(sheet, rows[r].label, left + 8, header + height - LOW, size=LETTER, color=INK)
+        said = f"{time:.2f} s"
+        left = EDGE + width - 8 - glyphs.width(said, size=LETTER)
+        glyphs.write(sheet, said, left, header + height - LOW, size=LETTER, color=FAINT)
+        yield encoded(sheet)
+
+
+def _scenery(around: AnyArray, look: Look) -> Stage:
+    if not 32 <= look.height <= 4096:
+        raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
+    points = np.asarray(around, np.float64).reshape(-1, 3)
+    camera = framed(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
+    return stage(camera, points)
+
+
+def _frames(row: Row, scenery: Stage, most: float) -> Iterator[Floats]:
+    for f, positions in enumerate(row.positions):
+        colors = row.colors
+        if row.distances is not None:
+            colors = heat.of_faces(row.distances[f], row.faces, most)
+        yield draw(scenery, positions.astype(np.float64), row.faces, colors)
+
+
+def _most(rows: Sequence[Row]) -> float:
+    return max((float(row.distances.max(initial=0)) for row in rows if row.distances is not None), default=0.0)
+
+
+def _header_height(rows: Sequence[Row], title: str) -> int:
+    return EDGE + (glyphs.HEIGHT * LETTER + GAP if title or _legend(rows) else 0)
+
+
+def _header_width(rows: Sequence[Row], title: str) -> int:
+    legend = _legend(rows)
+    words = glyphs.width(title, size=LETTER) + (glyphs.width(legend, size=LETTER) + BAR[0] + 40 if legend else 0)
+    return words + 2 * EDGE
+
+
+def _legend(rows: Sequence[Row]) -> str:
+    """What the heat's far end means, empty without heat."""
+    return _length(_most(rows)) if any(row.distances is not None for row in rows) else ""
+
+
+def _write_header(sheet: Floats, rows: Sequence[Row], title: str) -> None:
+    top = EDGE - GAP
+    glyphs.write(sheet, title, EDGE, top, size=LETTER, color=INK)
+    if legend := _legend(rows):
+        left = sheet.shape[1] - EDGE - glyphs.width(legend, size=LETTER)
+        glyphs.write(sheet, legend, left, top, size=LETTER, color=FAINT)
+        width, height = BAR
+        left -= width + 8
+        sheet[top + 3 : top + 3 + height, left : left + width] = heat.colors(np.linspace(0, 1, width))
+        glyphs.write(sheet, "0", left - 8 - glyphs.width("0", size=LETTER), top, size=LETTER, color=FAINT)
+
+
+def _length(meters: float) -> str:
+    """A length in a unit that suits it, in ASCII."""
+    for unit, factor in (("m", 1.0), ("cm", 1e2), ("mm", 1e3)):
+        if meters * factor >= 1 or unit == "mm":
+            return f"{meters * factor:.3g} {unit}"
+    raise AssertionError

@@ -1,0 +1,33 @@
+"""Colors of faces for pictures: what the materials say, else muted ones by part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import VertexCache
+
+CLAY = (0.60, 0.36, 0.18)
+# Linear light: one for each part, again from the start where there are more.
+PARTS = (
+    CLAY,
+    (0.22, 0.33, 0.42),
+    (0.48, 0.47, 0.44),
+    (0.50, 0.22, 0.15),
+    (0.28, 0.36, 0.22),
+    (0.62, 0.50, 0.30),
+    (0.34, 0.26, 0.38),
+)
+DARKEST = 0.035  # so that black things still have a shape
+
+
+def of_faces(cache: VertexCache, materials: Sequence[tuple[float, float, float]] = ()) -> Floats:
+    """Return a linear color (T, 3) for every face. materials: base colors by number; white counts as none."""
+    colors = np.tile(np.array(CLAY), (len(cache.faces), 1))
+    for i, part in enumerate(cache.parts):
+        color = materials[part.material] if 0 <= part.material < len(materials) else (1.0, 1.0, 1.0)
+        is_plain = min(color) > 0.95
+        colors[slice(*part.faces)] = PARTS[i % len(PARTS)] if is_plain else np.maximum(color, DARKEST)
+    return colors

@@ -1,0 +1,83 @@
+"""Which triangle is seen at which pixel: a z-buffer in numpy, no GPU and no driver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+
+BATCH = 1 << 20  # rows of triangles drawn at a time
+EDGE = 1e-9  # pixels by which a middle may lie outside, so that neighbors leave no gap
+FLAT = 1e-12  # pixels²; triangles of less area are seen from the side
+
+
+def visible(corners: Floats, *, width: int, height: int) -> Ints:
+    """Return the number of the nearest triangle at each pixel (height, width), −1 where there is none.
+
+    corners: (T, 3, 3): x and y in pixels from the top left, and nearness, which grows toward the eye and is linear on
+    the screen (1 / distance). A pixel belongs to a triangle that its middle lies in. Both sides are seen.
+    Each triangle is cut into rows, each row into the pixels between its edges; the nearest of all stays.
+    """
+    seen: Ints = np.full(height * width, -1, np.int64)
+    nearest = np.full(height * width, -np.inf)
+    shares, near, chosen = _planes(corners)
+    y = corners[chosen, :, 1]
+    first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
+    last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
+    rows = np.maximum(last - first + 1, 0)
+    ends = np.cumsum(rows)
+    start = 0
+    while start < len(chosen):
+        done = int(ends[start - 1]) if start else 0
+        stop = max(int(np.searchsorted(ends, done + BATCH, side="right")), start + 1)
+        some = slice(start, stop)
+        which = np.repeat(np.arange(start, stop), rows[some])
+        line = first[which] + np.arange(len(which)) - np.repeat(ends[some] - rows[some] - done, rows[some])
+        _draw(which, line, shares, near, chosen, seen, nearest, width)
+        start = stop
+    return seen.reshape(height, width)
+
+
+def _planes(corners: Floats) -> tuple[Floats, Floats, Ints]:
+    """Coefficients of x, y and 1 for the three barycentric shares (T, 3, 3) and nearness (T, 3) of usable triangles."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
+    chosen: Ints = np.flatnonzero((np.abs(area) > FLAT) & np.isfinite(corners).all(axis=(1, 2)))
+    a, b, c, over = a[chosen], b[chosen], c[chosen], 1 / area[chosen]
+    two = np.stack(((c[:, 1] - a[:, 1]) * over, (a[:, 0] - c[:, 0]) * over), axis=1)
+    three = np.stack(((a[:, 1] - b[:, 1]) * over, (b[:, 0] - a[:, 0]) * over), axis=1)
+    shares = np.empty((len(chosen), 3, 3))
+    for i, slope in ((1, two), (2, three)):
+        shares[:, i, :2] = slope
+        shares[:, i, 2] = -(slope * a[:, :2]).sum(axis=1)
+    shares[:, 0] = -shares[:, 1] - shares[:, 2]
+    shares[:, 0, 2] += 1
+    near = shares[:, 0] * a[:, 2, None] + shares[:, 1] * b[:, 2, None] + shares[:, 2] * c[:, 2, None]
+    return shares, near, chosen
+
+
+def _draw(
+    which: Ints, line: Ints, shares: Floats, near: Floats, chosen: Ints, seen: Ints, nearest: Floats, width: int
+) -> None:
+    """Draw rows `line` of triangles `which`, each between its edges."""
+    low, high = np.full(len(which), -np.inf), np.full(len(which), np.inf)
+    middle = line + 0.5
+    for i in range(3):
+        slope = shares[which, i, 0]
+        rest = shares[which, i, 1] * middle + shares[which, i, 2]
+        cut = -rest / np.where(slope == 0, 1.0, slope)
+        low = np.where(slope > 0, np.maximum(low, cut), low)
+        high = np.where(slope < 0, np.minimum(high, cut), high)
+        high = np.where((slope == 0) & (rest < -EDGE), -np.inf, high)
+    first = np.clip(np.ceil(low - 0.5 - EDGE), 0, width).astype(np.int64)
+    last = np.clip(np.floor(high - 0.5 + EDGE), -1, width - 1).astype(np.int64)
+    counts = np.maximum(last - first + 1, 0)
+    row = np.repeat(np.arange(len(which)), counts)
+    x = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    plane = near[which]
+    level = plane[:, 1] * middle + plane[:, 2] + plane[:, 0] * 0.5
+    depth = level[row] + plane[row, 0] * x
+    pixel = (line * width)[row] + x
+    np.maximum.at(nearest, pixel, depth)
+    won = depth == nearest[pixel]
+    seen[pixel[won]] = chosen[which[row[won]]]

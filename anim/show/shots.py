@@ -1,0 +1,177 @@
+"""What a filmstrip shows: clips of a file by skinning method, or a cache, at chosen times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.caches import axes, frames
+from anim.errors import NotFoundError, RangeError
+from anim.exchange.sticks import sticks
+from anim.gltf import read
+from anim.gltf.document import Document, items
+from anim.model import Clip, Instance, Mesh, Scene, Skeleton, VertexCache
+from anim.sampling import grid
+from anim.show import heat, palette
+from anim.show.filmstrip import MOST_POINTS, Row
+from anim.skinning.bake import bake
+from anim.skinning.methods import SKINNING_METHODS
+
+AROUND = 48  # frames of the whole motion that the camera is framed on
+MOST_FRAMES = 3000
+THICKER = 1.9  # times as wide as the sticks that go into files
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """Which frames: at these times; or `count` of them evenly spaced; or `fps` a second. From `begin` to `end` s.
+
+    begin, end: None for the clip's own.
+    """
+
+    at: tuple[float, ...] = ()
+    count: int | None = None
+    fps: float | None = None
+    begin: float | None = None
+    end: float | None = None
+
+    def times(self, start: float, end: float) -> Floats:
+        """Return times (F,) s of a motion from `start` to `end`. Raises RangeError where none lies in it."""
+        if self.at:
+            return np.unique(np.array(self.at, np.float64))
+        first = start if self.begin is None else max(self.begin, start)
+        last = end if self.end is None else min(self.end, end)
+        if first > last:
+            raise RangeError(
+                f"nothing lies from {first:g} s to {last:g} s (the motion goes from {start:g} s to {end:g} s)"
+            )
+        if self.fps is not None and self.count is None:
+            found = grid(first, last, fps=self.fps)
+            if len(found) > MOST_FRAMES:
+                raise RangeError(f"{len(found)} frames are too many for a picture (limit {MOST_FRAMES})")
+            return found
+        return np.linspace(first, last, self.count or 1) if last > first else np.array([first])
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One motion. clip, method: what it is, or empty. cache: its chosen frames; path: some frames of all of it.
+
+    colors: (T, 3) linear, of the faces.
+    """
+
+    clip: str
+    method: str
+    cache: VertexCache
+    path: VertexCache
+    colors: Floats
+
+
+def of_document(document: Document, clips: Sequence[int], methods: Sequence[str], when: When) -> list[Shot]:
+    """Return a shot for each clip by number and each skinning method; without clips one of the rest pose.
+
+    A file without a mesh is shown as sticks from joint to joint. Raises NotFoundError for a file without anything.
+    """
+    for name in methods:
+        if name not in SKINNING_METHODS:
+            raise RangeError(f"method is '{name}' (expected {', '.join(SKINNING_METHODS)})")
+    scene = _visible(read.scene(document))
+    known = read.clips(document)
+    chosen = [(known[i].name, known[i]) for i in clips] or [("", Clip("", ()))]
+    found = []
+    for name, clip in chosen:
+        start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
+        times, path = when.times(start, end), _spread(start, end)
+        for method in methods or ("lbs",):
+            cache = bake(scene, clip, times=times, method=method, rigid=True)
+            whole = bake(scene, clip, times=path, method=method, rigid=True)
+            colors = palette.of_faces(cache, _materials(document))
+            found.append(Shot(name, method if methods else "", cache, whole, colors))
+    return found
+
+
+def of_cache(cache: VertexCache, when: When) -> list[Shot]:
+    """Return one shot of a cache. Raises NotFoundError where it has no faces."""
+    if not len(cache.faces):
+        raise NotFoundError("has no faces to draw", help="put the rest mesh beside it: NAME-rest.ply")
+    cache = axes.turned(cache, "y")
+    start, end = float(cache.times[0]), float(cache.times[-1])
+    times = when.times(start, end)
+    chosen = frames.at_times(cache, times)
+    whole = frames.at_times(cache, _spread(start, end))
+    return [Shot("", "", chosen, whole, palette.of_faces(cache))]
+
+
+def rows(shots: Sequence[Shot], *, heated: bool = False) -> tuple[list[Row], AnyArray]:
+    """Return the rows of a filmstrip, and the places (P, 3) that its camera has to hold.
+
+    heated: color how far vertices are from where the clip's first method has them; from the rest pose where there is
+    one method only. Raises NotFoundError where there is no rest pose.
+    """
+    several_clips = len({shot.clip for shot in shots}) > 1
+    found: list[Row] = []
+    reference: AnyArray = np.empty(0)
+    for i, shot in enumerate(shots):
+        positions = shot.cache.whole().positions
+        is_first = i == 0 or shots[i - 1].clip != shot.clip
+        reference = positions if is_first else reference
+        label = " ".join(word for word in (shot.clip if several_clips else "", shot.method) if word)
+        distances = None
+        if heated and sum(other.clip == shot.clip for other in shots) == 1:
+            if shot.cache.rest is None:
+                raise NotFoundError("has no rest pose that distances could be measured from")
+            distances = heat.distances(positions, shot.cache.rest)
+        elif heated and not is_first:
+            distances = heat.distances(positions, reference)
+        found.append(Row(label, shot.cache.times, positions, shot.cache.faces, shot.colors, distances))
+    return found, np.concatenate([_places(shot.path) for shot in shots] + [_places(shot.cache) for shot in shots])
+
+
+def _visible(scene: Scene) -> Scene:
+    """The scene, with sticks on its joints where it has no faces."""
+    if any(len(instance.mesh.faces) for instance in scene.instances):
+        return scene
+    if not len(scene.skeleton):
+        raise NotFoundError("has neither a mesh nor a node to draw")
+    mesh, skin = sticks(scene.skeleton, _ends(scene.skeleton))
+    if not len(mesh.positions):
+        raise NotFoundError("has neither a mesh nor joints to draw")
+    return Scene(scene.skeleton, (Instance(0, _thicker(mesh), skin, np.zeros(0)),))
+
+
+def _thicker(mesh: Mesh) -> Mesh:
+    """Sticks of 24 corners (start, ring, ring, end, ring, ring, …) with wider rings, for small pictures."""
+    bodies = mesh.positions.reshape(-1, 24, 3).copy()
+    ring = np.array([1, 2, 4, 5, 7, 8, 10, 11, 13, 14, 16, 17, 19, 20, 22, 23])
+    middle = (bodies[:, [1]] + bodies[:, [13]]) / 2  # corners of the ring that face each other
+    bodies[:, ring] = middle + THICKER * (bodies[:, ring] - middle)
+    return replace(mesh, positions=bodies.reshape(-1, 3))
+
+
+def _ends(skeleton: Skeleton) -> frozenset[int]:
+    """Nodes that only mark where their parent's stick ends: those without children."""
+    parents = set(skeleton.parents.tolist())
+    return frozenset(i for i in range(len(skeleton)) if i not in parents and skeleton.parents[i] >= 0)
+
+
+def _materials(document: Document) -> list[tuple[float, float, float]]:
+    found = []
+    for material in items(document.json, "materials"):
+        surface = material.get("pbrMetallicRoughness", {})
+        color = (1.0, 1.0, 1.0) if "baseColorTexture" in surface else surface.get("baseColorFactor", (1.0, 1.0, 1.0))
+        found.append((float(color[0]), float(color[1]), float(color[2])))
+    return found
+
+
+def _spread(start: float, end: float) -> Floats:
+    return np.linspace(start, end, AROUND) if end > start else np.array([start])
+
+
+def _places(cache: VertexCache) -> AnyArray:
+    """Vertices of all frames, of frames farther apart where they are too many."""
+    step = max(1, -(-cache.frame_count * cache.vertex_count // MOST_POINTS))
+    found = [chunk.positions[-chunk.first % step :: step].reshape(-1, 3) for chunk in cache.chunks()]
+    return np.concatenate(found)

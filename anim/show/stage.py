@@ -1,0 +1,143 @@
+"""One frame of a mesh as a picture: flat-shaded over a ground with a grid and a soft shadow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.show.camera import Camera
+from anim.show.raster import visible
+
+SAMPLES = 3  # across and down in each pixel
+# Linear light.
+SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
+LINE, SHADOW = np.array([0.52, 0.53, 0.55]), np.array([0.16, 0.17, 0.20])
+KEY, FILL = np.array([-0.45, 0.80, 0.55]), np.array([0.75, 0.25, 0.30])  # directions of lights, in the camera's frame
+KEY_LIGHT, FILL_LIGHT, FROM_ABOVE, FROM_BELOW = 0.72, 0.14, 0.34, 0.16
+SHADOW_DEPTH = 0.55  # how much light the ground loses
+STEEPER = 0.5  # the light that casts shadows falls this much more from above, so that they stay near
+SHADOW_BLUR = 0.012  # of the picture's height
+CELLS = 7.0  # squares of the grid across the motion, about
+GRID_DEPTH = 0.38
+GAMMA = 2.2
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """What all frames share. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m."""
+
+    camera: Camera
+    ground: float
+    middle: Floats
+    reach: float
+    background: Floats
+
+
+def stage(camera: Camera, points: Floats) -> Stage:
+    """Return the stage for a motion whose vertices are `points` (P, 3), the ground under the lowest of them."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    ground = float(low[1])
+    if 0 <= ground <= 0.05 * (high[1] - low[1]):  # feet that hardly lift stand on the floor of the scene
+        ground = 0.0
+    middle = (low[[0, 2]] + high[[0, 2]]) / 2
+    reach = max(float(np.linalg.norm(high - low)) / 2, 1e-6)
+    return Stage(camera, ground, middle, reach, _background(camera, ground, middle, reach))
+
+
+def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats) -> Floats:
+    """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces."""
+    large = _larger(stage.camera, SAMPLES)
+    corners = large.project(positions)[faces]
+    seen = visible(corners, width=large.width, height=large.height)
+    shade = _shade(stage.camera, positions, faces)
+    lit = np.concatenate((colors * shade[:, None], np.zeros((1, 3))))[seen]
+    shape = (stage.camera.height, SAMPLES, stage.camera.width, SAMPLES)
+    cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
+    image = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
+    picture: Floats = image * (1 - cover) + lit.reshape(*shape, 3).mean(axis=(1, 3))
+    return picture
+
+
+def encoded(image: Floats) -> np.ndarray:
+    """Return linear light as bytes of sRGB (nearly: one power for all)."""
+    return np.rint(np.clip(image, 0, 1) ** (1 / GAMMA) * 255).astype(np.uint8)
+
+
+def _larger(camera: Camera, times: int) -> Camera:
+    return Camera(camera.eye, camera.axes, camera.scale * times, camera.width * times, camera.height * times)
+
+
+def _shade(camera: Camera, positions: Floats, faces: Ints) -> Floats:
+    """Light (T,) that each face sends to the eye: a key and a fill light, and the sky above."""
+    a, b, c = (positions[faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0, length, 1)
+    away = np.einsum("ti,ti->t", normals, a - camera.eye) > 0
+    normals = np.where(away[:, None], -normals, normals)
+    light = np.full(len(faces), 0.0)
+    for direction, strength in ((KEY, KEY_LIGHT), (FILL, FILL_LIGHT)):
+        world = direction / np.linalg.norm(direction) @ camera.axes
+        light += strength * np.maximum(normals @ world, 0)
+    above = (1 + normals[:, 1]) / 2
+    return light + FROM_BELOW + (FROM_ABOVE - FROM_BELOW) * above
+
+
+def _background(camera: Camera, ground: float, middle: Floats, reach: float) -> Floats:
+    share = np.linspace(0, 1, camera.height)[:, None, None]
+    image = np.broadcast_to(SKY * (1 - share) + EARTH * share, (camera.height, camera.width, 3)).copy()
+    rays = camera.rays()
+    down, height = -rays[..., 1], camera.eye[1] - ground
+    is_ground = (down > 1e-6) & (height > 0)
+    far = height / np.where(is_ground, down, 1)
+    places = camera.eye[[0, 2]] + rays[..., [0, 2]] * far[..., None]
+    fade = np.clip(1.25 - np.linalg.norm(places - middle, axis=-1) / (1.6 * reach), 0, 1)
+    step = nice(2 * reach / CELLS)
+    line = np.maximum(_lines(places[..., 0], step), _lines(places[..., 1], step))
+    line = np.where(is_ground, line * fade * GRID_DEPTH, 0)[..., None]
+    picture: Floats = image * (1 - line) + LINE * line
+    return picture
+
+
+def _lines(places: Floats, step: float) -> Floats:
+    """How much (H, W) of a pixel is line of a grid of this step, less where lines come too near each other."""
+    spread = np.abs(np.gradient(places, axis=0)) + np.abs(np.gradient(places, axis=1)) + 1e-9
+    off = np.abs((places / step + 0.5) % 1 - 0.5) * step
+    found: Floats = np.clip(1 - off / (0.75 * spread), 0, 1) * np.clip(step / (6 * spread), 0, 1)
+    return found
+
+
+def nice(length: float) -> float:
+    """Return the nearest of 1, 2, 5, 10, … below a length."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return max(factor * power for factor in (1, 2, 5) if factor * power <= length * 1.0001)
+
+
+def _shadow(stage: Stage, positions: Floats, faces: Ints) -> Floats:
+    """How dark (H, W) the ground is: what the key light finds in its way, made soft."""
+    camera = stage.camera
+    if camera.eye[1] <= stage.ground:
+        return np.zeros((camera.height, camera.width))
+    light = KEY / np.linalg.norm(KEY) @ camera.axes * (STEEPER, 1, STEEPER)
+    light[1] = max(light[1], 0.6)
+    above = np.maximum(positions[:, 1] - stage.ground, 0)
+    fallen = positions - (above / light[1])[:, None] * light
+    fallen[:, 1] = stage.ground
+    mask = visible(camera.project(fallen)[faces], width=camera.width, height=camera.height) >= 0
+    return SHADOW_DEPTH * _blurred(mask.astype(np.float64), max(round(SHADOW_BLUR * camera.height), 1))
+
+
+def _blurred(image: Floats, radius: int) -> Floats:
+    for axis in (0, 1):
+        for _ in range(2):
+            pad = [(0, 0), (0, 0)]
+            pad[axis] = (radius + 1, radius)
+            total = np.cumsum(np.pad(image, pad, mode="edge"), axis=axis)
+            size = 2 * radius + 1
+            ahead = np.take(total, range(size, total.shape[axis]), axis)
+            behind = np.take(total, range(total.shape[axis] - size), axis)
+            image = (ahead - behind) / size
+    return image

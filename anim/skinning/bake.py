@@ -1,0 +1,203 @@
+"""Clip + Scene → VertexCache: every vertex at every frame, a chunk of frames at a time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim import arrays
+from anim.arrays import Floats, Ints
+from anim.errors import NotFoundError, RangeError
+from anim.model import Clip, Instance, Part, Primitive, Scene, VertexCache
+from anim.sampling import pose
+from anim.sampling.pose import world_by_node
+from anim.skinning.bulge import Clamped
+from anim.skinning.layer import Frames, Layer, Make, layer
+from anim.skinning.linear_blend import LinearBlend
+from anim.skinning.methods import SKINNING_METHODS
+from anim.skinning.mixed import Mixed
+from anim.skinning.rig import Rig
+from anim.skinning.skinner import Skinner
+from anim.skinning.stream import Stream
+
+SPACES = ("world", "mesh")
+
+
+def bake(
+    scene: Scene,
+    clip: Clip,
+    *,
+    times: Floats,
+    method: str = "lbs",
+    blend: float | None = None,
+    bulge_clamp: bool = False,
+    space: str = "world",
+    normals: bool = False,
+    rigid: bool = False,
+    nodes: Sequence[int] | None = None,
+    threads: int | None = None,
+    progress: Callable[[int], None] = lambda frames: None,
+) -> VertexCache:
+    """Return where the vertices of a scene are at `times` (F,) in seconds while a clip plays.
+
+    Parameters as for `baker`, which is the thing to use for many clips; progress: called with the frames done.
+    bake(scene, clip, times=grid(0, 1, fps=30), method="dqs") → VertexCache of 31 frames
+    """
+    made = baker(
+        scene,
+        method=method,
+        blend=blend,
+        bulge_clamp=bulge_clamp,
+        space=space,
+        normals=normals,
+        rigid=rigid,
+        nodes=nodes,
+        threads=threads,
+    )
+    return made.bake(clip, times=times, progress=progress)
+
+
+def baker(
+    scene: Scene,
+    *,
+    method: str = "lbs",
+    blend: float | None = None,
+    bulge_clamp: bool = False,
+    space: str = "world",
+    normals: bool = False,
+    rigid: bool = False,
+    nodes: Sequence[int] | None = None,
+    threads: int | None = None,
+) -> Baker:
+    """Return what bakes clips of a scene: all that a method has to know of the meshes is found out here, once.
+
+    method: one of SKINNING_METHODS. blend: share of the method, the rest is lbs; None for all of it.
+    bulge_clamp: pull what stands farther from its bone than at rest back, as much as it is shared by two joints.
+    space: "world", where a skinned mesh's own node doesn't count, or "mesh", the space of the mesh's node.
+    normals: give unit normals too; of a mesh without them, those of its faces' mean.
+    rigid: meshes that neither joints nor morph targets move, too. nodes: only meshes on these.
+    threads: None for one per core; the result doesn't depend on it.
+    Raises RangeError for a parameter out of its range, NotFoundError where nothing is left to bake.
+    """
+    _check(method, blend, space, bulge_clamp=bulge_clamp)
+    chosen = baked(scene, rigid=rigid, nodes=nodes)
+    if not chosen:
+        raise NotFoundError("there is no mesh with a skin or morph targets to bake", help=_hint(scene, rigid=rigid))
+    starts = np.cumsum([0, *(len(instance.mesh.positions) for instance in chosen)])
+    make = _maker(method, blend, bulge_clamp=bulge_clamp)
+    layers = tuple(
+        layer(scene.skeleton, instance, make, at=at, space=space, normals=normals)
+        for instance, at in zip(chosen, starts.tolist(), strict=False)
+    )
+    still = pose(scene.skeleton, Clip("", ()), np.zeros(1))
+    frames = Frames(still, world_by_node(scene.skeleton, still))
+    return Baker(
+        scene,
+        layers,
+        int(starts[-1]),
+        np.concatenate([each.rig.faces + each.at for each in layers]),
+        tuple(_parts(scene, layers)),
+        np.concatenate([each.at_rest(frames) for each in layers]),
+        normals,
+        threads or _cores(),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Baker:
+    """Meshes of a scene, ready to be baked with any clip.
+
+    layers: in the order of their vertices, of which there are `vertices`. faces: (T, 3) of all of them.
+    rest: (V, 3) m, where vertices are in the scene's rest pose. normals: whether they are baked too.
+    """
+
+    scene: Scene
+    layers: tuple[Layer, ...]
+    vertices: int
+    faces: Ints
+    parts: tuple[Part, ...]
+    rest: Floats
+    normals: bool
+    threads: int
+
+    def bake(self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda frames: None) -> VertexCache:
+        """Return where the vertices are at `times` (F,) in seconds while a clip plays.
+
+        Vertices come in the scene's order: nodes depth-first, primitives as in the file, vertices as in their accessor.
+        Nothing is computed before frames are asked for, and then a chunk at a time: memory doesn't grow with F.
+        progress: called with the number of frames done, after each chunk.
+        """
+        seconds = arrays.times(times)
+        stream = Stream(self.scene.skeleton, self.layers, self.vertices, self.normals, self.threads)
+        return VertexCache(
+            seconds,
+            self.vertices,
+            self.faces,
+            lambda: stream.chunks(clip, seconds, progress),
+            rest=self.rest,
+            has_normals=self.normals,
+            parts=self.parts,
+        )
+
+
+def baked(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[Instance]:
+    """Return the mesh instances that have vertices and are baked: skinned or morphed ones, with `rigid` all."""
+    return [
+        instance
+        for instance in scene.instances
+        if len(instance.mesh.positions)
+        and (rigid or instance.skin is not None or len(instance.mesh.targets))
+        and (nodes is None or instance.node in nodes)
+    ]
+
+
+def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:
+    """What makes the skinner of a rig. A mesh on one joint alone needs no method: all give the same."""
+
+    def make(rig: Rig, plain: bool) -> Skinner:
+        if len(rig.nodes) == 1:
+            return LinearBlend(rig, plain)
+        skinner = SKINNING_METHODS[method].skinner(rig, plain)
+        if bulge_clamp:
+            skinner = Clamped(skinner, rig)
+        return skinner if blend is None else Mixed(LinearBlend(rig, plain), skinner, blend)
+
+    return make
+
+
+def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -> None:
+    if method not in SKINNING_METHODS:
+        raise RangeError(f"method is '{method}' (expected one of {', '.join(SKINNING_METHODS)})")
+    if blend is not None and not 0 <= blend <= 1:
+        raise RangeError(f"blend is {blend:g} (expected 0 … 1)")
+    if method == "lbs" and (blend is not None or bulge_clamp):
+        what = "blend" if blend is not None else "bulge clamp"
+        raise RangeError(f"{what} needs another method than lbs (expected dqs or cor)")
+    if space not in SPACES:
+        raise RangeError(f"space is '{space}' (expected one of {', '.join(SPACES)})")
+
+
+def _hint(scene: Scene, *, rigid: bool) -> str:
+    if not any(len(instance.mesh.positions) for instance in scene.instances):
+        return "the file has no mesh with vertices"
+    return "" if rigid else "meshes that only nodes move are baked with --rigid"
+
+
+def _parts(scene: Scene, layers: Sequence[Layer]) -> Iterator[Part]:
+    face = 0
+    for each in layers:
+        mesh, vertex = each.instance.mesh, each.at
+        name = mesh.name or scene.skeleton.names[each.instance.node]
+        primitives = mesh.primitives or (Primitive(len(mesh.positions), len(mesh.faces)),)
+        for primitive in primitives:
+            ends = vertex + primitive.vertices, face + primitive.faces
+            if primitive.vertices:
+                yield Part(name, (vertex, ends[0]), (face, ends[1]), each.instance.node, primitive.material)
+            vertex, face = ends
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,141 @@
+"""One mesh instance on its way through a bake: which matrices move it, and in which columns its vertices go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError, RangeError
+from anim.maths import matrix
+from anim.model import Instance, Pose, Skeleton
+from anim.skinning.rig import Rig, Singles, rig
+from anim.skinning.skinner import NO_NORMALS, Shape, Skinner, Target, filled
+from anim.skinning.smooth_normals import SmoothNormals
+
+Make: TypeAlias = Callable[[Rig, bool], Skinner]
+
+PIECE = 4096  # vertices that a thread takes at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Some frames of the whole scene: local transforms, and world_from_node (N, F, 3, 4)."""
+
+    pose: Pose
+    world: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """An instance, its rig and skinner, and its first column.
+
+    in_mesh_space: positions are wanted in the space of the instance's node. smooth: what makes normals of the faces
+    where they are wanted and the mesh has none.
+    """
+
+    instance: Instance
+    rig: Rig
+    skinner: Skinner
+    at: int
+    in_mesh_space: bool
+    smooth: SmoothNormals | None
+
+    def pack(self, frames: Frames, block: slice) -> tuple[Any, Shape]:
+        """Return what `place` needs for some of the frames."""
+        return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
+
+    def place(self, packed: tuple[Any, Shape], block: slice, positions: Singles, normals: Singles, first: int) -> None:
+        """Write a piece of the vertices, from `first` on, of a block of frames."""
+        parts, shape = packed
+        turned = normals[block] if len(shape.normals) else NO_NORMALS
+        last = min(first + PIECE, len(self.rig.points))
+        self.skinner.place(parts, shape, Target(self.at, positions[block], turned), first, last)
+
+    def finish(self, frames: Frames, positions: Singles, normals: Singles) -> None:
+        """Bring what was placed in world space into the mesh's own, and make normals of the faces if need be."""
+        span = slice(self.at, self.at + len(self.rig.points))
+        if self.in_mesh_space and self.instance.skin is not None:
+            node = frames.world[self.instance.node]
+            back = _inverse(node)
+            positions[:, span] = matrix.apply(back, positions[:, span].astype(np.float64))
+            if len(self.rig.normals):
+                turned = normals[:, span] @ node[..., :3]  # the inverse's inverse transpose, of rows
+                length = np.sqrt((turned * turned).sum(axis=-1, keepdims=True))
+                normals[:, span] = turned / np.where(length > 0, length, 1)
+        if self.smooth is not None:
+            self.smooth.of(positions[:, span], normals[:, span])
+
+    def at_rest(self, frames: Frames) -> Floats:
+        """Return the vertices (V, 3) in the first of the frames, blended linearly in float64."""
+        bound = self.matrices(frames, slice(0, 1))[0]
+        points = self._points(frames, slice(0, 1))[..., 0]
+        owner = np.repeat(np.arange(len(points)), np.diff(self.rig.start))
+        chosen = bound[self.rig.joint]
+        moved = np.einsum("eij,ej->ei", chosen[..., :3], points[owner]) + chosen[..., 3]
+        weighted = moved * self.rig.weight[:, None]
+        sums = [np.bincount(owner, part, minlength=len(points)) for part in weighted.T]
+        placed: Floats = np.stack(sums, axis=-1).astype(np.float64)
+        if self.in_mesh_space and self.instance.skin is not None:
+            placed = matrix.apply(_inverse(frames.world[self.instance.node, :1])[0], placed)
+        return placed
+
+    def matrices(self, frames: Frames, block: slice) -> Floats:
+        """Return world_from_mesh (n, J, 3, 4) of the joints; where there is no skin, of the node."""
+        if self.in_mesh_space and self.instance.skin is None:
+            count = len(frames.pose.times[block])
+            return np.broadcast_to(np.eye(4)[:3], (count, 1, 3, 4))
+        world = frames.world[self.rig.nodes, block].transpose(1, 0, 2, 3)
+        return matrix.multiply(world, self.rig.bind)
+
+    def _shape(self, frames: Frames, block: slice) -> Shape:
+        points = self._points(frames, block)
+        normals, turned = self.rig.normals[:, :, None], self.instance.mesh.normal_targets
+        if turned is not None and len(normals):
+            normals = _morphed(self.rig.normals, turned, self._weights(frames, block))
+        return Shape(_rows(points), _rows(normals))
+
+    def _points(self, frames: Frames, block: slice) -> Floats:
+        return _morphed(self.rig.points, self.instance.mesh.targets, self._weights(frames, block))
+
+    def _weights(self, frames: Frames, block: slice) -> Floats:
+        """Morph weights (n, M), or (1, M) where no frame has its own."""
+        animated = frames.pose.weights.get(self.instance.node)
+        return self.instance.weights[None] if animated is None else animated[block]
+
+
+def layer(skeleton: Skeleton, instance: Instance, make: Make, *, at: int, space: str, normals: bool) -> Layer:
+    """Return the layer of an instance. make: gets its rig, and whether its points never change and need no normals."""
+    name = instance.mesh.name or skeleton.names[instance.node] or f"node {instance.node}"
+    try:
+        bound = rig(instance, skeleton.parents, normals=normals)
+    except AnimError as error:
+        raise error.at(f"mesh '{name}'") from None
+    smooth = SmoothNormals(bound.faces, len(bound.points)) if normals and instance.mesh.normals is None else None
+    plain = not len(instance.mesh.targets) and not len(bound.normals)
+    return Layer(instance, bound, make(bound, plain), at, space == "mesh", smooth)
+
+
+def _morphed(base: Floats, targets: Floats, weights: Floats) -> Floats:
+    """base (V, 3) and targets (M, V, 3) by weights (n, M) → (V, 3, n); targets that never count are not read."""
+    used = np.flatnonzero(weights.any(axis=0)) if len(targets) else np.empty(0, np.int64)
+    if not len(used):
+        return base[:, :, None]
+    moved = targets[used].reshape(len(used), -1).T @ weights[:, used].T
+    return np.asarray(base[:, :, None] + moved.reshape(*base.shape, -1))
+
+
+def _rows(values: Floats) -> Singles:
+    return np.ascontiguousarray(values, np.float32) if values.shape[2] == 1 else filled(values)
+
+
+def _inverse(world: Floats) -> Floats:
+    """Inverses (F, 3, 4) of a node's matrices. Raises RangeError where it is flat at some time."""
+    linear = world[..., :3]
+    if not (np.abs(np.linalg.det(linear)) > 0).all():
+        raise RangeError("mesh space is flat: the node of a mesh has scale 0 (expected space 'world')")
+    back = np.linalg.inv(linear)
+    return np.concatenate((back, -(back @ world[..., 3:])), axis=-1)

@@ -1,0 +1,96 @@
+"""A mesh bound to joints, in the form that kernels read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Floats, Ints
+from anim.errors import RangeError
+from anim.model import Instance
+
+Singles: TypeAlias = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """V vertices, and the joints that each of them hangs on, strongest first, joints without weight left out.
+
+    nodes: (J,) node numbers. bind: (J, 3, 4) joint_from_mesh at bind time. above: (J,) the nearest joint above, or −1.
+    points: (V, 3) m in mesh space. normals: (V, 3), or (0, 3) where they are not wanted.
+    start: (V + 1,); influences start[v] … start[v + 1] are vertex v's. joint: (E,) into nodes. weight: (E,) as stored.
+    faces: (T, 3).
+    """
+
+    nodes: Ints
+    bind: Floats
+    above: Ints
+    points: Floats
+    normals: Floats
+    start: Ints
+    joint: NDArray[np.int32]
+    weight: Singles
+    faces: Ints
+
+
+def rig(instance: Instance, parents: Ints, *, normals: bool = False) -> Rig:
+    """Return the rig of a mesh instance; one without a skin hangs on its own node, whole.
+
+    parents: (N,) of the skeleton. normals: keep the mesh's, which it must have then.
+    Raises RangeError for a joint that the skin does not have, or a weight that is no number.
+    """
+    mesh, skin = instance.mesh, instance.skin
+    if skin is None:
+        nodes, bind = np.array([instance.node], np.int64), np.eye(4)[None, :3]
+        joints, weights = np.zeros((len(mesh.positions), 1), np.int64), np.ones((len(mesh.positions), 1))
+    else:
+        nodes, bind, joints, weights = skin.joints, skin.inverse_bind, mesh.joints, mesh.weights
+        _check(joints, weights, len(nodes))
+    start, joint, weight = influences(joints, weights)
+    kept = mesh.normals if normals and mesh.normals is not None else np.empty((0, 3))
+    above = joints_above(nodes, parents)
+    return Rig(nodes, bind, above, mesh.positions, kept, start, joint, weight, mesh.faces)
+
+
+def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], Singles]:
+    """Return start (V + 1,), joint (E,) and weight (E,) of joints and weights (V, I), strongest first, zeros left out.
+
+    influences([[4, 7]], [[0.25, 0.75]]) → [0, 2], [7, 4], [0.75, 0.25]
+    """
+    order = np.argsort(-weights, axis=1, kind="stable")
+    joints, weights = np.take_along_axis(joints, order, 1), np.take_along_axis(weights, order, 1)
+    used = weights > 0
+    start = np.zeros(len(joints) + 1, np.int64)
+    np.cumsum(used.sum(axis=1), out=start[1:])
+    return start, joints[used].astype(np.int32), weights[used].astype(np.float32)
+
+
+def whole_weights(rig: Rig) -> Singles:
+    """Return the weights (E,) as shares of each vertex's sum."""
+    owner = np.repeat(np.arange(len(rig.points)), np.diff(rig.start))
+    sums = np.bincount(owner, rig.weight, minlength=len(rig.points))
+    return (rig.weight / sums[owner]).astype(np.float32)
+
+
+def joints_above(nodes: Ints, parents: Ints) -> Ints:
+    """Return for each joint (J,) the number of the nearest joint above it, −1 where there is none."""
+    number = {node: i for i, node in enumerate(nodes.tolist())}
+    found = []
+    for node in nodes.tolist():
+        at = int(parents[node])
+        while at >= 0 and at not in number:
+            at = int(parents[at])
+        found.append(number.get(at, -1))
+    return np.array(found, np.int64)
+
+
+def _check(joints: Ints, weights: Floats, count: int) -> None:
+    if not np.isfinite(weights).all():
+        raise RangeError(f"vertex {int(np.argwhere(~np.isfinite(weights))[0][0])} has a skin weight that is no number")
+    outside = (joints < 0) | (joints >= count)
+    if outside.any():
+        v = int(np.argmax(outside.any(axis=1)))
+        raise RangeError(f"vertex {v} uses joint {int(joints[outside][0])} (the skin has {count})")

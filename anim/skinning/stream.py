@@ -1,0 +1,86 @@
+"""Chunks of frames out of layers, made by a pool of threads that is one chunk ahead of whoever asks."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Chunk, Clip, Skeleton
+from anim.sampling.pose import Poses, world_by_node
+from anim.skinning.kernels import LANES
+from anim.skinning.layer import PIECE, Frames, Layer
+from anim.skinning.rig import Singles
+from anim.skinning.skinner import NO_NORMALS
+
+CHUNK = 1 << 24  # bytes of positions in a chunk, about; never less than LANES frames
+MOST = 32  # blocks of LANES frames in a chunk, for their poses take memory too
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """What is made: `vertices` columns by these layers. threads: how many work on it, without any change of a bit."""
+
+    skeleton: Skeleton
+    layers: Sequence[Layer]
+    vertices: int
+    normals: bool
+    threads: int
+
+    def chunks(self, clip: Clip, times: Floats, progress: Callable[[int], None]) -> Iterator[Chunk]:
+        """Yield the frames at `times` (F,) s in order. progress: called with how many the caller is done with."""
+        blocks = min(CHUNK // (12 * self.vertices * LANES), MOST, -(-len(times) // LANES))
+        step = LANES * max(blocks, 1)
+        poses = Poses(self.skeleton, clip)
+        with ThreadPoolExecutor(self.threads) as pool:
+            ahead: deque[Future[_Begun]] = deque()
+            for first in range(-step, len(times), step):
+                following = times[first + step : first + 2 * step]
+                if len(following):
+                    ahead.append(pool.submit(self._begin, poses, following, pool))
+                if first >= 0:
+                    yield self._finished(first, ahead.popleft().result())
+                    progress(min(first + step, len(times)))
+
+    def _begin(self, poses: Poses, times: Floats, pool: Executor) -> _Begun:
+        """Sample the poses of a chunk and set its blocks going."""
+        local = poses.at(times)
+        frames = Frames(local, world_by_node(self.skeleton, local))
+        shape = (len(times), self.vertices, 3)
+        positions: Singles = np.empty(shape, np.float32)
+        normals: Singles = np.empty(shape, np.float32) if self.normals else NO_NORMALS
+        blocks = [slice(low, low + LANES) for low in range(0, len(times), LANES)]
+        begun = _Begun(frames, positions, normals, [])
+        begun.blocks.extend(
+            pool.submit(_placing, begun, layer, block, pool) for layer in self.layers for block in blocks
+        )
+        return begun
+
+    def _finished(self, first: int, begun: _Begun) -> Chunk:
+        for block in begun.blocks:
+            for piece in block.result():
+                piece.result()
+        for layer in self.layers:
+            layer.finish(begun.frames, begun.positions, begun.normals)
+        return Chunk(first, begun.positions, begun.normals if self.normals else None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Begun:
+    """A chunk under way: the pieces of each block are known when its matrices are packed."""
+
+    frames: Frames
+    positions: Singles
+    normals: Singles
+    blocks: list[Future[list[Future[None]]]]
+
+
+def _placing(begun: _Begun, layer: Layer, block: slice, pool: Executor) -> list[Future[None]]:
+    """Pack what a layer needs for a block of frames, and set its pieces going; nothing here waits for another."""
+    packed = layer.pack(begun.frames, block)
+    starts = range(0, len(layer.rig.points), PIECE)
+    return [pool.submit(layer.place, packed, block, begun.positions, begun.normals, start) for start in starts]

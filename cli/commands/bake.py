@@ -1,0 +1,196 @@
+"""`gltf-anim bake`: every vertex at every frame, skinned by a method of choice, as a vertex cache."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import PurePath
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from anim.arrays import Floats, sorted_unique
+from anim.caches import axes, extent
+from anim.caches import order as orders
+from anim.gltf import read
+from anim.model import Clip, Instance, VertexCache
+from anim.ops.selection import Selection
+from anim.sampling.times import grid
+from anim.skinning.bake import baked, baker
+from anim.skinning.methods import SKINNING_METHODS
+from anim.skinning.weights import bad_sums
+from cli import cache_files, cache_options, meshes, options, report, streams, units
+from cli.cache_files import Saved
+from cli.errors import UsageError
+from cli.progress import Progress
+from cli.report import Voice, plural
+
+PLACE = "{clip}"  # in OUT: where the name of the clip goes
+FORBIDDEN = frozenset('/\\:*?"<>|')  # what some file system doesn't take in a name
+
+Method = StrEnum("Method", [(name, name) for name in SKINNING_METHODS])  # type: ignore[misc]
+LBS = Method("lbs")
+
+
+class Space(StrEnum):
+    """Whose axes positions are in."""
+
+    WORLD = "world"
+    MESH = "mesh"
+
+
+def bake(
+    input: options.Input = "-",
+    output: cache_options.Product = "-",
+    *,
+    method: Annotated[
+        Method,
+        typer.Option("--method", help="; ".join(f"{name}: {m.about}" for name, m in SKINNING_METHODS.items()) + "."),
+    ] = LBS,
+    blend: Annotated[
+        float | None, typer.Option("--blend", metavar="0..1", help="Share of the method; the rest is lbs.")
+    ] = None,
+    bulge_clamp: Annotated[
+        bool, typer.Option("--bulge-clamp", help="Keep skin no farther from its bones than at rest.")
+    ] = False,
+    fps: Annotated[
+        float | None, typer.Option("--fps", metavar="N", help="Frames per second. Without it: the clip's own keys.")
+    ] = None,
+    clip: options.Clips = None,
+    mesh: meshes.Meshes = None,
+    space: Annotated[
+        Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")
+    ] = Space.WORLD,
+    normals: Annotated[bool, typer.Option("--normals", help="Bake normals too.")] = False,
+    rigid: Annotated[bool, typer.Option("--rigid", help="Bake meshes that only nodes move, too.")] = False,
+    format: cache_options.FormatOption = None,
+    up: cache_options.UpOption = None,
+    order: cache_options.OrderOption = None,
+    max_error: cache_options.MaxError = None,
+    quantize: cache_options.Quantize = False,
+    layout: cache_options.LayoutOption = None,
+    preset: cache_options.PresetOption = None,
+    depth: cache_options.DepthOption = None,
+    rest: cache_options.RestOption = None,
+    dry_run: options.DryRun = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Bake skinning and morph targets to a vertex cache, by a method that glTF itself can't play.
+
+    Vertices come in the order of the scene: nodes depth-first, primitives as in the file, vertices as in their
+    accessors. Skinned meshes are in world space, where their own node doesn't count. Several clips need {clip} in OUT,
+    which is replaced by each name. Skin weights count as they are stored; dqs and cor take them as shares of their sum.
+    """
+    voice = Voice(quiet, verbose)
+    began = time.perf_counter()
+    if fps is not None and fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    ending = cache_files.check(output, None if format is None else f".{format}")
+    given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
+    cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    done: list[_Done] = []
+    with streams.source(input) as source:
+        document = source.document
+        clips, scene = read.clips(document), read.scene(document, normals=normals)
+        numbers = Selection(clip or ()).chosen_clips(read.names(document))
+        files = _files(output, [(clips[i].name, i) for i in numbers])
+        nodes = meshes.nodes(scene, mesh)
+        _say_sums(baked(scene, nodes=nodes), voice)
+        made = baker(
+            scene,
+            method=method.value,
+            blend=blend,
+            bulge_clamp=bulge_clamp,
+            space=space.value,
+            normals=normals,
+            rigid=rigid,
+            nodes=nodes,
+        )
+        for each, file in zip([clips[i] for i in numbers] or [Clip("", ())], files, strict=True):
+            times = _times(each, fps)
+            progress = Progress(PurePath(file).name, len(times), shown=not quiet)
+            cache = _turned(made.bake(each, times=times, progress=progress), up, order)
+            try:
+                writing = cache_options.writing(ending, given | {"max_error": _meters(max_error, cache)})
+                saved = cache_files.save(cache, file, writing, ending=ending, dry_run=dry_run)
+            finally:
+                progress.close()
+            done.append(_Done(file, each.name, len(times), saved))
+            _say_notes(done, voice)
+            if len(files) > 1:
+                voice.detail(f"  {_summary(done[-1:], cache.vertex_count, method.value)}")
+    words = _summary(done, made.vertices, method.value)
+    tail = " (dry run: nothing written)" if dry_run else ""
+    voice.say(f"{words}, {time.perf_counter() - began:.1f} s{tail}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """One clip that was baked into a file."""
+
+    file: str
+    clip: str
+    frames: int
+    saved: Saved
+
+
+def _files(output: str, clips: list[tuple[str, int]]) -> list[str]:
+    """One output per clip, the clip's name in the place of {clip}; a name that is taken gets the clip's number."""
+    if PLACE not in output:
+        if len(clips) > 1:
+            raise UsageError(
+                f"{len(clips)} clips are chosen, but '{output}' holds one",
+                help=f"choose one with --clip, or put {PLACE} into OUT for a file per clip",
+            )
+        return [output]
+    names: list[str] = []
+    for name, number in clips or [("", 0)]:
+        plain = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ") or str(number)
+        file = output.replace(PLACE, plain)
+        names.append(output.replace(PLACE, f"{plain}-{number}") if file in names else file)
+    return names
+
+
+def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
+    if order is not None:
+        cache = orders.ordered(cache, str(order))
+    return cache if up is None else axes.turned(cache, str(up))
+
+
+def _meters(max_error: str | None, cache: VertexCache) -> float | None:
+    return None if max_error is None else units.meters(max_error, "--max-error", lambda: extent.diagonal(cache))
+
+
+def _say_notes(done: list[_Done], voice: Voice) -> None:
+    """Notes of the last file that none before it had."""
+    told = {note for each in done[:-1] for note in each.saved.written.notes}
+    for note in done[-1].saved.written.notes:
+        if note not in told:
+            voice.say(f"note: {note}")
+
+
+def _summary(done: list[_Done], vertices: int, method: str) -> str:
+    file = "stdout" if done[0].file == streams.PIPE else done[0].file
+    name = file if len(done) == 1 else f"{plural(len(done), 'file')}, {file} …"
+    frames = plural(sum(each.frames for each in done), "frame")
+    of = f" of '{done[0].clip}'" if len(done) == 1 and done[0].clip else ""
+    parts = [f"{name}  {report.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
+    parts.append(f"{frames} of {vertices} vertices")
+    errors = [each.saved.written.max_error for each in done if each.saved.written.max_error is not None]
+    return ", ".join([*parts, *([f"max {report.length(max(errors))}"] if errors else [])])
+
+
+def _times(clip: Clip, fps: float | None) -> Floats:
+    if fps is not None:
+        return grid(clip.start, clip.end, fps=fps)
+    return sorted_unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+
+
+def _say_sums(instances: list[Instance], voice: Voice) -> None:
+    for bad in bad_sums(instances):
+        count = "1 vertex" if bad.count == 1 else f"{bad.count} vertices"
+        words = f"note: mesh '{bad.mesh}': skin weights of {count} don't add up to 1"
+        voice.say(f"{words} ({bad.least:.3g} … {bad.most:.3g}), used as they are")

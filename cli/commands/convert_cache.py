@@ -1,0 +1,112 @@
+"""`gltf-anim convert-cache`: a vertex cache in another format."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Annotated, Any
+
+import typer
+
+from anim.caches import axes, extent, frames
+from anim.caches import order as orders
+from anim.caches.formats import CACHE_FORMATS
+from anim.caches.settings import Reading
+from anim.model import Chunk, VertexCache
+from cli import cache_files, cache_options, options, report, streams, units
+from cli.errors import UsageError
+from cli.progress import Progress
+
+Cache = Annotated[
+    str,
+    typer.Argument(metavar="IN", help=f"A cache: {cache_options.FORMATS}; '-' for stdin.", show_default=False),
+]
+
+
+def convert_cache(
+    input: Cache = "-",
+    output: cache_options.Product = "-",
+    *,
+    format: cache_options.FormatOption = None,
+    at: Annotated[float | None, typer.Option("--at", metavar="S", help="Only the frame at this time.")] = None,
+    fps: Annotated[
+        float | None, typer.Option("--fps", metavar="N", help="New frames, on straight lines between the old.", min=0)
+    ] = None,
+    read_fps: Annotated[
+        float | None,
+        typer.Option("--read-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24).", min=0),
+    ] = None,
+    up: cache_options.UpOption = None,
+    order: cache_options.OrderOption = None,
+    max_error: cache_options.MaxError = None,
+    quantize: cache_options.Quantize = False,
+    layout: cache_options.LayoutOption = None,
+    preset: cache_options.PresetOption = None,
+    depth: cache_options.DepthOption = None,
+    rest: cache_options.RestOption = None,
+    dry_run: options.DryRun = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Change a vertex cache into another format, frame by frame: as long as you like in little memory.
+
+    Formats go by the name's ending. PC2 and MDD get a rest mesh beside them with the same order of vertices; for
+    Blender's Mesh Cache modifier use --up z --order blender. Frame sequences (.ply, .obj, .stl) are numbered:
+    walk_00001.ply. Textures (.exr, .png) get a JSON and a mesh beside them.
+    """
+    voice = report.Voice(quiet)
+    began = time.perf_counter()
+    if at is not None and fps is not None:
+        raise UsageError("--at and --fps exclude each other")
+    ending = cache_files.check(output, None if format is None else f".{format}")
+    given: dict[str, Any] = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
+    cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    with cache_files.load(input, Reading(read_fps or None)) as loaded:
+        if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
+            raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
+        cache = _changed(loaded.cache, at, fps, up, order)
+        if max_error is not None:
+            given["max_error"] = units.meters(max_error, "--max-error", lambda: extent.diagonal(cache))
+        writing = cache_options.writing(ending, given)
+        progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
+        try:
+            saved = cache_files.save(_counted(cache, progress), output, writing, ending=ending, dry_run=dry_run)
+        finally:
+            progress.close()
+        size = loaded.size
+    for note in saved.written.notes:
+        voice.say(f"note: {note}")
+    name = loaded.name if output == streams.PIPE else output
+    parts = [
+        f"{name}  {report.change(size, saved.size)}",
+        f"{report.plural(cache.frame_count, 'frame')} of {cache.vertex_count} vertices",
+    ]
+    if saved.written.max_error is not None:
+        parts.append(f"max {report.length(saved.written.max_error)}")
+    if len(saved.files) > 1:
+        parts.append(f"{len(saved.files)} files")
+    parts.append(f"{time.perf_counter() - began:.1f} s")
+    voice.say(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
+
+
+def _changed(
+    cache: VertexCache, at: float | None, fps: float | None, up: str | None, chosen: str | None
+) -> VertexCache:
+    if at is not None:
+        cache = frames.at_time(cache, at)
+    if fps is not None:
+        cache = frames.at_rate(cache, fps)
+    if chosen is not None:
+        cache = orders.ordered(cache, str(chosen))
+    return cache if up is None else axes.turned(cache, str(up))
+
+
+def _counted(cache: VertexCache, progress: Progress) -> VertexCache:
+    """The cache, which says how far it was read."""
+
+    def chunks() -> Iterator[Chunk]:
+        for chunk in cache.chunks():
+            yield chunk
+            progress(chunk.first + len(chunk.positions))
+
+    return replace(cache, chunks=chunks)

@@ -1,0 +1,151 @@
+"""`gltf-anim render`: a clip as a filmstrip."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import PurePath
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from anim.arrays import Floats
+from anim.caches import glb
+from anim.caches.files import Memory, suffix
+from anim.caches.formats import CACHE_FORMATS, ending_of, reader_for
+from anim.caches.settings import Reading
+from anim.gltf import container, read
+from anim.gltf.document import Document
+from anim.model import VertexCache
+from anim.ops.selection import Selection
+from anim.show import filmstrip, image_file, shots
+from anim.show.camera import AZIMUTH, ELEVATION
+from anim.show.filmstrip import HEIGHT, Look
+from anim.show.shots import Shot, When
+from anim.skinning.methods import SKINNING_METHODS
+from cli import cache_files, options, report, streams
+from cli.errors import UsageError
+
+ENDINGS = (".png", *image_file.MOVING)
+FRAMES, FPS = 8, 24.0
+MOST_FRAMES = 3000
+
+Seen = Annotated[
+    str,
+    typer.Argument(metavar="IN", help="A glTF file or a vertex cache, '-' for stdin.", show_default=False),
+]
+Picture = Annotated[
+    str, typer.Argument(metavar="OUT", help=f"A {', '.join(ENDINGS)} file; '-' for stdout (PNG).", show_default=False)
+]
+
+
+def render(
+    input: Seen = "-",
+    output: Picture = "-",
+    *,
+    at: Annotated[
+        list[float] | None, typer.Option("--at", metavar="S", help="A frame at this time; may be repeated.")
+    ] = None,
+    count: Annotated[
+        int | None,
+        typer.Option("--frames", metavar="N", help="So many frames, evenly spaced; default 8.", min=1, max=MOST_FRAMES),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option("--fps", metavar="N", help="Frames per second of a moving OUT, default 24.", min=0.1),
+    ] = None,
+    begin: options.From = None,
+    end: options.To = None,
+    clip: options.Clips = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option("--method", help=f"Skinning: {', '.join(SKINNING_METHODS)}; repeat to compare."),
+    ] = None,
+    heat: Annotated[
+        bool, typer.Option("--heat", help="Color the distance to the first method; of one method, to the rest pose.")
+    ] = False,
+    size: Annotated[int, typer.Option("--size", metavar="PX", help="Height of a frame.", min=32, max=4096)] = HEIGHT,
+    azimuth: Annotated[
+        float, typer.Option("--azimuth", metavar="DEG", help="Camera: from the front (+Z) toward +X.")
+    ] = AZIMUTH,
+    elevation: Annotated[
+        float, typer.Option("--elevation", metavar="DEG", help="Camera: above the horizon.", min=-89, max=89)
+    ] = ELEVATION,
+    quiet: options.Quiet = False,
+) -> None:
+    """Draw a clip as a filmstrip, or as a moving .webp, .gif or .apng.
+
+    Meshes are skinned and flat-shaded under one camera framed on the whole motion; a skeleton without a mesh is drawn
+    as sticks. Several methods come side by side, several clips in rows; without --clip it is the first one. .gif, .webp
+    and .apng need the extra plot; a .png needs nothing.
+    """
+    voice = report.Voice(quiet)
+    began = time.perf_counter()
+    ending = _ending(output)
+    if at and (count is not None or fps is not None):
+        raise UsageError("--at excludes --frames and --fps")
+    is_moving = ending != ".png"
+    rate = fps or (FPS if is_moving and count is None and not at else None)
+    when = When(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
+    with _opened(input) as (seen, name):
+        if isinstance(seen, VertexCache):
+            if clip or method:
+                raise UsageError(f"--{'clip' if clip else 'method'} means nothing to a vertex cache")
+            found = shots.of_cache(seen, when)
+        else:
+            names = read.names(seen)
+            numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
+            found = shots.of_document(seen, numbers, method or (), when)
+        rows, around = shots.rows(found, heated=heat)
+        title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
+        look = Look(size, azimuth, elevation)
+        if is_moving:
+            pictures = filmstrip.moving(rows, around, title=title, look=look)
+            drawn = image_file.moving(pictures, ending, fps=fps or _rate(rows[0].times))
+        else:
+            drawn = image_file.png(filmstrip.filmstrip(rows, around, title=title, look=look))
+    streams.write_bytes([np.frombuffer(drawn, np.uint8)], output)
+    frames = report.plural(sum(len(row.times) for row in rows), "frame")
+    called = name if output == streams.PIPE else output
+    voice.say(f"{called}  {report.size(len(drawn))}, {frames}, {time.perf_counter() - began:.1f} s")
+
+
+def _ending(output: str) -> str:
+    if output == streams.PIPE:
+        return ".png"
+    streams.check_file(output)
+    ending = PurePath(output).suffix.lower()
+    if ending not in ENDINGS:
+        raise UsageError(f"{output}: no picture is called '{ending}' (expected {', '.join(ENDINGS)})")
+    return ending
+
+
+@contextmanager
+def _opened(path: str) -> Iterator[tuple[Document | VertexCache, str]]:
+    """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes."""
+    if path != streams.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
+        with cache_files.load(path, Reading()) as loaded:
+            yield loaded.cache, loaded.name
+    elif path != streams.PIPE:
+        with streams.source(path) as source:
+            yield glb.pages(source.document) or source.document, source.name
+    else:
+        with streams.content(path) as (data, name):
+            head = data[:64].tobytes()
+            if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
+                document = container.read(data)
+                yield glb.pages(document) or document, name
+            else:
+                reader = reader_for(ending_of(head, len(data)))
+                yield reader(Memory(name, {name: data.tobytes()}), Reading()), name
+
+
+def _one_clip(found: Sequence[Shot]) -> str:
+    return found[0].clip if len({shot.clip for shot in found}) == 1 else ""
+
+
+def _rate(times: Floats) -> float:
+    """Frames per second that play the times as fast as they are; one where there is a single one."""
+    return (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 1 else 1.0

@@ -1,0 +1,45 @@
+"""A bar on stderr for work that takes longer than a second; nothing where no person looks."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+PATIENCE = 1.0  # s, before there is a bar
+PAUSE = 0.1  # s, between two pictures of it
+WIDTH = 30  # characters
+
+
+class Progress:
+    """Shows how far a job is: progress(done) is called now and then, `close` at the end.
+
+    words: what is being done. total: what `done` is at the end. shown: False for no bar at all.
+    """
+
+    def __init__(self, words: str, total: int, *, shown: bool = True) -> None:
+        self._words, self._total = words, max(total, 1)
+        self._shown = shown and sys.stderr is not None and sys.stderr.isatty()
+        self._began = self._drawn = time.monotonic()
+        self._length = 0
+
+    def __call__(self, done: int) -> None:
+        """Draw the bar, if it is time to."""
+        now = time.monotonic()
+        if not self._shown or now - self._began < PATIENCE or now - self._drawn < PAUSE:
+            return
+        self._drawn = now
+        share = min(done / self._total, 1.0)
+        filled = round(share * WIDTH)
+        left = (now - self._began) * (1 - share) / share if share else 0.0
+        bar = "█" * filled + "░" * (WIDTH - filled)
+        line = f"{self._words} {bar} {100 * share:3.0f} %, {left:.0f} s left"
+        sys.stderr.write("\r" + line.ljust(self._length))
+        sys.stderr.flush()
+        self._length = len(line)
+
+    def close(self) -> None:
+        """Wipe the bar away."""
+        if self._length:
+            sys.stderr.write("\r" + " " * self._length + "\r")
+            sys.stderr.flush()
+            self._length = 0

@@ -1,0 +1,64 @@
+"""A second opinion: usd-core's UsdSkel places the same vertices, with the same influences and joint matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.gltf import read
+from anim.measure.surface import diagonal
+from anim.sampling import pose
+from anim.sampling.pose import world_by_node
+from anim.sampling.times import grid
+from anim.skinning.bake import baker
+from anim.skinning.layer import Frames, Layer
+from tests.files import opened_path
+
+pxr = pytest.importorskip("pxr")
+Find = Callable[[str], Path]
+
+
+@pytest.mark.parametrize("name", ["Fox.glb", "CesiumMan.glb", "Knight.glb", "Robot.glb"])
+@pytest.mark.parametrize("method", ["lbs", "dqs"])
+def test_usd_agrees(name: str, method: str, asset: Find) -> None:
+    document = opened_path(asset(name))
+    of = read.scene(document)
+    made = baker(of, method=method)
+    compared = 0
+    for played in read.clips(document)[::9]:
+        times = grid(played.start, played.end, fps=6)
+        whole = made.bake(played, times=times).whole().positions
+        local = pose(of.skeleton, played, times)
+        frames = Frames(local, world_by_node(of.skeleton, local))
+        for layer in made.layers:
+            if layer.instance.skin is None:
+                continue
+            found = whole[:, layer.at : layer.at + len(layer.rig.points)]
+            wanted = _skinned(layer, layer.matrices(frames, slice(None)), method)
+            assert np.abs(found - wanted).max() < 1e-5 * diagonal(of)
+            compared += len(times)
+    assert compared > 5
+
+
+def _skinned(layer: Layer, matrices: Floats, method: str) -> Floats:
+    """Points (F, V, 3) as UsdSkel.SkinPoints has them."""
+    from pxr import Gf, UsdSkel, Vt
+
+    mesh = layer.instance.mesh
+    kind: Any = UsdSkel.Tokens.classicLinear if method == "lbs" else UsdSkel.Tokens.dualQuaternion
+    joints = Vt.IntArray.FromNumpy(mesh.joints.astype(np.int32).ravel())
+    weights = Vt.FloatArray.FromNumpy(mesh.weights.astype(np.float32).ravel())
+    result = []
+    for frame in matrices:
+        four = np.tile(np.eye(4), (len(frame), 1, 1))
+        four[:, :3] = frame
+        moves = Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(four.transpose(0, 2, 1)))
+        points = Vt.Vec3fArray.FromNumpy(mesh.positions.astype(np.float32))
+        assert UsdSkel.SkinPoints(kind, Gf.Matrix4d(1), moves, joints, weights, mesh.joints.shape[1], points)
+        result.append(np.array(points, float))
+    return np.stack(result)

@@ -1,0 +1,216 @@
+"""`bake`: vertex caches from files, one per clip, by every method; and what it says."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anim.gltf import read
+from anim.gltf.document import Document
+from anim.sampling.times import grid
+from anim.skinning.bake import bake as baked
+from cli.progress import Progress
+from fixtures.broken.pieces import buffered, text
+from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.running import help_line, refusal, shell
+from tests.files import glb_of, opened_fixture, opened_path
+
+
+def test_what_it_writes_is_what_the_library_bakes(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source, out = fixture("arm"), tmp_path / "arm.npz"
+    run = call("bake", source, out, "--clip", "twist", "--method", "dqs", "--fps", 24, "--normals")
+    assert run.out == b""
+    assert run.code == 0
+    assert run.err.startswith(f"{out}  ")
+    assert "dqs of 'twist', 25 frames of 530 vertices" in run.err
+    document = opened_fixture("arm")
+    twist = next(clip for clip in read.clips(document) if clip.name == "twist")
+    cache = baked(read.scene(document, normals=True), twist, times=grid(0, 1, fps=24), method="dqs", normals=True)
+    found, whole = np.load(out), cache.whole()
+    assert np.array_equal(found["positions"], whole.positions)
+    assert np.array_equal(found["normals"], whole.normals)  # type: ignore[arg-type]
+    assert np.array_equal(found["faces"], cache.faces)
+    assert np.array_equal(found["times"], cache.times)
+    assert found["positions"].dtype == np.float32
+
+
+def test_keys_are_the_frames_without_a_rate(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    out = tmp_path / "tube.npz"
+    assert call("bake", fixture("tube"), out, "--clip", "twist180", "-q").err == ""
+    assert np.load(out)["times"].tolist() == [0, 0.5, 1]
+
+
+def test_several_clips_need_a_place_for_their_names(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source = fixture("arm")
+    run = call("bake", source, tmp_path / "arm.npz")
+    assert "2 clips are chosen, but" in refusal(run, 2)
+    assert help_line(run) == "choose one with --clip, or put {clip} into OUT for a file per clip"
+    run = call("bake", source, tmp_path / "arm-{clip}.npz", "-v")
+    assert run.code == 0
+    assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["arm-bend.npz", "arm-twist.npz"]
+    assert run.err.splitlines()[-1].startswith("2 files, ")
+    assert len(run.err.splitlines()) == 3
+
+
+def test_names_that_no_file_can_have(call: Call, tmp_path: Path) -> None:
+    document = opened_fixture("arm")
+    names = ["a/b:c", "a/b:c"]
+    animations = [{**each, "name": name} for each, name in zip(document.json["animations"], names, strict=True)]
+    (tmp_path / "odd.glb").write_bytes(glb_of(Document({**document.json, "animations": animations}, document.buffers)))
+    assert call("bake", tmp_path / "odd.glb", tmp_path / "{clip}.npz", "-q").code == 0
+    assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["a_b_c-1.npz", "a_b_c.npz"]
+
+
+def test_every_format_is_written(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source = fixture("arm")
+    for ending in (".npz", ".pc2", ".mdd", ".glb"):
+        run = call("bake", source, tmp_path / f"out{ending}", "--clip", "bend", "--fps", 5)
+        assert run.code == 0, run.err
+        assert (tmp_path / f"out{ending}").stat().st_size > 530 * 3 * 4
+    data = np.fromfile(tmp_path / "out.pc2", "<f4", offset=32).reshape(6, 530, 3)
+    assert np.array_equal(data, np.load(tmp_path / "out.npz")["positions"])
+
+
+def test_up_and_order_are_blenders(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source = fixture("arm")
+    for name, more in (("y", ()), ("z", ("--up", "z", "--order", "blender"))):
+        assert call("bake", source, tmp_path / f"{name}.npz", "--clip", "bend", *more).code == 0
+    y, z = (np.load(tmp_path / f"{name}.npz")["positions"] for name in "yz")
+    assert np.array_equal(z, y[..., [0, 2, 1]] * np.array([1, -1, 1], np.float32))
+
+
+def test_pipes(fixture: Fixture, tmp_path: Path) -> None:
+    fixture("arm")
+    line = "cat arm.glb | gltf-anim bake --clip twist --method cor | gltf-anim convert-cache - out.mdd"
+    assert shell(line, tmp_path).code == 0
+    assert (tmp_path / "out.mdd").stat().st_size == 8 + 2 * 4 + 2 * 530 * 12
+
+
+def test_dry_runs_write_nothing(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("bake", fixture("arm"), tmp_path / "arm.npz", "--clip", "twist", "-n")
+    assert run.err.endswith("(dry run: nothing written)\n")
+    assert not list(tmp_path.glob("*.npz"))
+
+
+def test_same_input_same_bytes(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source = fixture("biped")
+    for name in "ab":
+        assert call("bake", source, tmp_path / f"{name}.npz", "--clip", "walk", "--method", "dqs").code == 0
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_no_clip_is_the_rest_pose(call: Call, tmp_path: Path) -> None:
+    document = opened_fixture("arm")
+    json = {key: value for key, value in document.json.items() if key != "animations"}
+    (tmp_path / "still.glb").write_bytes(glb_of(Document(json, document.buffers)))
+    run = call("bake", tmp_path / "still.glb", tmp_path / "still.npz")
+    assert run.code == 0, run.err
+    assert np.load(tmp_path / "still.npz")["times"].tolist() == [0]
+
+
+def test_rigid_meshes_only_on_request(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source = fixture("interpolations")
+    run = call("bake", source, tmp_path / "{clip}.npz")
+    assert "there is no mesh with a skin or morph targets" in refusal(run, 5)
+    assert "--rigid" in help_line(run)
+    assert call("bake", source, tmp_path / "{clip}.npz", "--rigid").code == 0
+
+
+def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
+    weights = np.array([[0.5, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]])
+    content = buffered(("VEC3", 5126, np.eye(3)), ("VEC4", 5121, np.zeros((3, 4))), ("VEC4", 5126, weights))
+    content |= {
+        "nodes": [{"mesh": 0, "skin": 0}, {}],
+        "skins": [{"joints": [1]}],
+        "meshes": [{"name": "flag", "primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}}]}],
+    }
+    (tmp_path / "flag.gltf").write_bytes(text(content))
+    run = call("bake", tmp_path / "flag.gltf", tmp_path / "flag.npz")
+    assert "note: mesh 'flag': skin weights of 1 vertex" in run.err
+    assert "(0.5 … 0.5), used as they are" in run.err
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "words"),
+    [
+        (("--fps", "0"), 2, "--fps is 0 (expected a number above 0)"),
+        (("--method", "lsb"), 2, "'lsb' is none of lbs, dqs, cor"),
+        (("--blend", "0.5"), 2, "blend needs another method than lbs"),
+        (("--method", "dqs", "--blend", "2"), 2, "blend is 2 (expected 0 … 1)"),
+        (("--mesh", "hand"), 5, "no mesh matches 'hand'"),
+        (("--clip", "twits"), 5, "no clip matches 'twits'"),
+        (("--quantize",), 2, "--quantize means nothing to .npz"),
+    ],
+)
+def test_refusals(args: tuple[str, ...], code: int, words: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    assert words in refusal(call("bake", fixture("arm"), tmp_path / "{clip}.npz", *args), code)
+    assert not list(tmp_path.glob("*.npz"))
+
+
+def test_an_output_of_no_format(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    assert "no cache format is called '.abc'" in refusal(call("bake", fixture("arm"), tmp_path / "arm.abc"), 2)
+
+
+@pytest.mark.parametrize("name", sorted(["skin/ibm_invalid_count.gltf", "skin/unresolved_joint.gltf"]))
+def test_bad_files_are_refused(name: str, call: Call, bad_input: Find, tmp_path: Path) -> None:
+    refusal(call("bake", bad_input(name), tmp_path / "out.npz"), 3)
+
+
+def test_draco_is_told(call: Call, tmp_path: Path) -> None:
+    content = {
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_draco_mesh_compression"],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "meshes": [
+            {
+                "primitives": [
+                    {
+                        "attributes": {"POSITION": 0},
+                        "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}},
+                    }
+                ]
+            }
+        ],
+        "accessors": [{"componentType": 5126, "type": "VEC3", "count": 3}],
+    }
+    (tmp_path / "draco.gltf").write_bytes(text(content))
+    assert "KHR_draco_mesh_compression" in refusal(call("bake", tmp_path / "draco.gltf", tmp_path / "o.npz"), 4)
+
+
+def test_a_real_file_with_every_clip(call: Call, asset: Find, tmp_path: Path) -> None:
+    source = asset("Fox.glb")
+    assert call("bake", source, tmp_path / "{clip}.npz", "--method", "dqs", "-q").code == 0
+    for clip in read.clips(opened_path(source)):
+        positions = np.load(tmp_path / f"{clip.name}.npz")["positions"]
+        assert positions.shape[1:] == (1728, 3)
+        assert np.isfinite(positions).all()
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_for_people_and_long_jobs(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = iter([0.0, 0.5, 2.0, 2.05, 3.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(now))
+    monkeypatch.setattr("sys.stderr", Terminal())
+    import sys
+
+    progress = Progress("walk.npz", 100)
+    progress(10)  # after half a second: nothing yet
+    assert sys.stderr.getvalue() == ""  # type: ignore[union-attr]
+    progress(50)
+    assert sys.stderr.getvalue() == "\rwalk.npz " + "█" * 15 + "░" * 15 + "  50 %, 2 s left"  # type: ignore[union-attr]
+    progress(51)  # too soon after the last
+    progress(100)
+    progress.close()
+    assert sys.stderr.getvalue().endswith(" \r")  # type: ignore[union-attr]
+    monkeypatch.setattr("sys.stderr", io.StringIO())
+    monkeypatch.setattr("time.monotonic", lambda: 1e9)
+    Progress("walk.npz", 100)(50)
+    assert sys.stderr.getvalue() == ""  # type: ignore[union-attr]

@@ -1,0 +1,152 @@
+"""`convert-cache`: from every format to every other, in files and pipes, and what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anim.caches.formats import CACHE_FORMATS
+from tests.anim.caches.making import FACES, cache, written
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import help_line, refusal, shell
+
+LOSSY = {".glb": 1e-4, ".png": 2e-4}
+EVERY = [ending for ending in CACHE_FORMATS if ending != ".stl"]
+OPTIONS = {".glb": ["--max-error", "0.1mm"]}
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    """A cache in a file, in a folder of its own."""
+    (tmp_path / "walk.npz").write_bytes(written(cache(), "walk.npz")[0].files["walk.npz"])
+    return tmp_path / "walk.npz"
+
+
+def positions(path: Path) -> np.ndarray:
+    with np.load(path) as arrays:
+        found: np.ndarray = arrays["positions"]
+        return found
+
+
+@pytest.mark.parametrize("first", EVERY)
+@pytest.mark.parametrize("second", EVERY)
+def test_every_format_becomes_every_other(first: str, second: str, walk: Path, call: Call) -> None:
+    one, two, back = walk.with_name(f"one{first}"), walk.with_name(f"two{second}"), walk.with_name("back.npz")
+    call("convert-cache", walk, one, *OPTIONS.get(first, [])).product()
+    call("convert-cache", one, two, *OPTIONS.get(second, [])).product()
+    call("convert-cache", two, back).product()
+    off = np.abs(positions(back) - positions(walk)).max()
+    assert off <= 1e-5 + LOSSY.get(first, 0) + LOSSY.get(second, 0)
+    with np.load(back) as arrays:
+        assert arrays["times"] == pytest.approx(np.arange(7) / 30, abs=1e-6)
+        assert (arrays["faces"] == FACES).all()
+
+
+def test_one_line_says_what_came_of_it(walk: Path, call: Call) -> None:
+    run = call("convert-cache", walk, walk.with_name("a.mdd"))
+    assert run.out == b""
+    (line,) = run.err.splitlines()
+    assert line.endswith("s")
+    for words in ("a.mdd  ", "kB", "7 frames of 9 vertices", "2 files"):
+        assert words in line
+    assert call("convert-cache", walk, walk.with_name("a.mdd"), "-q").err == ""
+
+
+def test_pipes(walk: Path, tmp_path: Path) -> None:
+    run = shell(
+        "gltf-anim convert-cache - - --format pc2 < walk.npz | gltf-anim convert-cache - - --format mdd --read-fps 30 "
+        "| gltf-anim convert-cache - back.npz",
+        tmp_path,
+    )
+    assert run.code == 0, run.err
+    assert "not written, since the output is a pipe: stdout-rest.ply" in run.err
+    assert (positions(tmp_path / "back.npz") == positions(walk)).all()
+    same = shell("gltf-anim convert-cache -q < walk.npz | cmp - walk.npz", tmp_path)
+    assert same.code == 0, same.err
+
+
+def test_for_blender(walk: Path, call: Call) -> None:
+    out = walk.with_name("a.pc2")
+    call("convert-cache", walk, out, "--up", "z", "--order", "blender").product()
+    data = out.read_bytes()
+    assert np.frombuffer(data[16:20], "<i4") == 8
+    x, y, z = np.moveaxis(positions(walk)[:, :8], -1, 0)
+    assert (np.frombuffer(data[32:], "<f4").reshape(7, 8, 3) == np.stack((x, -z, y), axis=-1)).all()
+
+
+def test_other_frames(walk: Path, call: Call) -> None:
+    call("convert-cache", walk, walk.with_name("a.npz"), "--fps", "60").product()
+    found, source = positions(walk.with_name("a.npz")), positions(walk)
+    assert (found[::2] == source).all()
+    assert found[1::2] == pytest.approx((source[1:] + source[:-1]) / 2, abs=1e-6)
+    call("convert-cache", walk, walk.with_name("b.ply"), "--at", "0.1").product()
+    assert walk.with_name("b.ply").is_file()
+
+
+def test_an_input_can_be_its_own_output_and_same_bytes_are_not_written(walk: Path, call: Call) -> None:
+    before, stamp = walk.read_bytes(), walk.stat().st_mtime_ns
+    call("convert-cache", walk, walk).product()
+    assert (walk.read_bytes(), walk.stat().st_mtime_ns) == (before, stamp)
+    call("convert-cache", walk, walk, "--up", "z").product()
+    assert walk.read_bytes() != before
+    assert [path.name for path in walk.parent.iterdir()] == ["walk.npz"]
+
+
+def test_a_dry_run_writes_nothing(walk: Path, call: Call) -> None:
+    run = call("convert-cache", walk, walk.with_name("a.pc2"), "--dry-run")
+    assert "nothing written" in run.err
+    assert [path.name for path in walk.parent.iterdir()] == ["walk.npz"]
+
+
+@pytest.mark.parametrize("ending", EVERY)
+def test_cut_off_files_are_exit_3_in_one_line_and_leave_nothing(ending: str, walk: Path, call: Call) -> None:
+    files, _ = written(cache(), f"a{ending}")
+    for name, data in files.files.items():
+        is_main = name == f"a{ending}" or ending in (".ply", ".obj")
+        walk.with_name(name).write_bytes(data[: len(data) // 3] if is_main else data)
+    there = sorted(walk.parent.iterdir())
+    line = refusal(call("convert-cache", walk.with_name(f"a{ending}"), walk.with_name("out.npz")), 3)
+    assert f"a{ending}: " in line
+    assert sorted(walk.parent.iterdir()) == there
+
+
+@pytest.mark.parametrize("name", ["no.pc2", "no.usdc", "no.ply", "no.npz", "no.exr"])
+def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
+    assert f"{name}: " in refusal(call("convert-cache", tmp_path / name, tmp_path / "a.npz"), 3)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["a.abc"], "no cache format is called '.abc'"),
+        (["a.npz", "--max-error", "1mm"], "--max-error means nothing to .npz"),
+        (["a.mdd", "--preset", "unity"], "--preset means nothing to .mdd"),
+        (["a.glb", "--max-error", "1parsec"], "expected a length"),
+        (["a.png", "--preset", "godot"], "cuts 16-bit PNG"),
+        (["a.mdd", "--read-fps", "9"], "--read-fps means nothing to .npz"),
+        (["a.npz", "--at", "9"], "no frame at 9 s"),
+        (["a.npz", "--at", "0", "--fps", "9"], "exclude each other"),
+        (["no/a.npz"], "there is no folder"),
+    ],
+)
+def test_what_can_t_be_done_is_exit_2(args: list[str], words: str, walk: Path, call: Call) -> None:
+    there = sorted(walk.parent.iterdir())
+    run = call("convert-cache", walk, walk.parent / args[0], *args[1:])
+    assert words in refusal(run, 2)
+    assert sorted(walk.parent.iterdir()) == there
+
+
+def test_a_gltf_is_played(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    call("convert-cache", fixture("arm"), tmp_path / "arm.npz", "--read-fps", "10").product()
+    assert positions(tmp_path / "arm.npz").shape[0] == 11
+
+
+def test_uneven_frames_get_an_advice(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    with (tmp_path / "a.npz").open("wb") as file:
+        np.savez(file, positions=np.zeros((4, 3, 3), "f4"), times=[0, 0.1, 0.5, 0.6], faces=[[0, 1, 2]])
+    run = call("convert-cache", tmp_path / "a.npz", tmp_path / "a.pc2")
+    assert "even steps" in refusal(run, 2)
+    assert "--fps" in help_line(run)
+    call("convert-cache", tmp_path / "a.npz", tmp_path / "a.pc2", "--fps", "10").product()

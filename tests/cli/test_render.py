@@ -1,0 +1,114 @@
+"""`render`: pictures that others can open, of files, pipes and caches."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.anim.caches.making import cache, written
+from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.running import built, refusal
+
+SMALL = ("--size", "64")
+
+
+def opened(path: Path) -> Any:
+    """The picture in a file, which is closed again."""
+    return Image.open(io.BytesIO(path.read_bytes()))
+
+
+def test_a_strip_of_a_file(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    run = call("render", fixture("biped"), tmp_path / "walk.png", "--clip", "walk", *SMALL)
+    assert run.out == b""
+    assert "walk.png  " in run.err
+    assert "8 frames" in run.err
+    image = opened(tmp_path / "walk.png")
+    assert image.mode == "RGB"
+    assert np.asarray(image).std() > 10
+
+
+def test_pipes(call: Call) -> None:
+    one = call("render", *SMALL, "--frames", "2", stdin=built("arm")).product()
+    assert Image.open(io.BytesIO(one)).size[0] > 64
+    data = written(cache(), "a.npz")[0].files["a.npz"]
+    assert call("render", *SMALL, "--at", "0.1", stdin=data).product().startswith(b"\x89PNG")
+    assert (
+        call("render", *SMALL, "--at", "0.1", stdin=data).out == call("render", *SMALL, "--at", "0.1", stdin=data).out
+    )
+
+
+def test_methods_and_clips_are_rows(fixture: Fixture, call: Call) -> None:
+    def height(*args: str) -> int:
+        data = call("render", path, "-", "--frames", "2", *SMALL, *args).product()
+        return int(Image.open(io.BytesIO(data)).size[1])
+
+    path = fixture("arm")
+    one = height("--clip", "twist")
+    assert height("--method", "lbs", "--method", "dqs", "--clip", "twist", "--heat") > one + 60
+    assert height("--clip", "*") > one + 60
+    assert height() == one
+
+
+@pytest.mark.parametrize(("ending", "form"), [(".webp", "WEBP"), (".gif", "GIF"), (".apng", "PNG")])
+def test_moving_pictures(ending: str, form: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    call("render", fixture("arm"), tmp_path / f"a{ending}", "--clip", "bend", "--fps", "5", *SMALL).product()
+    image = opened(tmp_path / f"a{ending}")
+    assert image.format == form
+    assert image.n_frames == 6
+    assert image.info.get("duration", 200) == 200
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.mdd", "a.ply", "a.usdc", "a.exr", "a.glb"])
+def test_caches(name: str, call: Call, tmp_path: Path) -> None:
+    for file, data in written(cache(), name)[0].files.items():
+        (tmp_path / file).write_bytes(data)
+    call("render", tmp_path / name, tmp_path / "out.png", "--frames", "2", *SMALL).product()
+    assert opened(tmp_path / "out.png").size[0] > 100
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["CesiumMan.glb", "Fox.glb", "Robot.glb", "MorphStressTest.glb", "BusterDrone/busterDrone.gltf", "vrm/test.vrma"],
+)
+def test_real_files(name: str, asset: Find, call: Call) -> None:
+    data = call("render", asset(name), "-", "--frames", "2", *SMALL).product()
+    assert np.asarray(Image.open(io.BytesIO(data))).std() > 8
+
+
+@pytest.mark.parametrize("name", ["interpolations", "morph_cube", "pointer", "noop", "accessors", "gltf_embedded"])
+def test_every_fixture(name: str, fixture: Fixture, call: Call) -> None:
+    call("render", fixture(name), "-", "--frames", "2", *SMALL).product()
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "words"),
+    [
+        (["a.jpg"], 2, "no picture is called '.jpg'"),
+        (["a.png", "--clip", "no"], 5, "no clip matches 'no'"),
+        (["a.png", "--method", "foo"], 2, "expected lbs"),
+        (["a.png", "--at", "1", "--frames", "2"], 2, "--at excludes"),
+        (["a.png", "--from", "7"], 2, "nothing lies"),
+        (["a.png", "--size", "3"], 2, "too small"),
+    ],
+)
+def test_what_can_t_be_done(
+    args: list[str], code: int, words: str, fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    assert words in refusal(call("render", fixture("arm"), tmp_path / args[0], *args[1:]), code)
+    assert not (tmp_path / args[0]).exists()
+
+
+def test_a_cache_has_no_clips(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.npz").write_bytes(written(cache(), "a.npz")[0].files["a.npz"])
+    line = refusal(call("render", tmp_path / "a.npz", tmp_path / "a.png", "--method", "dqs"), 2)
+    assert "means nothing to a vertex cache" in line
+
+
+@pytest.mark.parametrize("data", [b"", b"hello", b"glTF"])
+def test_bad_input(data: bytes, call: Call) -> None:
+    refusal(call("render", stdin=data), 3)
