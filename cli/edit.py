@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -53,11 +54,17 @@ def edit(
         skeleton = read.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
         new = {i: _changed(clips[i], i, skeleton, selection, change) for i in chosen}
+        new = {i: clip for i, clip in new.items() if not _is_same(clip, clips[i])}
+        if not new:
+            voice.say("note: no track was changed")
         result = write.replace_clips(document, new)
         written = read.clips(result)
         edited = Edited({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
         if measure:
             edited = _measured(edited, document, accessors, skeleton, voice)
+        else:
+            for i, clip in edited.before.items():
+                voice.detail(f"  {read.label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
         size = streams.write(result, output, source.folder, dry_run=dry_run)
     outside = "" if dry_run or output == streams.PIPE else streams.left_outside(result, source.folder, output)
     if outside:
@@ -71,6 +78,10 @@ def _changed(clip: Clip, number: int, skeleton: Skeleton, selection: Selection, 
         return change(clip, selection.chosen_tracks(clip, skeleton), skeleton)
     except AnimError as error:
         raise error.at(read.label(clip.name, number)) from None
+
+
+def _is_same(new: Clip, old: Clip) -> bool:
+    return new is old or (len(new.tracks) == len(old.tracks) and all(map(operator.is_, new.tracks, old.tracks)))
 
 
 def _measured(

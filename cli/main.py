@@ -208,7 +208,7 @@ def gltf_anim(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """The command-line workbench for glTF 2.0 animation: inspect, sample, resample, convert."""
+    """The command-line workbench for glTF 2.0 animation: look into clips, change them, bake them, draw them."""
 
 
 def main() -> None:

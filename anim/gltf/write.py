@@ -31,7 +31,7 @@ def replace_clips(document: Document, clips: Mapping[int, Clip]) -> Document:
         return document
     pool = _Pool()
     animations = [
-        _animation(animation, clips[i], pool) if i in clips else animation
+        _named_animation(animation, i, clips[i], pool) if i in clips else animation
         for i, animation in enumerate(items(document.json, "animations"))
     ]
     return assemble(document, animations, set(clips), pool.numbers)
@@ -60,6 +60,13 @@ class _Pool:
         return found
 
 
+def _named_animation(animation: Json, number: int, clip: Clip, pool: _Pool) -> Json:
+    try:
+        return _animation(animation, clip, pool)
+    except AnimError as error:
+        raise error.at(f"clip '{clip.name}'" if clip.name else f"clip {number}") from None
+
+
 def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
     waiting: dict[tuple[int | None, str], deque[Track]] = {}
     for track in clip.tracks:
@@ -79,7 +86,7 @@ def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
         channels += [{"sampler": samplers.new(track, None), "target": _target(track)} for track in queue]
     if not channels:
         if animation["channels"]:
-            raise RangeError(f"clip '{clip.name}' has no track left (glTF knows no animation without channels)")
+            raise RangeError("has no track left (glTF knows no animation without channels)")
         return animation
     replaced = {**animation, "channels": channels, "samplers": samplers.list}
     if clip.name != animation.get("name", ""):

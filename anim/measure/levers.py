@@ -8,6 +8,7 @@ from anim.arrays import Floats
 
 LEVER = 0.05  # of the skeleton's size: how far from a node its turning counts
 PER_NODE = 4
+SPEED_STEP = 1e-4  # s; speeds at an end are taken over this time: what a player shows in the first moment
 
 
 def points(world: Floats) -> Floats:

@@ -32,7 +32,8 @@ class Loop:
     """A clip, or a part of it, as a loop.
 
     start, end: seconds. seam: m, how far the worst node, or what turns with it, is from where it started; the way that
-    the root has made is taken off. speed_seam: m/s. node: the worst one's name. frame: m, the motion per frame at the
+    the root has made is taken off. speed_seam: m/s. node: the worst one's name, by speed where the loop is closed.
+    frame: m, the motion per frame at the
     seam. travel: m, the root's way. fps: the rate that frames were counted at.
     """
 
@@ -79,27 +80,31 @@ def best_ranges(skeleton: Skeleton, clip: Clip, *, root: int = -1, shortest: flo
         if all(abs(a - c) > 2 or abs(b - d) > 2 for c, d in taken):
             taken.append((a, b))
             found.append(_judged(skeleton, clip, float(times[a]), float(times[b]), root))
-    return found
+    looping = [each for each in found if each.kind is not LoopKind.NOT_A_LOOP] or found
+    return sorted(looping, key=lambda each: (list(LoopKind).index(each.kind), each.seam))
 
 
 def _judged(skeleton: Skeleton, clip: Clip, start: float, end: float, root: int) -> Loop:
     fps = _fps(clip)
-    step = min(1 / fps, (end - start) / 2) if end > start else 0.0
-    if not len(skeleton) or step == 0:
+    frame_step = min(1 / fps, (end - start) / 2) if end > start else 0.0
+    if not len(skeleton) or frame_step == 0:
         return Loop(LoopKind.NOT_A_LOOP, start, end, 0.0, 0.0, "", 0.0, 0.0, fps)
-    times = np.array([start, start + step, end - step, end])
+    step = min(levers.SPEED_STEP, frame_step / 2)
+    times = np.array([start, start + step, start + frame_step, end - frame_step, end - step, end])
     points = _points(skeleton, clip, times, root)
+    first, just_after, second, last_but_one, just_before, last = (points[:, i] for i in range(len(times)))
     size = levers.size(points)
-    off = np.linalg.norm(points[:, 3] - points[:, 0], axis=1)
-    speeds = np.linalg.norm((points[:, 3] - points[:, 2]) - (points[:, 1] - points[:, 0]), axis=1) / step
-    frame = float(max(_longest(points[:, 1] - points[:, 0]), _longest(points[:, 3] - points[:, 2])))
+    off = np.linalg.norm(last - first, axis=1)
+    speeds = np.linalg.norm((last - just_before) - (just_after - first), axis=1) / step
+    frame = max(_longest(second - first), _longest(last - last_but_one))
     seam = float(off.max())
-    worst = int(off.argmax()) // levers.PER_NODE
+    going_on = _longest(last + (last - last_but_one) - first)  # how far the start is from where the end was heading
     kind = LoopKind.NOT_A_LOOP
     if seam <= CLOSED * size:
         kind = LoopKind.CLOSED
-    elif seam <= ONE_FRAME * frame and float(speeds.max()) * step <= ONE_FRAME * frame:
+    elif seam <= ONE_FRAME * frame and going_on <= frame:
         kind = LoopKind.OPEN_BY_ONE_FRAME
+    worst = int((speeds if kind is LoopKind.CLOSED else off).argmax()) // levers.PER_NODE
     travel = _travel(skeleton, clip, times, root)
     name = skeleton.names[worst] or f"node {worst}"
     return Loop(kind, start, end, seam, float(speeds.max()), name, frame, travel, fps)

@@ -14,7 +14,6 @@ from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 
 ONWARD = 0.7
-STEP = 1 / 240  # s; speeds at the ends are taken over this time, or a quarter of a shorter clip
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +71,7 @@ def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
 
 
 def _ends(clip: Clip) -> Floats:
-    step = min(STEP, (clip.end - clip.start) / 4)
+    step = min(levers.SPEED_STEP, (clip.end - clip.start) / 4)
     return np.array([clip.start, clip.start + step, clip.end - step, clip.end])
 
 
@@ -81,7 +80,7 @@ def _travel(skeleton: Skeleton, clip: Clip, places: Floats, depth: Floats) -> Tr
     duration = clip.end - clip.start
     if duration <= 0:
         return Travel(0.0, 0.0, -1, 0.0, 0.0)
-    step = min(STEP, duration / 4)
+    step = min(levers.SPEED_STEP, duration / 4)
     away = places[:, :, 3] - places[:, :, 0]
     root = _root(clip, depth)
     own = away[root, 0] if root >= 0 else np.zeros(3)

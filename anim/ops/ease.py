@@ -126,4 +126,4 @@ class _Job:
             return self.tolerances.angle, speed
         ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]
         moving = ranges[ranges > 0]
-        return self.tolerances.share * float(moving.min() if len(moving) else 1.0), speed
+        return refine.reachable(track, self.tolerances.share * float(moving.min() if len(moving) else 1.0)), speed

@@ -42,6 +42,11 @@ class Keys:
     out_tangents: Floats
 
 
+def reachable(track: Track, tolerance: float) -> float:
+    """Return a tolerance for vector values that float32 can reach: no tighter than four steps of its largest value."""
+    return max(tolerance, 4 * float(np.spacing(np.float32(np.abs(track.values).max(initial=0.0)))))
+
+
 def spline_track(track: Track, keys: Keys) -> Track:
     """Return `track` with these keys as CUBICSPLINE."""
     return replace(

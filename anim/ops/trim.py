@@ -31,12 +31,15 @@ def trim(
 
     New end keys have the value, and under CUBICSPLINE the tangent, that the track has there; a cut piece of a rotation
     spline gets keys more where renormalized cubics need them. A track with no key in between becomes one key.
-    start, end: by default the clip's own; times beyond it are brought back to it.
+    start, end: by default the clip's own; times beyond it are brought back to it, others rounded to float32, as keys
+    are. A clip of one moment stays as it is.
     rebase: move all so that the part starts at 0 s. Raises RangeError for an empty part.
     (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
     """
-    first = clip.start if start is None else max(start, clip.start)
-    last = clip.end if end is None else min(end, clip.end)
+    if clip.end == clip.start:
+        return clip
+    first = clip.start if start is None else max(float(np.float32(start)), clip.start)
+    last = clip.end if end is None else min(float(np.float32(end)), clip.end)
     if not last > first:
         raise RangeError(
             f"nothing between {first:g} s and {last:g} s (the clip has {clip.start:g} s to {clip.end:g} s)"

@@ -37,6 +37,7 @@ def warp(
     end: float | None = None,
     tolerance: float = TOLERANCE,
     angle_tolerance: float = ANGLE_TOLERANCE,
+    interpolation: str = "cubicspline",
     tracks: frozenset[int] | None = None,
 ) -> Clip:
     """Return the clip with one ease over a whole range: at start + u·d it shows what it showed at start + e(u)·d.
@@ -44,13 +45,14 @@ def warp(
     start, end: seconds, by default the clip's own; before and after nothing changes. An ease that overshoots runs into
     the motion beyond the range and back; beyond the clip's ends it holds.
     STEP keys move to where the map reaches them, exactly. Others become CUBICSPLINE: exact for LINEAR vectors under a
-    cubic ease, within `tolerance` (share of a track's range) or `angle_tolerance` (rad) elsewhere.
+    cubic ease, within `tolerance` (share of a track's range) or `angle_tolerance` (rad) elsewhere; with interpolation
+    "linear" LINEAR, within the same.
     Raises RangeError for an empty range, or an ease that jumps.
     """
     first = clip.start if start is None else start
     last = clip.end if end is None else end
     if easing.stepped:
-        raise RangeError(f"'{easing.name}' jumps: time can't (ease each segment instead: --per segment)")
+        raise RangeError(f"'{easing.name}' jumps, and time can't")
     if not last > first:
         raise RangeError(f"the range from {first:g} s to {last:g} s is empty")
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
@@ -62,13 +64,15 @@ def warp(
         if i not in chosen or len(track.times) == 1 or not _moves(track):
             new.append(track)
             continue
-        allowed = angle_tolerance if track.kind is Kind.ROTATION else tolerance * _extent(track)
+        allowed = (
+            angle_tolerance if track.kind is Kind.ROTATION else refine.reachable(track, tolerance * _extent(track))
+        )
         times = _map(track, easing, first, last, allowed)
         key = (id(track.times), times.cubics)
         if key not in corners:
             reached = times.reaching(track.times)
             corners[key] = reached[apart(reached)]
-        new.append(_warped(track, times, corners[key], allowed))
+        new.append(_warped(track, times, corners[key], allowed, interpolation))
     return Clip(clip.name, tuple(new))
 
 
@@ -126,7 +130,7 @@ def _moves(track: Track) -> bool:
     return bool(changes) or (track.in_tangents is not None and piece.fastest_per_second(track) > 0)
 
 
-def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float) -> Track:
+def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float, interpolation: str) -> Track:
     old = times.old(corners)
     inside = (old >= track.times[0] - 1e-9) & (old <= track.times[-1] + 1e-9)
     corners = corners[inside | np.append(inside[1:], False) | np.insert(inside[:-1], 0, False)]
@@ -134,6 +138,9 @@ def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float) -> Tr
         values = sample(track, times.old(np.append((corners[:-1] + corners[1:]) / 2, corners[-1])))
         return _without_repeats(held(track, corners, values, Interpolation.STEP))
     motion = _motion(track, times)
+    if interpolation == "linear":
+        keys = refine.linear_keys(motion, corners, tolerance=allowed / 2)
+        return held(track, keys.times, keys.values, Interpolation.LINEAR)
     return refine.spline_track(track, refine.cubic_keys(motion, corners, tolerance=allowed / 2))
 
 

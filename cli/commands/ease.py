@@ -76,14 +76,21 @@ def ease(
     voice = Voice(quiet, verbose)
     easing = parse(ease)
     share, angle = units.share(tolerance, "--tolerance"), units.angle(angle_tolerance, "--angle-tolerance")
-    if per is Per.RANGE and interpolation is Output.LINEAR:
-        raise UsageError("--per range writes CUBICSPLINE", help="resample --interpolation linear after it")
+    if per is Per.RANGE and easing.stepped:
+        raise UsageError(f"'{easing.name}' jumps, and time can't", help="--per segment makes STEP keys of it")
     tolerances = by_segment.Tolerances(share, angle)
 
     def change(each: Clip, tracks: frozenset[int], _: Skeleton) -> Clip:
         if per is Per.RANGE:
             eased = by_range.warp(
-                each, easing=easing, start=start, end=end, tolerance=share, angle_tolerance=angle, tracks=tracks
+                each,
+                easing=easing,
+                start=start,
+                end=end,
+                tolerance=share,
+                angle_tolerance=angle,
+                interpolation=interpolation.value,
+                tracks=tracks,
             )
         else:
             eased = by_segment.ease(

@@ -211,6 +211,8 @@ def _one(call: list[str]) -> dict[str, float]:
     kind, size, *rest = call
     if kind == "limit":
         return limit(size)
+    if kind == "knight":
+        return knight(size, cold=rest[0] == "cold")
     if kind == "long":
         return long(size)
     if kind == "usd":
@@ -244,7 +246,7 @@ def main(arguments: list[str]) -> None:
         sys.stdout.write(f"\nlong: 100000 vertices x 10000 frames, dqs: {one['seconds']:.1f} s, {one['mb']:.0f} MB\n")
     if "knight" in wanted:
         with tempfile.TemporaryDirectory() as folder:
-            cold, warm = knight(folder, cold=True), knight(folder, cold=False)
+            cold, warm = (_measured("knight", folder, kind) for kind in ("cold", "warm"))
         sys.stdout.write(
             f"\nbake Knight.glb --method dqs, 76 clips: {cold['seconds']:.1f} s with compiling, "
             f"{warm['seconds']:.1f} s after, {warm['mb']:.0f} MB\n"

@@ -45,6 +45,13 @@ def test_per_range_keeps_the_clips_ends(call: Call, fixture: Fixture) -> None:
     assert (clip[0].start, clip[0].end) == (0.0, 1.0)
 
 
+def test_a_selection_of_nothing_is_said_and_changes_nothing(call: Call, fixture: Fixture) -> None:
+    path = fixture("biped")
+    run = call("ease", path, "-", "--path", "weights")
+    assert "no track was changed" in run.err
+    assert run.product() == path.read_bytes()
+
+
 @pytest.mark.parametrize(
     ("options", "words", "hint"),
     [

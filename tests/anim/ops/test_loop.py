@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 import fixtures
+from anim.curves.tangents import TANGENTS
 from anim.errors import RangeError
 from anim.gltf import read
 from anim.maths import quaternion
 from anim.measure.loop import LoopKind, best_ranges
 from anim.measure.loop import loop as judged
-from anim.measure.travel import traveling_root
+from anim.measure.travel import traveling_root, travels
 from anim.model import Clip, Skeleton, Track
 from anim.ops.loop import loop, with_last_frame
+from anim.ops.spline import spline
 from anim.ops.trim import trim
 from anim.sampling.slopes import rates
 from anim.sampling.track import sample
@@ -99,3 +101,10 @@ def _lap(times: np.ndarray) -> np.ndarray:
 def _again(track: Track) -> np.ndarray:
     values = track.values if len(track.times) == 1 else np.concatenate((track.values, track.values[1:]))
     return quaternion.align_signs(values) if track.path == "rotation" else values
+
+
+def test_a_seam_without_a_corner_has_no_speed() -> None:
+    smooth = spline(WALK, tangents=TANGENTS["natural"], cyclic=True)
+    assert judged(SKELETON, WALK).speed_seam > 0.1
+    assert judged(SKELETON, smooth).speed_seam < 0.01
+    assert travels(SKELETON, [smooth])[0].speed_seam < 0.01

@@ -115,3 +115,17 @@ def test_warp_refuses_jumps_and_empty_ranges() -> None:
         warp(Clip("", (TRACKS["linear"],)), easing=parse("steps(3)"))
     with pytest.raises(RangeError, match="empty"):
         warp(Clip("", (TRACKS["linear"],)), easing=parse("quad-in"), start=2, end=2)
+
+
+def test_a_track_that_hardly_moves_gets_no_keys_beyond_what_float32_tells_apart() -> None:
+    values = (1 + 1e-7 * np.arange(4))[:, None] * np.ones(3)
+    trembling = Track(0, "translation", TRACKS["linear"].interpolation, KEYS, values)
+    assert len(warp(Clip("", (trembling,)), easing=parse("sine-in-out")).tracks[0].times) < 50
+
+
+def test_warp_gives_lines_too() -> None:
+    new = warp(Clip("", (TRACKS["slerp"],)), easing=parse("smoothstep"), interpolation="linear").tracks[0]
+    u = INSIDE / 3
+    old = 3 * (u * u * (3 - 2 * u))
+    assert new.in_tangents is None
+    assert distance(new, sample(new, INSIDE), sample(TRACKS["slerp"], old)) <= np.radians(0.05) * 1.01

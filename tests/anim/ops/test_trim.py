@@ -12,7 +12,7 @@ from anim.sampling.slopes import rates
 from anim.sampling.track import sample
 from tests.anim.ops.tracks import ANCHOR, KEYS, TRACKS, distance
 
-START, END = 0.3, 2.6
+START, END = 0.3125, 2.625  # exact in float32, to which bounds are rounded
 INSIDE = np.linspace(START, END, 997)
 
 
@@ -56,6 +56,18 @@ def test_a_held_part_is_one_key() -> None:
 def test_by_hand() -> None:
     new = trim(Clip("", (TRACKS["linear"],)), start=0.25).tracks[0]
     np.testing.assert_allclose(new.values[0], TRACKS["linear"].values[:2].mean(axis=0))
+
+
+def test_a_bound_at_a_key_as_float32_holds_it_is_that_key() -> None:
+    times = np.array([0, 0.3, 0.7, 1]).astype(np.float32).astype(np.float64)
+    track = Track(0, "translation", TRACKS["linear"].interpolation, times, TRACKS["linear"].values)
+    new = trim(Clip("", (track,)), start=0.3, end=0.7).tracks[0]
+    np.testing.assert_array_equal(new.times, times[1:3])
+
+
+def test_a_clip_of_one_moment_stays() -> None:
+    still = Clip("", (Track(0, "scale", ANCHOR.interpolation, np.zeros(1), np.ones((1, 3))),))
+    assert trim(still, start=0.1, end=0.2) is still
 
 
 def test_nothing_left_is_refused() -> None:
