@@ -55,8 +55,6 @@ def edit(
         chosen = selection.chosen_clips([clip.name for clip in clips])
         new = {i: _changed(clips[i], i, skeleton, selection, change) for i in chosen}
         new = {i: clip for i, clip in new.items() if not _is_same(clip, clips[i])}
-        if not new:
-            voice.say("note: no track was changed")
         result = write.replace_clips(document, new)
         written = read.clips(result)
         edited = Edited({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
@@ -66,6 +64,8 @@ def edit(
             for i, clip in edited.before.items():
                 voice.detail(f"  {read.label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
         size = streams.write(result, output, source.folder, dry_run=dry_run)
+    if chosen and not new:
+        voice.say("note: no track was changed")
     outside = "" if dry_run or output == streams.PIPE else streams.left_outside(result, source.folder, output)
     if outside:
         voice.say(f"{outside}; convert --embed takes them in")

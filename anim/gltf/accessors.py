@@ -1,4 +1,4 @@
-"""Numbers out of a document: every component type, stride, normalised, sparse, zero-filled, compressed."""
+"""Numbers out of a document: every component type, stride, normalized, sparse, zero-filled, compressed."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Accessors:
         return self._located(index, self._raw)
 
     def floats(self, index: int) -> Floats:
-        """Return the numbers (count, components) as float64, normalised integers as fractions (glTF 2.0, 3.11).
+        """Return the numbers (count, components) as float64, normalized integers as fractions (glTF 2.0, 3.11).
 
         Raises FormatError for NaN or infinity.
         """
@@ -136,7 +136,7 @@ class Accessors:
 
 
 def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:
-    """Return stored normalised integers as the fractions that they mean: c / max, signed ones not below −1."""
+    """Return stored normalized integers as the fractions that they mean: c / max, signed ones not below −1."""
     scaled = values / float(np.iinfo(dtype).max)
     return np.maximum(scaled, -1.0) if dtype.kind == "i" else scaled
 

@@ -15,7 +15,7 @@ from anim.model.track import WIDTHS
 
 INTERPOLATIONS = {name.value: name for name in Interpolation}
 TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
-FRACTIONS = (5120, 5121, 5122, 5123)  # component types that rotations and weights may have, normalised
+FRACTIONS = (5120, 5121, 5122, 5123)  # component types that rotations and weights may have, normalized
 
 
 class Reader:
@@ -100,7 +100,7 @@ class Reader:
         component_type, normalized = output["componentType"], output.get("normalized", False)
         fractions = path in ("rotation", "weights") and component_type in FRACTIONS and normalized
         if component_type != FLOAT and not fractions:
-            raise FormatError(f"output accessor has component type {component_type} (expected {FLOAT}, or normalised)")
+            raise FormatError(f"output accessor has component type {component_type} (expected {FLOAT}, or normalized)")
         return WIDTHS[path] if path != "weights" else self._target_count(node)
 
     def _target_count(self, node: int | None) -> int:

@@ -101,7 +101,7 @@ def _tangents(values: Floats, shape: tuple[int, int], name: str) -> Floats:
 def kind_of(track: Track) -> Kind:
     """Return what the values of `track` are.
 
-    A pointer that ends in "/rotation" and has four components is a quaternion; integers that are not normalised
+    A pointer that ends in "/rotation" and has four components is a quaternion; integers that are not normalized
     under STEP are bools or integers of the object model (KHR_animation_pointer allows nothing else for those).
     """
     if track.path == "rotation":

@@ -26,7 +26,8 @@ def resample(
 
     Keys lie at start + k / fps of the clip; the last key is the clip's end even when the duration is no multiple of
     1 / fps. A track that never changes, or has one key, is kept as it is: more keys would say nothing.
-    Rotations stay unit and sign-continuous. Morph weights and pointers are sampled like any other track.
+    Rotations stay unit and sign-continuous; a rotation spline between far keys is followed closely but not exactly,
+    since players normalize it and its new keys are unit. Morph weights and pointers are sampled like any other track.
 
     fps: frames per second, > 0. Raises RangeError otherwise.
     interpolation: "keep", or "step", "linear", "cubicspline" for all tracks; bools and integers stay STEP.

@@ -56,7 +56,7 @@ def interpolate(
 ) -> Floats:
     """Return the values (F, ..., C) between keys `values` (K, ..., C): any number of tracks on one time axis at once.
 
-    tangents: in and out, both (K, ..., C) per second, for CUBICSPLINE. Rotations come out normalised.
+    tangents: in and out, both (K, ..., C) per second, for CUBICSPLINE. Rotations come out normalized.
     """
     start = values[place.left]
     if interpolation is Interpolation.STEP or len(values) == 1:

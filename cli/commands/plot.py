@@ -19,7 +19,7 @@ from anim.show.eases import eases
 from anim.show.through import through as curves_through
 from cli import options, streams
 from cli.errors import UsageError
-from cli.report import Voice, plural
+from cli.report import Voice, plural, size
 
 
 class Format(StrEnum):
@@ -91,6 +91,8 @@ def plot(
     else:
         picture = _tracks(source, Selection(clip or (), node or (), path or ()), compare, kind, limit, voice)
     streams.write_bytes([np.frombuffer(picture, np.uint8)], output)
+    if output != streams.PIPE:
+        voice.say(f"{output}  {size(len(picture))}")
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
