@@ -74,7 +74,9 @@ def test_files(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     walk = fixture("biped")
     for name in ("walk.png", "walk.svg"):
         run = call("plot", walk, tmp_path / name, "--clip", "walk", "--node", "hips")
-        assert (run.code, run.out, run.err) == (0, b"", "")
+        assert (run.code, run.out) == (0, b"")
+        assert run.err.startswith(f"{tmp_path / name}  ")  # one line after a write: its name and size
+        assert run.err.count("\n") == 1
     said = words((tmp_path / "walk.svg").read_bytes())
     assert "biped: walk" in said
     assert said.count("hips") == 2
