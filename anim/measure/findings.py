@@ -78,10 +78,10 @@ def _of_samplers(json: Json) -> Iterator[Finding]:
         if ignored:
             problem = f"{ignored} channels without a target that is known"
             yield Finding("ignored-channels", Severity.INFO, where, problem, "players skip them; they are kept")
-        for sampler in animation["samplers"]:
-            if not {"min", "max"} <= accessors[sampler["input"]].keys():
-                unbounded.add(sampler["input"])
-            strided |= {n for n in (sampler["input"], sampler["output"]) if _has_stride(accessors[n], views)}
+        inputs = {sampler["input"] for sampler in animation["samplers"]}
+        unbounded |= {n for n in inputs if not {"min", "max"} <= accessors[n].keys()}
+        named = inputs | {sampler["output"] for sampler in animation["samplers"]}
+        strided |= {n for n in named if _has_stride(accessors[n], views)}
     if unbounded:
         problem = f"{len(unbounded)} key time accessors without min and max"
         yield Finding(

@@ -7,18 +7,19 @@ import numpy as np
 from anim.arrays import Floats
 
 LEVER = 0.05  # of the skeleton's size: how far from a node its turning counts
-PER_NODE = 4
+PER_NODE = 3
 SPEED_STEP = 1e-4  # s; speeds at an end are taken over this time: what a player shows in the first moment
 
 
 def points(world: Floats) -> Floats:
-    """Return four points per node (4 N, F, 3) in world space from world matrices (N, F, 3, 4).
+    """Return three points per node (3 N, F, 3) in world space from world matrices (N, F, 3, 4).
 
-    The node's place, and one a lever away on each of its axes, so that a node which only turns moves too.
+    The node's place, and one a lever away on each of two axes, so that a node which only turns moves too.
     """
     places = world[..., 3]
-    lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2, keepdims=True))
-    axes = LEVER * size(places) * np.swapaxes(world[..., :3] / np.where(lengths > 0, lengths, 1), -1, -2)
+    two = world[..., :2]
+    lengths = np.sqrt((two * two).sum(axis=-2, keepdims=True))
+    axes = LEVER * size(places) * np.swapaxes(two / np.where(lengths > 0, lengths, 1), -1, -2)
     joined = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)
     return joined.reshape(-1, world.shape[1], 3)
 

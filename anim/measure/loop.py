@@ -116,7 +116,7 @@ def _fps(clip: Clip) -> float:
 
 
 def _points(skeleton: Skeleton, clip: Clip, times: Floats, root: int) -> Floats:
-    """Four points per node (4 N, F, 3): its place and one a lever away on each axis; the root's way taken off."""
+    """Points per node (see `levers`); the root's way taken off."""
     world = world_by_node(skeleton, pose(skeleton, clip, times))
     if root >= 0:
         way = world[root, :, :, 3] - world[root, :1, :, 3]

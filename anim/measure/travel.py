@@ -76,7 +76,7 @@ def _ends(clip: Clip) -> Floats:
 
 
 def _travel(skeleton: Skeleton, clip: Clip, places: Floats, depth: Floats) -> Travel:
-    """places: (N, 4 points, 4, 3) at start, just after it, just before the end, and at the end."""
+    """places: (N, points, 4, 3) at start, just after it, just before the end, and at the end."""
     duration = clip.end - clip.start
     if duration <= 0:
         return Travel(0.0, 0.0, -1, 0.0, 0.0)
