@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from math import degrees
 from typing import Any
 
 from anim.exchange.from_euler import Converted
@@ -16,7 +17,7 @@ from cli import report, tables
 
 SCHEMA = 1
 LISTED = 8  # names in a line
-NEAR_DEG = round(NEAR * 180 / 3.141592653589793)
+NEAR_DEG = round(degrees(NEAR))
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,8 @@ def lines(made: Conversion, *, verbose: bool) -> Iterator[str]:
     yield from (f"note: {note}" for note in made.motion.notes)
     if made.scale_words:
         yield f"scale: {made.scale_words}"
+    if made.format != "bvh":
+        yield from _angles_line(made.motion)
     if made.gimbal:
         yield _gimbal_line(made.gimbal)
         if verbose:
@@ -86,11 +89,19 @@ def listed(names: list[str]) -> str:
     return f"{words} and {len(names) - LISTED} more" if len(names) > LISTED else words
 
 
+def _angles_line(motion: EulerMotion) -> Iterator[str]:
+    """The range of angles, which shows degrees that were read as radians, and the other way round."""
+    curves = [curve for node in motion.nodes for curve in node.rotation if curve is not None]
+    if curves:
+        low, high = min(curve.values.min() for curve in curves), max(curve.values.max() for curve in curves)
+        yield f"angles: {degrees(low):.4g}° to {degrees(high):.4g}°"
+
+
 def _gimbal_line(rows: tuple[GimbalRow, ...]) -> str:
     near = [row for row in rows if row.nearest_deg < NEAR_DEG]
     worst = min(rows, key=lambda row: row.nearest_deg)
     words = f"gimbal: {len(near)} of {report.plural(len(rows), 'joint')} within {NEAR_DEG}° of lock; nearest "
-    words += f"'{worst.node}', {worst.nearest_deg:.2g}° at {worst.at_s:.3g} s"
+    words += f"'{worst.node}', {round(worst.nearest_deg, 2):.2g}° at {worst.at_s:.3g} s"
     if worst.best_order != worst.order:
         words += f" ({worst.order}; {worst.best_order} would keep {worst.best_nearest_deg:.2g}°)"
     return words

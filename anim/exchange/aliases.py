@@ -6,6 +6,7 @@ import csv
 import io
 
 from anim.errors import FormatError
+from anim.exchange.lines import text_of
 from anim.gltf import text
 
 
@@ -22,7 +23,7 @@ def read(data: bytes) -> dict[str, str]:
                 raise FormatError(f"'{name}' has {other!r} (expected the name of a node)")
         return content
     found: dict[str, str] = {}
-    rows = csv.reader(io.StringIO(data.decode("utf-8-sig", errors="replace")))
+    rows = csv.reader(io.StringIO(text_of(data)))
     for cells in rows:
         if not cells or cells[0].startswith("#"):
             continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from enum import StrEnum
 
 import numpy as np
@@ -12,6 +11,7 @@ from anim.errors import UnsupportedError
 from anim.exchange import bvh_frames, bvh_hierarchy, bvh_write, curve
 from anim.exchange.bvh_hierarchy import BvhJoint
 from anim.exchange.curve import Curve, Mode
+from anim.exchange.lines import text_of
 from anim.exchange.motion import Convention, EulerMotion, EulerNode
 from anim.maths.euler import Frame
 
@@ -30,7 +30,7 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
     Names that appear twice get a number: "Hand", "Hand.2". Line ends of any system, UTF-8, UTF-16 or Latin-1.
     Raises FormatError with the line.
     """
-    lines = re.split(r"\r\n|\r|\n", _text(data))
+    lines = text_of(data).split("\n")
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()
     joints, start, column = bvh_hierarchy.hierarchy(lines)
@@ -51,15 +51,6 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     if convention.frame != Frame.INTRINSIC:
         raise UnsupportedError("a BVH's angles are intrinsic", help="give --frame intrinsic; the order reads backwards")
     return bvh_write.write(motion)
-
-
-def _text(data: bytes) -> str:
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return data.decode("utf-16", errors="replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
 
 
 def _unique(names: list[str]) -> tuple[list[str], list[str]]:

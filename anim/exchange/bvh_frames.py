@@ -41,6 +41,8 @@ def frames(lines: list[str], start: int, column: int, channels: int) -> Frames:
     _check_columns(lines, body, len(numbers), channels, claimed)
     rows = numbers.reshape(-1, channels)
     notes = []
+    if not len(rows) and not claimed:
+        fail(len(lines), "there are no frames")
     if len(rows) != claimed:
         if not len(rows) or 2 * len(rows) < claimed:
             fail(len(lines), f"the file holds {len(rows)} of {claimed} claimed frames (truncated?)")
@@ -99,7 +101,7 @@ def _check_columns(lines: list[str], body: int, count: int, channels: int, claim
         return
     right = sum(length == channels for _, length in per_line)
     for number, length in per_line:
-        if length != channels and (2 * right > len(per_line) or one_per_line):
+        if length != channels and (2 * right > len(per_line) or len(per_line) == claimed):
             cut_off = number == per_line[-1][0] and length < channels
             hint = "; truncated?" if cut_off else ""
             fail(number, f"{length} numbers in a row (expected {channels}, one per channel{hint})")

@@ -128,7 +128,8 @@ class _Parser:
             name = self._next("a channel")
             channel = CHANNELS.get(name.text.casefold())
             if channel is None:
-                fail(name.line, f"unknown channel '{_short(name.text)}' (expected Xposition … Zrotation)")
+                cut = "; truncated?" if self._at == len(self._words) else ""
+                fail(name.line, f"unknown channel '{_short(name.text)}' (expected Xposition … Zrotation{cut})")
             if channel[1] == "position" and channel in joint.channels:
                 fail(name.line, f"{name.text} twice in joint '{joint.name}'")
             joint.channels.append(channel)

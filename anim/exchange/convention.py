@@ -23,8 +23,12 @@ NOTHING = Stated()
 
 
 def stated(values: dict[str, Any], where: str) -> Stated:
-    """Return what a file says under "order", "frame" and "unit". Raises FormatError for words that are none."""
-    order, frame, unit = (values.get(key) for key in ("order", "frame", "unit"))
+    """Return what a file says under "order", "frame" and "unit", in letters of any case.
+
+    Raises FormatError for words that are none.
+    """
+    order = values.get("order")
+    frame, unit = (word.casefold() if isinstance(word, str) else word for word in map(values.get, ("frame", "unit")))
     if order is not None and str(order).upper() not in ORDERS:
         raise FormatError(f"order is '{order}' (expected one of {', '.join(ORDERS)})", where=where)
     if frame is not None and frame not in list(Frame):
@@ -32,7 +36,9 @@ def stated(values: dict[str, Any], where: str) -> Stated:
     if unit is not None and unit not in list(Unit):
         raise FormatError(f"unit is '{unit}' (expected {' or '.join(Unit)})", where=where)
     return Stated(
-        None if order is None else str(order).upper(), None if frame is None else Frame(frame), unit and Unit(unit)
+        None if order is None else str(order).upper(),
+        None if frame is None else Frame(frame),
+        None if unit is None else Unit(unit),
     )
 
 

@@ -11,46 +11,68 @@ Frames: a row per time, a column per channel; an empty cell is no key of that ch
 
 Keys: a row per key.
 
-    node,channel,time,value,interpolation,in_tangent,out_tangent
-    hips,rx,0,0,linear,,
-    hips,rx,1,720,cubic,0,90
+    node,channel,time,value,interpolation,in_tangent,out_tangent,in_weight,out_weight
+    hips,rx,0,0,linear,,,,
+    hips,rx,1,720,cubic,0,90,,0.5
 
 Channels are tx ty tz (metres, or the file's unit by `# meters_per_unit=0.01`), rx ry rz, sx sy sz; where an axis comes
-twice in the order (ZXZ) angles are r1 r2 r3. Times are seconds, tangents per second. Lines that begin with # state the
-convention, or `#node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]`: hierarchy and rest, if they are known.
-Without interpolation curves are linear; in the frames form `# interpolation=step` makes all of them steps.
+twice in the order (ZXZ) angles are r1 r2 r3. Times are seconds; where the first is before 0, all are moved by as much.
+Tangents are per second, at both ends of every cubic piece; weights are the handles' lengths as shares of the time to
+the next key, a third if empty. Lines that begin with # state the convention, or the hierarchy and the rest, if they are
+known: `#node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]`. Without interpolation curves are linear; in the
+frames form `# interpolation=step` makes all of them steps.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
-from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.exchange.convention import Stated, agreed, complete, stated
+from anim.exchange.csv_keys import Row, keyed
 from anim.exchange.csv_write import EXTRA_COLUMNS, KEY_COLUMNS, write
-from anim.exchange.curve import Curve, Mode, uniform_modes
-from anim.exchange.draft import KINDS, Draft, checked, finished
-from anim.exchange.json import MODES
-from anim.exchange.lines import number, wrong
+from anim.exchange.curve import MODES, Curve, Mode, uniform_modes
+from anim.exchange.draft import KINDS, MAX_UNIT, Draft, checked, finished
+from anim.exchange.lines import check_times, number, number_in, text_of, wrong
 from anim.exchange.motion import Convention, EulerMotion
+from anim.exchange.start import start
 
 __all__ = ["read", "write"]
 
 
 @dataclass(slots=True)
 class _File:
-    """What a CSV says before its numbers: words of the comments, nodes, the header, and rows with their lines."""
+    """What a CSV says before its numbers: words of the comments and their lines, nodes, the header; and its rows."""
 
     words: dict[str, str] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
     nodes: list[tuple[int, list[str]]] = field(default_factory=list)
     header: list[str] = field(default_factory=list)
     header_line: int = 1
     rows: list[tuple[int, list[str]]] = field(default_factory=list)
+
+    def hear(self, line: int, comment: str) -> None:
+        """Take the words "key=value" out of a comment."""
+        found = {key.casefold(): value for key, value in re.findall(r"(\w+)\s*=\s*(\S+)", comment)}
+        self.words |= found
+        self.lines |= dict.fromkeys(found, line)
+
+    def meters_per_unit(self) -> float:
+        """Return what the comments say of the unit of length; 1 if nothing. Raises FormatError with the line."""
+        if "meters_per_unit" not in self.words:
+            return 1.0
+        line = self.lines["meters_per_unit"]
+        unit = number_in(self.words["meters_per_unit"], line, "meters_per_unit")
+        if not 0 < unit < MAX_UNIT:
+            raise wrong(line, f"meters_per_unit is {unit:g} (expected a number above 0)")
+        return unit
 
 
 def read(data: bytes, options: Stated) -> EulerMotion:
@@ -63,17 +85,18 @@ def read(data: bytes, options: Stated) -> EulerMotion:
     drafts = _Drafts(convention)
     for line, cells in file.nodes:
         drafts.describe(line, cells)
+    later, notes = start(_times(file))
     if tuple(file.header[:1]) == ("time",):
-        _read_frames(file, drafts)
+        _read_frames(file, drafts, later)
     elif set(KEY_COLUMNS) <= set(file.header):
-        _read_keys(file, drafts)
+        _read_keys(file, drafts, later)
     else:
-        raise FormatError(
-            f"the header is '{','.join(file.header)[:60]}' (expected time,NAME.rx,… or {','.join(KEY_COLUMNS)})"
-        )
-    unit = _number(file.words.get("meters_per_unit", "1"), 1, "meters_per_unit")
-    nodes, nested = finished([*drafts.by_name.values()], unit)
-    return EulerMotion(nodes, nested=nested)
+        header = ",".join(file.header)
+        hint = "; columns are separated by commas" if len(file.header) == 1 and re.search(r"[;\t]", header) else ""
+        expected = f"expected time,NAME.rx,… or {','.join(KEY_COLUMNS)}{hint}"
+        raise wrong(file.header_line, f"the header is {header[:60]!r} ({expected})")
+    nodes, nested = finished([*drafts.by_name.values()], file.meters_per_unit())
+    return EulerMotion(nodes, nested=nested, notes=notes)
 
 
 class _Drafts:
@@ -95,7 +118,7 @@ class _Drafts:
             raise wrong(line, f"a second #node line for '{cells[0]}'")
         draft = self.named(cells[0])
         draft.parent = cells[1] or None
-        numbers = np.array([_number(cell, line, "a rest") for cell in cells[2:]])
+        numbers = np.array([number_in(cell, line, "a rest") for cell in cells[2:]])
         draft.translation = numbers[:3]
         if len(numbers) > 3:
             draft.angles = numbers[3:6]
@@ -113,22 +136,17 @@ class _Drafts:
 
 
 def _parsed(data: bytes) -> _File:
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
     file = _File()
-    rows = csv.reader(io.StringIO(text.replace("\r\n", "\n").replace("\r", "\n")), strict=True)
+    rows = csv.reader(io.StringIO(text_of(data)), strict=True)
     try:
         for cells in rows:
             cells = [cell.strip() for cell in cells]
             if not any(cells):
                 continue
-            if cells[0] == "#node":
+            if re.fullmatch(r"#\s*node", cells[0]):
                 file.nodes.append((rows.line_num, cells[1:]))
             elif cells[0].startswith("#"):
-                words = " ".join(cells).lstrip("#").split()
-                file.words |= {key: value for key, _, value in (word.partition("=") for word in words) if value}
+                file.hear(rows.line_num, " ".join(cells))
             elif not file.header:
                 file.header, file.header_line = cells, rows.line_num
                 if len(set(cells)) != len(cells):
@@ -144,66 +162,40 @@ def _parsed(data: bytes) -> _File:
     return file
 
 
-def _read_frames(file: _File, drafts: _Drafts) -> None:
+def _times(file: _File) -> Iterator[float]:
+    """All key times that are numbers."""
+    if "time" in file.header:
+        column = file.header.index("time")
+        found = (number(cells[column]) for _, cells in file.rows)
+        yield from (time for time in found if time is not None)
+
+
+def _read_frames(file: _File, drafts: _Drafts, later: float) -> None:
     mode = MODES.get(file.words.get("interpolation", "linear"), Mode.CUBIC)
     if mode is Mode.CUBIC:
         raise FormatError(f"interpolation is '{file.words['interpolation']}' (frames have no tangents: step or linear)")
-    times = np.array([_number(cells[0], line, "time") for line, cells in file.rows])
-    _check_times(times, [line for line, _ in file.rows])
+    times = np.array([number_in(cells[0], line, "time") for line, cells in file.rows])
+    check_times(times, [line for line, _ in file.rows])
+    times = times + later
     for column, title in enumerate(file.header[1:], 1):
         name, _, channel = title.rpartition(".")
         draft, slot = drafts.channel(name, channel, file.header_line)
         there = [i for i, (_, cells) in enumerate(file.rows) if cells[column]]
         if not there:
             continue
-        values = np.array([_number(file.rows[i][1][column], file.rows[i][0], title) for i in there])
+        values = np.array([number_in(file.rows[i][1][column], file.rows[i][0], title) for i in there])
         own = times if len(there) == len(times) else times[there]
         draft.add(slot, Curve(own, values, uniform_modes(len(own), mode)))
 
 
-def _read_keys(file: _File, drafts: _Drafts) -> None:
+def _read_keys(file: _File, drafts: _Drafts, later: float) -> None:
     unknown = set(file.header) - {*KEY_COLUMNS, *EXTRA_COLUMNS}
     if unknown:
         raise FormatError(f"unknown column '{min(unknown)}' (expected {', '.join((*KEY_COLUMNS, *EXTRA_COLUMNS))})")
-    found: dict[tuple[str, tuple[str, int]], list[tuple[int, dict[str, str]]]] = {}
+    found: dict[tuple[str, tuple[str, int]], list[Row]] = {}
     for line, cells in file.rows:
         row = dict(zip(file.header, cells, strict=True))
         draft, slot = drafts.channel(row["node"], row["channel"], line)
         found.setdefault((draft.name, slot), []).append((line, row))
     for (name, slot), rows in found.items():
-        checked(drafts.named(name), slot, lambda rows=rows: _keyed(rows))
-
-
-def _keyed(rows: list[tuple[int, dict[str, str]]]) -> Curve:
-    lines = [line for line, _ in rows]
-    times = np.array([_number(row["time"], line, "time") for line, row in rows])
-    _check_times(times, lines)
-    values = np.array([_number(row["value"], line, "value") for line, row in rows])
-    modes = np.zeros(len(rows), np.uint8)
-    for i, (line, row) in enumerate(rows):
-        word = row.get("interpolation") or "linear"
-        if word not in MODES:
-            raise wrong(line, f"interpolation is '{word}' (expected {', '.join(MODES)})")
-        modes[i] = MODES[word]
-    if not (modes == Mode.CUBIC).any():
-        return Curve(times, values, modes)
-    tangents: list[Floats] = []
-    for key in ("in_tangent", "out_tangent"):
-        tangents.append(np.array([_number(row.get(key) or "0", line, key) for line, row in rows]))
-    return Curve(times, values, modes, *tangents)
-
-
-def _check_times(times: Floats, lines: list[int]) -> None:
-    if times[0] < 0:
-        raise wrong(lines[0], f"time is {times[0]:g} (expected 0 s or later)")
-    steps = np.diff(times)
-    if (steps <= 0).any():
-        k = int(np.argmax(steps <= 0)) + 1
-        raise wrong(lines[k], f"time {times[k]:g} s after {times[k - 1]:g} s (expected increasing times)")
-
-
-def _number(text: str, line: int, what: str) -> float:
-    value = number(text)
-    if value is None:
-        raise wrong(line, f"{what} is '{text[:40]}' (expected a finite number)")
-    return value
+        checked(drafts.named(name), slot, partial(keyed, rows, later))

@@ -9,19 +9,25 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import sorted_unique
+from anim.errors import UnsupportedError
 from anim.exchange.convention import axis_names
-from anim.exchange.curve import Curve, Mode
+from anim.exchange.curve import HANDLES, Curve, Mode
 from anim.exchange.motion import Convention, EulerMotion, EulerNode
 
 KEY_COLUMNS = ("node", "channel", "time", "value")
-EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent")
+EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
 DIGITS = 9  # behind the point
 
 Column = tuple[str, str, Curve]  # node, channel, its curve in the unit to write
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
-    """Return the motion as CSV; the convention is that of its nodes, with the unit to use."""
+    """Return the motion as CSV; the convention is that of its nodes, with the unit to use.
+
+    Raises UnsupportedError where a node's order is another: a CSV has one.
+    """
+    if any(node.order != convention.order for node in motion.nodes):
+        raise UnsupportedError("a CSV has one order for all nodes", help="write .json or .bvh")
     out = io.StringIO()
     out.write(f"# order={convention.order} frame={convention.frame} unit={convention.unit}\n")
     rows = csv.writer(out, lineterminator="\n")
@@ -59,12 +65,11 @@ def _write_keys(rows: Any, columns: list[Column]) -> None:
     words = [mode.name.lower() for mode in Mode]
     rows.writerow([*KEY_COLUMNS, *EXTRA_COLUMNS])
     for node, channel, curve in columns:
-        empty = [""] * len(curve.times)
-        arriving = empty if curve.in_tangents is None else [*map(_text, curve.in_tangents.tolist())]
-        leaving = empty if curve.out_tangents is None else [*map(_text, curve.out_tangents.tolist())]
-        keys = zip(curve.times.tolist(), curve.values.tolist(), curve.modes.tolist(), arriving, leaving, strict=True)
-        for time, value, mode, before, after in keys:
-            rows.writerow([node, channel, _text(time), _text(value), words[mode], before, after])
+        handles = [getattr(curve, name) for name in HANDLES]
+        extra = [[""] * len(curve.times) if h is None else [*map(_text, h.tolist())] for h in handles]
+        keys = zip(curve.times.tolist(), curve.values.tolist(), curve.modes.tolist(), *extra, strict=True)
+        for time, value, mode, *cells in keys:
+            rows.writerow([node, channel, _text(time), _text(value), words[mode], *cells])
 
 
 def _text(value: float) -> str:

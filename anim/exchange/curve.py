@@ -12,8 +12,12 @@ from numpy.typing import NDArray
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import ShapeError
+from anim.errors import RangeError, ShapeError
+from anim.exchange import weighted
 from anim.maths import hermite
+
+WEIGHTS = ("in_weights", "out_weights")
+HANDLES = ("in_tangents", "out_tangents", *WEIGHTS)
 
 
 class Mode(IntEnum):
@@ -24,12 +28,16 @@ class Mode(IntEnum):
     CUBIC = 2
 
 
+MODES = {mode.name.lower(): mode for mode in Mode}
+
+
 @dataclass(frozen=True, slots=True)
 class Curve:
     """Keys of one number. Outside its keys a curve holds its end values.
 
     times: (K,) s, ≥ 0, strictly increasing. values: (K,) radians, metres or factors.
     modes: (K,) Mode after each key. in_tangents, out_tangents: (K,) per second, for CUBIC; None means none are.
+    in_weights, out_weights: (K,) lengths of the handles as shares of their piece, 0 … 1; None means a third.
     """
 
     times: Floats
@@ -37,14 +45,18 @@ class Curve:
     modes: NDArray[np.uint8]
     in_tangents: Floats | None = None
     out_tangents: Floats | None = None
+    in_weights: Floats | None = None
+    out_weights: Floats | None = None
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
         set_field(self, "times", arrays.times(self.times))
-        for name in ("values", "in_tangents", "out_tangents"):
+        for name in ("values", *HANDLES):
             given = getattr(self, name)
             if given is not None:
                 set_field(self, name, arrays.floats(given, str(len(self.times)), name=name))
+            if given is not None and name in WEIGHTS and not ((given >= 0) & (given <= 1)).all():
+                raise RangeError(f"{name} go from {given.min():g} to {given.max():g} (expected shares, 0 … 1)")
         arrays.check_shape(self.modes, str(len(self.times)), name="modes")
         if (self.modes == Mode.CUBIC).any() and (self.in_tangents is None or self.out_tangents is None):
             raise ShapeError("a cubic curve lacks tangents")
@@ -66,6 +78,19 @@ class Curve:
         arriving = None if self.in_tangents is None else self.in_tangents * factor
         leaving = None if self.out_tangents is None else self.out_tangents * factor
         return replace(self, values=self.values * factor, in_tangents=arriving, out_tangents=leaving)
+
+    def kept(self, keys: Ints, times: Floats) -> Curve:
+        """Return the curve with these keys (K,) only, at other times (K,)."""
+        parts = {name: getattr(self, name) for name in HANDLES}
+        handles = {name: None if part is None else part[keys] for name, part in parts.items()}
+        return Curve(times, self.values[keys], self.modes[keys], **handles)
+
+    def weights(self, left: Ints, right: Ints) -> tuple[Floats, Floats]:
+        """Return how far the handles after keys `left` and before keys `right` reach, as shares of the piece."""
+        third = np.full(len(self.times), weighted.PLAIN)
+        leaving = third if self.out_weights is None else self.out_weights
+        arriving = third if self.in_weights is None else self.in_weights
+        return leaving[left], arriving[right]
 
 
 def constant(value: float) -> Curve:
@@ -104,7 +129,11 @@ def evaluate(curve: Curve, at: Floats, *, before: bool = False) -> Floats:
         assert curve.in_tangents is not None
         assert curve.out_tangents is not None
         leaving, arriving = duration * curve.out_tangents[left], duration * curve.in_tangents[right]
-        values = np.where(cubic, hermite.evaluate(u, start, leaving, end, arriving), values)
+        if curve.in_weights is None and curve.out_weights is None:
+            values = np.where(cubic, hermite.evaluate(u, start, leaving, end, arriving), values)
+        else:
+            bent = weighted.evaluate(u, start, leaving, end, arriving, curve.weights(left, right))
+            values = np.where(cubic, bent, values)
     return values
 
 
@@ -120,11 +149,11 @@ def travel(curve: Curve, a: Floats, b: Floats) -> Floats:
     assert curve.out_tangents is not None
     left = np.clip(np.searchsorted(curve.times, a, side="right") - 1, 0, len(curve.times) - 1)
     right = np.minimum(left + 1, len(curve.times) - 1)
-    third = (curve.times[right] - curve.times[left]) / 3
+    duration, (leaving, arriving) = curve.times[right] - curve.times[left], curve.weights(left, right)
     points = (
         curve.values[left],
-        curve.values[left] + third * curve.out_tangents[left],
-        curve.values[right] - third * curve.in_tangents[right],
+        curve.values[left] + leaving * duration * curve.out_tangents[left],
+        curve.values[right] - arriving * duration * curve.in_tangents[right],
         curve.values[right],
     )
     bound = sum(np.abs(q - p) for p, q in pairwise(points))

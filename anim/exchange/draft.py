@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +13,7 @@ from anim.exchange.convention import place_of_axis
 from anim.exchange.curve import Curve
 from anim.exchange.motion import PLAIN, Convention, EulerNode, Pivots
 
+MAX_UNIT = 1e9  # m; of a file's unit of length
 KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
 
 
@@ -73,11 +75,10 @@ def finished(drafts: list[Draft], meters_per_unit: float) -> tuple[tuple[EulerNo
     return nodes, any(node.parent >= 0 for node in nodes)
 
 
-def checked(curve_of: Draft, slot: tuple[str, int], build: object) -> None:
-    """Add the curve that `build()` makes; what is wrong with it is the file's fault."""
-    assert callable(build)
+def checked(draft: Draft, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
+    """Put the curve that `build()` makes into a node's slot. Raises FormatError for what is wrong with it."""
     try:
-        curve_of.add(slot, build())
+        draft.add(slot, build())
     except FormatError:
         raise
     except AnimError as error:

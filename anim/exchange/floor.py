@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,11 +10,13 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.model import Instance, Scene
+from anim.model import Instance, Scene, Skeleton
 from anim.sampling import rest, world_matrices
 
-LOWEST = 5.0  # percentile of the lowest point's height that is taken for the floor
-DOWN = 0.03  # share of the height that the lowest point may be above it while a foot is down
+LOWEST = 5.0  # percentile of a foot's lowest height that is taken for the ground under it
+DOWN = 0.03  # share of the height that the lowest foot may be above its ground while it is down
+STANDS, LEAVES = 0.015, 0.04  # shares of the height: up to the first clearance is noise, from the second on none of it
+UNEVEN = 0.04  # share of the height that a foot's ground may be above that of all: markers and floors are never level
 WINDOW, STEP = 0.1, 1 / 120  # s
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
@@ -41,7 +43,7 @@ def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> 
     """
     world = world_matrices(scene.skeleton, rest(scene.skeleton))[0]
     feet = {node for role, node in roles if role.endswith(("foot", "toe"))}
-    below = {node for node in range(len(scene.skeleton)) if _is_below(scene, node, feet)} or set(range(len(world)))
+    below = {int(node) for node in at_or_below(scene.skeleton, feet)} or set(range(len(world)))
     nodes, points, lowest = list[int](), list[Floats](), [float(positions[sorted(below), 1].min())]
     for instance in scene.instances:
         if instance.skin is None or not instance.mesh.joints.shape[1]:
@@ -57,24 +59,53 @@ def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> 
     if not nodes:
         nodes, points = sorted(below), [positions[sorted(below)]]
     numbers = np.array(nodes, np.int64)
-    return Soles(numbers, _in_space_of(world[numbers], np.concatenate(points)), min(lowest))
+    return Soles(
+        numbers, matrix.apply(matrix.inverse(world[numbers]), np.concatenate(points)[:, None])[:, 0], min(lowest)
+    )
 
 
-def heights_above_contact(times: Floats, source: Floats, target: Floats, floor: float, scale: float) -> Floats:
+def at_or_below(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
+    """Return the numbers of `nodes` and of all that hang on them, in order."""
+    found: list[int] = []
+    for node in range(len(skeleton)):
+        at = node
+        while at >= 0 and at not in nodes:
+            at = int(skeleton.parents[at])
+        if at >= 0:
+            found.append(node)
+    return np.array(found, np.int64)
+
+
+def heights_above_contact(
+    times: Floats, source: Floats, feet: Sequence[Ints], target: Floats, floor: float, scale: float
+) -> Floats:
     """Return by how much the target stands too high (F,), in metres, smooth in time.
 
-    While a foot of the source is down, the target's lowest sole belongs as far above its floor as the source's lowest
-    node is above the ground, times scale; in between, while it jumps, what is too high at take-off goes over into what
-    is too high at landing.
-    times: (F,) s. source: heights (F, N) of the source's nodes. target: heights (F, P) of the target's soles; floor:
-    of its rest.
+    While a foot of the source is down, the target's lowest sole belongs on its floor, or as far above as the source is
+    above its ground, times scale, where that is more than recordings are unsure of; in between, while it jumps, what
+    is too high at take-off goes over into what is too high at landing.
+    times: (F,) s. source: heights (F, N) of the source's nodes. feet: numbers of the nodes of each of its feet.
+    target: heights (F, P) of the target's soles; floor: of its rest.
     """
+    height = float(np.median(np.ptp(source, axis=1))) or 1.0
+    clearance = _clearance(source, feet, UNEVEN * height)
+    down = clearance <= DOWN * height
+    above = target.min(axis=1) - floor - scale * clearance
+    noise = np.minimum(clearance, height * np.interp(clearance / height, (STANDS, LEAVES), (STANDS, 0.0)))
+    return _smoothed(times, np.interp(times, times[down], above[down]) + scale * noise)
+
+
+def _clearance(source: Floats, feet: Sequence[Ints], uneven: float) -> Floats:
+    """How high (F,) the source is: its lowest node above the ground, or a foot above the ground under this one."""
     lowest = source.min(axis=1)
     ground = float(np.percentile(lowest, LOWEST))
-    height = float(np.median(np.ptp(source, axis=1))) or 1.0
-    down = lowest - ground <= DOWN * height
-    above = target.min(axis=1) - floor - scale * np.maximum(lowest - ground, 0.0)
-    return _smoothed(times, np.interp(times, times[down], above[down]))
+    clearance = lowest - ground
+    for foot in feet:
+        own = source[:, foot].min(axis=1)
+        under = float(np.percentile(own, LOWEST))
+        if abs(under - ground) <= uneven:
+            clearance = np.minimum(clearance, own - under)
+    return np.asarray(np.maximum(clearance, 0.0))
 
 
 def _smoothed(times: Floats, values: Floats) -> Floats:
@@ -98,17 +129,3 @@ def _placed(instance: Instance, world: Floats) -> tuple[Floats, Ints]:
     placed = (rows[:, :, :3] @ mesh.positions[:, :, None])[:, :, 0] + rows[:, :, 3]
     most = mesh.joints[np.arange(len(placed)), mesh.weights.argmax(axis=1)]
     return placed, skin.joints[most]
-
-
-def _is_below(scene: Scene, node: int, nodes: set[int]) -> bool:
-    """Whether a node is one of `nodes` or hangs below one."""
-    while node >= 0 and node not in nodes:
-        node = int(scene.skeleton.parents[node])
-    return node >= 0
-
-
-def _in_space_of(world: Floats, points: Floats) -> Floats:
-    whole = np.tile(np.eye(4), (len(world), 1, 1))
-    whole[:, :3] = world
-    inverse = np.linalg.inv(whole)
-    return np.asarray((inverse[:, :3, :3] @ points[:, :, None])[:, :, 0] + inverse[:, :3, 3])

@@ -41,14 +41,19 @@ def _read_bvh(data: bytes, reading: Reading) -> EulerMotion:
     return bvh.read(data, position=reading.bvh_position)
 
 
+def _curves(read: Callable[[bytes, Stated], EulerMotion]) -> Callable[[bytes, Reading], EulerMotion]:
+    def read_curves(data: bytes, reading: Reading) -> EulerMotion:
+        if reading.bvh_position is not BvhPosition.REPLACE:
+            raise RangeError("these curves have no OFFSET (--bvh-position is about BVH)")
+        return read(data, reading.stated)
+
+    return read_curves
+
+
 TRACK_FORMATS = {
     "bvh": TrackFormat(".bvh", _read_bvh, bvh.write, lambda head: head.upper().startswith(b"HIERARCHY"), False),
-    "json": TrackFormat(
-        ".json", lambda data, reading: json.read(data, reading.stated), json.write, lambda head: head[:1] == b"{", True
-    ),
-    "csv": TrackFormat(
-        ".csv", lambda data, reading: csv.read(data, reading.stated), csv.write, lambda head: b"," in head, True
-    ),
+    "json": TrackFormat(".json", _curves(json.read), json.write, lambda head: head[:1] == b"{", True),
+    "csv": TrackFormat(".csv", _curves(csv.read), csv.write, lambda head: b"," in head, True),
 }
 
 
@@ -59,6 +64,8 @@ def of_path(path: str) -> TrackFormat | None:
 
 def of_content(data: bytes) -> TrackFormat:
     """Return the format of a file by its first bytes. Raises FormatError where it is none of them."""
+    if data[:4] == b"glTF":
+        raise FormatError(f"is a glTF already (expected {', '.join(TRACK_FORMATS)})")
     head = data[:4096].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
     for each in TRACK_FORMATS.values():
         if each.begins(head):

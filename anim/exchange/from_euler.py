@@ -24,11 +24,16 @@ STILL = 1e-9  # share of the skeleton's size
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """A skeleton in its rest pose, and its motion. ends: numbers of nodes that only mark where their parent ends."""
+    """A skeleton in its rest pose, and its motion.
+
+    ends: numbers of nodes that only mark where their parent ends. tolerance: rad, within which the clip follows the
+    source between its keys; None for recordings, which keep their grid.
+    """
 
     skeleton: Skeleton
     clip: Clip
     ends: frozenset[int]
+    tolerance: float | None = None
 
 
 def from_euler(motion: EulerMotion, *, tolerance: float, keys: Keys = Keys.AUTO, name: str = "") -> Converted:
@@ -50,13 +55,16 @@ def from_euler(motion: EulerMotion, *, tolerance: float, keys: Keys = Keys.AUTO,
     size = extent(bones) or 1.0
     stored, axes = StoredTimes(), _Axes()
     tracks: list[Track] = []
+    adaptive = False
     for number, node in enumerate(motion.nodes):
         on_grid = stays_on_grid(motion, node, keys)
+        adaptive |= not on_grid and any(not curve.is_constant for curve in curves_of(node))
         try:
             tracks += _tracks(number, stored.node(node), None if on_grid else tolerance, size, axes)
         except AnimError as error:
             raise error.at(f"node '{node.name}'") from None
-    return Converted(bones, Clip(name, tuple(tracks)), frozenset(i for i, n in enumerate(motion.nodes) if n.end))
+    ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
+    return Converted(bones, Clip(name, tuple(tracks)), ends, tolerance if adaptive else None)
 
 
 class _Axes:

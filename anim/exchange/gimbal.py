@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.motion import EulerMotion
-from anim.maths import euler
+from anim.exchange.motion import PLAIN, EulerMotion, Pivots
+from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, Frame
 from anim.model import Clip, Interpolation, Track
 from anim.sampling.track import sample
 
 NEAR = np.radians(5.0)  # from lock: rates are 23 times amplified there
 MANY, BETWEEN = 500, 29  # keys that are enough; times looked at between two where they are not
+SAME = 1e-9  # rad; nearer than this nothing is nearer: the first counts
 CELLS = 200_000  # quaternions looked at together
 
 
@@ -44,12 +45,14 @@ def gimbal(motion: EulerMotion, clip: Clip) -> tuple[GimbalRow, ...]:
     """Return a row for each node that turns about three axes, in the order of nodes.
 
     clip: the motion as quaternions, whose node numbers are the motion's. Looked at are its keys; where they are few,
-    also what lies between them.
+    also what lies between them. Pre and post rotations are taken off: the three angles are between them.
     Source: the Jacobian's singular values are 1, √(1 + s), √(1 − s), s the cosine of the distance from lock.
     """
     turning = [(t.node, t) for t in clip.tracks if t.path == "rotation" and t.node is not None]
     rows = []
-    for times, nodes, values in _stacked([_looked_at(node, t) for node, t in turning if _has_lock(motion, node)]):
+    for times, nodes, values in _stacked(
+        [_looked_at(motion, node, t) for node, t in turning if _has_lock(motion, node)]
+    ):
         by_order = {order: euler.distance_to_lock(values, order=order) for order in ORDERS}
         nearest = {order: distance.min(axis=0) for order, distance in by_order.items()}
         for i, node in enumerate(nodes):
@@ -67,14 +70,21 @@ def _has_lock(motion: EulerMotion, node: int) -> bool:
     return motion.nodes[node].order in ORDERS
 
 
-def _looked_at(node: int, track: Track) -> tuple[int, Floats, Floats]:
-    """Node, times and rotations: the track's own, or with BETWEEN more in each piece."""
+def _looked_at(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
+    """Node, times and the rotations of its angles: at the track's keys, or with BETWEEN more in each piece."""
     if len(track.times) > MANY or track.interpolation is Interpolation.STEP or len(track.times) == 1:
-        return node, track.times, track.values
+        return node, track.times, _of_angles(motion.nodes[node].pivots, track.values)
     shares = np.arange(BETWEEN + 1) / (BETWEEN + 1)
     pieces = track.times[:-1, None] + np.diff(track.times)[:, None] * shares
     at = np.append(pieces.ravel(), track.times[-1])
-    return node, at, sample(track, at)
+    return node, at, _of_angles(motion.nodes[node].pivots, sample(track, at))
+
+
+def _of_angles(pivots: Pivots, q: Floats) -> Floats:
+    """R (K, 4) from Rpre · R · Rpost⁻¹."""
+    if pivots is PLAIN:
+        return q
+    return quaternion.multiply(quaternion.multiply(quaternion.conjugate(pivots.pre_rotation), q), pivots.post_rotation)
 
 
 def _stacked(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, list[int], Floats]]:
@@ -93,7 +103,7 @@ def _stacked(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, lis
 
 def _row(motion: EulerMotion, node: int, times: Floats, distance: Floats, best: str, best_nearest: float) -> GimbalRow:
     about = motion.nodes[node]
-    least = int(distance.argmin())
+    least = int((distance <= distance.min() + SAME).argmax())
     spans = np.zeros(len(times))  # each key stands for half the way to its neighbors
     spans[1:] += np.diff(times) / 2
     spans[:-1] += np.diff(times) / 2

@@ -24,31 +24,41 @@
       ]
     }
 
-Times are seconds. Interpolation is step, linear (if left out) or cubic, for the curve or after each key; tangents are
-per second in the value's own unit. Where an axis comes twice in the order (ZXZ), angles are rotation.1, .2, .3.
+Times are seconds; where the first is before 0, all are moved by as much. Interpolation is step, linear (if left out) or
+cubic, for the curve or after each key; tangents are per second in the value's own unit. in_weights and out_weights say
+how far handles reach, as shares of the time to the next key (Maya's and FBX's weighted tangents, Blender's handles); a
+third if left out. Where an axis comes twice in the order (ZXZ), angles are rotation.1, .2, .3. Other keys are refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import FormatError
-from anim.exchange.convention import Stated, agreed, axis_names, complete, merged, stated
-from anim.exchange.curve import Curve, Mode
-from anim.exchange.draft import Draft, checked, finished
+from anim.exchange.convention import Stated, agreed, complete, merged, stated
+from anim.exchange.curve import HANDLES, MODES, WEIGHTS, Curve, Mode
+from anim.exchange.draft import MAX_UNIT, Draft, checked, finished
+from anim.exchange.json_write import SCHEMA, write
 from anim.exchange.lines import LIMIT
-from anim.exchange.motion import OFFSETS, Convention, EulerMotion, EulerNode, Pivots
+from anim.exchange.motion import OFFSETS, Convention, EulerMotion, Pivots
+from anim.exchange.start import start
 from anim.gltf import text
 from anim.maths import euler, quaternion
 from anim.maths.euler import Frame
 
-SCHEMA = "euler-curves/1"
-MODES = {mode.name.lower(): mode for mode in Mode}
-CURVE_KEYS = {"times", "values", "interpolation", "in_tangents", "out_tangents"}
+__all__ = ["read", "write"]
+
+CONVENTION_KEYS = ("order", "frame", "unit")
+FILE_KEYS = ("schema", *CONVENTION_KEYS, "meters_per_unit", "nodes")
+TURNS = ("pre_rotation", "post_rotation")
+NODE_KEYS = ("name", "parent", *CONVENTION_KEYS, "translation", "rotation", "scale", *TURNS, *OFFSETS, "curves")
+CURVE_KEYS = ("times", "values", "interpolation", *HANDLES)
 
 
 def read(data: bytes, options: Stated) -> EulerMotion:
@@ -57,43 +67,45 @@ def read(data: bytes, options: Stated) -> EulerMotion:
     options: what the command line says about the convention. Raises FormatError with the place.
     """
     content = text.parse(data)
+    if "asset" in content and "schema" not in content:
+        raise FormatError(f"is a glTF already (expected a JSON of curves, schema '{SCHEMA}')")
     if content.get("schema") != SCHEMA:
         raise FormatError(f"schema is {content.get('schema')!r} (expected '{SCHEMA}')")
+    _check_keys(content, FILE_KEYS, "")
     said = agreed(stated(content, ""), options)
     nodes = content.get("nodes")
     if not isinstance(nodes, list) or not nodes:
         raise FormatError("has no nodes")
+    later, notes = start(_times(nodes))
     drafts, names = [], set[str]()
     for i, node in enumerate(nodes):
         where = f"nodes[{i}]"
-        draft = _draft(node, said, where)
+        draft = _draft(node, said, later, where)
         if draft.name in names:
             raise FormatError(f"a second node '{draft.name}'", where=where)
         names.add(draft.name)
         drafts.append(draft)
     unit = content.get("meters_per_unit", 1.0)
-    if not isinstance(unit, int | float) or not 0 < unit < 1e9:
+    if type(unit) not in (int, float) or not 0 < unit < MAX_UNIT:
         raise FormatError(f"meters_per_unit is {unit!r} (expected a number above 0)")
     finished_nodes, nested = finished(drafts, float(unit))
-    return EulerMotion(finished_nodes, nested=nested)
+    return EulerMotion(finished_nodes, nested=nested, notes=notes)
 
 
-def write(motion: EulerMotion, convention: Convention) -> bytes:
-    """Return the motion as a JSON of curves, see above; the convention is that of its nodes, with the unit to use."""
-    nodes = [_described(node, motion, convention) for node in motion.nodes]
-    content = {
-        "schema": SCHEMA,
-        "order": convention.order,
-        "frame": str(convention.frame),
-        "unit": str(convention.unit),
-        "nodes": nodes,
-    }
-    return text.dump(content, indent=1) + b"\n"
+def _times(nodes: list[Any]) -> Iterator[float]:
+    """All key times that are numbers; what else stands there is told later."""
+    for node in nodes:
+        curves = node.get("curves") if isinstance(node, dict) else None
+        for about in curves.values() if isinstance(curves, dict) else ():
+            times = about.get("times") if isinstance(about, dict) else None
+            if isinstance(times, list):
+                yield from (time for time in times if type(time) in (int, float) and abs(time) <= LIMIT)
 
 
-def _draft(node: Any, said: Stated, where: str) -> Draft:
+def _draft(node: Any, said: Stated, later: float, where: str) -> Draft:
     if not isinstance(node, dict) or not isinstance(node.get("name"), str) or not node["name"]:
         raise FormatError("has no name", where=where)
+    _check_keys(node, NODE_KEYS, where)
     parent = node.get("parent")
     if parent is not None and not isinstance(parent, str):
         raise FormatError(f"parent is {parent!r} (expected a name)", where=where)
@@ -102,7 +114,7 @@ def _draft(node: Any, said: Stated, where: str) -> Draft:
     draft.translation = _numbers(node, "translation", (3,), np.zeros(3), where)
     draft.angles = _numbers(node, "rotation", (3,), np.zeros(3), where)
     draft.scale = _numbers(node, "scale", (3,), np.ones(3), where)
-    if any(key in node for key in (*OFFSETS, "pre_rotation", "post_rotation")):
+    if any(key in node for key in (*OFFSETS, *TURNS)):
         draft.pivots = _pivots(node, convention, where)
     curves = node.get("curves", {})
     if not isinstance(curves, dict):
@@ -112,7 +124,7 @@ def _draft(node: Any, said: Stated, where: str) -> Draft:
         try:
             kind, _, axis = channel.partition(".")
             slot = draft.place(kind, axis)
-            checked(draft, slot, lambda about=about, at=at: _curve(about, at))
+            checked(draft, slot, partial(_curve, about, later, at))
         except FormatError as error:
             raise (error if error.where.startswith(at) else error.at(at)) from None
     return draft
@@ -120,7 +132,7 @@ def _draft(node: Any, said: Stated, where: str) -> Draft:
 
 def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivots:
     turns = {}
-    for key in ("pre_rotation", "post_rotation"):
+    for key in TURNS:
         given = _numbers(node, key, (3, 4), np.zeros(3), where)
         if len(given) == 4:
             if not given.any():
@@ -132,11 +144,14 @@ def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivo
     return Pivots(**turns, **offsets)
 
 
-def _curve(about: Any, where: str) -> Curve:
-    if not isinstance(about, dict) or not CURVE_KEYS >= about.keys() >= {"times", "values"}:
-        raise FormatError(f"expected an object of {', '.join(sorted(CURVE_KEYS))}; times and values must be there")
+def _curve(about: Any, later: float, where: str) -> Curve:
+    if not isinstance(about, dict) or not about.keys() >= {"times", "values"}:
+        raise FormatError("expected an object with times and values")
+    _check_keys(about, CURVE_KEYS, where)
     times = _numbers(about, "times", None, np.zeros(0), where)
     count = len(times)
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
+        raise FormatError(f"times not increasing at key {k} ({times[k]:g} s after {times[k - 1]:g} s)")
     values = _numbers(about, "values", (count,), np.zeros(0), where)
     given = about.get("interpolation", "linear")
     words = given if isinstance(given, list) else [given] * count
@@ -151,7 +166,17 @@ def _curve(about: Any, where: str) -> Curve:
             if key not in about:
                 raise FormatError(f"a cubic curve lacks {key}")
             tangents[i] = _numbers(about, key, (count,), np.zeros(0), where)
-    return Curve(times, values, modes, *tangents)
+    weights = [_numbers(about, key, (count,), np.zeros(0), where) if key in about else None for key in WEIGHTS]
+    return Curve(times + later, values, modes, *tangents, *weights)
+
+
+def _check_keys(about: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    """Refuse a key that is none: what is misspelled would be left out in silence."""
+    for key in about:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            help = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+            raise FormatError(f"unknown key '{key}'", where=where, help=help)
 
 
 def _numbers(
@@ -167,37 +192,3 @@ def _numbers(
     if not all(-LIMIT <= x <= LIMIT for x in given):
         raise FormatError(f"{key} holds a number beyond {LIMIT:g}", where=where)
     return np.array(given, np.float64)
-
-
-def _described(node: EulerNode, motion: EulerMotion, convention: Convention) -> dict[str, Any]:
-    about: dict[str, Any] = {"name": node.name}
-    if node.parent >= 0:
-        about["parent"] = motion.nodes[node.parent].name
-    about["translation"] = _short(node.translation)
-    about["rotation"] = _short(node.angles / convention.unit.radians)
-    about["scale"] = _short(node.scale)
-    curves: dict[str, Any] = {}
-    for axis, curve in sorted(node.moves.items()):
-        curves[f"translation.{'xyz'[axis]}"] = _curve_json(curve)
-    for axis_name, turn in zip(axis_names(node.order), node.rotation, strict=True):
-        if turn is not None:
-            curves[f"rotation.{axis_name}"] = _curve_json(turn.scaled(1 / convention.unit.radians))
-    for axis, curve in sorted(node.scales.items()):
-        curves[f"scale.{'xyz'[axis]}"] = _curve_json(curve)
-    return {**about, "curves": curves} if curves else about
-
-
-def _curve_json(curve: Curve) -> dict[str, Any]:
-    about: dict[str, Any] = {"times": _short(curve.times), "values": _short(curve.values)}
-    if (curve.modes != Mode.LINEAR).any():
-        words = [Mode(mode).name.lower() for mode in curve.modes.tolist()]
-        about["interpolation"] = words[0] if len(set(words)) == 1 else words
-    if curve.in_tangents is not None and curve.out_tangents is not None:
-        about |= {"in_tangents": _short(curve.in_tangents), "out_tangents": _short(curve.out_tangents)}
-    return about
-
-
-def _short(values: Floats) -> list[float]:
-    """Numbers with ten digits behind the point: far below float32, without the noise of binary fractions."""
-    rounded: list[float] = (np.round(values, 10) + 0.0).tolist()
-    return rounded

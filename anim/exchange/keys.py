@@ -59,17 +59,27 @@ def keys(path: Path, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats
 
 
 def _followed(path: Path, knots: Floats, tolerance: float) -> Floats:
-    a, b = _split(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL))
-    found = [knots]
+    starts, _ = _split(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL))
+    return refined(np.append(starts, knots[-1]), lambda a, b: _wanted(path, a, b, tolerance))
+
+
+def refined(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floats:
+    """Return times (K,) and more between them, until no piece wants to be split.
+
+    times: (T,) float32-exact. wanted: how many pieces (B,), up to MOST_PIECES, those from a to b (B,) should become;
+    1 where one is good. Raises RangeError for over two million keys.
+    """
+    found, a, b = [times], times[:-1], times[1:]
     for _ in range(ROUNDS):
-        found.append(a)
-        pieces = _wanted(path, a, b, tolerance)
-        again: Bools = (pieces > 1) & (_middle(a, b) > a) & (_middle(a, b) < b)
+        pieces = wanted(a, b)
+        middle = _stored((a + b) / 2)
+        again: Bools = (pieces > 1) & (middle > a) & (middle < b)
         if not again.any():
             break
         if pieces[again].sum() + sum(map(len, found)) > MAX_KEYS:
             raise RangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
         a, b = _split(a[again], b[again], pieces[again])
+        found.append(a)
     return sorted_unique(np.concatenate(found))
 
 
@@ -95,7 +105,7 @@ def _wanted(path: Path, a: Floats, b: Floats, tolerance: float) -> Ints:
 
 
 def _split(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]:
-    """Ends of all pieces, evenly split at times that float32 holds; pieces of no length are left out."""
+    """The ends (B,) of all pieces from a to b, evenly split at times that float32 holds; none has no length."""
     counts = np.maximum(pieces, 1)
     if counts.sum() > MAX_KEYS:
         raise RangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")
@@ -108,10 +118,6 @@ def _split(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]
     ends = np.where(last, b[piece], _stored(a[piece] + (step + 1) * length))
     some = ends > starts
     return starts[some], ends[some]
-
-
-def _middle(a: Floats, b: Floats) -> Floats:
-    return _stored((a + b) / 2)
 
 
 def _stored(times: Floats) -> Floats:

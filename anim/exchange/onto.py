@@ -49,7 +49,11 @@ def onto(
         of_target=sorted(joints) if joints and nested else list(range(len(target.skeleton))),
     )
     if not matching.pairs:
-        raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
+        first = source.skeleton.names[0], target.skeleton.names[min(joints, default=0)]
+        raise NotFoundError(
+            "no joint of the motion is one of the character",
+            help=f"pair them in an --alias file, in lines such as '{first[0]},{first[1]}'",
+        )
     if nested:
         done = retarget(source, target, matching, floor=floor, rest_at=rest_at)
         return Onto(done.clip, matching, done.scale, done.lowered)

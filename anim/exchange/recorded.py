@@ -66,13 +66,7 @@ class StoredTimes:
         _, times, kept = found
         if len(kept) == len(curve.times):
             return replace(curve, times=times)
-        return Curve(
-            times,
-            curve.values[kept],
-            curve.modes[kept],
-            None if curve.in_tangents is None else curve.in_tangents[kept],
-            None if curve.out_tangents is None else curve.out_tangents[kept],
-        )
+        return curve.kept(kept, times)
 
 
 def _is_recorded(curve: Curve, first: Curve) -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.match import Matching
+from anim.exchange.motion import NO_TURN
 from anim.exchange.roles import PERSON
 from anim.maths import quaternion
 
@@ -64,10 +65,10 @@ def corrections(source: RestPose, target: RestPose, matching: Matching, turn: Fl
             goal = quaternion.rotate(turn, source.positions[b] - source.positions[a])
             found[node] = shortest(target.positions[end] - target.positions[node], goal)
         elif person and node in _upright(matching):
-            found[node] = np.array((0.0, 0.0, 0.0, 1.0))
+            found[node] = NO_TURN
         else:
             above = _matched_above(target, node, found)
-            found[node] = found[above] if above >= 0 else np.array((0.0, 0.0, 0.0, 1.0))
+            found[node] = found[above] if above >= 0 else NO_TURN
     return found
 
 
@@ -75,7 +76,7 @@ def shortest(a: Floats, b: Floats) -> Floats:
     """Return the smallest turn (4,) that points direction a (3,) along b (3,); none where one has no length."""
     lengths = np.linalg.norm(a) * np.linalg.norm(b)
     if lengths < 1e-12:
-        return np.array((0.0, 0.0, 0.0, 1.0))
+        return NO_TURN
     axis, cosine = np.cross(a, b), float(a @ b)
     if cosine < -0.999999 * lengths:
         side = np.cross(a, (1.0, 0, 0) if abs(a[0]) < 0.9 * np.linalg.norm(a) else (0, 0, 1.0))
@@ -128,9 +129,9 @@ def _matched_above(pose: RestPose, node: int, nodes: Mapping[int, object]) -> in
     return above
 
 
-def _parents_first(pose: RestPose, nodes: object) -> list[int]:
+def _parents_first(pose: RestPose, nodes: Iterable[int]) -> list[int]:
     depth = {}
-    for node in nodes:  # type: ignore[attr-defined]
+    for node in nodes:
         at, depth[node] = node, 0
         while pose.parents[at] >= 0:
             at, depth[node] = pose.parents[at], depth[node] + 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.maths import matrix
 from anim.model import Mesh, Skeleton, Skin
 from anim.sampling import rest, world_matrices
 
@@ -38,7 +39,7 @@ def sticks(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[Mesh
     faces = np.arange(len(corners)).reshape(-1, 3)
     none = np.zeros((0, len(corners), 3))
     mesh = Mesh(NAME, corners, faces, holders, weights, none, np.zeros(0), normals)
-    return mesh, Skin(joints, np.array([_inverse(world[node]) for node in joints.tolist()]))
+    return mesh, Skin(joints, matrix.inverse(world[joints]))
 
 
 def _lines(skeleton: Skeleton, places: Floats, ends: frozenset[int], size: float) -> list[tuple[Floats, Floats, int]]:
@@ -73,9 +74,3 @@ def _bipyramid(start: Floats, end: Floats, size: float) -> Floats:
 def _normals(triangles: Floats) -> Floats:
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
-
-
-def _inverse(world: Floats) -> Floats:
-    whole = np.eye(4)
-    whole[:3] = world
-    return np.asarray(np.linalg.inv(whole)[:3])

@@ -8,9 +8,10 @@ import numpy as np
 
 from anim.arrays import Floats, sorted_unique
 from anim.errors import RangeError, UnsupportedError
-from anim.exchange.curve import Curve, Mode, uniform_modes
-from anim.exchange.motion import EulerMotion, EulerNode
-from anim.exchange.to_euler import FILE_LOCK, unique_names
+from anim.exchange.curve import Curve, linear
+from anim.exchange.motion import NO_TURN, ZERO, EulerMotion, EulerNode
+from anim.exchange.orders import Orders
+from anim.exchange.to_euler import FILE_LOCK, left_out, unique_names, what_of
 from anim.exchange.turns import world_rotations
 from anim.maths import euler, quaternion
 from anim.maths.euler import Frame
@@ -28,7 +29,7 @@ def to_bvh(
     skeleton: Skeleton,
     clip: Clip,
     *,
-    order: str,
+    order: str | Orders,
     fps: float | None = None,
     joints: Collection[int] = (),
     meters_per_unit: float = 1.0,
@@ -36,37 +37,41 @@ def to_bvh(
     """Return the clip with angles seen from the rest pose along world axes, so that all zero is the rest pose.
 
     Every joint stands where it stands in the glTF, at every frame: joints that move in their parent, and roots, have
-    translation curves too. Frame k lies at the clip's start + k / fps, the last at or behind its end.
-    fps: None for the grid of the keys. Raises RangeError where they have none.
+    translation curves too; what BVH has no place for is in the notes. Frame k lies at the clip's start + k / fps, the
+    last at or behind its end.
+    order: one of the twelve for all joints, or `Orders`. fps: None for the grid of the keys. Raises RangeError where
+    they have none.
     joints: nodes to write, with what lies between them; empty for all. Lengths are divided by meters_per_unit.
     """
-    shown, times = _frames(clip, fps)
-    chosen = _chosen(skeleton, clip, joints)
+    orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
+    chosen, names = _chosen(skeleton, clip, joints), unique_names(skeleton)
     if not chosen:
         raise UnsupportedError("there is no node to write")
+    orders.check([names[node] for node in chosen])
+    shown, times = _frames(clip, fps)
     moving, still = pose(skeleton, clip, times), rest(skeleton)
     places, home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
     turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
     turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
     size = float(np.ptp(home[chosen], axis=0).max()) or 1.0
     numbers = {node: i for i, node in enumerate(chosen)}
-    names = unique_names(skeleton)
     nodes = []
     for node in chosen:
         parent = _above(skeleton, node, numbers)
-        above = (np.zeros(3), turns[node][:1] * 0 + [0, 0, 0, 1], np.zeros(3))
+        above = (ZERO, NO_TURN[None], ZERO)
         if parent >= 0:
             above = (home[parent], turns[parent], places[:, parent])
         offset, turn, path = _seen_from((home[node], turns[node], places[:, node]), above)
         moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * size)
         end = parent >= 0 and not moved and _is_end(skeleton, clip, node, numbers)
-        angles = euler.continuous(turn, order=order, frame=Frame.INTRINSIC, lock=FILE_LOCK)
+        own = orders.of(names[node], turn)
+        angles = euler.continuous(turn, order=own, frame=Frame.INTRINSIC, lock=FILE_LOCK)
         nodes.append(
             EulerNode(
                 names[node],
                 numbers.get(parent, -1),
                 offset / meters_per_unit,
-                order,
+                own,
                 Frame.INTRINSIC,
                 np.zeros(3),
                 (None, None, None) if end else tuple(_curves(shown, angles)),
@@ -74,7 +79,8 @@ def to_bvh(
                 end=end,
             )
         )
-    return EulerMotion(tuple(nodes), sampled=True)
+    lost = [what_of(track, names) for track in clip.tracks if track.path not in ("translation", "rotation")]
+    return EulerMotion(tuple(nodes), sampled=True, notes=(left_out(lost),) if lost else ())
 
 
 Placed = tuple[Floats, Floats, Floats]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
@@ -137,5 +143,4 @@ def _above(skeleton: Skeleton, node: int, among: Collection[int]) -> int:
 
 
 def _curves(times: Floats, values: Floats) -> list[Curve]:
-    modes = uniform_modes(len(times), Mode.LINEAR)
-    return [Curve(times, column, modes) for column in values.T]
+    return [linear(times, column) for column in values.T]

@@ -43,6 +43,18 @@ def apply(matrix: Floats, points: Floats) -> Floats:
     return moved
 
 
+def inverse(matrix: Floats) -> Floats:
+    """Return the inverses (..., 3, 4) of affine matrices (..., 3, 4).
+
+    Of one that flattens space, as a scale of 0 does, the pseudo-inverse: what it flattened stays flat.
+    """
+    try:
+        back = np.linalg.inv(matrix[..., :3])
+    except np.linalg.LinAlgError:
+        back = np.linalg.pinv(matrix[..., :3])
+    return np.concatenate((back, -(back @ matrix[..., 3:])), axis=-1)
+
+
 def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return translation (..., 3), unit quaternion (..., 4), scale (..., 3) and shear (...) of matrices (..., 3, 4).
 

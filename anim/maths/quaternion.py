@@ -42,7 +42,7 @@ def conjugate(q: Floats) -> Floats:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Return the scalar product (...) of quaternions (..., 4): the cosine of half the angle between, up to sign."""
-    return np.asarray((a * b).sum(axis=-1))
+    return _sum(a * b)
 
 
 def normalize(q: Floats) -> Floats:
@@ -187,4 +187,12 @@ def _near(a: Floats, b: Floats) -> Floats:
 
 
 def _length(vectors: Floats) -> Floats:
-    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))
+    return np.asarray(np.sqrt(_sum(vectors * vectors)))
+
+
+def _sum(products: Floats) -> Floats:
+    """Return the sums (...) over the last axis: numpy's own takes three times as long where that one is short."""
+    total = products[..., 0] + products[..., 1]
+    for i in range(2, products.shape[-1]):
+        total = total + products[..., i]
+    return np.asarray(total)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from anim.errors import FormatError
-from anim.exchange import aliases, formats
+from anim.errors import FormatError, RangeError
+from anim.exchange import formats
 from anim.exchange.bvh import BvhPosition
 from anim.exchange.convention import Stated
 from anim.exchange.formats import Reading
@@ -20,19 +19,19 @@ from anim.exchange.from_euler import from_euler as converted_from
 from anim.exchange.gimbal import gimbal
 from anim.exchange.local import extent, skeleton
 from anim.exchange.motion import EulerMotion, Unit, scaled, turned_up
-from anim.exchange.onto import onto as put_onto
 from anim.exchange.recorded import Keys
 from anim.exchange.retarget import Floor
 from anim.exchange.sticks import sticks
+from anim.exchange.trees import trees
 from anim.exchange.units import guess_unit
-from anim.gltf import author, read
-from anim.gltf.document import Document
-from anim.maths.euler import ORDERS, Frame
+from anim.gltf import author
+from anim.maths.euler import Frame, check_order
 from cli import conversion, options, report, streams, units
+from cli.casting import Casting, cast, pairs, renamed
 from cli.conversion import Conversion
-from cli.errors import CheckError, UsageError
+from cli.errors import UsageError
 
-Order = StrEnum("Order", {order: order for order in ORDERS})  # type: ignore[misc]
+TALL = 10.0  # m; a skeleton that is taller is hardly in meters
 
 
 class Up(StrEnum):
@@ -62,7 +61,10 @@ def from_euler(
     ] = "-",
     output: options.Output = "-",
     *,
-    order: Annotated[Order | None, typer.Option("--order", help="Order of the axes as written (CSV, JSON).")] = None,
+    order: Annotated[
+        str | None,
+        typer.Option("--order", metavar="ORDER", help="Of the axes as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
+    ] = None,
     frame: Annotated[
         Frame | None, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = None,
@@ -72,7 +74,8 @@ def from_euler(
         str, typer.Option("--tolerance", metavar="ANGLE", help="The most that slerp may leave the Euler motion.")
     ] = "0.05deg",
     scale: Annotated[
-        float | None, typer.Option("--scale", metavar="N", help="Meters per unit of length; for BVH guessed.")
+        float | None,
+        typer.Option("--scale", metavar="N", help="Meters per unit, times the file's; for BVH guessed."),
     ] = None,
     up: Annotated[Up, typer.Option("--up", help="Axis of the source that points up.")] = Up.Y,
     bvh_position: Annotated[
@@ -105,15 +108,19 @@ def from_euler(
     Every axis is evaluated on its own keys, the axes are combined as --order and --frame say, and keys are placed so
     that slerp follows the motion between them too. A BVH says its order itself, and keeps its frames. Without --onto a
     skeleton is made; with it, joints are matched by name and the motion is put on the character, with regard to both
-    rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints.
+    rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints. README shows
+    what CSV and JSON look like.
     """
     began = time.perf_counter()
     voice = report.Voice(quiet, verbose)
     limit = units.angle(tolerance, "--tolerance")
-    _check(output, format, scale, onto, mesh, dry_run=dry_run)
+    _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
+    if onto is None and (alias, fail_unmatched, rest_at, floor) != (None, None, None, Floor.CONTACT):
+        raise UsageError("--alias, --fail-unmatched, --floor and --rest-at are about a character (--onto names it)")
+    stated = Stated(_order(order), frame, unit)
     with streams.content(source) as (data, called):
         kind = formats.of_path(source) or formats.of_content(data.tobytes())
-        motion = kind.read(data.tobytes(), Reading(Stated(order and str(order), frame, unit), bvh_position))
+        motion = kind.read(data.tobytes(), Reading(stated, bvh_position))
         motion = turned_up(motion) if up is Up.Z else motion
         meters, words = _meters_per_unit(motion, scale, known=kind.has_units)
         clip = name or (Path(source).stem if source != streams.PIPE else "motion")
@@ -123,12 +130,15 @@ def from_euler(
     rows = () if quiet and format is Format.TEXT else gimbal(motion, converted.clip)
     made = Conversion(kind.suffix[1:], motion, converted, meters, words, rows)
     if onto is None:
-        bodies = [sticks(converted.skeleton, converted.ends)] if mesh is Mesh.STICKS else []
-        document = author.author(converted.skeleton, [converted.clip], bodies)
+        bones = converted.skeleton
+        bodies = trees(bones, *sticks(bones, converted.ends)) if mesh is Mesh.STICKS else []
+        document = author.author(bones, [converted.clip], bodies)
         before, size = len(data), streams.write(document, output, None, dry_run=dry_run)
     else:
         with streams.source(onto) as character:
-            made, document = _onto(made, character.document, _aliases(alias), floor, rest_at, fail_unmatched)
+            made = made if name else renamed(made, character.document)
+            casting = Casting(pairs(alias), floor, rest_at, fail_unmatched)
+            made, document = cast(made, character.document, casting)
             before, size = character.size, streams.write(document, output, character.folder, dry_run=dry_run)
     if format is Format.JSON:
         streams.write_text(conversion.as_json(made))
@@ -139,12 +149,23 @@ def from_euler(
     voice.say(f"{', '.join(parts)}, {time.perf_counter() - began:.1f} s{ending}")
 
 
-def _check(output: str, format: Format, scale: float | None, onto: str | None, mesh: Mesh, *, dry_run: bool) -> None:
+def _order(order: str | None) -> str | None:
+    try:
+        return None if order is None else check_order(order)
+    except RangeError as error:
+        raise UsageError(f"--{error.problem}") from None
+
+
+def _check(
+    source: str, output: str, format: Format, scale: float | None, onto: str | None, mesh: Mesh, *, dry_run: bool
+) -> None:
     """Refuse at once what can't be done."""
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
     if onto is not None and mesh is not Mesh.NONE:
         raise UsageError("--mesh makes a body for a new skeleton (--onto has one)")
+    if source == onto == streams.PIPE:
+        raise UsageError("SOURCE and --onto can't both be stdin")
     if format is Format.JSON and output == streams.PIPE and not dry_run:
         raise UsageError("--format json and the GLB both want stdout", help="name an output file, or add --dry-run")
     if not dry_run:
@@ -156,34 +177,10 @@ def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -
     height = extent(skeleton(motion))
     if scale is not None:
         return scale, f"{scale:g} m per unit (--scale): the skeleton measures {report.length(height * scale)}"
-    if known:
+    if known and height < TALL:
         return 1.0, ""
+    if known:
+        return 1.0, f"the skeleton measures {report.length(height)} (--scale 0.01 if its unit is centimeters)"
     guess = guess_unit(height)
     measures = f"the skeleton then measures {report.length(guess.height)}"
     return guess.scale, f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
-
-
-def _aliases(path: str | None) -> dict[str, str]:
-    if path is None:
-        return {}
-    with streams.content(path) as (data, _):
-        return aliases.read(data.tobytes())
-
-
-def _onto(
-    made: Conversion,
-    document: Document,
-    names: dict[str, str],
-    floor: Floor,
-    rest_at: float | None,
-    fail_unmatched: int | None,
-) -> tuple[Conversion, Document]:
-    scene = read.scene(document)
-    done = put_onto(made.converted, scene, aliases=names, nested=made.motion.nested, floor=floor, rest_at=rest_at)
-    left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
-    if fail_unmatched is not None and len(left) > fail_unmatched:
-        raise CheckError(
-            f"{len(left)} joints without a partner (limit {fail_unmatched}): {conversion.listed(left)}",
-            help="name partners in an --alias file; an empty target leaves a joint out",
-        )
-    return replace(made, onto=done, character=scene.skeleton), author.add_clips(document, [done.clip])

@@ -9,22 +9,22 @@ from typing import Annotated
 
 import typer
 
-from anim.errors import NotFoundError
+from anim.errors import NotFoundError, RangeError
 from anim.exchange.formats import TRACK_FORMATS, TrackFormat, of_path
 from anim.exchange.motion import Convention, EulerMotion, Unit
+from anim.exchange.orders import BEST, USUAL, Orders, parse
 from anim.exchange.to_bvh import to_bvh
 from anim.exchange.to_euler import to_euler as curves_of
 from anim.gltf import read
 from anim.gltf.document import Document, items
-from anim.maths.euler import ORDERS, Frame
+from anim.maths.euler import Frame
 from anim.model import Clip
 from anim.ops.selection import Selection
 from cli import options, report, streams, units
 from cli.errors import UsageError
 
-Order = StrEnum("Order", {order: order for order in ORDERS})  # type: ignore[misc]
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
-ZXY = Order("ZXY")
+NOTABLE = math.radians(0.5)  # that straight curves may leave the motion by before a way out is named
 CENTIMETERS = 0.01  # m per unit of a BVH, unless told
 
 
@@ -34,7 +34,14 @@ def to_euler(
         str, typer.Argument(metavar="OUT", help="A .bvh, .csv or .json file, '-' for stdout.", show_default=False)
     ] = "-",
     *,
-    order: Annotated[Order, typer.Option("--order", help="Order of the axes as written.")] = ZXY,
+    order: Annotated[
+        str,
+        typer.Option(
+            "--order",
+            metavar="ORDER",
+            help="Of the axes as written: XYZ …, auto (each joint's farthest from lock), or 'hips=ZXY,*arm=YZX,auto'.",
+        ),
+    ] = USUAL,
     frame: Annotated[
         Frame, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = Frame.INTRINSIC,
@@ -46,7 +53,9 @@ def to_euler(
         str | None,
         typer.Option("--tolerance", metavar="ANGLE", help="CSV, JSON: add keys where curves leave the motion by more."),
     ] = None,
-    scale: Annotated[float, typer.Option("--scale", metavar="N", help="BVH: meters per unit of length.")] = CENTIMETERS,
+    scale: Annotated[
+        float | None, typer.Option("--scale", metavar="N", help="BVH: meters per unit of length, else 0.01.")
+    ] = None,
     format: Annotated[
         Format | None, typer.Option("--format", help="Default: by OUT's ending; bvh for '-'.", show_default=False)
     ] = None,
@@ -64,16 +73,19 @@ def to_euler(
     voice = report.Voice(quiet)
     kind = _kind(output, format)
     limit = None if tolerance is None else units.angle(tolerance, "--tolerance")
+    orders = _orders(order, kind)
     _check(kind, unit, frame, scale, limit)
     if output != streams.PIPE and not dry_run:
         streams.check_file(output)
-    convention = Convention(str(order), frame, unit)
+    convention = Convention(USUAL if orders.otherwise == BEST else orders.otherwise, frame, unit)
     with streams.source(input) as source:
         chosen = _only(read.clips(source.document), clip)
-        motion, words = _motion(source.document, chosen, kind, convention, fps, limit, scale)
+        motion, words = _motion(source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS)
         data = kind.write(motion, convention)
     if not dry_run:
         streams.write_text(data.decode(), output)
+    for note in motion.notes:
+        voice.say(f"note: {note}")
     name = source.name if output == streams.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     voice.say(
@@ -92,10 +104,22 @@ def _kind(output: str, format: Format | None) -> TrackFormat:
     return found or TRACK_FORMATS["bvh"]
 
 
-def _check(kind: TrackFormat, unit: Unit, frame: Frame, scale: float, limit: float | None) -> None:
-    if not (math.isfinite(scale) and scale > 0):
+def _orders(text: str, kind: TrackFormat) -> Orders:
+    try:
+        orders = parse(text)
+    except RangeError as error:
+        raise UsageError(f"--{error.problem}") from None
+    if not orders.is_one and kind is TRACK_FORMATS["csv"]:
+        raise UsageError("a CSV has one order for all nodes", help="write .json or .bvh")
+    return orders
+
+
+def _check(kind: TrackFormat, unit: Unit, frame: Frame, scale: float | None, limit: float | None) -> None:
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
     if kind is not TRACK_FORMATS["bvh"]:
+        if scale is not None:
+            raise UsageError("--scale is the unit of a BVH (CSV and JSON are in meters)")
         return
     if unit is not Unit.DEG or frame is not Frame.INTRINSIC:
         raise UsageError(
@@ -120,7 +144,8 @@ def _motion(
     document: Document,
     clip: Clip,
     kind: TrackFormat,
-    convention: Convention,
+    orders: Orders,
+    frame: Frame,
     fps: float | None,
     limit: float | None,
     scale: float,
@@ -129,18 +154,18 @@ def _motion(
     skeleton = read.skeleton(document)
     if kind is TRACK_FORMATS["bvh"]:
         joints = {joint for skin in items(document.json, "skins") for joint in skin["joints"]}
-        return to_bvh(skeleton, clip, order=convention.order, fps=fps, joints=joints, meters_per_unit=scale), ""
+        return to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale), ""
     holders = {i for i, node in enumerate(items(document.json, "nodes")) if "skin" in node}
     found = curves_of(
         skeleton,
         clip,
-        order=convention.order,
-        frame=convention.frame,
+        order=orders,
+        frame=frame,
         fps=fps,
         tolerance=limit,
         without=holders,
     )
     words = f"between keys off by up to {math.degrees(found.deviation):.2g}°, " if found.deviation else ""
-    if found.left_out:
-        words += f"left out: {found.left_out[0]}{', …' if len(found.left_out) > 1 else ''}, "
+    if limit is None and found.deviation > NOTABLE:
+        words = f"{words[:-2]} (--tolerance adds keys), "
     return found.motion, words

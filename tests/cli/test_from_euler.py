@@ -59,6 +59,19 @@ def test_a_bvh_through_a_pipe(call: Call, mesh: str) -> None:
     assert document.json["asset"]["generator"].startswith("gltf-anim")
 
 
+def test_two_figures_in_a_bvh(call: Call) -> None:
+    """One skin for both would have no common root, which no validator takes."""
+    head, _, body = SMALL.decode().partition("MOTION")
+    roots = head.partition("\n")[2]
+    rows = "\n".join(f"{row} {row}" for row in body.strip().splitlines()[2:])
+    text = f"HIERARCHY\n{roots}{roots.replace('hip', 'pelvis')}MOTION\nFrames: 2\nFrame Time: 0.1\n{rows}\n"
+    run = call("from-euler", "-", "-", "--mesh", "sticks", stdin=text.encode())
+    document = opened(run.product())
+    _valid(run.out)
+    assert [skin["joints"] for skin in document.json["skins"]] == [[0, 1], [3, 4]]
+    assert "names that appear twice got numbers: knee.2" in run.err
+
+
 def test_it_says_what_it_guessed(call: Call) -> None:
     err = call("from-euler", "-", "-", stdin=SMALL).err
     assert "frame time 0.033333 s is taken for 1/30 s" in err
@@ -72,10 +85,34 @@ def test_scale_and_up(call: Call) -> None:
     np.testing.assert_allclose(read.skeleton(document).translation[1], (0, 0, 42.5), atol=1e-6)
 
 
+def test_a_giant_is_told(call: Call) -> None:
+    giant = b"#node,hips,,0,95,0\n#node,head,hips,0,80,0\n" + CURVES.replace(b"door", b"head")
+    assert "scale: the skeleton measures 80 m (--scale 0.01" in call("from-euler", "-", "-", *XYZ, stdin=giant).err
+
+
 def test_csv_keys_follow_the_motion(call: Call) -> None:
     run = call("from-euler", "-", "-", *XYZ, "--tolerance", "0.1deg", stdin=CURVES)
     _valid(run.out)
     assert 3 < len(read.clips(opened(run.product()))[0].tracks[0].times) <= 17
+
+
+def test_the_range_of_angles_shows_a_wrong_unit(call: Call) -> None:
+    assert "angles: 0° to 90°" in call("from-euler", "-", "-", *XYZ, stdin=CURVES).err
+    assert "angles: 0° to 5157°" in call("from-euler", "-", "-", *XYZ[:-1], "rad", stdin=CURVES).err
+    assert "angles:" not in call("from-euler", "-", "-", stdin=SMALL).err
+
+
+def test_a_body_without_a_size(call: Call) -> None:
+    """Hidden things have a scale of 0, whose matrix has no inverse."""
+    flat = b"#node,door,,0,0,0,0,0,0,0,1,1\n#node,knob,door,1,0,0\n" + CURVES
+    _valid(call("from-euler", "-", "-", *XYZ, "--mesh", "sticks", stdin=flat).product())
+
+
+def test_an_order_in_small_letters_and_keys_before_zero(call: Call) -> None:
+    early = CURVES.replace(b"\n0,", b"\n-0.04,")
+    run = call("from-euler", "-", "-", "--order", "xyz", *XYZ[2:], stdin=early)
+    assert "note: the first key is at -0.04 s: all are moved by 0.04 s, to begin at 0" in run.err
+    assert read.clips(opened(run.product()))[0].end == pytest.approx(1.04)
 
 
 def test_a_gltf_with_its_bin(call: Call, tmp_path: Path) -> None:
@@ -100,6 +137,23 @@ def test_onto_a_character(call: Call, asset: Find, fixture: Fixture) -> None:
     assert [clip.name for clip in read.clips(document)] == ["walk", "wave", "jump", "cmu_01_01"]
     assert "onto: 21 of 31 joints matched; not: 'LHipJoint', 'RHipJoint'" in run.err
     assert "LeftUpLeg → left_upper_leg" in run.err
+
+
+def test_a_name_that_is_taken_gets_a_number(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    (tmp_path / "walk.bvh").write_bytes(SMALL)
+    (tmp_path / "names.csv").write_text("hip,hips\n")
+    onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
+    run = call("from-euler", *onto)
+    assert [clip.name for clip in read.clips(opened(run.product()))] == ["walk", "wave", "jump", "walk 2"]
+    assert "note: the character has a clip 'walk': this one is called 'walk 2'" in run.err
+    told = call("from-euler", *onto, "--name", "walk")
+    assert [clip.name for clip in read.clips(opened(told.product()))] == ["walk", "wave", "jump", "walk"]
+
+
+def test_strangers_are_shown_how_to_pair(call: Call, asset: Find) -> None:
+    run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", asset("CesiumMan.glb"))
+    assert "no joint of the motion is one of the character" in refusal(run, 5)
+    assert help_line(run) == "pair them in an --alias file, in lines such as 'Hips,Skeleton_torso_joint_1'"
 
 
 def test_too_many_strangers_fail(call: Call, asset: Find, fixture: Fixture) -> None:
@@ -137,6 +191,14 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         ((), SMALL.replace(b"Frames: 2", b"Frames: 1000000000"), 3, "line 20: the file holds 2 of 1000000000"),
         ((), SMALL[:200], 3, "line "),
         ((), b"", 3, "stdin: is empty"),
+        ((), b"glTF\2\0\0\0", 3, "stdin: is a glTF already"),
+        ((), b'{"asset": {"version": "2.0"}}', 3, "stdin: is a glTF already"),
+        (
+            (),
+            SMALL[: SMALL.index(b"Zrot") + 4],
+            3,
+            "line 5: unknown channel 'Zrot' (expected Xposition … Zrotation; truncated?)",
+        ),
         ((), b"\x89PNG\r\n", 3, "stdin: starts with"),
         (XYZ, SMALL, 2, "a BVH says the order of every joint itself"),
         ((), CURVES, 2, "nobody says the order"),
@@ -145,13 +207,22 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         (("--tolerance", "0"), SMALL, 2, "--tolerance is '0'"),
         (("--tolerance", "1mm"), SMALL, 2, "--tolerance is '1mm'"),
         (("--scale", "0"), SMALL, 2, "--scale is 0"),
+        (("--fail-unmatched", "0"), SMALL, 2, "are about a character (--onto names it)"),
+        (("--rest-at", "0"), SMALL, 2, "are about a character (--onto names it)"),
         (("--format", "json"), SMALL, 2, "both want stdout"),
+        (("--onto", "-"), SMALL, 2, "SOURCE and --onto can't both be stdin"),
+        ((*XYZ, "--bvh-position", "add"), CURVES, 2, "--bvh-position is about BVH"),
         (("--onto", "nobody.glb"), SMALL, 3, "nobody.glb: can't be read"),
-        (("--order", "XXY"), SMALL, 2, "from-euler"),
+        (("--order", "XXY"), SMALL, 2, "--order is 'XXY' (expected one of XYZ,"),
     ],
 )
 def test_refusals(call: Call, args: tuple[str, ...], data: bytes, code: int, words: str) -> None:
     assert words in refusal(call("from-euler", "-", "-", *args, stdin=data), code)
+
+
+def test_a_rest_pose_must_be_in_the_motion(call: Call, fixture: Fixture, asset: Find) -> None:
+    run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", fixture("biped"), "--rest-at", "9")
+    assert "rest at 9 s (the motion runs from 0 to 0.03333 s)" in refusal(run, 2)
 
 
 def test_sticks_and_a_character_exclude_each_other(call: Call, fixture: Fixture) -> None:

@@ -35,6 +35,18 @@ def test_bvh_on_stdout(call: Call, fixture: Fixture) -> None:
     assert motion.nodes[0].moves[1].values[0] == pytest.approx(0.93, abs=0.1)
 
 
+def test_each_joint_can_have_its_order(call: Call, fixture: Fixture) -> None:
+    walk = (fixture("biped"), "--clip", "walk", "--fps", "24")
+    motion = bvh.read(call("to-euler", *walk, "--order", "hips=xzy,*leg=zyx,yxz").product())
+    orders = {node.name: node.order for node in motion.nodes}
+    assert [orders[name] for name in ("hips", "left_lower_leg", "head")] == ["XZY", "ZYX", "YXZ"]
+    auto = json.loads(call("to-euler", *walk, "--order", "auto", "--format", "json").product())
+    assert len({node.get("order", auto["order"]) for node in auto["nodes"]}) > 1
+    run = call("to-euler", *walk, "--order", "hip=XYZ")
+    assert "order 'hip=XYZ', but no node is called that" in refusal(run, 5)
+    assert help_line(run) == "did you mean 'hips'?"
+
+
 def test_a_tolerance_adds_keys(call: Call, fixture: Fixture) -> None:
     plain, fine = (
         json.loads(call("to-euler", fixture("biped"), "--clip", "wave", "--format", "json", *more).product())
@@ -58,8 +70,11 @@ def test_the_clip_must_be_one(call: Call, fixture: Fixture) -> None:
         (("--unit", "rad"), "a BVH's angles are intrinsic"),
         (("--tolerance", "1deg"), "--tolerance adds keys"),
         (("--scale", "-1"), "--scale is -1"),
+        (("--scale", "1", "--format", "csv"), "--scale is the unit of a BVH"),
         (("--fps", "0"), "fps is 0"),
         (("--format", "fbx"), "to-euler"),
+        (("--order", "XXY"), "--order is 'XXY'"),
+        (("--order", "auto", "--format", "csv"), "a CSV has one order"),
     ],
 )
 def test_refusals(call: Call, fixture: Fixture, args: tuple[str, ...], words: str) -> None:

@@ -24,11 +24,11 @@ time,hips.ty,hips.rz,"spine, lower.ry"
 1,95,90,30
 """
 
-KEYS = """node,channel,time,value,interpolation,in_tangent,out_tangent
-arm,rx,0,0,linear,,
-arm,ry,0,0,step,,
-arm,rx,1,720,cubic,0,90
-arm,rx,2,0,,-90,
+KEYS = """node,channel,time,value,interpolation,in_tangent,out_tangent,in_weight,out_weight
+arm,rx,0,0,linear,,,,
+arm,ry,0,0,step,,,,
+arm,rx,1,720,cubic,0,90,,0.5
+arm,rx,2,0,,-90,,,
 """
 
 
@@ -59,9 +59,22 @@ def test_keys_with_modes_and_tangents() -> None:
     x, y = _curve(arm.rotation[0]), _curve(arm.rotation[1])
     np.testing.assert_allclose(x.values, np.radians((0, 720, 0)))
     assert x.modes.tolist() == [Mode.LINEAR, Mode.CUBIC, Mode.LINEAR]
+    assert x.out_weights is not None
+    np.testing.assert_allclose(x.out_weights, (1 / 3, 0.5, 1 / 3))
+    assert x.in_weights is None
     assert x.in_tangents is not None
     np.testing.assert_allclose(x.in_tangents, np.radians((0, 0, -90)))
     assert y.modes.tolist() == [Mode.STEP]
+
+
+def test_keys_before_zero_come_later_all_by_as_much() -> None:
+    frames = csv.read(FRAMES.replace("\n0,90", "\n-0.25,90").encode(), NOTHING)
+    np.testing.assert_allclose(_curve(frames.nodes[0].rotation[0]).times, (0, 0.75, 1.25))
+    np.testing.assert_allclose(_curve(frames.nodes[1].rotation[2]).times, (0, 1.25))
+    keys = csv.read(KEYS.replace("arm,rx,0", "arm,rx,-2").encode(), XYZ)
+    np.testing.assert_allclose(_curve(keys.nodes[0].rotation[0]).times, (0, 3, 4))
+    np.testing.assert_allclose(_curve(keys.nodes[0].rotation[1]).times, (2,))
+    assert keys.notes == ("the first key is at -2 s: all are moved by 2 s, to begin at 0",)
 
 
 def test_proper_orders_number_their_angles() -> None:
@@ -85,6 +98,7 @@ def test_what_is_written_is_read_as_the_same(text: str) -> None:
                 np.testing.assert_allclose(b.times, a.times, atol=1e-9)
                 np.testing.assert_allclose(b.values, a.values, atol=1e-9)
                 assert a.modes.tolist() == b.modes.tolist()
+                assert (a.out_weights is None) == (b.out_weights is None)
 
 
 @pytest.mark.parametrize(
@@ -101,6 +115,24 @@ def test_the_convention_is_never_guessed(stated: Stated, problem: str) -> None:
         csv.read(KEYS.encode(), stated)
 
 
+def test_the_convention_in_a_persons_spelling() -> None:
+    """Spaces, capitals and commas in comments, "# node", and what spreadsheets save as Unicode text."""
+    loose = FRAMES.replace("order=ZXY frame=intrinsic", "Order = zxy, FRAME = Intrinsic,").replace("#node", "# node")
+    assert loose != FRAMES
+    for text in (loose.encode(), FRAMES.encode("utf-16"), FRAMES.replace("\n", "\r").encode()):
+        motion = csv.read(text, NOTHING)
+        assert [(n.name, n.parent, n.order, n.frame) for n in motion.nodes] == [
+            ("hips", -1, "ZXY", Frame.INTRINSIC),
+            ("spine, lower", 0, "ZXY", Frame.INTRINSIC),
+        ]
+        np.testing.assert_allclose(motion.nodes[1].translation, (0, 0.12, 0))
+
+
+def test_other_separators_are_named() -> None:
+    with pytest.raises(FormatError, match=r"line 1: the header is 'time;a\.rx'.*separated by commas"):
+        csv.read(b"time;a.rx\n0;1\n", XYZ)
+
+
 def test_two_conventions_are_refused() -> None:
     with pytest.raises(RangeError, match="the file says order ZXY, the options say XYZ"):
         csv.read(FRAMES.encode(), XYZ)
@@ -114,11 +146,12 @@ def test_two_conventions_are_refused() -> None:
         ("1,95", "1,nan", "line 8: hips.ty is 'nan'"),
         ("1,95", "1,x", "line 8: hips.ty is 'x'"),
         ("0.5,,45", "2,,45", "line 8: time 1 s after 2 s"),
-        ("0,90,0,0", "-1,90,0,0", "line 5: time is -1"),
         ("hips.rz", "hips.rw", "line 4: unknown channel"),
         ("hips.rz", "hips.q", "line 4: unknown channel 'q'"),
         ("hips.rz", "hips.ty", "line 4: column 'hips.ty' twice"),
-        ("time,", "tme,", "the header is"),
+        ("time,", "tme,", "line 4: the header is 'tme,"),
+        ("0.01", "0", "line 1: meters_per_unit is 0 .expected a number above 0"),
+        ("0.01", "cm", "line 1: meters_per_unit is 'cm'"),
         ("unit=deg", "unit=grad", "unit is 'grad'"),
         (",hips,0,12", ",hip,0,12", "has the parent 'hip', which is not there"),
         ("#node,hips,,", "#node,hips,hips,", "'hips' is its own ancestor"),
@@ -138,7 +171,10 @@ def test_a_fault_is_told_with_its_line(old: str, new: str, problem: str) -> None
         ("cubic,0", "bezier,0", "line 4: interpolation is 'bezier'"),
         ("arm,rx,2", "arm,rx,0.5", "line 5: time 0.5 s after 1 s"),
         ("720", "inf", "line 4: value is 'inf'"),
+        (",,0.5", ",,1.5", "line 4: out_weight is 1.5 .expected a share"),
         ("interpolation", "interp", "unknown column 'interp'"),
+        ("cubic,0,90", "cubic,0,", "line 4: a cubic piece lacks its out_tangent"),
+        (",-90", ",", "line 5: a cubic piece lacks its in_tangent"),
     ],
 )
 def test_a_fault_in_keys_is_told_with_its_line(old: str, new: str, problem: str) -> None:

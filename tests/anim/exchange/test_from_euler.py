@@ -135,7 +135,31 @@ def test_recordings_keep_their_grid_and_wrap() -> None:
     track = _track(node)
     assert len(track.times) == 30
     assert quaternion.angle_between(track.values[1:], track.values[:-1]).max() == pytest.approx(np.radians(20))
+    assert (quaternion.dot(track.values[1:], track.values[:-1]) > 0).all()
     assert len(_track(node, keys=Keys.ADAPTIVE).times) > 30
+
+
+def test_few_even_keys_are_no_recording() -> None:
+    """A key a second is set by somebody: between them the angles are to be followed."""
+    angles = np.radians([[0, 90, 0, -90, 0], [0, 90, 180, 90, 0]])
+    track = _track(_node([*(linear(np.arange(5.0), each) for each in angles), None]))
+    assert len(track.times) > 5
+
+
+def test_keys_that_fall_together_in_float32_are_one() -> None:
+    times = np.array((0.0, 1.0, 1.0 + 1e-9, 2.0))
+    track = _track(_node([linear(times, np.array((0.0, 0.1, 0.2, 0.2))), None, None]), keys=Keys.GRID)
+    assert track.times.tolist() == [0, 1, 2]
+    assert quaternion.rotation_vector(track.values)[1, 0] == pytest.approx(0.2)
+
+
+def test_a_cubic_that_comes_back_moves_all_the_same() -> None:
+    """Equal values, but tangents that lead away: 0.75 m / 4 at 0.5 s."""
+    keys = np.array((0.0, 1.0))
+    swing = Curve(keys, np.zeros(2), uniform_modes(2, Mode.CUBIC), np.array((0, -0.75)), np.array((0.75, 0)))
+    assert not swing.is_constant
+    track = _track(_node([swing, None, None]))
+    assert quaternion.rotation_vector(sample(track, np.array(0.5)))[0] == pytest.approx(0.75 / 4, abs=TOLERANCE)
 
 
 def test_pre_and_post_rotation_and_pivots_are_fbxs() -> None:

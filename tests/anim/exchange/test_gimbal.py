@@ -8,15 +8,18 @@ import pytest
 from anim.exchange.curve import linear
 from anim.exchange.from_euler import from_euler
 from anim.exchange.gimbal import GimbalRow, gimbal
-from anim.exchange.motion import EulerMotion, EulerNode
+from anim.exchange.motion import PLAIN, EulerMotion, EulerNode, Pivots
+from anim.maths import quaternion
 from anim.maths.euler import ORDERS, Frame, is_proper
 
 TIMES = np.arange(181) / 60
 
 
-def _row(angles: tuple[float, float, float], order: str = "ZXY", frame: Frame = Frame.INTRINSIC) -> GimbalRow:
+def _row(
+    angles: tuple[float, float, float], order: str = "ZXY", frame: Frame = Frame.INTRINSIC, pivots: Pivots = PLAIN
+) -> GimbalRow:
     curves = tuple(linear(TIMES, np.linspace(0, np.radians(a), len(TIMES))) for a in angles)
-    motion = EulerMotion((EulerNode("a", -1, np.zeros(3), order, frame, np.zeros(3), curves),))
+    motion = EulerMotion((EulerNode("a", -1, np.zeros(3), order, frame, np.zeros(3), curves, pivots=pivots),))
     return gimbal(motion, from_euler(motion, tolerance=1e-3).clip)[0]
 
 
@@ -62,3 +65,25 @@ def test_proper_orders_lock_at_zero() -> None:
     row = _row((0, 30, 0), "ZXZ")
     assert row.nearest_deg == pytest.approx(0, abs=1e-6)
     assert row.aligned == "both Z"
+
+
+def test_the_best_extrinsic_order_is_the_intrinsic_one_backwards() -> None:
+    inner, outer = _row((0, 88, 0), "ZXY"), _row((0, 88, 0), "YXZ", Frame.EXTRINSIC)
+    assert outer.best_order == inner.best_order[::-1]
+    assert outer.best_order != outer.best_order[::-1]
+
+
+@pytest.mark.parametrize("frame", Frame)
+def test_pre_and_post_rotations_are_no_part_of_the_angles(frame: Frame) -> None:
+    """80° of the middle angle are 10° from lock, whatever stands around the three turns."""
+    turns = quaternion.normalize(np.random.default_rng(4).normal(size=(2, 4)))
+    row = _row((30, 80, -20), "ZXY", frame, Pivots(*turns))
+    assert row.nearest_deg == pytest.approx(10, abs=1e-3)
+    assert row.at_s == pytest.approx(3)
+    assert row.best_nearest_deg == pytest.approx(_row((30, 80, -20), "ZXY", frame).best_nearest_deg, abs=0.01)
+
+
+def test_the_first_of_equal_times_counts() -> None:
+    """A turn about one axis is a quarter from lock all the time, to within rounding."""
+    turns = quaternion.normalize(np.random.default_rng(4).normal(size=(2, 4)))
+    assert _row((720, 0, 0), "ZXY", pivots=Pivots(*turns)).at_s == 0

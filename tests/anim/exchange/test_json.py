@@ -39,6 +39,7 @@ CURVES: dict[str, Any] = {
                     "interpolation": "cubic",
                     "in_tangents": [0, 0, 0],
                     "out_tangents": [60, 0, 0],
+                    "out_weights": [0.5, 0.25, 0.3],
                 },
                 "translation.z": {"times": [0, 1], "values": [0, 5], "interpolation": ["step", "linear"]},
             },
@@ -71,6 +72,8 @@ def test_the_documented_schema_is_read() -> None:
     np.testing.assert_allclose(arm.pivots.pre_rotation, turned)
     np.testing.assert_allclose(arm.pivots.post_rotation, (0, 0, 0, 1))
     np.testing.assert_allclose(arm.rotation[1].out_tangents, np.radians((60, 0, 0)))
+    np.testing.assert_allclose(arm.rotation[1].out_weights, (0.5, 0.25, 0.3))
+    assert arm.rotation[1].in_weights is None
     assert arm.moves[2].modes.tolist() == [Mode.STEP, Mode.LINEAR]
     np.testing.assert_allclose(arm.moves[2].values, (0, 0.05))
 
@@ -88,6 +91,17 @@ def test_what_is_written_is_read_as_the_same() -> None:
         assert b is not None
         np.testing.assert_allclose(b.values, a.values, atol=1e-9)
         np.testing.assert_array_equal(b.modes, a.modes)
+        assert (b.out_weights is None) == (a.out_weights is None)
+
+
+def test_keys_before_zero_come_later_all_by_as_much() -> None:
+    motion = _read(_changed("nodes/0/curves/rotation.x/times", [-0.5, 1]))
+    arm, body = motion.nodes[1], motion.nodes[0]
+    np.testing.assert_allclose(arm.rotation[0].times, (0, 1.5))
+    np.testing.assert_allclose(arm.rotation[1].times, (0.5, 1, 2.5))
+    np.testing.assert_allclose(body.rotation[0].times, (0.5,))
+    assert motion.notes == ("the first key is at -0.5 s: all are moved by 0.5 s, to begin at 0",)
+    assert _read(CURVES).notes == ()
 
 
 @pytest.mark.parametrize(
@@ -106,10 +120,16 @@ def test_what_is_written_is_read_as_the_same() -> None:
         ("nodes/1/curves/rotation.z", {"times": [0], "values": [0]}, "no single place in order ZXZ"),
         ("nodes/0/curves/rotation.x/values", [1], "values is not a list of 2 numbers"),
         ("nodes/0/curves/rotation.x/times", [1, 0], "times not increasing at key 1"),
-        ("nodes/0/curves/rotation.x/times", [-1, 0], "times start at -1"),
+        ("nodes/0/curves/rotation.x/times", [-1, -2], "times not increasing at key 1 .-2 s after -1 s"),
+        ("nodes/0/curves/rotation.y/out_weights", [0, 0.5], "out_weights is not a list of 3 numbers"),
+        ("nodes/0/curves/rotation.y/out_weights", [0, 0.5, 1.5], r"out_weights go from 0 to 1.5 .expected shares"),
         ("nodes/0/curves/rotation.x/interpolation", "smooth", "interpolation is 'smooth'"),
         ("nodes/0/curves/rotation.x/interpolation", "cubic", "a cubic curve lacks in_tangents"),
-        ("nodes/0/curves/rotation.x/tension", 1, "expected an object of"),
+        ("nodes/0/curves/rotation.x/tension", 1, r"curves\['rotation.x'\]: unknown key 'tension'"),
+        ("nodes/0/curves/rotation.x", {"times": [0]}, "expected an object with times and values"),
+        ("nodes/0/pre_rotaton", [0, 0, 9], r"nodes\[0\]: unknown key 'pre_rotaton'"),
+        ("meters_per_units", 1, "unknown key 'meters_per_units'"),
+        ("meters_per_unit", True, "meters_per_unit is True"),
     ],
 )
 def test_a_fault_is_told_with_its_place(path: str, value: object, problem: str) -> None:

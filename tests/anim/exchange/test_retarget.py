@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +12,22 @@ import pytest
 from anim.arrays import Floats
 from anim.errors import NotFoundError
 from anim.exchange import bvh
-from anim.exchange.curve import linear
+from anim.exchange.curve import Curve, Mode, linear, uniform_modes
 from anim.exchange.from_euler import Converted, from_euler
 from anim.exchange.local import extent, skeleton
 from anim.exchange.motion import Convention, EulerMotion, EulerNode, Unit, scaled
 from anim.exchange.onto import Onto, onto
 from anim.exchange.retarget import Floor
 from anim.exchange.to_bvh import to_bvh
+from anim.exchange.turns import world_rotations
 from anim.exchange.units import guess_unit
 from anim.gltf import author, read
 from anim.gltf.document import Document
 from anim.maths import quaternion
 from anim.maths.euler import Frame
-from anim.model import Clip, Scene, Skeleton
-from anim.sampling import pose, world_matrices
+from anim.model import Clip, Interpolation, Scene, Skeleton, Track
+from anim.sampling import pose, rest, world_matrices
+from anim.sampling.track import sample
 from tests.files import glb_of, opened, opened_fixture, opened_path
 
 CESIUM = {
@@ -78,7 +81,8 @@ def _lowest(scene: Scene, clip: Clip, times: Floats) -> tuple[Floats, float]:
 
 
 CHARACTERS = pytest.mark.parametrize(
-    ("name", "aliases", "least"), [("biped", {}, 21), ("CesiumMan.glb", CESIUM, 19), ("Knight.glb", {}, 18)]
+    ("name", "aliases", "least"),
+    [("biped", {}, 21), ("CesiumMan.glb", CESIUM, 19), ("Knight.glb", {}, 18)],
 )
 
 
@@ -171,6 +175,26 @@ def test_a_characters_own_motion_comes_back(asset: Find) -> None:
     assert done.scale == pytest.approx(1, abs=1e-5)
 
 
+def test_legs_and_feet_that_hang_elsewhere_stay_in_their_joints(asset: Find) -> None:
+    """The robot's legs do not hang on its hips, nor its feet on its legs: they are for inverse kinematics."""
+    source, document = _recorded("freebvh.bvh", asset), _character("Robot.glb", asset)
+    bones = read.skeleton(document)
+    done = _on(document, source, {})
+    times = done.clip.tracks[0].times
+    moved = [bones.names[track.node or 0] for track in done.clip.tracks if track.path == "translation"]
+    assert sorted(moved) == ["Foot.L", "Foot.R", "Hips", "UpperLeg.L", "UpperLeg.R"]  # lower legs hang on upper ones
+    still, moving = world_matrices(bones, rest(bones))[0], world_matrices(bones, pose(bones, done.clip, times))
+    at = {name: bones.names.index(name) for name in ("Hips", "UpperLeg.L", "LowerLeg.L", "Foot.L")}
+    for holder, held in (("Hips", "UpperLeg.L"), ("LowerLeg.L", "Foot.L")):
+        before, after = (
+            np.linalg.solve(
+                world[..., at[holder], :, :3], (world[..., at[held], :, 3:] - world[..., at[holder], :, 3:])
+            )
+            for world in (still, moving)
+        )
+        np.testing.assert_allclose(after, np.broadcast_to(before, after.shape), atol=1e-4 * np.abs(before).max())
+
+
 def test_the_clip_is_added_and_nothing_else(asset: Find) -> None:
     document = opened_fixture("biped")
     done = _on(document, _recorded("cmu_01_01.bvh", asset), {})
@@ -206,6 +230,56 @@ def test_other_chains_point_alike() -> None:
     assert done.scale == pytest.approx(0.5)
 
 
+def _keyed(name: str, parent: int, *degrees: tuple[float, ...], mode: Mode = Mode.LINEAR) -> EulerNode:
+    """A joint a metre out on x, keyed every two seconds on X, Y and Z."""
+    curves = []
+    for values in degrees:
+        times = np.array([2.0 * key for key in range(len(values))])
+        curves.append(Curve(times, np.radians(values), uniform_modes(len(values), mode)))
+    offset = np.array((float(parent >= 0), 0, 0))
+    return EulerNode(name, parent, offset, "XYZ", Frame.INTRINSIC, np.zeros(3), tuple(curves))
+
+
+def test_keys_between_keys_keep_the_tolerance() -> None:
+    """A joint between two matched ones turns too: what the outer one does in its new parent is no slerp."""
+    tolerance = np.radians(0.1)
+    nodes = (
+        _keyed("tail1", -1, (0, 80, 0), (0, 30, 60), (0, -50, 0)),
+        _keyed("other", 0, (0, -70, 40), (0, 20, 0), (10, 90, 0)),
+        _keyed("tail2", 1, (0, 60, 0), (0, 0, 50), (0, 70, -170)),
+        _keyed("tail3", 2, (0, 10, 0), (0, 0, 0), (0, 0, 10)),
+    )
+    source = from_euler(EulerMotion(nodes), tolerance=tolerance)
+    target = _tail(quaternion.from_rotation_vector(np.array((0, 0, 0.0))))
+    clip = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP).clip
+    joint, at = target.names.index("tail2"), np.linspace(0, 4, 3001)
+
+    def wanted(times: Floats) -> Floats:
+        turned = world_rotations(source.skeleton, pose(source.skeleton, source.clip, times).rotation)
+        return quaternion.multiply(quaternion.conjugate(turned[0]), turned[2])
+
+    assert quaternion.angle_between(pose(target, clip, at).rotation[:, joint], wanted(at)).max() < tolerance
+    keys = np.unique(np.concatenate([track.times for track in source.clip.tracks]))
+    without = Track(joint, "rotation", Interpolation.LINEAR, keys, quaternion.align_signs(wanted(keys)))
+    assert quaternion.angle_between(sample(without, at), wanted(at)).max() > tolerance
+
+
+def test_steps_stay_steps() -> None:
+    nodes = [_keyed("tail1", -1, (0, 80, 0), (0, 0, 0), (0, 0, 0), mode=Mode.STEP)]
+    source = from_euler(EulerMotion(tuple(nodes)), tolerance=1e-3)
+    clip = onto(source, Scene(_tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True, floor=Floor.KEEP).clip
+    turn = next(track for track in clip.tracks if track.path == "rotation")
+    before, after = sample(turn, np.array((1.999, 2.001)))
+    assert quaternion.angle_between(before, np.array((0, 0, 0, 1.0))) < 1e-6
+    assert quaternion.angle_between(before, after) == pytest.approx(np.radians(80), abs=1e-6)
+
+
+def test_recordings_keep_their_grid(asset: Find) -> None:
+    source = _recorded("freebvh.bvh", asset)
+    times = _on(_character("Knight.glb", asset), source, {}).clip.tracks[0].times
+    np.testing.assert_array_equal(times, source.clip.tracks[0].times)
+
+
 def test_curves_without_a_hierarchy_are_the_nodes_own() -> None:
     curve = linear(np.array((0.0, 1.0)), np.array((0.0, 0.5)))
     node = EulerNode("tail2", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
@@ -227,3 +301,16 @@ def test_units_are_guessed_by_height() -> None:
     assert guess_unit(66).unit == "inches"
     assert guess_unit(1720).unit == "millimeters"
     assert guess_unit(0).scale == 1
+
+
+def test_the_path_begins_from_where_the_character_stands() -> None:
+    """Both axes of the ground, so that a crowd does not gather in one place."""
+    target = _tail(np.array((0, 0, 0, 1.0)))
+    aside = replace(target, translation=target.translation + (target.parents < 0)[:, None] * [3.0, 0, -2])
+    source = from_euler(EulerMotion((_keyed("tail1", -1, (0, 80, 0), (0, 0, 0), (0, 0, 0)),)), tolerance=1e-3)
+    here, there = (
+        pose(each, clip, np.zeros(1)).translation[0, 0]
+        for each in (target, aside)
+        for clip in [onto(source, Scene(each, ()), aliases={}, nested=True, floor=Floor.KEEP).clip]
+    )
+    np.testing.assert_allclose(there - here, (3, 0, -2), atol=1e-9)

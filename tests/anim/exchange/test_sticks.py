@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.exchange.sticks import sticks
+from anim.exchange.trees import trees
 from anim.gltf import author, read
 from anim.model import Skeleton
 from tests.files import glb_of, opened
@@ -51,6 +52,27 @@ def test_the_skin_holds_it_where_it_is_at_rest() -> None:
     places = np.array([[0, 1, 0], [0, 1, 0], [0, 3, 0]])
     for bind, place in zip(instance.skin.inverse_bind, places, strict=True):
         np.testing.assert_allclose(bind[:, :3] @ place + bind[:, 3], 0, atol=1e-6)
+
+
+def test_each_tree_gets_a_body_of_its_own() -> None:
+    two = Skeleton(
+        (*ARM.names, "ball", "string"),
+        np.array([-1, 0, 1, 2, -1, 4]),
+        np.concatenate((ARM.translation, np.array([[5.0, 0, 0], [0, -1, 0]]))),
+        np.concatenate((ARM.rotation, np.tile((0, 0, 0, 1.0), (2, 1)))),
+        np.ones((6, 3)),
+    )
+    whole, skin = sticks(two, frozenset({3}))
+    bodies = trees(two, whole, skin)
+    assert [own.joints.tolist() for _, own in bodies] == [[0, 1, 2], [4, 5]]
+    assert [mesh.name for mesh, _ in bodies] == ["sticks 1", "sticks 2"]
+    drawn = np.concatenate([mesh.positions[mesh.faces] for mesh, _ in bodies])
+    assert {each.tobytes() for each in drawn} == {each.tobytes() for each in whole.positions[whole.faces]}
+    for mesh, own in bodies:
+        for corner, joint in zip(mesh.positions, own.joints[mesh.joints[:, 0]], strict=True):
+            same = (whole.positions == corner).all(axis=1)
+            assert joint in skin.joints[whole.joints[same, 0]]
+    assert trees(ARM, *sticks(ARM))[0][0].name == "sticks"
 
 
 def test_a_single_joint_shows_too() -> None:

@@ -1,0 +1,77 @@
+"""Which order each node's angles get: the same for all, one of its own, or the one that keeps farthest from lock."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import NotFoundError, RangeError
+from anim.maths import euler
+from anim.maths.euler import ORDERS, Frame
+
+BEST = "auto"
+USUAL = "ZXY"  # what most recorders write
+CANDIDATES = (USUAL, *(order for order in ORDERS if not euler.is_proper(order) and order != USUAL))
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """Orders by node name. rules: (glob, order), the first that fits counts; `otherwise` where none does.
+
+    An order is one of the twelve or "auto": of the six without a repeated axis, which are what BVH, Maya and FBX
+    know, the one that keeps farthest from gimbal lock.
+    """
+
+    otherwise: str = USUAL
+    rules: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def is_one(self) -> bool:
+        """Whether all nodes have the same."""
+        return not self.rules and self.otherwise != BEST
+
+    def of(self, name: str, q: Floats, frame: Frame = Frame.INTRINSIC) -> str:
+        """Return the order for a node and its rotations (..., 4)."""
+        order = next((order for glob, order in self.rules if fnmatchcase(name, glob)), self.otherwise)
+        if order != BEST:
+            return order
+        found = _best(q.reshape(-1, 4))
+        return found if frame == Frame.INTRINSIC else found[::-1]
+
+    def check(self, names: Sequence[str]) -> None:
+        """Raise NotFoundError for a rule that fits no name."""
+        for glob, order in self.rules:
+            if not any(fnmatchcase(name, glob) for name in names):
+                near = difflib.get_close_matches(glob, names, n=1)
+                help = f"did you mean '{near[0]}'?" if near else ""
+                raise NotFoundError(f"order '{glob}={order}', but no node is called that", help=help)
+
+
+def parse(text: str) -> Orders:
+    """Return what "ZXY", "auto" or "hips=ZXY,*arm=YZX,auto" says, in letters of any case.
+
+    Raises RangeError for an order that is none, or more than one without a name.
+    """
+    rules, otherwise = [], list[str]()
+    for item in text.split(","):
+        glob, named, order = item.strip().rpartition("=")
+        checked = BEST if order.strip().casefold() == BEST else euler.check_order(order.strip())
+        if named:
+            rules.append((glob.strip(), checked))
+        else:
+            otherwise.append(checked)
+    if len(otherwise) > 1:
+        raise RangeError(f"order is '{text}' (expected one for all nodes, and NAME=ORDER for others)")
+    return Orders(otherwise[0] if otherwise else USUAL, tuple(rules))
+
+
+def _best(q: Floats) -> str:
+    """The intrinsic order farthest from lock; the usual one where others are no better."""
+    nearest = {order: float(euler.distance_to_lock(q, order=order).min()) for order in CANDIDATES}
+    best = max(CANDIDATES, key=lambda order: nearest[order])
+    return USUAL if nearest[best] <= nearest[USUAL] + np.radians(1.0) else best

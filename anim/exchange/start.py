@@ -1,0 +1,16 @@
+"""Key times before zero, where DCC scenes may begin and glTF can't."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def start(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
+    """Return by how many seconds all keys must come later for none to be before 0, and a note where they must.
+
+    start([-0.5, 0, 1]) → 0.5, ("the first key is at -0.5 s: all are moved by 0.5 s, to begin at 0",)
+    """
+    first = min(times, default=0.0)
+    if first >= 0:
+        return 0.0, ()
+    return -first, (f"the first key is at {first:.6g} s: all are moved by {-first:.6g} s, to begin at 0",)

@@ -1,0 +1,50 @@
+"""Cubics whose handles are longer or shorter than a third of the piece: Maya's weighted tangents, Blender's handles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+
+PLAIN = 1 / 3  # of a piece; with both handles so long the cubic is the one of `maths.hermite`
+ROUNDS = 60  # halvings of the bracket at worst; some six steps as a rule
+
+
+def evaluate(
+    share: Floats, p0: Floats, rise0: Floats, p1: Floats, rise1: Floats, weights: tuple[Floats, Floats]
+) -> Floats:
+    """Return the value at `share` (…), 0 … 1 of the piece's duration, of the Bézier cubic from p0 to p1.
+
+    rise0, rise1: slopes per share: per second times the piece's duration. weights: 0 … 1, how far the handles after
+    the first key and before the second reach, as shares of the piece.
+    evaluate(0.5, 0, 0, 1, 0, (1/3, 1/3)) → 0.5
+    """
+    u = parameter(share, *weights)
+    return _bezier(u, p0, p0 + weights[0] * rise0, p1 - weights[1] * rise1, p1)
+
+
+def parameter(share: Floats, leaving: Floats, arriving: Floats) -> Floats:
+    """Return the cubic's parameter u (…) at which it has come `share` of the way in time.
+
+    leaving, arriving: lengths of the handles, 0 … 1: then time never runs back. Newton's steps, halving where one
+    leaves the bracket.
+    """
+    share, leaving, arriving = np.broadcast_arrays(share, leaving, arriving)
+    low, high, u = np.zeros(share.shape), np.ones(share.shape), share.astype(np.float64)
+    for _ in range(ROUNDS):
+        v = 1 - u
+        off = 3 * leaving * u * v * v + 3 * (1 - arriving) * u * u * v + u**3 - share
+        low, high = np.where(off <= 0, u, low), np.where(off >= 0, u, high)
+        slope = 3 * leaving * v * v + 6 * (1 - arriving - leaving) * u * v + 3 * arriving * u * u
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = u - off / slope
+        following = np.where((step > low) & (step < high), step, (low + high) / 2)
+        if (np.abs(following - u) < 1e-15).all():
+            break
+        u = following
+    return u
+
+
+def _bezier(u: Floats, p0: Floats, p1: Floats, p2: Floats, p3: Floats) -> Floats:
+    v = 1 - u
+    return v**3 * p0 + 3 * u * v * v * p1 + 3 * u * u * v * p2 + u**3 * p3
