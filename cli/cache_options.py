@@ -59,7 +59,10 @@ MaxError = Annotated[
 ]
 Quantize = Annotated[bool, typer.Option("--quantize", help="Morph targets as 16-bit integers.")]
 LayoutOption = Annotated[
-    Layout | None, typer.Option("--layout", help=".glb: morph targets (default) or a flip-book.", show_default=False)
+    Layout | None,
+    typer.Option(
+        "--layout", help=".glb: morph targets (default; up to 1 GB of positions) or a flip-book.", show_default=False
+    ),
 ]
 PresetOption = Annotated[
     Preset | None, typer.Option("--preset", help="Textures: whose axes; default plain.", show_default=False)
@@ -87,3 +90,15 @@ def writing(ending: str, given: Mapping[str, Any]) -> Writing:
         said["rest"] = "" if said["rest"] == "none" else f".{said['rest']}"
     plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}
     return Writing(**plain)
+
+
+def holding(what: str) -> tuple[str, ...]:
+    """Return the endings of formats with a place for "normals" or "tangents"."""
+    return tuple(ending for ending, format in CACHE_FORMATS.items() if what in format.holds)
+
+
+def check_held(ending: str, **wanted: bool) -> None:
+    """Raise UsageError for what is wanted beside positions and has no place in the format."""
+    for what, is_wanted in wanted.items():
+        if is_wanted and what not in CACHE_FORMATS[ending].holds:
+            raise UsageError(f"--{what} means nothing to {ending}", help=f"{', '.join(holding(what))} keep {what}")

@@ -1,4 +1,5 @@
-"""Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path."""
+"""Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path, but
+`cli.folders` for what is streamed."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def turned(cache: VertexCache, up: str) -> VertexCache:
 
     def chunks() -> Iterator[Chunk]:
         for chunk in cache.chunks():
-            yield Chunk(chunk.first, turn(chunk.positions), None if chunk.normals is None else turn(chunk.normals))
+            yield chunk.changed(turn)
 
     return replace(cache, chunks=chunks, rest=None if cache.rest is None else turn(cache.rest), up=up)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import AnyArray
 from anim.caches.files import Outputs
-from anim.caches.glb_file import VERTICES, GlbFile, primitive
+from anim.caches.glb_file import VERTICES, GlbFile, primitive, signed
 from anim.caches.settings import Writing, Written
 from anim.model import VertexCache
 
@@ -49,6 +49,8 @@ def _write(cache: VertexCache, outputs: Outputs, *, by_scale: bool) -> None:
             attributes = {"POSITION": file.add(positions.astype("<f4"), target=VERTICES, bounds=True)}
             if chunk.normals is not None:
                 attributes["NORMAL"] = file.add(chunk.normals[i].astype("<f4"), target=VERTICES)
+            if chunk.tangents is not None and cache.handedness is not None:
+                attributes["TANGENT"] = file.add(signed(chunk.tangents[i], cache.handedness), target=VERTICES)
             gltf.meshes.append(Mesh(primitives=[primitive(attributes, indices)]))
             node = Node(mesh=frame)
             if frame and by_scale:

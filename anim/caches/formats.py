@@ -19,32 +19,46 @@ Write: TypeAlias = Callable[[VertexCache, Outputs, Writing], Written]
 
 @dataclass(frozen=True, slots=True)
 class CacheFormat:
-    """One format. about: for --help. takes: the fields of Reading and Writing that mean something to it."""
+    """One format. about: for --help. takes: the fields of Reading and Writing that mean something to it.
+
+    holds: "normals" and "tangents", where there is a place for them beside positions.
+    """
 
     about: str
     read: Read
     write: Write
     takes: frozenset[str] = frozenset()
+    holds: frozenset[str] = frozenset()
 
+
+NORMALS = frozenset(("normals",))
+BOTH = frozenset(("normals", "tangents"))
 
 CACHE_FORMATS: dict[str, CacheFormat] = {
-    ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write),
+    ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write, holds=BOTH),
     ".pc2": CacheFormat("point cache of 3ds Max and Blender", pc2.read, pc2.write, frozenset(("read_fps", "rest"))),
     ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, frozenset(("rest",))),
-    ".usdc": CacheFormat("USD, binary (extra usd)", usd_read.read, usd.write, frozenset(("read_fps",))),
-    ".usda": CacheFormat("USD, text (extra usd)", usd_read.read, usd.write, frozenset(("read_fps",))),
+    ".usdc": CacheFormat("USD, binary (extra usd)", usd_read.read, usd.write, frozenset(("read_fps",)), BOTH),
+    ".usda": CacheFormat("USD, text (extra usd)", usd_read.read, usd.write, frozenset(("read_fps",)), BOTH),
     ".glb": CacheFormat(
         "glTF: morph targets or a flip-book",
         glb.read,
         glb.write,
         frozenset(("read_fps", "max_error", "quantize", "layout")),
+        BOTH,
     ),
     ".exr": CacheFormat(
-        "vertex animation texture, float (extra exr)", texture_read.read, texture.write, frozenset(("preset", "depth"))
+        "vertex animation texture, float (extra exr)",
+        texture_read.read,
+        texture.write,
+        frozenset(("preset", "depth")),
+        NORMALS,
     ),
-    ".png": CacheFormat("vertex animation texture, 16 bit", texture_read.read, texture.write, frozenset(("preset",))),
-    ".ply": CacheFormat("a mesh a frame", sequence.read, sequence.write, frozenset(("read_fps",))),
-    ".obj": CacheFormat("a mesh a frame, as text", sequence.read, sequence.write, frozenset(("read_fps",))),
+    ".png": CacheFormat(
+        "vertex animation texture, 16 bit", texture_read.read, texture.write, frozenset(("preset",)), NORMALS
+    ),
+    ".ply": CacheFormat("a mesh a frame", sequence.read, sequence.write, frozenset(("read_fps",)), NORMALS),
+    ".obj": CacheFormat("a mesh a frame, as text", sequence.read, sequence.write, frozenset(("read_fps",)), NORMALS),
     ".stl": CacheFormat("a mesh a frame, without order", sequence.read, sequence.write, frozenset(("read_fps",))),
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from anim.caches.raw import per_chunk
 from anim.errors import RangeError
 from anim.model import Chunk, VertexCache
 from anim.sampling import grid
+
+Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents of one frame
 
 SAME = 1e-6  # s; times closer than this are the same frame
 
@@ -51,10 +54,10 @@ def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Itera
     window = _Window(cache)
     for first in range(0, len(left), step):
         rows = range(first, min(first + step, len(left)))
-        pairs = [window.between(int(left[i]), int(right[i]), np.float32(share[i])) for i in rows]
-        positions = np.stack([positions for positions, _ in pairs])
-        normals = [normals for _, normals in pairs if normals is not None]
-        yield Chunk(first, positions, np.stack(normals) if normals else None)
+        found = [window.between(int(left[i]), int(right[i]), np.float32(share[i])) for i in rows]
+        positions, normals, tangents = (_stacked(arrays) for arrays in zip(*found, strict=True))
+        assert positions is not None
+        yield Chunk(first, positions, normals, tangents)
 
 
 class _Window:
@@ -62,24 +65,30 @@ class _Window:
 
     def __init__(self, cache: VertexCache) -> None:
         self._chunks = cache.chunks()
-        self._kept: dict[int, tuple[AnyArray, AnyArray | None]] = {}
+        self._kept: dict[int, Frame] = {}
         self._read = 0
 
-    def between(self, left: int, right: int, share: np.float32) -> tuple[AnyArray, AnyArray | None]:
+    def between(self, left: int, right: int, share: np.float32) -> Frame:
         while self._read <= right:
             chunk = next(self._chunks)
-            self._kept = {frame: pair for frame, pair in self._kept.items() if frame >= left}
+            self._kept = {frame: arrays for frame, arrays in self._kept.items() if frame >= left}
             for i in range(len(chunk.positions)):
-                normals = None if chunk.normals is None else chunk.normals[i]
-                self._kept[chunk.first + i] = (chunk.positions[i], normals)
+                self._kept[chunk.first + i] = tuple(None if each is None else each[i] for each in _arrays(chunk))
             self._read = chunk.first + len(chunk.positions)
-        (start, start_normals), (end, end_normals) = self._kept[left], self._kept[right]
+        start, end = self._kept[left], self._kept[right]
         if share == 0 or left == right:
-            return start, start_normals
-        positions = start + share * (end - start)
-        if start_normals is None or end_normals is None:
-            return positions, None
-        return positions, _unit(start_normals + share * (end_normals - start_normals))
+            return start
+        mixed = [None if a is None or b is None else a + share * (b - a) for a, b in zip(start, end, strict=True)]
+        return mixed[0], *(None if each is None else _unit(each) for each in mixed[1:])
+
+
+def _stacked(arrays: tuple[AnyArray | None, ...]) -> AnyArray | None:
+    there = [each for each in arrays if each is not None]
+    return np.stack(there) if len(there) == len(arrays) else None
+
+
+def _arrays(chunk: Chunk) -> Frame:
+    return chunk.positions, chunk.normals, chunk.tangents
 
 
 def _unit(vectors: AnyArray) -> AnyArray:

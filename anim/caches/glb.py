@@ -68,18 +68,20 @@ def _pages(document: Document, children: list[int], up: str) -> VertexCache:
     if len(times) != len(pages):
         raise FormatError(f"flip-book has {len(pages)} pages and {len(times)} times")
     faces: Ints = np.empty((0, 3), np.int64) if indices is None else accessors.integers(indices).reshape(-1, 3)
-    has_normals = all("NORMAL" in each for each in attributes)
+    has_normals, has_tangents = (all(name in each for each in attributes) for name in ("NORMAL", "TANGENT"))
+    handedness = accessors.floats(attributes[0]["TANGENT"])[:, 3] if has_tangents else None
 
     def chunks() -> Iterator[Chunk]:
         for i, each in enumerate(attributes):
             normals = _rows(accessors, each["NORMAL"], count) if has_normals else None
-            yield Chunk(i, _rows(accessors, each["POSITION"], count), normals)
+            tangents = _rows(accessors, each["TANGENT"], count, 4)[..., :3] if has_tangents else None
+            yield Chunk(i, _rows(accessors, each["POSITION"], count), normals, tangents)
 
-    return VertexCache(np.array(times), count, faces, chunks, has_normals=has_normals, up=up)
+    return VertexCache(np.array(times), count, faces, chunks, has_normals=has_normals, up=up, handedness=handedness)
 
 
-def _rows(accessors: Accessors, number: int, count: int) -> Floats:
+def _rows(accessors: Accessors, number: int, count: int, width: int = 3) -> Floats:
     rows = accessors.floats(number)
-    if rows.shape != (count, 3):
+    if rows.shape != (count, width):
         raise FormatError(f"a page of the flip-book has {len(rows)} vertices (the first has {count})")
     return rows.astype(np.float32)[None]  # type: ignore[return-value]

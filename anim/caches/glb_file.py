@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import anim
-from anim.arrays import AnyArray
+from anim.arrays import AnyArray, Floats
 from anim.caches.files import PIECE, Outputs
 from anim.errors import UnsupportedError
 from anim.gltf.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB
@@ -105,6 +105,12 @@ class GlbFile:
             file.write(struct.pack("<II", self.size, BIN_CHUNK))
             self._bin.seek(0)
             shutil.copyfileobj(self._bin, file, PIECE)
+
+
+def signed(tangents: AnyArray, handedness: Floats) -> AnyArray:
+    """Return TANGENT (V, 4) of unit tangents (V, 3) and their signs; one without a direction gets some, as it must."""
+    has = np.linalg.norm(tangents, axis=1, keepdims=True) > 0.5
+    return np.concatenate((np.where(has, tangents, (1, 0, 0)), handedness[:, None]), axis=1).astype("<f4")
 
 
 def primitive(attributes: dict[str, int], indices: int | None, targets: Sequence[dict[str, int]] = ()) -> Any:

@@ -4,6 +4,8 @@
 |---|---|---|
 | positions | (F, V, 3) float32 | m |
 | normals | (F, V, 3) float32 | absent without normals |
+| tangents | (F, V, 3) float32 | absent without tangents |
+| handedness | (V,) int8 | ±1, of tangents: bitangent = normal × tangent · handedness |
 | times | (F,) float64 | s |
 | faces | (T, 3) int32 | triangles, counterclockwise |
 | rest | (V, 3) float32, float64 where that is too coarse | m; absent where unknown |
@@ -18,7 +20,8 @@ from __future__ import annotations
 import json
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from typing import IO, Any, BinaryIO
 
 import numpy as np
@@ -31,6 +34,7 @@ from anim.errors import AnimError, FormatError
 from anim.model import Chunk, Part, VertexCache
 
 SCHEMA = 1
+DIRECTIONS = ("normals", "tangents")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every member: same cache, same bytes
 
 
@@ -40,26 +44,30 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
         shape = _shape(archive, "positions")
         if shape is None:
             raise FormatError("has no array 'positions' (expected positions, times and faces)")
-        has_normals = _shape(archive, "normals") is not None
-        if has_normals and _shape(archive, "normals") != shape:
-            raise FormatError(f"normals have another shape than positions, {shape}")
-        times, faces, rest = (_array(archive, name) for name in ("times", "faces", "rest"))
+        present = tuple(name for name in DIRECTIONS if _shape(archive, name) is not None)
+        for name in present:
+            if _shape(archive, name) != shape:
+                raise FormatError(f"{name} have another shape than positions, {shape}")
+        times, faces, rest, signs = (_array(archive, name) for name in ("times", "faces", "rest", "handedness"))
         meta = _meta(archive)
     if times is None or faces is None:
         raise FormatError(f"has no array '{'times' if times is None else 'faces'}'")
     if len(times) != shape[0] or faces.shape[1:] != (3,) or (rest is not None and rest.shape != (shape[1], 3)):
         raise FormatError(f"times {times.shape}, faces {faces.shape} and positions {shape} don't fit together")
+    if ("tangents" in present) != (signs is not None) or (signs is not None and signs.shape != (shape[1],)):
+        raise FormatError("tangents and handedness don't go together (expected both, a sign for each vertex)")
     if faces.size and (faces.min() < 0 or faces.max() >= shape[1]):
         raise FormatError(f"a face uses vertex {faces.max() if faces.min() >= 0 else faces.min()} of {shape[1]}")
     return VertexCache(
         times.astype(np.float64),
         shape[1],
         faces.astype(np.int64),
-        lambda: _chunks(inputs, shape, has_normals),
+        lambda: _chunks(inputs, shape, present),
         rest=None if rest is None else rest.astype(np.float64),
-        has_normals=has_normals,
+        has_normals="normals" in present,
         parts=parts_of(meta),
         up="z" if meta.get("up") == "z" else "y",
+        handedness=None if signs is None else signs.astype(np.float64),
     )
 
 
@@ -68,23 +76,27 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     with (
         outputs.create(outputs.main) as file,
         zipfile.ZipFile(file, "w") as archive,
-        tempfile.TemporaryFile() as aside,  # normals come with positions, but go into a member of their own
+        ExitStack() as stack,
     ):
         _put(archive, "times", cache.times)
         _put(archive, "faces", cache.faces.astype("<i4"))
         if cache.rest is not None:
             _put(archive, "rest", _rest(cache.rest))
+        if cache.handedness is not None:
+            _put(archive, "handedness", np.where(cache.handedness < 0, -1, 1).astype("<i1"))
         _put(archive, "meta", np.array(json.dumps(about(cache))))
         shape = (cache.frame_count, cache.vertex_count, 3)
+        wanted = [name for name, has in zip(DIRECTIONS, (cache.has_normals, cache.has_tangents), strict=True) if has]
+        aside = {name: stack.enter_context(tempfile.TemporaryFile()) for name in wanted}  # they come with positions
         with _member(archive, "positions", shape) as member:
             for chunk in cache.chunks():
                 member.write(np.ascontiguousarray(chunk.positions, "<f4").data)
-                if chunk.normals is not None:
-                    aside.write(np.ascontiguousarray(chunk.normals, "<f4").data)
-        if cache.has_normals:
-            aside.seek(0)
-            with _member(archive, "normals", shape) as member:
-                while piece := aside.read(PIECE):
+                for name, file_aside in aside.items():
+                    file_aside.write(np.ascontiguousarray(getattr(chunk, name), "<f4").data)
+        for name, file_aside in aside.items():
+            file_aside.seek(0)
+            with _member(archive, name, shape) as member:
+                while piece := file_aside.read(PIECE):
                     member.write(piece)
     return Written()
 
@@ -176,15 +188,17 @@ def _pair(values: list[int]) -> tuple[int, int]:
     return int(first), int(end)
 
 
-def _chunks(inputs: Inputs, shape: tuple[int, ...], has_normals: bool) -> Iterator[Chunk]:
+def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> Iterator[Chunk]:
     frames, vertices = shape[:2]
-    with inputs.open(inputs.main) as first, inputs.open(inputs.main) as second:
-        positions = _frames(_opened(first), "positions", shape)
-        normals = _frames(_opened(second), "normals", shape) if has_normals else None
+    with ExitStack() as stack:
+        following = {
+            name: _frames(_opened(stack.enter_context(inputs.open(inputs.main))), name, shape)
+            for name in ("positions", *present)
+        }
         step = max(1, PIECE // max(12 * vertices, 1))
         for start in range(0, frames, step):
             count = min(step, frames - start)
-            yield Chunk(start, positions(count), None if normals is None else normals(count))
+            yield Chunk(start, **{name: rows(count) for name, rows in following.items()})
 
 
 def _frames(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> Callable[[int], AnyArray]:

@@ -43,8 +43,8 @@ def _only_used(cache: VertexCache) -> VertexCache:
 def _taken(cache: VertexCache, kept: Ints, faces: Ints, parts: tuple[Part, ...]) -> VertexCache:
     def chunks() -> Iterator[Chunk]:
         for chunk in cache.chunks():
-            normals = None if chunk.normals is None else chunk.normals[:, kept]
-            yield Chunk(chunk.first, chunk.positions[:, kept], normals)
+            yield chunk.changed(lambda rows: rows[:, kept])
 
-    rest = None if cache.rest is None else cache.rest[kept]
-    return replace(cache, vertex_count=len(kept), faces=faces, chunks=chunks, rest=rest, parts=parts)
+    rest, handedness = (None if each is None else each[kept] for each in (cache.rest, cache.handedness))
+    count = len(kept)
+    return replace(cache, vertex_count=count, faces=faces, chunks=chunks, rest=rest, parts=parts, handedness=handedness)

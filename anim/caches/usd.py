@@ -1,8 +1,9 @@
 """VertexCache → .usdc/.usda: a mesh whose points are time samples, through usd-core (extra `usd`).
 
 Stage: upAxis as the cache, metersPerUnit 1, timeCodesPerSecond the frame rate, start and end time code. Mesh: points,
-extent and, where there are, vertex normals at every frame; the mesh at rest is their default. A .usdc is saved chunk by
-chunk, so its length is bounded by the disk; a .usda is text that usd-core keeps in memory as a whole.
+extent and, where there are, vertex normals and primvars:tangents (float4: xyz and handedness) at every frame; the mesh
+at rest is their default. It is saved chunk by chunk, a .usda as a .usdc first that is then
+spelled out, so its length is bounded by the disk.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from anim.model import VertexCache
 
 DEFAULT_FPS = 24.0  # USD's own
 PRIM = "/mesh"
+TANGENTS = "tangents"  # a primvar, as exporters from glTF name it
 KEY = "gltf_anim"  # of the layer's custom data: the parts, as in an .npz
 PER_SECOND = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # rates that frames are tried on
 
@@ -32,7 +34,8 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     rate = _rate(cache.times)
     codes = np.round(cache.times * rate, 9).tolist()
     with paths.written(outputs, outputs.main) as path:
-        stage = usd.Stage.CreateNew(path)
+        is_text = suffix(outputs.main) == ".usda"
+        stage = usd.Stage.CreateNew(f"{path}.usdc" if is_text else path)
         geom.SetStageUpAxis(stage, geom.Tokens.z if cache.up == "z" else geom.Tokens.y)
         geom.SetStageMetersPerUnit(stage, 1.0)
         stage.SetTimeCodesPerSecond(rate)
@@ -42,8 +45,9 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         layer = stage.GetRootLayer()
         layer.customLayerData = {KEY: json.dumps(about(cache))}
         mesh = _mesh(stage, cache, geom, vt)
-        is_binary, step = suffix(outputs.main) == ".usdc", raw.per_chunk(cache.vertex_count)
+        step = raw.per_chunk(cache.vertex_count)
         points, normals, extent = mesh.GetPointsAttr(), mesh.GetNormalsAttr(), mesh.GetExtentAttr()
+        tangents = geom.PrimvarsAPI(mesh).GetPrimvar(TANGENTS).GetAttr()
         for chunk in cache.chunks():
             for i, positions in enumerate(chunk.positions):
                 code = codes[chunk.first + i]
@@ -51,9 +55,13 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
                 extent.Set(_bounds(vt, positions), code)
                 if chunk.normals is not None:
                     normals.Set(_vectors(vt, chunk.normals[i]), code)
-                if is_binary and (chunk.first + i + 1) % step == 0:
+                if chunk.tangents is not None and cache.handedness is not None:
+                    tangents.Set(_signed(vt, chunk.tangents[i], cache.handedness), code)
+                if (chunk.first + i + 1) % step == 0:
                     layer.Save()
         layer.Save()
+        if is_text:
+            layer.Export(path)
     return Written()
 
 
@@ -78,11 +86,20 @@ def _mesh(stage: Any, cache: VertexCache, geom: Any, vt: Any) -> Any:
     if cache.has_normals:
         mesh.CreateNormalsAttr()
         mesh.SetNormalsInterpolation(geom.Tokens.vertex)
+    if cache.has_tangents:
+        from pxr import Sdf
+
+        kind = Sdf.ValueTypeNames.Float4Array
+        geom.PrimvarsAPI(mesh).CreatePrimvar(TANGENTS, kind, geom.Tokens.vertex)
     return mesh
 
 
 def _vectors(vt: Any, rows: AnyArray) -> Any:
     return vt.Vec3fArray.FromNumpy(np.ascontiguousarray(rows, np.float32))
+
+
+def _signed(vt: Any, rows: AnyArray, signs: Floats) -> Any:
+    return vt.Vec4fArray.FromNumpy(np.concatenate((rows, signs[:, None]), axis=1).astype(np.float32))
 
 
 def _bounds(vt: Any, rows: AnyArray) -> Any:

@@ -31,11 +31,12 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
         codes / rate - min(codes[0] / rate, 0.0),
         stage.vertices,
         faces,
-        lambda: _chunks(inputs, codes, stage.vertices, has_normals=stage.has_normals),
+        lambda: _chunks(inputs, codes, stage.vertices, stage.has_normals, stage.handedness is not None),
         rest=None if still is None else still * stage.unit,
         has_normals=stage.has_normals,
         parts=parts if parts and parts[-1].vertices[1] == stage.vertices else (),
         up=stage.up,
+        handedness=stage.handedness,
     )
 
 
@@ -71,6 +72,7 @@ class _Stage:
         self.unit = float(geom.GetStageMetersPerUnit(self._stage))
         self.up = "z" if geom.GetStageUpAxis(self._stage) == geom.Tokens.z else "y"
         self.has_normals = all(self._normals(mesh, self._first(mesh)) is not None for mesh in self._meshes)
+        self.handedness = self._handedness()
         try:
             self.kept = json.loads(self._stage.GetRootLayer().customLayerData.get(usd.KEY, "{}"))
         except (ValueError, TypeError):
@@ -113,6 +115,26 @@ class _Stage:
             rows.append(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30))
         return np.concatenate(rows)
 
+    def tangents(self, code: float) -> Floats:
+        """Tangents of all meshes at a time code, turned as their meshes."""
+        rows = []
+        for mesh in self._meshes:
+            matrix = np.array(mesh.ComputeLocalToWorldTransform(code))[:3, :3]
+            turned = np.asarray(self._tangents(mesh, code), np.float64)[:, :3] @ matrix
+            rows.append(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30))
+        return np.concatenate(rows)
+
+    def _handedness(self) -> Floats | None:
+        found = [self._tangents(mesh, self._first(mesh)) for mesh in self._meshes]
+        signs = [np.asarray(each, np.float64)[:, 3] for each in found if each is not None]
+        return np.concatenate(signs) if len(signs) == len(found) else None
+
+    def _tangents(self, mesh: Any, code: Any) -> Any:
+        primvar = self._geom.PrimvarsAPI(mesh).GetPrimvar(usd.TANGENTS)
+        found = primvar.Get(code) if primvar and primvar.GetInterpolation() == self._geom.Tokens.vertex else None
+        fits = found is not None and np.shape(found) == (len(self._points(mesh)), 4)
+        return found if fits else None
+
     def _first(self, mesh: Any) -> Any:
         samples = mesh.GetPointsAttr().GetTimeSamples()
         return samples[0] if samples else self._default
@@ -140,7 +162,7 @@ def _fans(counts: Ints, corners: Ints) -> Ints:
     return chosen
 
 
-def _chunks(inputs: Inputs, codes: Floats, vertices: int, *, has_normals: bool) -> Iterator[Chunk]:
+def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangents: bool) -> Iterator[Chunk]:
     step = raw.per_chunk(vertices)
     with _opened(inputs) as stage:
         for first in range(0, len(codes), step):
@@ -148,8 +170,9 @@ def _chunks(inputs: Inputs, codes: Floats, vertices: int, *, has_normals: bool) 
             with paths.hushed():
                 rows = [_checked(stage.positions(code), vertices, code) for code in some]
             positions = np.stack(rows) * stage.unit
-            normals = np.stack([stage.normals(code) for code in some]).astype(np.float32) if has_normals else None
-            yield Chunk(first, positions.astype(np.float32), normals)
+            wanted = ((normals, stage.normals), (tangents, stage.tangents))
+            turned = (np.stack([of(code) for code in some]).astype(np.float32) if want else None for want, of in wanted)
+            yield Chunk(first, positions.astype(np.float32), *turned)
 
 
 def _checked(rows: Floats | None, vertices: int, code: float) -> Floats:

@@ -17,12 +17,14 @@ HIDING = ("KHR_draco_mesh_compression",)  # extensions that keep a primitive's v
 
 
 class Meshes:
-    """Reads meshes of one document, each once per skin size. normals: whether to read those too."""
+    """Reads meshes of one document, each once per skin size. normals, tangents: whether to read those too."""
 
-    def __init__(self, document: Document, accessors: Accessors, *, normals: bool = False) -> None:
+    def __init__(
+        self, document: Document, accessors: Accessors, *, normals: bool = False, tangents: bool = False
+    ) -> None:
         self._meshes = items(document.json, "meshes")
         self._accessors = accessors
-        self._with_normals = normals
+        self._wanted = {"NORMAL": normals, "TANGENT": tangents}
         self._done: dict[tuple[int, int], Mesh] = {}
 
     def mesh(self, number: int, *, joint_count: int) -> Mesh:
@@ -59,9 +61,11 @@ class Meshes:
             _stacked([part.weights for part in parts], influences, np.float64),
             np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
             np.array(about.get("weights", [0.0] * count), float),
-            _normals(parts),
-            _normal_targets(parts, count),
+            _of_all([part.normals for part in parts]),
+            _targets_of_all([(part.normal_targets, part.targets) for part in parts]),
             tuple(primitive for part in parts for primitive in part.primitives),
+            _of_all([part.tangents for part in parts]),
+            _targets_of_all([(part.tangent_targets, part.targets) for part in parts]),
         )
 
     def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
@@ -78,12 +82,21 @@ class Meshes:
         about = primitive.get("targets", ())
         targets = self._displacements(about, "POSITION", len(positions))
         faces = self._faces(primitive, len(positions))
-        normals = self._normals(attributes, len(positions))
-        turned = self._with_normals and any("NORMAL" in target for target in about)
-        normal_targets = self._displacements(about, "NORMAL", len(positions)) if turned else None
         part = Primitive(len(positions), len(faces), primitive.get("material", -1))
-        rest = np.zeros(len(targets))
-        return Mesh("", positions, faces, joints, weights, targets, rest, normals, normal_targets, (part,))
+        return Mesh(
+            "",
+            positions,
+            faces,
+            joints,
+            weights,
+            targets,
+            np.zeros(len(targets)),
+            self._directions(attributes, "NORMAL", (len(positions), 3)),
+            self._turns(about, "NORMAL", len(positions)),
+            (part,),
+            self._directions(attributes, "TANGENT", (len(positions), 4)),
+            self._turns(about, "TANGENT", len(positions)),
+        )
 
     def _influences(self, attributes: Json, vertices: int, joint_count: int) -> tuple[Ints, Floats]:
         joints: list[Ints] = []
@@ -107,13 +120,18 @@ class Meshes:
             )
         return np.where(all_weights != 0, all_joints, 0), all_weights
 
-    def _normals(self, attributes: Json, vertices: int) -> Floats | None:
-        if not self._with_normals or "NORMAL" not in attributes:
+    def _directions(self, attributes: Json, name: str, shape: tuple[int, int]) -> Floats | None:
+        if not self._wanted[name] or name not in attributes:
             return None
-        normals = self._accessors.floats(attributes["NORMAL"])
-        if normals.shape != (vertices, 3):
-            raise FormatError(f"NORMAL has shape {normals.shape} for {vertices} vertices (expected ({vertices}, 3))")
-        return normals
+        found = self._accessors.floats(attributes[name])
+        if found.shape != shape:
+            raise FormatError(f"{name} has shape {found.shape} for {shape[0]} vertices (expected {shape})")
+        return found
+
+    def _turns(self, targets: Sequence[Json], name: str, vertices: int) -> Floats | None:
+        if not self._wanted[name] or not any(name in target for target in targets):
+            return None
+        return self._displacements(targets, name, vertices)
 
     def _displacements(self, targets: Sequence[Json], attribute: str, vertices: int) -> Floats:
         """What targets add to an attribute (M, V, 3); nothing where one doesn't have it."""
@@ -122,7 +140,7 @@ class Meshes:
             if attribute in target:
                 moved = self._accessors.floats(target[attribute])
                 if moved.shape != (vertices, 3):
-                    noun = "positions" if attribute == "POSITION" else "normals"
+                    noun = f"{attribute.lower()}s"
                     raise FormatError(f"a morph target has {len(moved)} {noun} for {vertices} vertices")
                 result[i] = moved
         return result
@@ -154,17 +172,17 @@ def _stacked(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarra
     return np.concatenate([np.empty((0, influences), dtype), *filled])
 
 
-def _normals(parts: list[Mesh]) -> Floats | None:
-    """Normals of all primitives, None where one has none: then they come from the faces."""
-    found = [part.normals for part in parts if part.normals is not None]
-    return np.concatenate([np.empty((0, 3)), *found]) if len(found) == len(parts) else None
+def _of_all(parts: list[Floats | None]) -> Floats | None:
+    """Normals or tangents of all primitives, None where one has none: normals then come from the faces."""
+    found = [part for part in parts if part is not None]
+    return np.concatenate(found) if found and len(found) == len(parts) else None
 
 
-def _normal_targets(parts: list[Mesh], count: int) -> Floats | None:
-    if all(part.normal_targets is None for part in parts):
+def _targets_of_all(parts: list[tuple[Floats | None, Floats]]) -> Floats | None:
+    """What targets add to directions in all primitives, with what they add to positions: 0 where one says nothing."""
+    if all(turns is None for turns, _ in parts):
         return None
-    filled = [np.zeros(p.targets.shape) if p.normal_targets is None else p.normal_targets for p in parts]
-    return np.concatenate([np.empty((count, 0, 3)), *filled], axis=1)
+    return np.concatenate([np.zeros(moves.shape) if turns is None else turns for turns, moves in parts], axis=1)
 
 
 def _nothing(targets: int) -> Mesh:
@@ -172,4 +190,6 @@ def _nothing(targets: int) -> Mesh:
     faces = np.empty((0, 3), np.int64)
     joints, positions = none.astype(np.int64), np.empty((0, 3))
     displacements, part = np.empty((targets, 0, 3)), Primitive(0, 0)
-    return Mesh("", positions, faces, joints, none, displacements, np.zeros(targets), positions, None, (part,))
+    return Mesh(
+        "", positions, faces, joints, none, displacements, np.zeros(targets), positions, None, (part,), np.empty((0, 4))
+    )

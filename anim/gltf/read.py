@@ -55,7 +55,8 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     """
     accessors = accessors or Accessors(document)
     reader = channels.Reader(document, accessors)
-    return tuple(_clip(i, animation, reader) for i, animation in enumerate(items(document.json, "animations")))
+    with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
+        return tuple(_clip(i, animation, reader) for i, animation in enumerate(items(document.json, "animations")))
 
 
 def names(document: Document) -> tuple[str, ...]:
@@ -63,14 +64,16 @@ def names(document: Document) -> tuple[str, ...]:
     return tuple(animation.get("name", "") for animation in items(document.json, "animations"))
 
 
-def scene(document: Document, accessors: Accessors | None = None, *, normals: bool = False) -> Scene:
+def scene(
+    document: Document, accessors: Accessors | None = None, *, normals: bool = False, tangents: bool = False
+) -> Scene:
     """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
 
-    normals: read those of vertices and morph targets too.
+    normals, tangents: read those of vertices and morph targets too.
     Raises UnsupportedError where vertices are hidden by an extension that is not handled (Draco).
     """
     accessors = accessors or Accessors(document)
-    meshes = Meshes(document, accessors, normals=normals)
+    meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
     nodes = items(document.json, "nodes")
     instances = []

@@ -43,7 +43,8 @@ class Mesh:
     positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0, as stored.
     targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3), or None where any
     lacks or they were not read.
-    normal_targets: (M, V, 3) what morph targets add to normals, or None where they add nothing.
+    tangents: (V, 4) xyz and handedness ±1, like normals. normal_targets, tangent_targets: (M, V, 3) what morph targets
+    add to normals and tangents, or None where they add nothing.
     primitives: in the order of the file; empty where unknown.
     """
 
@@ -57,6 +58,8 @@ class Mesh:
     normals: Floats | None = None
     normal_targets: Floats | None = None
     primitives: tuple[Primitive, ...] = ()
+    tangents: Floats | None = None
+    tangent_targets: Floats | None = None
 
     def __post_init__(self) -> None:
         arrays.check_shape(self.positions, "V 3", name="positions")

@@ -68,11 +68,12 @@ class Track:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "times", arrays.times(self.times))
-        set_field(self, "values", arrays.floats(self.values, "K C", name="values"))
-        shape = (len(self.times), WIDTHS.get(self.path, int(self.values.shape[1])))
-        if self.values.shape != shape:
-            raise ShapeError(f"values have shape {self.values.shape} (expected {shape})")
+        times, values = arrays.times(self.times), arrays.floats(self.values, "K C", name="values")
+        set_field(self, "times", times)
+        set_field(self, "values", values)
+        shape = (len(times), WIDTHS.get(self.path, int(values.shape[1])))
+        if values.shape != shape:
+            raise ShapeError(f"values have shape {values.shape} (expected {shape})")
         cubic = self.interpolation is Interpolation.CUBICSPLINE
         if (self.in_tangents is not None) is not cubic or (self.out_tangents is not None) is not cubic:
             raise ShapeError(f"{self.interpolation} with {'one or no' if cubic else 'in or out'} tangents")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -15,11 +15,18 @@ from anim.errors import ShapeError
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Some frames in a row: `first` is the number of the first, positions (n, V, 3) m and normals (n, V, 3) float32."""
+    """Some frames in a row: `first` is the number of the first, positions (n, V, 3) m, normals and
+    tangents (n, V, 3), all float32."""
 
     first: int
     positions: AnyArray
     normals: AnyArray | None = None
+    tangents: AnyArray | None = None
+
+    def changed(self, change: Callable[[AnyArray], AnyArray]) -> Chunk:
+        """Return the chunk with the same done to positions, normals and tangents."""
+        turned = (None if each is None else change(each) for each in (self.normals, self.tangents))
+        return Chunk(self.first, change(self.positions), *turned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +52,8 @@ class VertexCache:
 
     times: (F,) s, increasing. faces: (T, 3). chunks: called for a new pass over all frames, in order, each frame once.
     rest: (V, 3) m, the mesh at rest in the same order, or None. has_normals: whether every chunk carries them.
-    parts: the primitives, in order, covering all vertices; empty where unknown. up: "y" or "z".
+    parts: the primitives, in order, covering all vertices; empty where unknown. up: "y" or "z". handedness: (V,) ±1
+    where every chunk carries tangents too, else None.
     """
 
     times: Floats
@@ -56,6 +64,7 @@ class VertexCache:
     has_normals: bool = False
     parts: tuple[Part, ...] = field(default=())
     up: str = "y"
+    handedness: Floats | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", arrays.times(self.times))
@@ -68,12 +77,16 @@ class VertexCache:
         """Number of frames."""
         return len(self.times)
 
+    @property
+    def has_tangents(self) -> bool:
+        """Whether every chunk carries tangents."""
+        return self.handedness is not None
+
     def whole(self) -> Chunk:
         """Return all frames at once: 12 bytes times F times V, so for short or small caches only."""
         chunks = list(self.chunks())
-        normals = [each.normals for each in chunks if each.normals is not None]
-        joined = np.concatenate(normals) if len(normals) == len(chunks) else None
-        return Chunk(0, np.concatenate([each.positions for each in chunks]), joined)
+        positions = np.concatenate([each.positions for each in chunks])
+        return Chunk(0, positions, _joined(each.normals for each in chunks), _joined(each.tangents for each in chunks))
 
 
 def from_arrays(
@@ -84,3 +97,10 @@ def from_arrays(
     return VertexCache(
         times, positions.shape[1], faces, lambda: iter((chunk,)), rest=rest, has_normals=normals is not None
     )
+
+
+def _joined(parts: Iterable[AnyArray | None]) -> AnyArray | None:
+    """All parts in one array, None where one is missing."""
+    listed = list(parts)
+    there = [each for each in listed if each is not None]
+    return np.concatenate(there) if there and len(there) == len(listed) else None

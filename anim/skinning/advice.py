@@ -10,7 +10,7 @@ from anim.skinning.collapse import LOW, MeshCollapse
 from anim.skinning.fared import Fared
 
 GOOD = 0.95  # of a ring's radius: what twist joints should leave
-MUCH = 1.25  # times the distance from the bones at rest: a bulge that is seen
+MUCH = 1.25  # times the distance from the links of its joints at rest: a bulge that is seen
 MORE = 0.1  # than linear blending: else it is the motion that does it
 SOME = 0.01  # share of vertices that has to bulge to be worth a word
 

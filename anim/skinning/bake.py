@@ -10,10 +10,11 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import NotFoundError, RangeError
+from anim.errors import NotFoundError, RangeError, UnsupportedError
 from anim.model import Clip, Instance, Part, Primitive, Scene, VertexCache
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
+from anim.skinning.buffers import Buffers
 from anim.skinning.bulge import Clamped
 from anim.skinning.layer import Frames, Layer, Make, layer
 from anim.skinning.linear_blend import LinearBlend
@@ -36,6 +37,7 @@ def bake(
     bulge_clamp: bool = False,
     space: str = "world",
     normals: bool = False,
+    tangents: bool = False,
     rigid: bool = False,
     nodes: Sequence[int] | None = None,
     threads: int | None = None,
@@ -53,6 +55,7 @@ def bake(
         bulge_clamp=bulge_clamp,
         space=space,
         normals=normals,
+        tangents=tangents,
         rigid=rigid,
         nodes=nodes,
         threads=threads,
@@ -68,6 +71,7 @@ def baker(
     bulge_clamp: bool = False,
     space: str = "world",
     normals: bool = False,
+    tangents: bool = False,
     rigid: bool = False,
     nodes: Sequence[int] | None = None,
     threads: int | None = None,
@@ -75,12 +79,14 @@ def baker(
     """Return what bakes clips of a scene: all that a method has to know of the meshes is found out here, once.
 
     method: one of SKINNING_METHODS. blend: share of the method, the rest is lbs; None for all of it.
-    bulge_clamp: pull what stands farther from its bone than at rest back, as much as it is shared by two joints.
+    bulge_clamp: pull what stands farther from its link than at rest back, as much as it is shared by two joints.
     space: "world", where a skinned mesh's own node doesn't count, or "mesh", the space of the mesh's node.
-    normals: give unit normals too; of a mesh without them, those of its faces' mean.
+    normals: give unit normals too; of a mesh without them, those of its faces' mean. tangents: unit tangents too, with
+    their handedness as the file has it; all meshes must have them.
     rigid: meshes that neither joints nor morph targets move, too. nodes: only meshes on these.
     threads: None for one per core; the result doesn't depend on it.
-    Raises RangeError for a parameter out of its range, NotFoundError where nothing is left to bake.
+    Raises RangeError for a parameter out of its range, NotFoundError where nothing is left to bake, UnsupportedError
+    for tangents of a mesh without any.
     """
     _check(method, blend, space, bulge_clamp=bulge_clamp)
     chosen = baked(scene, rigid=rigid, nodes=nodes)
@@ -89,7 +95,7 @@ def baker(
     starts = np.cumsum([0, *(len(instance.mesh.positions) for instance in chosen)])
     make = _maker(method, blend, bulge_clamp=bulge_clamp)
     layers = tuple(
-        layer(scene.skeleton, instance, make, at=at, space=space, normals=normals)
+        layer(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
     still = pose(scene.skeleton, Clip("", ()), np.zeros(1))
@@ -102,7 +108,9 @@ def baker(
         tuple(_parts(scene, layers)),
         np.concatenate([each.at_rest(frames) for each in layers]),
         normals,
+        _handedness(chosen) if tangents else None,
         threads or _cores(),
+        Buffers(),
     )
 
 
@@ -111,7 +119,8 @@ class Baker:
     """Meshes of a scene, ready to be baked with any clip.
 
     layers: in the order of their vertices, of which there are `vertices`. faces: (T, 3) of all of them.
-    rest: (V, 3) m, where vertices are in the scene's rest pose. normals: whether they are baked too.
+    rest: (V, 3) m, where vertices are in the scene's rest pose. normals: whether they are baked too. handedness: (V,)
+    of tangents, None where those are not baked.
     """
 
     scene: Scene
@@ -121,7 +130,9 @@ class Baker:
     parts: tuple[Part, ...]
     rest: Floats
     normals: bool
+    handedness: Floats | None
     threads: int
+    buffers: Buffers
 
     def bake(self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda frames: None) -> VertexCache:
         """Return where the vertices are at `times` (F,) in seconds while a clip plays.
@@ -131,7 +142,8 @@ class Baker:
         progress: called with the number of frames done, after each chunk.
         """
         seconds = arrays.times(times)
-        stream = Stream(self.scene.skeleton, self.layers, self.vertices, self.normals, self.threads)
+        wanted = (self.normals, self.handedness is not None)
+        stream = Stream(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads, self.buffers)
         return VertexCache(
             seconds,
             self.vertices,
@@ -140,6 +152,7 @@ class Baker:
             rest=self.rest,
             has_normals=self.normals,
             parts=self.parts,
+            handedness=self.handedness,
         )
 
 
@@ -152,6 +165,20 @@ def baked(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = No
         and (rigid or instance.skin is not None or len(instance.mesh.targets))
         and (nodes is None or instance.node in nodes)
     ]
+
+
+def _handedness(chosen: Sequence[Instance]) -> Floats:
+    """The signs (V,) that with normal and tangent give the bitangent; a mirrored joint does not change them.
+
+    That is what players make of them (three.js: TANGENT.w as it is).
+    """
+    signs = []
+    for instance in chosen:
+        if instance.mesh.tangents is None:
+            name = instance.mesh.name or f"of node {instance.node}"
+            raise UnsupportedError(f"mesh '{name}' has no tangents", help="--normals needs nothing of the file")
+        signs.append(instance.mesh.tangents[:, 3])
+    return np.concatenate(signs)
 
 
 def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:

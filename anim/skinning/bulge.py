@@ -1,4 +1,4 @@
-"""How far skin stands off its bones, and a clamp that pulls back what bulges."""
+"""How far skin stands off the links between its joints, and a clamp that pulls back what bulges."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.skinning.compiled import compiled
-from anim.skinning.rig import Rig, Singles
-from anim.skinning.skinner import Shape, Skinner, Target
+from anim.skinning.kernels.lanes import Shape, Singles, Target
+from anim.skinning.rig import Rig
+from anim.skinning.skinner import Skinner
 from anim.skinning.stretch import pivots
 
 
 @dataclass(frozen=True, slots=True)
-class Bones:
-    """The bones of a skin: from each joint to those below it, or the joint's own place where none is below.
+class Links:
+    """The links of a skin: from each joint to those below it, or the joint's own place where none is below.
 
-    start: (J + 1,) into tips (B,): joint numbers at the far ends. distance: (V,) m from each vertex to the nearest bone
+    start: (J + 1,) into tips (B,): joint numbers at the far ends. distance: (V,) m from each vertex to the nearest link
     of its joints in bind pose. share: (V,) 1 where two joints hold a vertex equally, 0 where one holds it alone.
     joints: (J, 3) m, where they are in bind pose.
     """
@@ -31,48 +32,48 @@ class Bones:
     joints: Floats
 
 
-def bones(rig: Rig) -> Bones:
-    """Return the bones of a rig and how far its vertices are from them."""
+def links(rig: Rig) -> Links:
+    """Return the links of a rig and how far its vertices are from them."""
     count = len(rig.nodes)
     below = [np.flatnonzero(rig.above == j) for j in range(count)]
     tips = [each if len(each) else np.array([j]) for j, each in enumerate(below)]
     start = np.cumsum([0, *map(len, tips)])
-    found = Bones(start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _share(rig), pivots(rig))
+    found = Links(start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _share(rig), pivots(rig))
     points, at = rig.points[None].astype(np.float32), found.joints[None].astype(np.float32)
     squared = np.zeros((1, len(rig.points)), np.float32)
     compiled(stand_off)(points, 0, rig.start, rig.joint, start, found.tips, at, squared)
-    return Bones(start, found.tips, np.sqrt(squared[0]), found.share, found.joints)
+    return Links(start, found.tips, np.sqrt(squared[0]), found.share, found.joints)
 
 
 @dataclass(frozen=True)
 class Clamped:
-    """A method whose vertices are pulled back to the distance from their bones that they have in bind pose.
+    """A method whose vertices are pulled back to the distance from their links that they have in bind pose.
 
     As much as two joints share a vertex: what one joint holds alone stays. Distances grow with the pivot's scale.
-    Source: the idea of Kim & Han 2014, "Bulging-free dual quaternion skinning", with the nearest bone for their axis.
+    Source: the idea of Kim & Han 2014, "Bulging-free dual quaternion skinning", with the nearest link for their axis.
     """
 
     inner: Skinner
     rig: Rig
-    bones: Bones = field(init=False, repr=False)
+    links: Links = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bones", bones(self.rig))
+        object.__setattr__(self, "links", links(self.rig))
 
     def pack(self, matrices: Floats) -> tuple[Any, Singles, Singles]:
         """Return what the inner method needs, where joints are (n, J, 3), and their scales (n, J)."""
-        return self.inner.pack(matrices), *placed(self.bones, matrices)
+        return self.inner.pack(matrices), *placed(self.links, matrices)
 
     def place(self, packed: tuple[Any, Singles, Singles], shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         inner, joints, scales = packed
         self.inner.place(inner, shape, target, first, last)
-        held = (self.rig.start, self.rig.joint, self.bones.start, self.bones.tips)
-        rest = (self.bones.distance, self.bones.share)
+        held = (self.rig.start, self.rig.joint, self.links.start, self.links.tips)
+        rest = (self.links.distance, self.links.share)
         compiled(pull_back)(target.positions, target.at, *held, joints, scales, *rest, first, last)
 
 
-def placed(of: Bones, matrices: Floats) -> tuple[Singles, Singles]:
+def placed(of: Links, matrices: Floats) -> tuple[Singles, Singles]:
     """Return where joints stand (n, J, 3) under matrices (n, J, 3, 4), and how much they scale (n, J)."""
     at = matrix.apply(matrices, of.joints[:, None])[..., 0, :]
     scales = np.cbrt(np.abs(np.linalg.det(matrices[..., :3])))
@@ -84,16 +85,16 @@ def stand_off(
     at: int,
     start: Ints,
     joint: Ints,
-    bone_start: Ints,
+    link_start: Ints,
     tips: Ints,
     joints: Singles,
     squared: Singles,
 ) -> None:
-    """Write the squared distance (n, V) of vertices, columns `at` + v of positions, from the nearest of their bones."""
+    """Write the squared distance (n, V) of vertices, columns `at` + v of positions, from the nearest of their links."""
     for f in range(len(positions)):
         for v in range(squared.shape[1]):
             p = positions[f, at + v]
-            squared[f, v] = _nearest(p, joints[f], joint, start[v], start[v + 1], bone_start, tips)[0]
+            squared[f, v] = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)[0]
 
 
 def pull_back(
@@ -101,7 +102,7 @@ def pull_back(
     at: int,
     start: Ints,
     joint: Ints,
-    bone_start: Ints,
+    link_start: Ints,
     tips: Ints,
     joints: Singles,
     scales: Singles,
@@ -110,13 +111,13 @@ def pull_back(
     first: int,
     last: int,
 ) -> None:
-    """Move vertices first … last towards their nearest bone where they are farther from it than at rest."""
+    """Move vertices first … last towards their nearest link where they are farther from it than at rest."""
     for f in range(len(positions)):
         for v in range(first, last):
             if share[v] == 0:
                 continue
             p = positions[f, at + v]
-            squared, x, y, z = _nearest(p, joints[f], joint, start[v], start[v + 1], bone_start, tips)
+            squared, x, y, z = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)
             allowed = distance[v] * scales[f, joint[start[v]]]
             if squared <= allowed * allowed:
                 continue
@@ -127,15 +128,15 @@ def pull_back(
 
 
 def _nearest(
-    p: Singles, joints: Singles, joint: Ints, begin: int, end: int, bone_start: Ints, tips: Ints
+    p: Singles, joints: Singles, joint: Ints, begin: int, end: int, link_start: Ints, tips: Ints
 ) -> tuple[Any, Any, Any, Any]:
-    """Squared distance to the nearest bone of influences begin … end, and the point on it."""
+    """Squared distance to the nearest link of influences begin … end, and the point on it."""
     best = np.float32(np.inf)
     nx, ny, nz = p[0], p[1], p[2]
     for e in range(begin, end):
         j = joint[e]
         ax, ay, az = joints[j, 0], joints[j, 1], joints[j, 2]
-        for b in range(bone_start[j], bone_start[j + 1]):
+        for b in range(link_start[j], link_start[j + 1]):
             t = tips[b]
             dx, dy, dz = joints[t, 0] - ax, joints[t, 1] - ay, joints[t, 2] - az
             length = dx * dx + dy * dy + dz * dz

@@ -8,7 +8,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.skinning.compiled import compiled
-from anim.skinning.rig import Rig, Singles
+from anim.skinning.kernels.lanes import Singles
+from anim.skinning.rig import Rig
 
 WIDTH = 0.1  # σ of the paper: how alike weights must be to count
 LEAST = 1e-8  # a pair of weights of which the product is below can't matter

@@ -8,12 +8,12 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.skinning import kernels
 from anim.skinning.centers import centers
 from anim.skinning.compiled import compiled
-from anim.skinning.kernels import LANES
-from anim.skinning.rig import Rig, Singles, whole_weights
-from anim.skinning.skinner import Shape, Target, lanes
+from anim.skinning.kernels.around_centers import around_centers
+from anim.skinning.kernels.lanes import LANES, Held, Shape, Singles, Target, room
+from anim.skinning.rig import Rig, whole_weights
+from anim.skinning.skinner import lanes
 from anim.skinning.stretch import pivots, split, topmost
 
 
@@ -35,12 +35,12 @@ class CentersOfRotation:
     """
 
     rig: Rig
-    weight: Singles = field(init=False, repr=False)
+    held: Held = field(init=False, repr=False)
     pivots: Floats = field(init=False, repr=False)
     centers: Singles = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "weight", whole_weights(self.rig))
+        object.__setattr__(self, "held", self.rig.held._replace(weight=whole_weights(self.rig)))
         object.__setattr__(self, "pivots", pivots(self.rig))
         object.__setattr__(self, "centers", centers(self.rig).astype(np.float32)[:, :, None])
 
@@ -53,7 +53,6 @@ class CentersOfRotation:
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        hung = (self.centers, self.weight, self.rig.joint, self.rig.start)
         moves = (packed.turns, packed.rigids, packed.stretches)
-        span = (first, last, target.at, target.positions, target.normals)
-        compiled(kernels.around_centers)(shape.points, shape.normals, *hung, *moves, *span)
+        into = (first, last, room(self.rig.most), target)
+        compiled(around_centers)(shape, self.centers, self.held, *moves, *into)

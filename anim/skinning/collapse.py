@@ -47,7 +47,7 @@ def collapse(
     """Return what happens to each skinned mesh of a scene at `times` (F,) s while a clip plays.
 
     The collapse index of a vertex belongs to linear blending; the methods are compared by the volume that they enclose
-    and by how far they stand off the bones. nodes: only meshes on these. For many clips make a `Comparison`.
+    and by how far they stand off the links. nodes: only meshes on these. For many clips make a `Comparison`.
     collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707
     Source: notes/algorithms.md E3.
     """

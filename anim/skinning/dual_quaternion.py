@@ -8,11 +8,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import dual_quaternion as duals
-from anim.skinning import kernels
 from anim.skinning.compiled import compiled
-from anim.skinning.kernels import LANES
-from anim.skinning.rig import Rig, Singles, whole_weights
-from anim.skinning.skinner import Shape, Target, lanes
+from anim.skinning.kernels.around_duals import around_duals
+from anim.skinning.kernels.lanes import LANES, Held, Shape, Singles, Target, room
+from anim.skinning.rig import Rig, whole_weights
+from anim.skinning.skinner import lanes
 from anim.skinning.stretch import pivots, split, topmost
 
 
@@ -34,11 +34,11 @@ class DualQuaternion:
     """
 
     rig: Rig
-    weight: Singles = field(init=False, repr=False)
+    held: Held = field(init=False, repr=False)
     pivots: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "weight", whole_weights(self.rig))
+        object.__setattr__(self, "held", self.rig.held._replace(weight=whole_weights(self.rig)))
         object.__setattr__(self, "pivots", pivots(self.rig))
 
     def pack(self, matrices: Floats) -> Packed:
@@ -49,6 +49,5 @@ class DualQuaternion:
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        hung = (self.weight, self.rig.joint, self.rig.start, packed.duals, packed.stretches)
-        span = (first, last, target.at, target.positions, target.normals)
-        compiled(kernels.around_duals)(shape.points, shape.normals, *hung, *span)
+        into = (first, last, room(self.rig.most), target)
+        compiled(around_duals)(shape, self.held, packed.duals, packed.stretches, *into)

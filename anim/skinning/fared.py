@@ -1,4 +1,4 @@
-"""How one method fares in a clip: what the mesh encloses, and how far it stands off its bones."""
+"""How one method fares in a clip: what the mesh encloses, and how far it stands off its links."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from anim.model import Chunk, Clip, Skeleton
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 from anim.skinning.bake import Baker
-from anim.skinning.bulge import Bones, bones, placed, stand_off
+from anim.skinning.bulge import Links, links, placed, stand_off
 from anim.skinning.closed import closed_faces, volumes
 from anim.skinning.compiled import compiled
 from anim.skinning.layer import Frames, Layer
 from anim.skinning.stretch import topmost
 
-BULGE = 1.05  # distance from the bones, against that in bind pose, above which a vertex bulges
-NEAR = 0.25  # of the middle distance: what lies nearer to a bone has no ratio worth a word
+BULGE = 1.05  # distance from the links, against that in bind pose, above which a vertex bulges
+NEAR = 0.25  # of the middle distance: what lies nearer to a link has no ratio worth a word
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Fared:
     """How one method fared on one mesh.
 
     volume: (F,) enclosed against bind pose, None where no part of the mesh is closed.
-    bulge: greatest distance of a vertex between two joints from their bones, against that in bind pose.
+    bulge: greatest distance of a vertex between two joints from their links, against that in bind pose.
     bulging: share of all vertices that are ever above 1.05. vertex, joint, time: where and when bulge is.
     """
 
@@ -50,7 +50,7 @@ class Subject:
     layer: Layer
     faces: Ints
     volume: float
-    bones: Bones
+    links: Links
     watched: Ints
 
 
@@ -59,7 +59,7 @@ def subject(layer: Layer) -> Subject:
     rig = layer.rig
     faces = rig.faces[closed_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
-    of = bones(rig)
+    of = links(rig)
     shared = of.share > 0
     middle = float(np.median(of.distance[shared])) if shared.any() else 0.0
     watched = np.flatnonzero(shared & (of.distance > NEAR * middle))
@@ -103,12 +103,12 @@ class _Seen:
 
     def _add_bulge(self, positions: AnyArray, matrices: Floats, first: int) -> None:
         of, rig = self._of, self._of.layer.rig
-        joints, scales = placed(of.bones, matrices)
+        joints, scales = placed(of.links, matrices)
         squared = np.empty((len(positions), len(rig.points)), np.float32)
-        held = (rig.start, rig.joint, of.bones.start, of.bones.tips)
+        held = (rig.start, rig.joint, of.links.start, of.links.tips)
         compiled(stand_off)(positions, of.layer.at, *held, joints, squared)
         pivot = rig.joint[rig.start[of.watched]]
-        rest = of.bones.distance[of.watched] * np.where(scales > 0, scales, np.inf)[:, pivot]
+        rest = of.links.distance[of.watched] * np.where(scales > 0, scales, np.inf)[:, pivot]
         ratio = np.sqrt(squared[:, of.watched]) / rest
         at = ratio.argmax(axis=0)
         most = np.take_along_axis(ratio, at[None], 0)[0]

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim.arrays import Floats
-from anim.skinning import kernels
 from anim.skinning.compiled import compiled
-from anim.skinning.kernels import LANES
-from anim.skinning.rig import Rig, Singles
-from anim.skinning.skinner import Shape, Target, lanes
+from anim.skinning.kernels.lanes import LANES, Shape, Singles, Target, aligned, room
+from anim.skinning.kernels.linear import linear
+from anim.skinning.kernels.points_only import points_only
+from anim.skinning.rig import Rig
+from anim.skinning.skinner import lanes
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +25,9 @@ class Packed:
 
 @dataclass(frozen=True)
 class LinearBlend:
-    """Blends matrices: p′ = (Σ w M) p, weights as stored; normals by the inverse transpose of the blended matrix.
+    """Blends matrices: p′ = (Σ w M) p, weights as stored; normals by its inverse transpose, tangents by itself.
 
-    plain: no frame has points of its own and no normals are wanted, which takes a shorter way to the same numbers.
+    plain: no frame has points of its own and no directions are wanted, which takes a shorter way to the same numbers.
     Source: glTF 2.0, 3.7.3.1; Magnenat-Thalmann et al. 1988.
     """
 
@@ -45,17 +46,15 @@ class LinearBlend:
         if not self.plain:
             return Packed(None, lanes(matrices))
         frames, joints = matrices.shape[:2]
-        columns = np.zeros((joints, 4, LANES, 3), np.float32)
+        columns = aligned(joints, 4, LANES, 3)
         columns[:, :, :frames] = matrices.transpose(1, 3, 0, 2)
+        columns[:, :, frames:] = 0
         return Packed(columns.reshape(joints, 4, 3 * LANES), None)
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        rig, span = self.rig, (first, last, target.at)
+        held, into = self.rig.held, (first, last, room(self.rig.most), target)
         if packed.columns is not None:
-            kernel = compiled(kernels.points_only)
-            kernel(self.coefficients, rig.joint, rig.start, packed.columns, *span, target.positions)
-            return
-        kernel = compiled(kernels.linear)
-        hung = (rig.weight, rig.joint, rig.start, packed.rows)
-        kernel(shape.points, shape.normals, *hung, *span, target.positions, target.normals)
+            compiled(points_only)(self.coefficients, held, packed.columns, *into)
+        else:
+            compiled(linear)(shape, held, packed.rows, *into)

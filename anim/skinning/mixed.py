@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.skinning.rig import Singles
-from anim.skinning.skinner import Shape, Skinner, Target
+from anim.skinning.kernels.lanes import Shape, Singles, Target
+from anim.skinning.skinner import Skinner
 
 
 @dataclass(frozen=True)
 class Mixed:
-    """Positions (1 − share) · first + share · second; normals the same, made unit again."""
+    """Positions (1 − share) · first + share · second; normals and tangents the same, made unit again."""
 
     first: Skinner
     second: Skinner
@@ -27,15 +27,15 @@ class Mixed:
     def place(self, packed: tuple[Any, Any], shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         self.first.place(packed[0], shape, target, first, last)
-        aside = Target(target.at, np.empty_like(target.positions), np.empty_like(target.normals))
+        aside = Target(target.at, *(np.empty_like(each) for each in target[1:]))
         self.second.place(packed[1], shape, aside, first, last)
         span = slice(target.at + first, target.at + last)
         _mix(target.positions[:, span], aside.positions[:, span], self.share)
-        if len(shape.normals):
-            normals = target.normals[:, span]
-            _mix(normals, aside.normals[:, span], self.share)
-            length = np.sqrt((normals * normals).sum(axis=-1, keepdims=True))
-            normals /= np.where(length > 0, length, 1)
+        for ours, other in ((target.normals, aside.normals), (target.tangents, aside.tangents)):
+            if len(ours):
+                _mix(ours[:, span], other[:, span], self.share)
+                length = np.sqrt((ours[:, span] ** 2).sum(axis=-1, keepdims=True))
+                ours[:, span] /= np.where(length > 0, length, 1)
 
 
 def _mix(into: Singles, other: Singles, share: float) -> None:

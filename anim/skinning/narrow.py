@@ -12,13 +12,14 @@ from anim.model import Clip, Scene, Skeleton
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 from anim.skinning.compiled import compiled
-from anim.skinning.kernels import LANES, shrinkage
+from anim.skinning.kernels.lanes import LANES, Singles, room
+from anim.skinning.kernels.shrinkage import shrinkage
 from anim.skinning.layer import Frames, Layer
-from anim.skinning.rig import Singles, whole_weights
+from anim.skinning.rig import whole_weights
 from anim.skinning.skinner import filled, lanes
 from anim.skinning.stretch import pivots, split, topmost
 
-TWIST = 0.7  # cosine between the axis of a turn and the bone, above which the turn is a twist
+TWIST = 0.7  # cosine between the axis of a turn and the link, above which the turn is a twist
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,7 @@ class Narrow:
 
     index: √ of the volume factor: 1 rigid, 0 flat or inside out; the radius of a twisted ring against that at rest.
     vertex: of the mesh. joint, other: names of its two strongest joints. time: s. angle: rad between the two then.
-    twist: whether they turn about the bone between them, rather than bend.
+    twist: whether they turn about the link between them, rather than bend.
     """
 
     index: float
@@ -59,14 +60,15 @@ def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     √D with D = det(Σ w A) / Π |det A|^w, A the linear parts of the joints' matrices and w shares of the weights' sum:
     scales are divided out. Joints of scale 0 don't count as collapse.
     """
-    rig, weight = layer.rig, whole_weights(layer.rig)
+    rig = layer.rig
+    held, space = rig.held._replace(weight=whole_weights(rig)), room(rig.most)
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
     by_frame = np.zeros(len(times))
     for first in range(0, len(times), LANES):
         matrices = _matrices(scene, layer, clip, times[first : first + LANES])
         factors: Singles = np.empty((len(rig.points), len(matrices)), np.float32)
-        compiled(shrinkage)(weight, rig.joint, rig.start, lanes(matrices), _logs(matrices), factors)
+        compiled(shrinkage)(held, lanes(matrices), _logs(matrices), space, factors)
         factors[~np.isfinite(factors) | (np.diff(rig.start) == 0)[:, None]] = 1
         by_frame[first : first + LANES] = factors.min(axis=0, initial=1)
         at = factors.argmin(axis=1)
@@ -100,9 +102,9 @@ def _narrow(scene: Scene, layer: Layer, clip: Clip, vertex: int, time: float, in
     matrices = _matrices(scene, layer, clip, np.array([time]))
     rotation = split(matrices, pivots(rig), topmost(rig.above)).rotation[0]
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(rotation[a]), rotation[b]))
-    angle, bone = float(np.linalg.norm(turn)), np.diff(pivots(rig)[[a, b]], axis=0)[0]
-    along = abs(float(turn @ bone))
-    is_twist = along > TWIST * angle * float(np.linalg.norm(bone)) and along > 0
+    angle, link = float(np.linalg.norm(turn)), np.diff(pivots(rig)[[a, b]], axis=0)[0]
+    along = abs(float(turn @ link))
+    is_twist = along > TWIST * angle * float(np.linalg.norm(link)) and along > 0
     return Narrow(index, vertex, _name(names, rig.nodes[a]), _name(names, rig.nodes[b]), time, angle, is_twist)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +10,7 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 from anim.model import Instance
-
-Singles: TypeAlias = NDArray[np.float32]
+from anim.skinning.kernels.lanes import Held, Singles
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +18,9 @@ class Rig:
     """V vertices, and the joints that each of them hangs on, strongest first, joints without weight left out.
 
     nodes: (J,) node numbers. bind: (J, 3, 4) joint_from_mesh at bind time. above: (J,) the nearest joint above, or −1.
-    points: (V, 3) m in mesh space. normals: (V, 3), or (0, 3) where they are not wanted.
+    points: (V, 3) m in mesh space. normals, tangents: (V, 3), or (0, 3) where they are not wanted.
     start: (V + 1,); influences start[v] … start[v + 1] are vertex v's. joint: (E,) into nodes. weight: (E,) as stored.
-    faces: (T, 3).
+    most: how many influences a vertex has at most. faces: (T, 3).
     """
 
     nodes: Ints
@@ -30,16 +28,23 @@ class Rig:
     above: Ints
     points: Floats
     normals: Floats
+    tangents: Floats
     start: Ints
     joint: NDArray[np.int32]
     weight: Singles
+    most: int
     faces: Ints
 
+    @property
+    def held(self) -> Held:
+        """What the vertices hang on, as kernels read it."""
+        return Held(self.weight, self.joint, self.start)
 
-def rig(instance: Instance, parents: Ints, *, normals: bool = False) -> Rig:
+
+def rig(instance: Instance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> Rig:
     """Return the rig of a mesh instance; one without a skin hangs on its own node, whole.
 
-    parents: (N,) of the skeleton. normals: keep the mesh's, which it must have then.
+    parents: (N,) of the skeleton. normals, tangents: keep the mesh's, if it has them.
     Raises RangeError for a joint that the skin does not have, or a weight that is no number.
     """
     mesh, skin = instance.mesh, instance.skin
@@ -50,9 +55,23 @@ def rig(instance: Instance, parents: Ints, *, normals: bool = False) -> Rig:
         nodes, bind, joints, weights = skin.joints, skin.inverse_bind, mesh.joints, mesh.weights
         _check(joints, weights, len(nodes))
     start, joint, weight = influences(joints, weights)
-    kept = mesh.normals if normals and mesh.normals is not None else np.empty((0, 3))
+    none = np.empty((0, 3))
+    turned = mesh.normals if normals and mesh.normals is not None else none
+    along = mesh.tangents[:, :3] if tangents and mesh.tangents is not None else none
     above = joints_above(nodes, parents)
-    return Rig(nodes, bind, above, mesh.positions, kept, start, joint, weight, mesh.faces)
+    return Rig(
+        nodes,
+        bind,
+        above,
+        mesh.positions,
+        turned,
+        along,
+        start,
+        joint,
+        weight,
+        int(np.diff(start).max(initial=0)),
+        mesh.faces,
+    )
 
 
 def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], Singles]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from anim.arrays import Ints
 from anim.skinning.compiled import compiled
-from anim.skinning.kernels import normals_of_faces
-from anim.skinning.rig import Singles
+from anim.skinning.kernels.lanes import Singles
+from anim.skinning.kernels.normals_of_faces import normals_of_faces
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Chunks of frames out of layers, made by a pool of threads that is one chunk ahead of whoever asks."""
+"""Chunks of frames out of layers, made by a pool of threads that is some chunks ahead of whoever asks."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
-import numpy as np
-
 from anim.arrays import Floats
 from anim.model import Chunk, Clip, Skeleton
 from anim.sampling.pose import Poses, world_by_node
-from anim.skinning.kernels import LANES
+from anim.skinning.buffers import Buffers
+from anim.skinning.kernels.lanes import LANES, NOTHING, Target
 from anim.skinning.layer import PIECE, Frames, Layer
-from anim.skinning.rig import Singles
-from anim.skinning.skinner import NO_NORMALS
 
-CHUNK = 1 << 24  # bytes of positions in a chunk, about; never less than LANES frames
+CHUNK = 1 << 23  # bytes of positions in a chunk, about; never less than LANES frames
 MOST = 32  # blocks of LANES frames in a chunk, for their poses take memory too
+AHEAD = 2  # chunks that are under way
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,19 +27,21 @@ class Stream:
     layers: Sequence[Layer]
     vertices: int
     normals: bool
+    tangents: bool
     threads: int
+    buffers: Buffers
 
     def chunks(self, clip: Clip, times: Floats, progress: Callable[[int], None]) -> Iterator[Chunk]:
         """Yield the frames at `times` (F,) s in order. progress: called with how many the caller is done with."""
         blocks = min(CHUNK // (12 * self.vertices * LANES), MOST, -(-len(times) // LANES))
         step = LANES * max(blocks, 1)
         poses = Poses(self.skeleton, clip)
-        with ThreadPoolExecutor(self.threads) as pool:
+        with ThreadPoolExecutor(self.threads) as pool, ThreadPoolExecutor(1) as sampler:
             ahead: deque[Future[_Begun]] = deque()
-            for first in range(-step, len(times), step):
-                following = times[first + step : first + 2 * step]
+            for first in range(-AHEAD * step, len(times), step):
+                following = times[max(first + AHEAD * step, 0) :][:step]
                 if len(following):
-                    ahead.append(pool.submit(self._begin, poses, following, pool))
+                    ahead.append(sampler.submit(self._begin, poses, following, pool))
                 if first >= 0:
                     yield self._finished(first, ahead.popleft().result())
                     progress(min(first + step, len(times)))
@@ -51,10 +51,10 @@ class Stream:
         local = poses.at(times)
         frames = Frames(local, world_by_node(self.skeleton, local))
         shape = (len(times), self.vertices, 3)
-        positions: Singles = np.empty(shape, np.float32)
-        normals: Singles = np.empty(shape, np.float32) if self.normals else NO_NORMALS
+        wanted = (True, self.normals, self.tangents)
+        whole = Target(0, *(self.buffers.array(*shape) if each else NOTHING for each in wanted))
         blocks = [slice(low, low + LANES) for low in range(0, len(times), LANES)]
-        begun = _Begun(frames, positions, normals, [])
+        begun = _Begun(frames, whole, [])
         begun.blocks.extend(
             pool.submit(_placing, begun, layer, block, pool) for layer in self.layers for block in blocks
         )
@@ -65,8 +65,9 @@ class Stream:
             for piece in block.result():
                 piece.result()
         for layer in self.layers:
-            layer.finish(begun.frames, begun.positions, begun.normals)
-        return Chunk(first, begun.positions, begun.normals if self.normals else None)
+            layer.finish(begun.frames, begun.whole)
+        _, positions, normals, tangents = begun.whole
+        return Chunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +75,7 @@ class _Begun:
     """A chunk under way: the pieces of each block are known when its matrices are packed."""
 
     frames: Frames
-    positions: Singles
-    normals: Singles
+    whole: Target
     blocks: list[Future[list[Future[None]]]]
 
 
@@ -83,4 +83,4 @@ def _placing(begun: _Begun, layer: Layer, block: slice, pool: Executor) -> list[
     """Pack what a layer needs for a block of frames, and set its pieces going; nothing here waits for another."""
     packed = layer.pack(begun.frames, block)
     starts = range(0, len(layer.rig.points), PIECE)
-    return [pool.submit(layer.place, packed, block, begun.positions, begun.normals, start) for start in starts]
+    return [pool.submit(layer.place, packed, block, begun.whole, start) for start in starts]

@@ -53,17 +53,24 @@ def bake(
         float | None, typer.Option("--blend", metavar="0..1", help="Share of the method; the rest is lbs.")
     ] = None,
     bulge_clamp: Annotated[
-        bool, typer.Option("--bulge-clamp", help="Keep skin no farther from its bones than at rest.")
+        bool, typer.Option("--bulge-clamp", help="Keep skin no farther from the links between joints than at rest.")
     ] = False,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="Frames per second. Without it: the clip's own keys.")
+        float | None,
+        typer.Option("--fps", metavar="N", help="Frames per second; without it one frame per key of the clip."),
     ] = None,
     clip: options.Clips = None,
     mesh: meshes.Meshes = None,
     space: Annotated[
         Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")
     ] = Space.WORLD,
-    normals: Annotated[bool, typer.Option("--normals", help="Bake normals too.")] = False,
+    normals: Annotated[
+        bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(cache_options.holding('normals'))}).")
+    ] = False,
+    tangents: Annotated[
+        bool,
+        typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(cache_options.holding('tangents'))})."),
+    ] = False,
     rigid: Annotated[bool, typer.Option("--rigid", help="Bake meshes that only nodes move, too.")] = False,
     format: cache_options.FormatOption = None,
     up: cache_options.UpOption = None,
@@ -91,10 +98,11 @@ def bake(
     ending = cache_files.check(output, None if format is None else f".{format}")
     given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
     cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    cache_options.check_held(ending, normals=normals, tangents=tangents)
     done: list[_Done] = []
     with streams.source(input) as source:
         document = source.document
-        clips, scene = read.clips(document), read.scene(document, normals=normals)
+        clips, scene = read.clips(document), read.scene(document, normals=normals or tangents, tangents=tangents)
         numbers = Selection(clip or ()).chosen_clips(read.names(document))
         files = _files(output, [(clips[i].name, i) for i in numbers])
         nodes = meshes.nodes(scene, mesh)
@@ -105,7 +113,8 @@ def bake(
             blend=blend,
             bulge_clamp=bulge_clamp,
             space=space.value,
-            normals=normals,
+            normals=normals or tangents,
+            tangents=tangents,
             rigid=rigid,
             nodes=nodes,
         )

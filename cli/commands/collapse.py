@@ -58,7 +58,7 @@ def collapse(
     The collapse index is what linear blending leaves of the radius around a vertex: 1 is rigid, 0.71 a quarter turn
     between two joints, 0 a candy wrapper. It needs no closed mesh. Where parts of a mesh are closed, the volume that
     they enclose is compared method by method, against that in bind pose. Bulge is the greatest distance of a vertex
-    from its bones, against that in bind pose. Below: what to do.
+    from the links between its joints, against that in bind pose. Below: what to do.
     """
     if fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")

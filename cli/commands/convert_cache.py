@@ -31,11 +31,11 @@ def convert_cache(
     format: cache_options.FormatOption = None,
     at: Annotated[float | None, typer.Option("--at", metavar="S", help="Only the frame at this time.")] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="New frames, on straight lines between the old.", min=0)
+        float | None, typer.Option("--fps", metavar="N", help="New frames, on straight lines between the old.")
     ] = None,
     read_fps: Annotated[
         float | None,
-        typer.Option("--read-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24).", min=0),
+        typer.Option("--read-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24)."),
     ] = None,
     up: cache_options.UpOption = None,
     order: cache_options.OrderOption = None,
@@ -48,7 +48,9 @@ def convert_cache(
     dry_run: options.DryRun = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Change a vertex cache into another format, frame by frame: as long as you like in little memory.
+    """Change a vertex cache into another format, frame by frame.
+
+    Any length goes in little memory, but for .glb morph targets (1 GB of positions) and textures (4096 × 8192 pixels).
 
     Formats go by the name's ending. PC2 and MDD get a rest mesh beside them with the same order of vertices; for
     Blender's Mesh Cache modifier use --up z --order blender. Frame sequences (.ply, .obj, .stl) are numbered:
@@ -56,12 +58,15 @@ def convert_cache(
     """
     voice = report.Voice(quiet)
     began = time.perf_counter()
+    for name, rate in (("--fps", fps), ("--read-fps", read_fps)):
+        if rate is not None and rate <= 0:
+            raise UsageError(f"{name} is {rate:g} (expected a number above 0)")
     if at is not None and fps is not None:
         raise UsageError("--at and --fps exclude each other")
     ending = cache_files.check(output, None if format is None else f".{format}")
     given: dict[str, Any] = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
     cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
-    with cache_files.load(input, Reading(read_fps or None)) as loaded:
+    with cache_files.load(input, Reading(read_fps)) as loaded:
         if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
         cache = _changed(loaded.cache, at, fps, up, order)

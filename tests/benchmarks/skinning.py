@@ -2,15 +2,17 @@
 
     python -m tests.benchmarks.skinning [small] [medium] [large] [long] [knight]
 
-Every figure is the least of several repeats in a process of its own, one after another in one run: trust the ratios.
 Ours is `anim.skinning.bake` from clip to chunks of positions, sampling and hierarchy included, chunks let go of as a
 writer would; "kept" puts them into one array. USD's is BakeSkinning alone on a stage in memory, its skeleton flat.
-The limit is the time of writing an array as large as the output. Memory is the peak of the process.
+The limit is the time of writing an array as large as the output, by all cores. They take turns in one process, and each
+ratio is the median of the rounds', so that a busy machine slows all alike; milliseconds are the least of the rounds.
+Memory is the peak of a process of its own for each, without what only this file imports.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -26,8 +28,6 @@ from anim import arrays
 from anim.arrays import Floats
 from anim.model import Clip, Instance, Interpolation, Mesh, Scene, Skeleton, Skin, Track
 from anim.sampling import pose, world_matrices
-from anim.skinning.bake import baker
-from tests.files import ASSETS
 
 SIZES = {
     "small": (3_000, 30, 60),
@@ -37,7 +37,7 @@ SIZES = {
 FPS = 30.0
 INFLUENCES = 4
 LONG = (100_000, 150, 10_000)  # for memory alone, streamed once
-REPEATS = {"small": 20, "medium": 7, "large": 3}
+ROUNDS = {"small": 20, "medium": 9, "large": 3}
 METHODS = ("lbs", "dqs")
 
 
@@ -68,35 +68,68 @@ def rig(vertices: int, joints: int, frames: int) -> tuple[Scene, Clip, Floats]:
     return scene, Clip("clip", tuple(tracks)), times
 
 
-def ours(size: str, method: str, *, kept: bool) -> dict[str, float]:
-    """Return seconds, MB, and the limit in seconds."""
+def turns(size: str, method: str) -> dict[str, list[float]]:
+    """Return the seconds of each round of ours, kept, the limit and USD."""
     scene, clip, times = rig(*SIZES[size])
-    made = baker(scene, method=method)
+    jobs = {
+        "ours": _streamed(scene, clip, times, method),
+        "limit": _limit(size),
+        "kept": _into_one(scene, clip, times, method),
+    }
+    found: dict[str, list[float]] = {name: [] for name in (*jobs, "usd")}
+    for job in jobs.values():
+        job()
+    for _ in range(ROUNDS[size]):
+        for name, job in jobs.items():
+            found[name].append(_seconds(job))
+        found["usd"].append(_usd(scene, clip, times, method))
+    return found
 
-    def streamed() -> None:
-        for _ in made.bake(clip, times=times).chunks():
-            pass
 
-    def into_one() -> None:
-        cache = made.bake(clip, times=times)
-        whole = np.empty((cache.frame_count, cache.vertex_count, 3), np.float32)
-        for chunk in cache.chunks():
-            whole[chunk.first : chunk.first + len(chunk.positions)] = chunk.positions
-
-    return {"seconds": _least(into_one if kept else streamed, REPEATS[size]), "mb": _peak()}
+def peak(size: str, method: str, who: str) -> float:
+    """Return the MB that one bake takes, the rig of the test included."""
+    scene, clip, times = rig(*SIZES[size])
+    if who == "usd":
+        _usd(scene, clip, times, method)
+    else:
+        _streamed(scene, clip, times, method)()
+    return _peak()
 
 
 def long(method: str) -> dict[str, float]:
     """Return seconds and MB of one stream over very many frames."""
     scene, clip, times = rig(*LONG)
-    began = time.perf_counter()
-    for _ in baker(scene, method=method).bake(clip, times=times).chunks():
-        pass
-    return {"seconds": time.perf_counter() - began, "mb": _peak()}
+    return {"seconds": _seconds(_streamed(scene, clip, times, method)), "mb": _peak()}
 
 
-def limit(size: str) -> dict[str, float]:
-    """Return the time of writing an array of the output's size that is there already, by all cores."""
+def _streamed(scene: Scene, clip: Clip, times: Floats, method: str) -> Callable[[], None]:
+    from anim.skinning.bake import baker
+
+    made = baker(scene, method=method)
+
+    def job() -> None:
+        for _ in made.bake(clip, times=times).chunks():
+            pass
+
+    return job
+
+
+def _into_one(scene: Scene, clip: Clip, times: Floats, method: str) -> Callable[[], None]:
+    from anim.skinning.bake import baker
+
+    made = baker(scene, method=method)
+
+    def job() -> None:
+        cache = made.bake(clip, times=times)
+        whole = np.empty((cache.frame_count, cache.vertex_count, 3), np.float32)
+        for chunk in cache.chunks():
+            whole[chunk.first : chunk.first + len(chunk.positions)] = chunk.positions
+
+    return job
+
+
+def _limit(size: str) -> Callable[[], None]:
+    """What writes an array of the output's size that is there already, by all cores."""
     import numba
 
     @numba.njit(parallel=True)  # type: ignore[untyped-decorator]
@@ -106,22 +139,18 @@ def limit(size: str) -> dict[str, float]:
 
     vertices, _, frames = SIZES[size]
     array = np.empty(vertices * frames * 3, np.float32)
-    return {"seconds": _least(lambda: fill(array, np.float32(1)), REPEATS[size]), "mb": _peak()}
+    return lambda: fill(array, np.float32(1))
 
 
-def usd(size: str, method: str) -> dict[str, float]:
-    """Return seconds and MB of UsdSkel.BakeSkinning on the same rig."""
+def _usd(scene: Scene, clip: Clip, times: Floats, method: str) -> float:
     from pxr import UsdSkel
 
-    scene, clip, times = rig(*SIZES[size])
-    seconds = []
-    for _ in range(REPEATS[size]):
-        stage, root = _stage(scene, clip, times, method)
-        began = time.perf_counter()
-        assert UsdSkel.BakeSkinning(root)
-        seconds.append(time.perf_counter() - began)
-        del stage, root
-    return {"seconds": min(seconds), "mb": _peak()}
+    stage, root = _stage(scene, clip, times, method)
+    began = time.perf_counter()
+    assert UsdSkel.BakeSkinning(root)
+    seconds = time.perf_counter() - began
+    del stage, root
+    return seconds
 
 
 def _stage(scene: Scene, clip: Clip, times: Floats, method: str) -> tuple[Any, Any]:
@@ -170,7 +199,7 @@ def _stage(scene: Scene, clip: Clip, times: Floats, method: str) -> tuple[Any, A
 
 def knight(folder: str, *, cold: bool) -> dict[str, float]:
     """Return seconds and MB of `bake Knight.glb --method dqs` for all its clips, as a process. cold: compile too."""
-    import os
+    from tests.files import ASSETS
 
     environment = dict(os.environ)
     if cold:
@@ -184,40 +213,42 @@ def knight(folder: str, *, cold: bool) -> dict[str, float]:
     return {"seconds": min(seconds), "mb": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1000}
 
 
-def _least(job: Callable[[], None], repeats: int) -> float:
+def _seconds(job: Callable[[], None]) -> float:
+    began = time.perf_counter()
     job()
-    seconds = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        job()
-        seconds.append(time.perf_counter() - began)
-    return min(seconds)
+    return time.perf_counter() - began
 
 
 def _peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
 
 
-def _measured(*call: str) -> dict[str, float]:
+def _measured(*call: str) -> Any:
     """The result of one measurement in a process of its own."""
     run = subprocess.run([sys.executable, "-m", __spec__.name, "--one", *call], capture_output=True, text=True)
     if run.returncode:
         raise SystemExit(run.stderr)
-    found: dict[str, float] = json.loads(run.stdout)
-    return found
+    return json.loads(run.stdout)
 
 
-def _one(call: list[str]) -> dict[str, float]:
-    kind, size, *rest = call
-    if kind == "limit":
-        return limit(size)
+def _one(call: list[str]) -> Any:
+    kind, *rest = call
     if kind == "knight":
-        return knight(size, cold=rest[0] == "cold")
-    if kind == "long":
-        return long(size)
-    if kind == "usd":
-        return usd(size, rest[0])
-    return ours(size, rest[0], kept=kind == "kept")
+        return knight(rest[0], cold=rest[1] == "cold")
+    jobs: dict[str, Callable[..., Any]] = {"turns": turns, "peak": peak, "long": long}
+    return jobs[kind](*rest)
+
+
+def _row(size: str, method: str) -> str:
+    found = {name: np.array(values) for name, values in _measured("turns", size, method).items()}
+    ours, theirs = (_measured("peak", size, method, who) for who in ("ours", "usd"))
+    least = {name: 1e3 * values.min() for name, values in found.items()}
+    share, faster = np.median(found["ours"] / found["limit"]), np.median(found["usd"] / found["ours"])
+    return (
+        f"  {method}  {least['ours']:8.1f} ms ({share:4.1f}x the limit of {least['limit']:.1f} ms), "
+        f"kept {least['kept']:8.1f} ms, {ours:5.0f} MB;  usd-core {least['usd']:8.1f} ms, {theirs:5.0f} MB;  "
+        f"{faster:4.1f}x faster, {ours / theirs:.2f} of the memory\n"
+    )
 
 
 def main(arguments: list[str]) -> None:
@@ -228,18 +259,10 @@ def main(arguments: list[str]) -> None:
     wanted = arguments or [*SIZES, "long", "knight"]
     for size in (each for each in SIZES if each in wanted):
         vertices, joints, frames = SIZES[size]
-        least = _measured("limit", size)["seconds"]
         output = 12 * vertices * frames / 1e6
-        words = f"\n{size}: {vertices} vertices x {joints} joints x {frames} frames, {output:.0f} MB"
-        sys.stdout.write(f"{words}; limit {1e3 * least:.1f} ms\n")
+        sys.stdout.write(f"\n{size}: {vertices} vertices x {joints} joints x {frames} frames, {output:.0f} MB\n")
         for method in METHODS:
-            us, them, kept = (_measured(kind, size, method) for kind in ("ours", "usd", "kept"))
-            sys.stdout.write(
-                f"  {method}  {1e3 * us['seconds']:8.1f} ms ({us['seconds'] / least:4.1f}x the limit), "
-                f"kept {1e3 * kept['seconds']:8.1f} ms, {us['mb']:5.0f} MB;  "
-                f"usd-core {1e3 * them['seconds']:8.1f} ms, {them['mb']:5.0f} MB;  "
-                f"{them['seconds'] / us['seconds']:4.1f}x faster, {us['mb'] / them['mb']:.2f} of the memory\n"
-            )
+            sys.stdout.write(_row(size, method))
             sys.stdout.flush()
     if "long" in wanted:
         one = _measured("long", "dqs")

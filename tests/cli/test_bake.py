@@ -10,6 +10,7 @@ import pytest
 
 from anim.gltf import read
 from anim.gltf.document import Document
+from anim.sampling import pose, world_matrices
 from anim.sampling.times import grid
 from anim.skinning.bake import bake as baked
 from cli.progress import Progress
@@ -143,11 +144,39 @@ def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
         (("--mesh", "hand"), 5, "no mesh matches 'hand'"),
         (("--clip", "twits"), 5, "no clip matches 'twits'"),
         (("--quantize",), 2, "--quantize means nothing to .npz"),
+        (("--tangents",), 4, "has no tangents"),
     ],
 )
 def test_refusals(args: tuple[str, ...], code: int, words: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
     assert words in refusal(call("bake", fixture("arm"), tmp_path / "{clip}.npz", *args), code)
     assert not list(tmp_path.glob("*.npz"))
+
+
+@pytest.mark.parametrize(("option", "name"), [("--normals", "a.pc2"), ("--normals", "a.stl"), ("--tangents", "a.ply")])
+def test_what_a_format_has_no_place_for(option: str, name: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("bake", fixture("arm"), tmp_path / name, "--clip", "twist", option)
+    assert f"{option} means nothing to {name[1:]}" in refusal(run, 2)
+    assert not (tmp_path / name).exists()
+
+
+def test_tangents_of_a_real_file(call: Call, asset: Find, tmp_path: Path) -> None:
+    """Rigid nodes turn them as they turn the file's own: checked by a product with the nodes' matrices."""
+    source = asset("BusterDrone/busterDrone.gltf")
+    call("bake", source, tmp_path / "a.npz", "--rigid", "--tangents", "--fps", "1").product()
+    document = opened_path(source)
+    of, (played,) = read.scene(document, tangents=True), read.clips(document)
+    with np.load(tmp_path / "a.npz") as arrays:
+        found, times, handedness = arrays["tangents"], arrays["times"], arrays["handedness"]
+    world = world_matrices(of.skeleton, pose(of.skeleton, played, times))
+    at = 0
+    for instance in of.instances:
+        own = instance.mesh.tangents
+        assert own is not None
+        wanted = np.einsum("fij,vj->fvi", world[:, instance.node, :, :3], own[:, :3])
+        wanted /= np.maximum(np.linalg.norm(wanted, axis=2, keepdims=True), 1e-30)
+        assert np.abs(found[:, at : at + len(own)] - wanted).max() < 1e-5
+        assert np.array_equal(handedness[at : at + len(own)], np.sign(own[:, 3]))
+        at += len(own)
 
 
 def test_an_output_of_no_format(call: Call, fixture: Fixture, tmp_path: Path) -> None:

@@ -128,6 +128,8 @@ def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
         (["a.mdd", "--read-fps", "9"], "--read-fps means nothing to .npz"),
         (["a.npz", "--at", "9"], "no frame at 9 s"),
         (["a.npz", "--at", "0", "--fps", "9"], "exclude each other"),
+        (["a.npz", "--fps", "0"], "--fps is 0 (expected a number above 0)"),
+        (["a.npz", "--read-fps", "-1"], "--read-fps is -1 (expected a number above 0)"),
         (["no/a.npz"], "there is no folder"),
     ],
 )

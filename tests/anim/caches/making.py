@@ -18,22 +18,37 @@ FACES = np.array([[0, 1, 2], [2, 1, 3], [4, 6, 5], [5, 6, 7]])
 PARTS = (Part("one", (0, 4), (0, 2), 3, 0), Part("two", (4, 9), (2, 4), 5, 1))
 
 
-def cache(frames: int = 7, *, fps: float = 30.0, normals: bool = True, step: int = 3) -> VertexCache:
-    """Return a cache of nine vertices, the last one in no face, that comes in chunks of `step` frames."""
+def cache(
+    frames: int = 7, *, fps: float = 30.0, normals: bool = True, step: int = 3, tangents: bool = False
+) -> VertexCache:
+    """Return a cache of nine vertices, the last one in no face, that comes in chunks of `step` frames.
+
+    tangents: at right angles to the normals, every third one left-handed.
+    """
     random = np.random.default_rng(11)
     positions = random.normal(size=(frames, 9, 3)).astype(np.float32)
     turns = random.normal(size=(frames, 9, 3))
     turns = (turns / np.linalg.norm(turns, axis=2, keepdims=True)).astype(np.float32)
+    along = np.cross(turns, turns[:, :, [1, 2, 0]])
+    along = (along / np.linalg.norm(along, axis=2, keepdims=True)).astype(np.float32)
+    handedness = np.where(np.arange(9) % 3, 1.0, -1.0)
     return VertexCache(
         np.arange(frames) / fps,
         9,
         FACES,
         lambda: (
-            Chunk(f, positions[f : f + step], turns[f : f + step] if normals else None) for f in range(0, frames, step)
+            Chunk(
+                f,
+                positions[f : f + step],
+                turns[f : f + step] if normals else None,
+                along[f : f + step] if tangents else None,
+            )
+            for f in range(0, frames, step)
         ),
         rest=positions[0].astype(np.float64) + 0.5,
         has_normals=normals,
         parts=PARTS,
+        handedness=handedness if tangents else None,
     )
 
 

@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from anim.skinning import kernels
+from anim.skinning import compiled as compiled_module
 from anim.skinning.compiled import compiled
+from anim.skinning.kernels import rows
+from anim.skinning.kernels.around_duals import around_duals
+from anim.skinning.kernels.lanes import LANES, Held, Shape, Target, room
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = """
@@ -29,16 +32,18 @@ def test_machine_code_is_the_python_it_came_from() -> None:
     random = np.random.default_rng(0)
     points = random.normal(size=(5, 3, 1)).astype(np.float32)
     normals = random.normal(size=(5, 3, 1)).astype(np.float32)
-    duals = random.normal(size=(4, 8, kernels.LANES)).astype(np.float32)
-    stretches = random.normal(size=(4, 12, kernels.LANES)).astype(np.float32)
-    joint, start = np.array([0, 1, 2, 3, 1, 2]), np.array([0, 2, 3, 3, 5, 6])
+    tangents = random.normal(size=(5, 3, 1)).astype(np.float32)
+    duals = random.normal(size=(4, 8, LANES)).astype(np.float32)
+    stretches = random.normal(size=(4, 12, LANES)).astype(np.float32)
+    joint, start = np.array([0, 1, 2, 3, 1, 2], np.int32), np.array([0, 2, 3, 3, 5, 6])
     weight = np.array([0.7, 0.3, 1, 0.6, 0.4, 1], np.float32)
     results = []
-    for kernel in (kernels.around_duals, compiled(kernels.around_duals)):
-        out, turned = np.full((2, 7, 3), 9, np.float32), np.full((2, 7, 3), 9, np.float32)
-        kernel(points, normals, weight, joint, start, duals, stretches, 1, 5, 2, out, turned)
+    for kernel in (around_duals, compiled(around_duals)):
+        out, turned, along = (np.full((2, 7, 3), 9, np.float32) for _ in range(3))
+        shape, held, into = Shape(points, normals, tangents), Held(weight, joint, start), Target(2, out, turned, along)
+        kernel(shape, held, duals, stretches, 1, 5, room(2), into)
         assert (out[:, [0, 1, 2]] == 9).all(), "only what was asked for"
-        results.append((out, turned))
+        results.append((out, turned, along))
     for plain, fast in zip(*results, strict=True):
         assert np.allclose(plain, fast, rtol=1e-5, atol=1e-5)
 
@@ -46,9 +51,21 @@ def test_machine_code_is_the_python_it_came_from() -> None:
 def test_code_is_kept_in_the_users_cache_and_not_beside_the_package(tmp_path: Path) -> None:
     _run(tmp_path)
     kept = {path.name.partition("-")[0] for path in tmp_path.rglob("*.nbi")}
-    assert "kernels.points_only" in kept
+    assert "points_only.points_only" in kept
     assert all((tmp_path / "gltf-anim") in path.parents for path in tmp_path.rglob("*.nbi"))
     assert not list((ROOT / "anim" / "skinning").rglob("*.nbi"))
+
+
+def test_a_change_in_what_a_kernel_calls_is_other_code() -> None:
+    """Numba alone would take the old code from the cache: it looks at the kernel's own file."""
+    before = compiled_module._digest(around_duals)
+    kept = rows.turn.__code__
+    try:
+        rows.turn.__code__ = rows.clear.__code__.replace(co_name="turn", co_varnames=kept.co_varnames[:3])
+        assert compiled_module._digest(around_duals) != before
+    finally:
+        rows.turn.__code__ = kept
+    assert compiled_module._digest(around_duals) == before
 
 
 def test_without_a_cache_folder_it_works_all_the_same(tmp_path: Path) -> None:
