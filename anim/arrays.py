@@ -66,7 +66,7 @@ def check_shape(array: AnyArray, shape: str, *, name: str = "array") -> None:
         words = shape.split()
         spec = _specs[shape] = len(words), tuple((i, int(word)) for i, word in enumerate(words) if word.isdigit())
     axes, fixed = spec
-    if array.ndim != axes or any(array.shape[i] != length for i, length in fixed):
+    if array.ndim != axes or (fixed and any(array.shape[i] != length for i, length in fixed)):
         raise ShapeError(f"{name} has shape {array.shape} (expected ({', '.join(shape.split())}))")
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 
-from anim.measure.continuity import Grade, Largest, Seam, TrackContinuity
 from anim.measure.facts import ClipFacts, Facts, SkinFacts, TrackFacts
 from anim.measure.findings import Finding
 from cli import tables
 from cli.report import length, plural, size, speed
 from cli.tables import Cell
 
-Inspected = tuple[str, int, Facts]
-Smoothness = tuple[tuple[TrackContinuity, ...], ...]
+if TYPE_CHECKING:
+    from anim.measure.continuity import TrackContinuity
+
+Inspected: TypeAlias = tuple[str, int, Facts]
+Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 STANDING = 1e-4  # m; a root that ends this near its start goes nowhere
 MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
@@ -28,7 +30,10 @@ def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, t
         parts.append(_clips(facts.clips))
     if tracks:
         parts += [_tracks(clip) for clip in facts.clips]
-    parts += [_continuity(*each) for each in zip(facts.clips, smooth, strict=False)]
+    if smooth:
+        from cli import smoothness
+
+        parts += [smoothness.table(*each) for each in zip(facts.clips, smooth, strict=False)]
     if facts.skins:
         parts.append(_skins(facts.skins))
     parts.append(_findings(facts.findings))
@@ -62,48 +67,6 @@ def track_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]
         for track in clip.track_list
     ]
     return header, rows
-
-
-def continuity_rows(files: Sequence[Inspected], smooth: Sequence[Smoothness]) -> tuple[list[str], list[list[Cell]]]:
-    """Return header and rows of one table: a row per track of every clip of every file, with its keys by smoothness."""
-    header = ["file", "clip", *continuity_cells(None)]
-    rows: list[list[Cell]] = [
-        [name, clip.name or str(clip.index), *continuity_cells(track).values()]
-        for (name, _, facts), of_clips in zip(files, smooth, strict=True)
-        for clip, tracks in zip(facts.clips, of_clips, strict=True)
-        for track in tracks
-    ]
-    return header, rows
-
-
-def continuity_cells(track: TrackContinuity | None) -> dict[str, Cell]:
-    """Return one row of that table by column; of None, the columns."""
-    plain = ("target", "path", "interpolation", "unit", "still", "interior_keys", "jumps", "c0", "g1", "c1", "c2")
-    cells: dict[str, Cell] = {name: getattr(track, name, None) for name in plain}
-    for name in ("value", "speed", "acceleration"):
-        largest: Largest | None = getattr(track, f"largest_{name}_jump", None)
-        cells[f"largest_{name}_jump"] = largest.size if largest else None
-        cells[f"largest_{name}_jump_at_s"] = largest.time_s if largest else None
-    seam = track.seam if track else None
-    cells["seam"] = str(seam.grade) if seam else None
-    for name in ("value_jump", "speed_jump", "acceleration_jump"):
-        cells[f"seam_{name}"] = getattr(seam, name, None)
-    return cells
-
-
-def continuity_json(track: TrackContinuity) -> dict[str, Any]:
-    """Return one track's smoothness as JSON holds it, with every key between its ends."""
-    about = {name: getattr(track, name) for name in track.__dataclass_fields__ if name != "keys"}
-    about |= {name: asdict(value) for name, value in about.items() if isinstance(value, Largest | Seam)}
-    keys = track.keys
-    about["keys"] = {
-        "times_s": keys.times.tolist(),
-        "grades": [str(grade) for grade in keys.grades],
-        "value_jumps": keys.value.tolist(),
-        "speed_jumps": keys.speed.tolist(),
-        "acceleration_jumps": keys.acceleration.tolist(),
-    }
-    return about
 
 
 def _fields(kind: type[ClipFacts] | type[TrackFacts]) -> list[str]:
@@ -182,62 +145,6 @@ def _tracks(clip: ClipFacts) -> str:
         for track in clip.track_list
     ]
     return tables.text(header, rows, left=3)
-
-
-def _continuity(clip: ClipFacts, tracks: Sequence[TrackContinuity]) -> str:
-    """How smooth the tracks of a clip are that move at all."""
-    header = [tables.one_line(f"smoothness of {clip.name or f'#{clip.index}'}"), "path", "how", "inner keys", "jump"]
-    header += ["C0", "G1", "C1", "C2", "value jump", "speed jump", "acceleration jump", "loop seam"]
-    moving = [track for track in tracks if not track.still]
-    rows: list[list[Cell]] = [
-        [
-            track.target,
-            track.path,
-            track.interpolation.lower(),
-            track.interior_keys,
-            *(str(count or "") for count in (track.jumps, track.c0, track.g1, track.c1, track.c2)),
-            *(
-                f"{_amount(largest.size, track.unit, per)} at {largest.time_s:.3g} s" if largest else ""
-                for largest, per in (
-                    (track.largest_value_jump, ""),
-                    (track.largest_speed_jump, "/s"),
-                    (track.largest_acceleration_jump, "/s²"),
-                )
-            ),
-            _seam(track),
-        ]
-        for track in moving
-    ]
-    still = len(tracks) - len(moving)
-    note = f"  {plural(still, 'track')} never move{'s' if still == 1 else ''}\n" if still else ""
-    return (tables.text(header, rows, left=3) if rows else "") + note
-
-
-def _seam(track: TrackContinuity) -> str:
-    """The loop's seam in words: "C2", "C0, 0.3 m/s", "open, 2 cm"."""
-    seam = track.seam
-    if seam is None or seam.grade is Grade.C2:
-        return "C2" if seam else ""
-    if seam.grade is Grade.JUMP:
-        return f"open, {_amount(seam.value_jump, track.unit, '')}"
-    if seam.grade is Grade.C1:
-        return f"C1, {_amount(seam.acceleration_jump, track.unit, '/s²')}"
-    return f"{seam.grade}, {_amount(seam.speed_jump, track.unit, '/s')}"
-
-
-def _amount(size: float, unit: str, per: str) -> str:
-    """A jump with its unit, two digits: "0.46 m/s", "12 °/s", "3.1 /s²"."""
-    if unit == "m":
-        return speed(size).removesuffix("/s") + per if per else length(size)
-    if unit == "rad":
-        degrees = number(math.degrees(size))
-        return f"{degrees} °{per}" if per else f"{degrees}°"
-    return f"{number(size)} {per}".rstrip()
-
-
-def number(value: float) -> str:
-    """A value rounded to two digits, never in the form 2.8e+02."""
-    return speed(value).removesuffix(" m/s")
 
 
 def _skins(skins: Sequence[SkinFacts]) -> str:

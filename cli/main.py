@@ -109,7 +109,7 @@ COMMANDS = {
         "Bake skinning by LBS, dual quaternions or centers of rotation to vertex caches.",
         (
             "gltf-anim bake walk.glb walk.npz --method dqs --fps 30",
-            "gltf-anim bake hero.glb 'caches/{clip}.pc2' --fps 24 --normals",
+            "gltf-anim bake hero.glb 'caches/{clip}.usdc' --fps 24 --normals",
             "gltf-anim bake face.glb face.npz --clip talk --mesh Head --space mesh",
         ),
     ),
@@ -144,6 +144,23 @@ COMMANDS = {
             "gltf-anim render walk.glb walk.png",
             "gltf-anim render arm.glb twist.png --method lbs --method dqs --heat --clip twist",
             "gltf-anim render walk.npz walk.webp --frames 24",
+        ),
+    ),
+    "optimize": Row(
+        "Make animations smaller, within an error that no vertex exceeds.",
+        (
+            "gltf-anim optimize hero.glb small.glb --max-error 0.1%",
+            "gltf-anim optimize hero.glb small.glb --max-error 0.5mm --meshopt ext --drop rest --report small.json",
+            "gltf-anim optimize hero.glb small.glb --max-bytes 260kB --effort fast",
+            "gltf-anim optimize hero.glb --curve size-against-error.csv --effort fast",
+        ),
+    ),
+    "diff": Row(
+        "Say how far apart the motion of two files is.",
+        (
+            "gltf-anim diff walk.glb walk30.glb",
+            "gltf-anim diff walk.glb walk30.glb --plot error.png --player three",
+            "gltf-anim diff walk.glb walk30.glb --fail-above 20% --format json > diff.json",
         ),
     ),
     "convert": Row(
@@ -216,6 +233,7 @@ def main() -> None:
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends us quietly, as it ends any other tool
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that temporary files are cleared away
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # our products are small: a second thread would only spin
     gc.disable()  # one short job over many long-lived objects: collecting only costs time
     code = run(sys.argv[1:])
     for stream in (sys.stdout, sys.stderr):

@@ -45,14 +45,18 @@ class Accessors:
 
         Raises FormatError for NaN or infinity.
         """
-        values = self._located(index, self._floats)
+        with np.errstate(invalid="ignore"):  # a signaling NaN is found below
+            values = self._located(index, self._floats)
         if not np.isfinite(values).all():
             row = int(np.argwhere(~np.isfinite(values))[0][0])
             raise FormatError(f"holds NaN or infinity (element {row})", where=f"accessor {index}")
         return values
 
     def unchecked(self, index: int) -> Floats:
-        """Return what `floats` does, without looking for NaN: for callers whose own types do."""
+        """Return what `floats` does, without looking for NaN: for callers whose own types do.
+
+        numpy warns of a signaling NaN; callers that read many accessors turn that off once, which is not free.
+        """
         return self._located(index, self._floats)
 
     def integers(self, index: int) -> Ints:
@@ -105,8 +109,7 @@ class Accessors:
 
     def _floats(self, index: int) -> Floats:
         raw = self._raw(index)
-        with np.errstate(invalid="ignore"):  # a signaling NaN; whoever gets the numbers looks for it
-            values = raw.astype(np.float64)
+        values = raw.astype(np.float64)
         if raw.dtype.kind != "f" and self._accessors[index].get("normalized"):
             return denormalized(values, raw.dtype)
         return values
@@ -119,15 +122,17 @@ class Accessors:
 
     def _opened(self, number: int) -> Bytes:
         view = self._views[number]
-        compressed = layout.compression(view)
         try:
+            if "extensions" not in view:
+                return _slice(self._document.buffers[view["buffer"]].data, view)
+            compressed = layout.compression(view)
             if compressed is not None:
                 stored = _slice(self._document.buffers[compressed["buffer"]].data, compressed)
                 plain = meshopt.decode(stored, compressed)
                 if len(plain) < view["byteLength"]:
                     raise FormatError(f"decodes to {len(plain)} bytes (expected {view['byteLength']})")
                 return plain
-            if view.get("extensions") and not self._document.buffers[view["buffer"]].has_data:
+            if view["extensions"] and not self._document.buffers[view["buffer"]].has_data:
                 names = ", ".join(view["extensions"])
                 raise UnsupportedError(f"its data is hidden by {names}, which is not handled")
             return _slice(self._document.buffers[view["buffer"]].data, view)

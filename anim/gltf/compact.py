@@ -21,20 +21,20 @@ def unused_views(document: Document, freed: Set[int], outside: References) -> se
 
 
 def shifts(
-    document: Document, freed: Set[int], unused: Set[int], outside: References, frozen: Set[int] = frozenset()
+    document: Document, freed: Set[int], unused: Set[int], outside: References, movable: Set[int]
 ) -> list[Shift]:
     """Return, for each buffer, where its bytes go when freed accessors and unused views are dropped.
 
     A view that freed accessors share with others loses their bytes too, unless someone refers to the view itself.
-    frozen: buffers in which nothing may move.
+    movable: buffers in which bytes may move; those of other buffers stay.
     """
     dropped: list[list[Range]] = [[] for _ in document.buffers]
     needed: list[list[Range]] = [[] for _ in document.buffers]
     spans = _spans(document.json, freed)
     for number, view in enumerate(items(document.json, "bufferViews")):
-        for buffer, place in _places(view):
+        for buffer, place in places(view):
             if number in unused:
-                dropped[buffer].append(place)
+                dropped[buffer] += [] if is_placeholder(view) else [place]
                 continue
             shared = [] if number in outside.views or layout.compression(view) else spans.get(number, [])
             theirs = [_moved(span, place[0]) for i, span in shared if i in freed]
@@ -43,9 +43,14 @@ def shifts(
             dropped[buffer] += free
             needed[buffer] += ranges.difference([place], free)
     return [
-        Shift(_droppable(d, n, b.byte_length) if b.has_data and i not in frozen else [])
+        Shift(_droppable(d, n, b.byte_length) if i in movable else [])
         for i, (d, n, b) in enumerate(zip(dropped, needed, document.buffers, strict=True))
     ]
+
+
+def is_placeholder(view: Json) -> bool:
+    """Return whether a view can be one that only holds a number: it names a byte, but that is not its own."""
+    return view.keys() == {"buffer", "byteLength"} and view["byteLength"] == 1
 
 
 def moved_view(view: Json, shift: list[Shift]) -> Json:
@@ -70,18 +75,31 @@ def moved_accessor(accessor: Json, views: list[Json], shift: list[Shift]) -> Jso
 
 
 def rebuilt(buffer: Buffer, shift: Shift, appended: list[Bytes], where: str) -> Buffer:
-    """Return the buffer without dropped bytes and with `appended` ones, which start on a multiple of four."""
+    """Return the buffer without dropped bytes and with `appended` ones, which start on a multiple of four.
+
+    One without data gets shorter only.
+    """
     if not shift.dropped and not appended:
         return buffer
-    length = shift(buffer.byte_length) if buffer.has_data else 0
+    length = shift(buffer.byte_length)
+    if not buffer.has_data:
+        return Buffer(length, buffer.uri, None, where=where)
     padding = np.zeros(-length % 4 if appended else 0, np.uint8)
 
     def load() -> Bytes:
-        kept = ranges.difference([(0, buffer.byte_length)], shift.dropped) if buffer.has_data else []
+        kept = ranges.difference([(0, buffer.byte_length)], shift.dropped)
         return np.concatenate([*(buffer.data[start:end] for start, end in kept), padding, *appended])
 
     total = length + len(padding) + sum(len(piece) for piece in appended)
     return Buffer(total, buffer.uri, load, where=where, replaced=True)
+
+
+def places(view: Json) -> Iterator[tuple[int, Range]]:
+    """Yield (buffer, range) of a view's bytes: decoded, and compressed where it is."""
+    yield view["buffer"], _span(view, view["byteLength"])
+    compressed = layout.compression(view)
+    if compressed is not None:
+        yield compressed["buffer"], _span(compressed, compressed["byteLength"])
 
 
 def _spans(json: Json, freed: Set[int]) -> dict[int, list[tuple[int, Range]]]:
@@ -114,13 +132,6 @@ def _accessor_spans(accessor: Json, views: list[Json]) -> Iterator[tuple[int, Ra
 def _span(place: Json, length: int) -> Range:
     start = place.get("byteOffset", 0)
     return start, start + length
-
-
-def _places(view: Json) -> Iterator[tuple[int, Range]]:
-    yield view["buffer"], _span(view, view["byteLength"])
-    compressed = layout.compression(view)
-    if compressed is not None:
-        yield compressed["buffer"], _span(compressed, compressed["byteLength"])
 
 
 def _moved(span: Range, by: int) -> Range:

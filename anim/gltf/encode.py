@@ -2,44 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import RangeError, ShapeError
+from anim.gltf import pack
 from anim.gltf.accessors import DTYPES, FLOAT, denormalized
 from anim.gltf.document import Json
 from anim.gltf.layout import COMPONENTS
-from anim.model import Interpolation, Track
+from anim.gltf.pack import Filtered
+from anim.model import Interpolation, Storage, Track
 
 ELEMENTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+DECODED = {"QUATERNION": Storage(5122, normalized=True), "EXPONENTIAL": Storage()}  # what a filter's codes become
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """The content of one accessor: stored bytes and what they are. Equal ones can share an accessor."""
+    """The content of one accessor: stored bytes and what they are. Equal ones can share an accessor.
+
+    filtered: the same as one of meshopt's filters takes it. key_size: bytes of a key, many elements for weights.
+    """
 
     data: bytes
     component_type: int
     element: str
     normalized: bool = False
     bounds: tuple[float, float] | None = None
+    filtered: Filtered | None = field(default=None, compare=False)
+    key_size: int = field(default=4, compare=False)
+
+    @property
+    def element_size(self) -> int:
+        """Bytes of one element."""
+        columns, rows = COMPONENTS[self.element]
+        return np.dtype(DTYPES[self.component_type]).itemsize * columns * rows
 
     def accessor(self, view: int, offset: int) -> Json:
         """Return the JSON of an accessor that finds these bytes at `offset` of `view`; defaults are left out."""
-        columns, rows = COMPONENTS[self.element]
-        size = np.dtype(DTYPES[self.component_type]).itemsize * columns * rows
         about: Json = {"bufferView": view}
         if offset:
             about["byteOffset"] = offset
         about["componentType"] = self.component_type
         if self.normalized:
             about["normalized"] = True
-        about["count"] = len(self.data) // size
+        about["count"] = len(self.data) // self.element_size
         about["type"] = self.element
         if self.bounds is not None:
             about["min"], about["max"] = [self.bounds[0]], [self.bounds[1]]
@@ -58,26 +70,45 @@ def times(track: Track) -> Numbers:
     return Numbers(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
 
 
-def values(track: Track) -> Numbers:
+def values(track: Track, filtered: Filtered | None = None) -> Numbers:
     """Return the values, with tangents for CUBICSPLINE as glTF orders them: in, value, out per key.
 
     Integers, as the track's storage asks for, only where they give every value back; float32 otherwise.
+    filtered: codes that the values were decoded from. Raises ShapeError where they decode to anything else.
     """
     rows = track.values
     if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
         assert track.out_tangents is not None
         rows = np.stack((track.in_tangents, rows, track.out_tangents), axis=1)
     element = ELEMENTS.get(track.path) or track.storage.element or BY_WIDTH.get(rows.shape[-1], "SCALAR")
-    kind, normalized = track.storage.component_type, track.storage.normalized
-    if kind != FLOAT:
-        integers = _integers(rows, np.dtype(DTYPES[kind]), normalized)
+    storage = track.storage if filtered is None else DECODED[filtered.name]
+    stored = _stored(rows, storage)
+    integers = stored.dtype.kind != "f"
+    kind, normalized = (storage.component_type, storage.normalized) if integers else (FLOAT, False)
+    key_size = stored.itemsize * rows.shape[-1]
+    data = stored.tobytes() if filtered is None else _as_decoded(stored, element, filtered)
+    return Numbers(data, kind, element, normalized, filtered=filtered, key_size=key_size)
+
+
+def _stored(rows: Floats, storage: Storage) -> NDArray[Any]:
+    if storage.component_type != FLOAT:
+        integers = _integers(rows, np.dtype(DTYPES[storage.component_type]), storage.normalized)
         if integers is not None:
-            return Numbers(integers.tobytes(), kind, element, normalized)
+            return integers
     with np.errstate(over="ignore"):
-        stored = rows.astype("<f4")
+        stored: NDArray[Any] = rows.astype("<f4")
     if np.isinf(stored).any():
         raise RangeError(f"a value of {float(np.abs(rows).max()):.3g} is too large for float32")
-    return Numbers(stored.tobytes(), FLOAT, element)
+    return stored
+
+
+def _as_decoded(stored: NDArray[Any], element: str, filtered: Filtered) -> bytes:
+    """The bytes that the codes decode to, which differ from `stored` in nothing but the sign of zeros."""
+    decoded = pack.decoded_bytes(filtered)
+    same = stored.nbytes == len(decoded) and np.array_equal(np.frombuffer(decoded, stored.dtype), stored.ravel())
+    if not same or (filtered.name == "QUATERNION") is not (element == "VEC4" and stored.dtype.kind == "i"):
+        raise ShapeError(f"values are not what their {filtered.name} codes decode to")
+    return decoded
 
 
 def _integers(rows: Floats, dtype: np.dtype[Any], normalized: bool) -> NDArray[Any] | None:
@@ -93,5 +124,6 @@ def _integers(rows: Floats, dtype: np.dtype[Any], normalized: bool) -> NDArray[A
 
 
 def _shortest(value: np.float32) -> float:
-    """The double with the shortest text that rounds to this float32: 1.0416666, not 1.0416666269302368."""
-    return float(str(value))
+    """The number with the shortest text that rounds to this float32: 1.0416666, not 1.0416666269302368; 2, not 2.0."""
+    number = float(str(value))
+    return int(number) if number.is_integer() else number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from anim.errors import FormatError, UnsupportedError
@@ -36,6 +37,7 @@ def element(component_type: int, kind: str) -> tuple[int, int, int]:
     return columns, rows, (size + 3) & ~3 if columns > 1 else size
 
 
+@cache
 def element_size(component_type: int, kind: str) -> int:
     """Return the bytes of one element; of a matrix's last column too, with its padding."""
     columns, _, column = element(component_type, kind)

@@ -1,4 +1,4 @@
-"""Views compressed by EXT_meshopt_compression or KHR_meshopt_compression, decoded by the package `meshopt`."""
+"""Views compressed by EXT_meshopt_compression or KHR_meshopt_compression, both ways, by the package `meshopt`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,15 @@ from anim.gltf.document import Bytes, Json
 
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
+VERSIONS = {"EXT_meshopt_compression": 0, "KHR_meshopt_compression": 1}  # of the attribute bitstream
+MAX_STRIDE = 256  # bytes
+
+
+def encode(rows: Bytes, extension: str) -> bytes:
+    """Return rows (count, byteStride), already filtered, as a stream of mode ATTRIBUTES under an extension."""
+    from meshopt import encode_gltf_buffer
+
+    return bytes(encode_gltf_buffer(rows, "ATTRIBUTES", VERSIONS[extension]))
 
 
 def decode(stored: Bytes, about: Json) -> Bytes:

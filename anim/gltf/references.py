@@ -44,8 +44,13 @@ def outside(json: Json, replaced: Iterable[int]) -> References:
             accessors |= {sampler["input"], sampler["output"]}
     views = {image["bufferView"] for image in items(json, "images") if "bufferView" in image}
     views |= set(_of_draco(json))
-    unknown = set(_whole_numbers(list(_unknown_parts(json))))
+    unknown = unknown_numbers(json)
     return References(frozenset(accessors | unknown), frozenset(views | unknown))
+
+
+def unknown_numbers(json: Json) -> set[int]:
+    """Return all whole numbers in extras and in unknown extensions: any of them might name an accessor or a view."""
+    return set(_whole_numbers(list(_unknown_parts(json))))
 
 
 def frozen_buffers(json: Json) -> set[int]:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 
 from anim.gltf.document import Json
 
 
 class Slots:
-    """Numbers for `count` new objects in a list: freed ones first, then beyond its end."""
+    """Numbers for new objects in a list: freed ones first, then beyond its end.
 
-    def __init__(self, length: int, freed: Set[int], count: int) -> None:
-        ordered = sorted(freed)
-        self.numbers = ordered[:count] + list(range(length, length + count - len(ordered)))
+    named: for each new object, how often its number will be written: the shortest numbers go to those named most.
+    """
+
+    def __init__(self, length: int, freed: Set[int], named: Sequence[int]) -> None:
+        ordered, count = sorted(freed), len(named)
+        taken = ordered[:count] + list(range(length, length + count - len(ordered)))
+        self.numbers = [0] * count
+        for number, i in zip(taken, sorted(range(count), key=lambda i: -named[i]), strict=True):
+            self.numbers[i] = number
         self._holes = ordered[count:]
 
     def fill(self, objects: list[Json], new: list[Json], placeholder: Json) -> None:
         """Put new objects at their numbers, in place; what is left over goes, or becomes a placeholder."""
-        for number, about in zip(self.numbers, new, strict=True):
+        for number, about in sorted(zip(self.numbers, new, strict=True), key=lambda pair: pair[0]):
             if number < len(objects):
                 objects[number] = about
             else:

@@ -15,48 +15,57 @@ from anim.gltf import encode, targets
 from anim.gltf.assemble import Place, assemble
 from anim.gltf.document import Document, Json, items
 from anim.gltf.encode import Numbers
+from anim.gltf.pack import PLAIN, Filtered, Packing
 from anim.model import Clip, Interpolation, Track
 
 _SAMPLER_KEYS = ("input", "output", "interpolation")
 
 
-def replace_clips(document: Document, clips: Mapping[int, Clip]) -> Document:
+def replace_clips(document: Document, clips: Mapping[int, Clip], *, packing: Packing = PLAIN) -> Document:
     """Return the document with the animations numbered in `clips` replaced; all others stay as they are.
 
     Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
     channel get one. Names, extras and extensions of animations, channels and samplers stay.
+    packing: how the new numbers are stored, see `pack`.
     Raises RangeError where keys fall together in float32, or no channel is left.
     """
     if not clips:
         return document
-    pool = _Pool()
+    pool = _Pool(packing.filtered)
     animations = [
         _named_animation(animation, i, clips[i], pool) if i in clips else animation
         for i, animation in enumerate(items(document.json, "animations"))
     ]
-    return assemble(document, animations, set(clips), pool.numbers)
+    return assemble(document, animations, set(clips), pool.numbers, packing)
 
 
 class _Pool:
     """Contents of new accessors, each kept once; numbers are given out later, so samplers hold places in here."""
 
-    def __init__(self) -> None:
+    def __init__(self, filtered: Mapping[int, Filtered]) -> None:
         self.numbers: list[Numbers] = []
+        self._filtered = filtered
         self._places: dict[Numbers, int] = {}
         self._axes: dict[int, int] = {}
 
-    def place(self, numbers: Numbers) -> int:
+    def _place(self, numbers: Numbers) -> int:
         place = self._places.get(numbers)
         if place is None:
             place = self._places[numbers] = len(self.numbers)
             self.numbers.append(numbers)
+        elif self.numbers[place].filtered is None:  # codes do for an equal content without
+            self.numbers[place] = numbers
         return place
+
+    def values(self, track: Track) -> int:
+        """The place of a track's values."""
+        return self._place(encode.values(track, self._filtered.get(id(track))))
 
     def axis(self, track: Track) -> int:
         """The place of a track's times; tracks that share one array are encoded once."""
         found = self._axes.get(id(track.times))
         if found is None:
-            found = self._axes[id(track.times)] = self.place(encode.times(track))
+            found = self._axes[id(track.times)] = self._place(encode.times(track))
         return found
 
 
@@ -108,7 +117,7 @@ class _Samplers:
 
     def new(self, track: Track, old: int | None) -> int:
         try:
-            times, values = self._pool.axis(track), self._pool.place(encode.values(track))
+            times, values = self._pool.axis(track), self._pool.values(track)
         except AnimError as error:
             raise error.at(f"{track.path} of node {track.node}" if track.pointer is None else track.pointer) from None
         own = {} if old is None else {k: v for k, v in self._old[old].items() if k not in _SAMPLER_KEYS}

@@ -18,6 +18,7 @@ from anim.measure.findings import Finding
 from anim.measure.tracks import TrackStats, stats
 from anim.model import Clip, Scene, Skeleton, Track
 from anim.model.scene import Instance
+from anim.sampling.joined import joined
 
 
 def inspect(document: Document, *, file_bytes: int, chosen: Iterable[int] | None = None, tracks: bool = False) -> Facts:
@@ -33,15 +34,15 @@ def inspect(document: Document, *, file_bytes: int, chosen: Iterable[int] | None
     skeleton = read.skeleton(document)
     numbers = list(range(len(clips)) if chosen is None else chosen)
     looked_at = [clips[i] for i in numbers]
-    counted = stats([track for clip in looked_at for track in clip.tracks], skeleton)
+    groups = joined([track for clip in looked_at for track in clip.tracks])
+    counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
-    ways = travel.travels(skeleton, looked_at)
-    costs = [footprint.footprint(document, [i]) for i in range(len(clips))]
+    ways = travel.travels(skeleton, looked_at, groups)
+    costs, cost = footprint.footprints(document)
     clip_facts = tuple(
         _clip(i, clip, ways[n], skeleton, counted[ends[n] : ends[n + 1]], costs[i], file_bytes, tracks=tracks)
         for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
     )
-    cost = footprint.of_all(document, costs)
     scene, hidden = _scene(document, accessors)
     skins = tuple(_skin(i, document, scene) for i in range(len(items(json, "skins"))))
     return Facts(
@@ -69,13 +70,14 @@ def _clip(
     *,
     tracks: bool,
 ) -> ClipFacts:
-    estimated = rate.estimate(sorted_unique(np.concatenate(clip.axes))) if clip.axes else None
+    start, end, axes = clip.start, clip.end, clip.axes
+    estimated = rate.estimate(sorted_unique(np.concatenate(axes))) if axes else None
     return ClipFacts(
         index=number,
         name=clip.name,
-        start_s=clip.start,
-        end_s=clip.end,
-        duration_s=clip.end - clip.start,
+        start_s=start,
+        end_s=end,
+        duration_s=end - start,
         tracks=dict(Counter(track.path for track in clip.tracks)),
         interpolations=dict(Counter(str(track.interpolation) for track in clip.tracks)),
         keys=sum(len(track.times) for track in clip.tracks),

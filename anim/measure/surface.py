@@ -56,10 +56,18 @@ def diagonal(scene: Scene) -> float:
 def placed(surface: Surface, world: Floats, weights: Floats) -> Floats:
     """Return the points (V, 3) in world space: morphed by weights (M,), then blended linearly by the joints' world
     matrices (J, 3, 4), with skin weights as stored."""
-    points = surface.points
-    if len(weights):
-        points = points + np.tensordot(weights, surface.targets, axes=1)
-    bound = matrix.multiply(world, surface.bind)
+    return skinned(surface, morphed(surface, weights[None])[0], matrix.multiply(world, surface.bind))
+
+
+def morphed(surface: Surface, weights: Floats) -> Floats:
+    """Return the points (F, V, 3) in mesh space, morphed by weights (F, M)."""
+    moving = np.flatnonzero(weights.any(axis=0))
+    moved = weights[:, moving] @ surface.targets[moving].reshape(len(moving), surface.points.size)
+    return np.asarray(surface.points + moved.reshape(len(weights), *surface.points.shape))
+
+
+def skinned(surface: Surface, points: Floats, bound: Floats) -> Floats:
+    """Return points (V, 3) of mesh space in world space, blended linearly by the joints' matrices (J, 3, 4)."""
     moved = np.zeros_like(points)
     for i in range(surface.joints.shape[1]):
         chosen = bound[surface.joints[:, i]]

@@ -9,7 +9,8 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.model import Interpolation, Kind, Skeleton, Track
+from anim.model import Interpolation, Kind, Skeleton
+from anim.sampling.joined import Joined
 
 FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two stored values are the same
 REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing
@@ -40,110 +41,125 @@ class TrackStats:
         return TrackStats(*(getattr(self, each.name)[part] for each in fields(self)))
 
 
-def stats(tracks: Sequence[Track], skeleton: Skeleton) -> TrackStats:
-    """Return the facts about tracks, in their order: those with as many keys and components are counted together."""
-    zeros = [np.zeros(len(tracks), kind) for kind in (bool, bool, int, int, int, int, float)]
-    result = TrackStats(*zeros)
-    groups: dict[tuple[object, ...], list[int]] = {}
-    for i, track in enumerate(tracks):
-        key = (len(track.times), track.values.shape[1], track.path, track.kind, track.interpolation)
-        groups.setdefault(key, []).append(i)
-    for numbers in groups.values():
-        _count(_Group([tracks[i] for i in numbers]), skeleton, result, np.array(numbers))
+def stats(groups: Sequence[Joined], skeleton: Skeleton) -> TrackStats:
+    """Return the facts about tracks that were `joined`, in the order that they had before."""
+    count = sum(len(group.tracks) for group in groups)
+    result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
+    for group in groups:
+        _count(group, skeleton, result)
     return result
 
 
-class _Group:
-    """G tracks with equally many keys: times (K, G), values and tangents (K, G, C)."""
-
-    def __init__(self, tracks: list[Track]) -> None:
-        self.tracks = tracks
-        self.kind, self.interpolation, self.path = tracks[0].kind, tracks[0].interpolation, tracks[0].path
-        self.times = np.stack([track.times for track in tracks], axis=1)
-        self.values = np.stack([track.values for track in tracks], axis=1)
-        self.tangents: tuple[Floats, Floats] | None = None
-        if self.interpolation is Interpolation.CUBICSPLINE:
-            arriving = [track.in_tangents for track in tracks if track.in_tangents is not None]
-            leaving = [track.out_tangents for track in tracks if track.out_tangents is not None]
-            self.tangents = np.stack(arriving, axis=1), np.stack(leaving, axis=1)
-
-
-def _count(group: _Group, skeleton: Skeleton, result: TrackStats, numbers: Ints) -> None:
+def _count(group: Joined, skeleton: Skeleton, result: TrackStats) -> None:
     values = group.values
     if group.kind is Kind.ROTATION:
-        lengths = np.sqrt(quaternion.dot(values, values))
-        bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in group.tracks])
-        result.non_unit[numbers] = (np.abs(lengths - 1) > np.where(bytes_only, UNIT_BYTE, UNIT)).sum(axis=0)
-        values = values / np.where(lengths > 0, lengths, 1)[..., None]
-        dots = quaternion.dot(values[1:], values[:-1])
-        angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))
-        result.flips[numbers] = (dots < 0).sum(axis=0)
-        result.wide[numbers] = (angles > WIDE_STEP).sum(axis=0)
-        result.widest[numbers] = angles.max(axis=0, initial=0.0)
-        values = quaternion.align_signs(values)
+        values = _turns(group, result)
     constant = _same_values(group, values)
-    result.constant[numbers] = constant
-    result.no_effect[numbers] = _at_rest(group, constant, skeleton)
-    result.redundant[numbers] = _redundant(group, values, constant)
+    result.constant[group.numbers] = constant
+    result.no_effect[group.numbers] = _at_rest(group, constant, skeleton)
+    result.redundant[group.numbers] = _redundant(group, values, constant)
 
 
-def _same_values(group: _Group, values: Floats) -> Bools:
-    size = np.abs(values).max(axis=(0, 2))
-    same: Bools = np.abs(values - values[:1]).max(axis=(0, 2)) <= FLOAT32 * size
+def _turns(group: Joined, result: TrackStats) -> Floats:
+    """The rotations (S, 4) at unit length, signs aligned within each track; what is counted goes into `result`."""
+    lengths = np.sqrt(quaternion.dot(group.values, group.values))
+    bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in group.tracks])
+    allowed = np.repeat(np.where(bytes_only, UNIT_BYTE, UNIT), group.counts)
+    values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
+    dots = np.ones(len(values))  # of each key with the one before it; the first of a track has none
+    dots[1:] = quaternion.dot(values[1:], values[:-1])
+    dots[group.starts] = 1.0
+    angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))
+    result.non_unit[group.numbers] = _sums(group, np.abs(lengths - 1) > allowed)
+    result.flips[group.numbers] = _sums(group, dots < 0)
+    result.wide[group.numbers] = _sums(group, angles > WIDE_STEP)
+    result.widest[group.numbers] = _largest(group, angles)
+    return values * np.cumprod(np.where(dots < 0, -1.0, 1.0))[:, None]
+
+
+def _same_values(group: Joined, values: Floats) -> Bools:
+    least, most = _extent(group, values)
+    first = values[group.starts]
+    off = np.maximum(most - first, first - least).max(axis=1)
+    same: Bools = off <= FLOAT32 * _sizes(least, most)
     if group.tangents is not None:
-        arriving, leaving = group.tangents
-        same &= (np.abs(arriving[1:]).max(axis=(0, 2)) == 0) & (np.abs(leaving[:-1]).max(axis=(0, 2)) == 0)
+        arriving, leaving = (_widest(each) for each in group.tangents)
+        arriving[group.starts] = 0.0  # what leads to the first key and away from the last is never played
+        leaving[group.starts + group.counts - 1] = 0.0
+        same &= (_largest(group, arriving) == 0) & (_largest(group, leaving) == 0)
     return same
 
 
-def _at_rest(group: _Group, constant: Bools, skeleton: Skeleton) -> Bools:
-    if group.path not in ("translation", "rotation", "scale") or not constant.any():
+def _at_rest(group: Joined, constant: Bools, skeleton: Skeleton) -> Bools:
+    if group.path not in ("translation", "rotation", "scale"):
         return np.zeros(len(constant), np.bool_)
     nodes = [track.node if track.node is not None else -1 for track in group.tracks]
     resting: Floats = getattr(skeleton, group.path)[nodes]
-    values = group.values[0]
+    first = group.values[group.starts]
     if group.kind is Kind.ROTATION:
-        values = values * np.where(quaternion.dot(values, resting) < 0, -1.0, 1.0)[:, None]
-    near: Bools = np.abs(values - resting).max(axis=1) <= 1e-6 * (1 + np.abs(resting).max(axis=1))
+        first = first * np.where(quaternion.dot(first, resting) < 0, -1.0, 1.0)[:, None]
+    near: Bools = np.abs(first - resting).max(axis=1) <= 1e-6 * (1 + np.abs(resting).max(axis=1))
     return constant & near
 
 
-def _redundant(group: _Group, values: Floats, constant: Bools) -> Ints:
+def _redundant(group: Joined, values: Floats, constant: Bools) -> Ints:
     """Keys that what is around them gives anyway: all but one of a constant track, inner ones of the others."""
-    keys = len(values)
-    result: Ints = np.where(constant, keys - 1, 0)
-    moving = np.flatnonzero(~constant)
-    if keys >= 3 and len(moving):
-        result[moving] = _inner_redundant(group, values[:, moving], moving).sum(axis=0)
-    return result
+    of_track = np.repeat(np.arange(len(constant)), group.counts)
+    inner = ~constant[of_track]
+    inner[group.starts] = inner[group.starts + group.counts - 1] = False
+    at = np.flatnonzero(inner)
+    given = _given(group, values, of_track, at)
+    return np.where(constant, group.counts - 1, np.bincount(of_track[at[given]], minlength=len(constant)))
 
 
-def _inner_redundant(group: _Group, values: Floats, moving: Ints) -> Bools:
-    """For every inner key of the moving tracks (K − 2, G), whether its neighbors give it."""
-    before, here, after = values[:-2], values[1:-1], values[2:]
+def _given(group: Joined, values: Floats, of_track: Ints, at: Ints) -> Bools:
+    """For each of the keys `at` (A,), none at an end of its track, whether the keys next to it give it."""
+    before, here, after = values[at - 1], values[at], values[at + 1]
     if group.interpolation is Interpolation.STEP:
-        return np.asarray(np.abs(here - before).max(axis=2) == 0)
-    extent = (values.max(axis=0) - values.min(axis=0)).max(axis=1)
-    allowed = REDUNDANT * extent + FLOAT32 * np.abs(values).max(axis=(0, 2))
-    times = group.times[:, moving]
-    duration = times[2:] - times[:-2]
-    u = (times[1:-1] - times[:-2]) / duration
+        return np.asarray(_widest(here - before) == 0)
+    least, most = _extent(group, values)
+    allowed = (REDUNDANT * (most - least).max(axis=1) + FLOAT32 * _sizes(least, most))[of_track[at]]
+    duration = group.times[at + 1] - group.times[at - 1]
+    u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
-        return _inner_cubic(group.tangents, values, moving, u, duration, allowed)
+        return _given_by_cubic(group.tangents, values, at, u[:, None], duration[:, None], allowed)
     if group.kind is Kind.ROTATION:
-        given = quaternion.slerp(before, after, u)
+        between = quaternion.slerp(before, after, u)
     else:
-        given = before + u[..., None] * (after - before)
-    return np.asarray(np.abs(here - given).max(axis=2) <= allowed)
+        between = before + u[:, None] * (after - before)
+    return np.asarray(_widest(here - between) <= allowed)
 
 
-def _inner_cubic(
-    tangents: tuple[Floats, Floats], values: Floats, moving: Ints, u: Floats, duration: Floats, allowed: Floats
+def _given_by_cubic(
+    tangents: tuple[Floats, Floats], values: Floats, at: Ints, u: Floats, duration: Floats, allowed: Floats
 ) -> Bools:
-    arriving, leaving = tangents[0][:, moving], tangents[1][:, moving]
-    u, duration = u[..., None], duration[..., None]
-    piece = (values[:-2], duration * leaving[:-2], values[2:], duration * arriving[2:])
-    off = np.abs(values[1:-1] - hermite.evaluate(u, *piece)).max(axis=2)
+    arriving, leaving = tangents
+    piece = (values[at - 1], duration * leaving[at - 1], values[at + 1], duration * arriving[at + 1])
+    off = _widest(values[at] - hermite.evaluate(u, *piece))
     slope = hermite.first_derivative(u, *piece)  # per u of the joined piece: as large as the values
-    bend = np.maximum(np.abs(duration * arriving[1:-1] - slope), np.abs(duration * leaving[1:-1] - slope)).max(axis=2)
+    bend = np.maximum(_widest(duration * arriving[at] - slope), _widest(duration * leaving[at] - slope))
     return np.asarray((off <= allowed) & (bend <= 10 * allowed))
+
+
+def _sums(group: Joined, counted: Bools) -> Ints:
+    """How many keys of each track (T,) count."""
+    return np.add.reduceat(counted, group.starts, dtype=np.int64)
+
+
+def _largest(group: Joined, sizes: Floats) -> Floats:
+    """The largest number at any key of each track (T,)."""
+    return np.maximum.reduceat(sizes, group.starts)
+
+
+def _extent(group: Joined, values: Floats) -> tuple[Floats, Floats]:
+    """The least and the greatest value (T, C) of each track."""
+    return np.minimum.reduceat(values, group.starts), np.maximum.reduceat(values, group.starts)
+
+
+def _sizes(least: Floats, most: Floats) -> Floats:
+    return np.asarray(np.maximum(np.abs(least), np.abs(most)).max(axis=1))
+
+
+def _widest(vectors: Floats) -> Floats:
+    """The largest component (S,) of each vector (S, C), without sign: by rows, since an axis of 3 or 4 is slow."""
+    return np.asarray(np.abs(vectors.T, order="C").max(axis=0))

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.measure import levers
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling import pose
+from anim.sampling.joined import Joined, joined
 from anim.sampling.pose import world_by_node
 
 ONWARD = 0.7
+ENDS = 4  # times that a clip is looked at
+PARTS = ("translation", "rotation", "scale")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,21 +35,21 @@ class Travel:
     speed: float
 
 
-def travels(skeleton: Skeleton, clips: Sequence[Clip]) -> list[Travel]:
-    """Return one Travel per clip; a clip without time between start and end has none."""
+def travels(skeleton: Skeleton, clips: Sequence[Clip], groups: Sequence[Joined] | None = None) -> list[Travel]:
+    """Return one Travel per clip; a clip without time between start and end has none.
+
+    groups: the tracks of all clips, `joined`, for callers that have them.
+    """
     if not len(skeleton) or not clips:
         return [Travel(0.0, 0.0, -1, 0.0, 0.0) for _ in clips]
-    poses = [pose(skeleton, clip, _ends(clip)) for clip in clips]
-    joined = Pose(
-        np.concatenate([each.times for each in poses]),
-        np.concatenate([each.translation for each in poses]),
-        np.concatenate([each.rotation for each in poses]),
-        np.concatenate([each.scale for each in poses]),
-    )
-    points = levers.points(world_by_node(skeleton, joined))
-    places = points.reshape(len(skeleton), levers.PER_NODE, len(clips), 4, 3)
+    if groups is None:
+        groups = joined([track for clip in clips for track in clip.tracks])
+    times = np.array([_ends(clip) for clip in clips])
+    of_track = np.repeat(np.arange(len(clips)), [len(clip.tracks) for clip in clips])
+    points = levers.points(world_by_node(skeleton, _poses(skeleton, groups, of_track, times)))
+    places = points.reshape(len(skeleton), levers.PER_NODE, len(clips), ENDS, 3)
     depth = _depths(skeleton)
-    return [_travel(skeleton, clip, places[:, :, i], depth) for i, clip in enumerate(clips)]
+    return [_travel(skeleton, clip, times[i], places[:, :, i], depth) for i, clip in enumerate(clips)]
 
 
 def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
@@ -70,22 +72,37 @@ def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
     return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length
 
 
+def _poses(skeleton: Skeleton, groups: Sequence[Joined], clip_of_track: Ints, times: Floats) -> Pose:
+    """All clips, each at its own times (clips, ENDS), one after the other: one pose of clips × ENDS frames."""
+    parts = {name: np.tile(getattr(skeleton, name), (*times.shape, 1, 1)) for name in PARTS}
+    for group in groups:
+        if group.path in parts:
+            clip = clip_of_track[group.numbers]
+            node = np.array([track.node for track in group.tracks])
+            parts[group.path][clip[:, None], np.arange(ENDS), node[:, None]] = group.sample(times[clip])
+    translation, rotation, scale = (part.reshape(-1, *part.shape[2:]) for part in parts.values())
+    return Pose(times.reshape(-1), translation, rotation, scale)
+
+
 def _ends(clip: Clip) -> Floats:
-    step = min(levers.SPEED_STEP, (clip.end - clip.start) / 4)
-    return np.array([clip.start, clip.start + step, clip.end - step, clip.end])
+    """ENDS times in seconds: the start, just after it, just before the end, and the end."""
+    start, end = clip.start, clip.end
+    step = min(levers.SPEED_STEP, (end - start) / 4)
+    return np.array([start, start + step, end - step, end])
 
 
-def _travel(skeleton: Skeleton, clip: Clip, places: Floats, depth: Floats) -> Travel:
-    """places: (N, points, 4, 3) at start, just after it, just before the end, and at the end."""
-    duration = clip.end - clip.start
+def _travel(skeleton: Skeleton, clip: Clip, times: Floats, places: Floats, depth: Floats) -> Travel:
+    """places: (N, points, ENDS, 3) at `times` (ENDS,)."""
+    duration = float(times[-1] - times[0])
     if duration <= 0:
         return Travel(0.0, 0.0, -1, 0.0, 0.0)
     step = min(levers.SPEED_STEP, duration / 4)
     away = places[:, :, 3] - places[:, :, 0]
     root = _root(clip, depth)
     own = away[root, 0] if root >= 0 else np.zeros(3)
-    leads = _leads(skeleton, clip, root)
-    carried = away - skeleton.below(root)[:, None, None] * own if leads else away
+    carried = away
+    if _leads(skeleton, clip, root):
+        carried = away - skeleton.below(root)[:, None, None] * own
     speeds = ((places[:, :, 3] - places[:, :, 2]) - (places[:, :, 1] - places[:, :, 0])) / step
     distance = float(np.linalg.norm(own))
     return Travel(_longest(carried), _longest(speeds), root, distance, distance / duration)
@@ -93,12 +110,9 @@ def _travel(skeleton: Skeleton, clip: Clip, places: Floats, depth: Floats) -> Tr
 
 def _root(clip: Clip, depth: Floats) -> int:
     """The moved node nearest to the root of the hierarchy: what carries a character along."""
-    moved = [
-        track.node
-        for track in clip.tracks
-        if track.path == "translation" and track.node is not None and (track.values != track.values[0]).any()
-    ]
-    return min(moved, key=lambda node: (depth[node], node), default=-1)
+    tracks = {track.node: track for track in clip.tracks if track.path == "translation" and track.node is not None}
+    from_root = sorted(tracks, key=lambda node: (depth[node], node))
+    return next((node for node in from_root if (tracks[node].values != tracks[node].values[0]).any()), -1)
 
 
 def _longest(vectors: Floats) -> float:

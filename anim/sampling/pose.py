@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import matrix
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling.batch import batches
+from anim.sampling.batch import Batch, batches
 from anim.sampling.track import Located, locate
+
+Sampler: TypeAlias = Callable[[Batch, Floats, Located], Floats]
 
 
 def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
@@ -17,10 +22,14 @@ def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
 
 
 class Poses:
-    """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked once."""
+    """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked once.
 
-    def __init__(self, skeleton: Skeleton, clip: Clip) -> None:
+    sample: gives the values of tracks at times, by default as glTF says.
+    """
+
+    def __init__(self, skeleton: Skeleton, clip: Clip, sample: Sampler = Batch.sample) -> None:
         self._skeleton = skeleton
+        self._sample = sample
         nodes = len(skeleton)
         self._batches = batches(track for track in clip.tracks if track.node is not None and track.node < nodes)
 
@@ -38,7 +47,7 @@ class Poses:
             place = places.get(id(batch.times))
             if place is None:
                 place = places[id(batch.times)] = locate(batch.times, at)
-            values = batch.sample(at, place)
+            values = self._sample(batch, at, place)
             numbers = [track.node for track in batch.tracks if track.node is not None]
             if batch.tracks[0].path == "weights":
                 weights.update((node, values[:, i]) for i, node in enumerate(numbers))
@@ -54,11 +63,16 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
 def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return world_from_node (N, F, 3, 4): the order in which it is fast to compute."""
+    return matrix.chained(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
+
+
+def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return parent_from_node (N, F, 3, 4) for every node and time of a pose."""
     by_node = (np.swapaxes(part, 0, 1) for part in (pose.translation, pose.rotation, pose.scale))
     local = matrix.from_trs(*by_node)
     if len(skeleton.sheared):
         local[skeleton.sheared] = skeleton.sheared_local[:, None]
-    return matrix.chained(local, skeleton.parents, skeleton.levels())
+    return local
 
 
 def rest(skeleton: Skeleton) -> Pose:

@@ -54,14 +54,14 @@ def sample(track: Track, at: Floats) -> Floats:
 def interpolate(
     place: Located, values: Floats, tangents: tuple[Floats, Floats] | None, interpolation: Interpolation, kind: Kind
 ) -> Floats:
-    """Return the values (F, ..., C) between keys `values` (K, ..., C): any number of tracks on one time axis at once.
+    """Return the values (..., C) at places (...) between keys `values` (K, C): of G tracks on one axis (..., G, C).
 
-    tangents: in and out, both (K, ..., C) per second, for CUBICSPLINE. Rotations come out normalized.
+    tangents: in and out, shaped as the values, per second, for CUBICSPLINE. Rotations come out normalized.
     """
     start = values[place.left]
     if interpolation is Interpolation.STEP or len(values) == 1:
         return quaternion.normalize(start) if kind is Kind.ROTATION else start
-    shape = (len(place.u),) + (1,) * (values.ndim - 1)
+    shape = place.u.shape + (1,) * (values.ndim - 1)
     u, end = place.u.reshape(shape), values[place.right]
     if interpolation is Interpolation.CUBICSPLINE and tangents is not None:
         arriving, leaving = tangents

@@ -11,7 +11,7 @@ import typer
 
 from anim.errors import AnimError
 from anim.gltf import read
-from anim.measure.continuity import continuity as continuity_of
+from anim.gltf.document import Document
 from anim.measure.facts import Facts
 from anim.measure.findings import Finding, Severity
 from anim.measure.inspect import inspect as facts_of
@@ -79,7 +79,9 @@ def inspect(
         streams.write_text(_json(done, smooth))
     elif format is Format.CSV:
         if continuity:
-            header, rows = inspection.continuity_rows(done, smooth)
+            from cli import smoothness
+
+            header, rows = smoothness.rows(done, smooth)
         else:
             header, rows = inspection.track_rows(done) if tracks else inspection.clip_rows(done)
         streams.write_text(tables.comma_separated(header, rows))
@@ -118,19 +120,30 @@ def _inspected(
             for each in streams.missing(source.document, source.folder)
         )
         facts = replace(facts, findings=(*facts.findings, *lost))
-        smooth: Smoothness = ()
-        if continuity:
-            clips, skeleton = read.clips(source.document), read.skeleton(source.document)
-            smooth = tuple(continuity_of(clips[each.index], skeleton) for each in facts.clips)
+        smooth = _smooth(source.document, facts) if continuity else ()
         return (source.name, source.size, facts), smooth
+
+
+def _smooth(document: Document, facts: Facts) -> Smoothness:
+    from anim.measure.continuity import continuity
+
+    clips, skeleton = read.clips(document), read.skeleton(document)
+    return tuple(continuity(clips[each.index], skeleton) for each in facts.clips)
 
 
 def _json(done: list[tuple[str, int, Facts]], smooth: list[Smoothness]) -> str:
     files = [{"file": name, "bytes": size, **_plain(asdict(facts))} for name, size, facts in done]
+    if any(smooth):
+        _add_smoothness(files, smooth)
+    return json.dumps({"schema": SCHEMA, "files": files}, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+
+
+def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> None:
+    from cli import smoothness
+
     for file, of_clips in zip(files, smooth, strict=True):
         for clip, tracks in zip(file["clips"], of_clips, strict=False):
-            clip["continuity"] = [inspection.continuity_json(track) for track in tracks]
-    return json.dumps({"schema": SCHEMA, "files": files}, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+            clip["continuity"] = [smoothness.json(track) for track in tracks]
 
 
 def _plain(facts: dict[str, Any]) -> dict[str, Any]:

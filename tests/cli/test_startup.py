@@ -87,6 +87,12 @@ def test_a_run_imports_nothing_heavy(line: list[str]) -> None:
     assert not tops(modules(*line, stdin=built("biped"))) & HEAVY
 
 
+def test_inspect_imports_no_more_of_numpy_and_of_us_than_it_shows() -> None:
+    names = modules("inspect", stdin=built("biped"))
+    assert not names & {"numpy.ma", "anim.measure.continuity", "cli.smoothness"}
+    assert "anim.measure.continuity" in modules("inspect", "--continuity", stdin=built("biped"))
+
+
 def test_a_wrong_command_line_imports_nothing_heavy_either() -> None:
     script = SCRIPT.replace("code = main", "code = 0 * main")
     for line in (["resampel"], ["resample", "--fps", "x"]):

@@ -128,6 +128,35 @@ def test_all_that_the_clip_alone_used_goes() -> None:
     assert len(after.json["accessors"]) == 2
 
 
+def test_a_placeholder_owns_no_byte() -> None:
+    """Bytes that nobody names stay where they are, also if a placeholder of the last writing points at the first."""
+    content: Json = {
+        "nodes": [{}],
+        "buffers": [{"byteLength": 24}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 1},
+            {"buffer": 0, "byteOffset": 4, "byteLength": 4},
+            {"buffer": 0, "byteOffset": 8, "byteLength": 16},
+        ],
+        "accessors": [
+            {"bufferView": 1, "componentType": 5126, "count": 1, "type": "SCALAR"},
+            {"bufferView": 2, "componentType": 5126, "count": 1, "type": "SCALAR"},
+            {"bufferView": 2, "byteOffset": 4, "componentType": 5126, "count": 1, "type": "VEC3"},
+        ],
+        "meshes": [{"primitives": [{"attributes": {"_A": 0}}]}],
+        "animations": [
+            {
+                "samplers": [{"input": 1, "output": 2}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+            }
+        ],
+    }
+    document = opened(glb(text(content), b"mine" + bytes(20)))
+    after = write.replace_clips(document, dict(enumerate(read.clips(document))))
+    assert after.buffers[0].data.tobytes()[:4] == b"mine"
+    assert after.json["bufferViews"][1] == content["bufferViews"][1]
+
+
 def _elements(document: Document, number: int) -> list[bytes]:
     """The bytes of each element of an accessor, cut out of the buffer."""
     about = document.json["accessors"][number]

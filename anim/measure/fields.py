@@ -1,0 +1,221 @@
+"""Displacements of the vertices of one surface over time: bounds for all, numbers for those that are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+
+CHUNK = 1_000_000  # vertices times frames gone through at once: 24 MB
+FIRST = 8  # frames gone through before the bounds of the others are looked at again
+
+
+class Field(Protocol):
+    """What a surface's vertices do, in groups."""
+
+    @property
+    def limits(self) -> Floats:
+        """(G, F), no vertex of the group has a longer vector."""
+        ...
+
+    def vectors(self, group: int, frames: Ints) -> Floats:
+        """Return the vectors (V_g, 3, f) of a group's vertices in some frames."""
+        ...
+
+    def joint(self, group: int, frame: int, vertex: int) -> int:
+        """Return which joint of the surface moves a vertex of a group most in a frame; vertex −1: any of them."""
+        ...
+
+    def rate(self, step: Floats) -> Field:
+        """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Groups:
+    """Vertices in groups, as products that displacements by joints' matrices are linear in.
+
+    reach: numbers of the joints that carry some of each group. products: (V_g, J_g · 4) of each group: skin weight
+    times x, y, z, 1, per joint. corners: (J, P, 3), points around all that each joint carries. share: the largest sum
+    of skin weights of a vertex.
+    """
+
+    reach: Sequence[Ints]
+    products: Sequence[Floats]
+    corners: Floats
+    share: float = 1.0
+
+
+class Linear:
+    """Displacements that are linear in the joints' matrices. moved: differences of matrices (J, F, 3, 4)."""
+
+    def __init__(self, groups: Groups, moved: Floats) -> None:
+        self._groups, self._moved = groups, moved
+
+    @cached_property
+    def limits(self) -> Floats:
+        """(G, F), no vertex of the group has a longer vector."""
+        return _by_group(self._bounds, self._groups.reach)
+
+    @cached_property
+    def _bounds(self) -> Floats:
+        """(J, F), nothing that a joint carries some of has a longer vector."""
+        return self._groups.share * largest_over(self._groups.corners, self._moved)
+
+    def rate(self, step: Floats) -> Field:
+        """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
+        return Linear(self._groups, np.diff(self._moved, axis=1) / step[:, None, None])
+
+    def vectors(self, group: int, frames: Ints) -> Floats:
+        """Return the vectors (V_g, 3, f) of a group's vertices in some frames."""
+        chosen = self._moved[self._groups.reach[group]][:, frames].transpose(0, 3, 2, 1)  # (J_g, 4, 3, f)
+        flat = self._groups.products[group] @ chosen.reshape(-1, 3 * len(frames))
+        return np.asarray(flat.reshape(-1, 3, len(frames)))
+
+    def joint(self, group: int, frame: int, vertex: int) -> int:
+        """Return which joint of the surface moves a vertex of a group most in a frame; vertex −1: any of them."""
+        reach = self._groups.reach[group]
+        if vertex < 0:
+            return int(reach[self._bounds[reach, frame].argmax()])
+        products = self._groups.products[group][vertex].reshape(len(reach), 4)
+        parts = np.einsum("jck,jk->jc", self._moved[reach, frame], products)
+        return int(reach[(parts * parts).sum(axis=1).argmax()])
+
+
+class Morphed:
+    """Displacements of morphed vertices.
+
+    bounds: (J, F), nothing that a joint carries some of is displaced more. groups: joints that reach each group, and
+    numbers of its vertices. displaced: gives all vertices' vectors (V, 3, f) for some frames (f,). rates: gives bounds
+    (J, F − 1) of how fast they change, for steps in s.
+    """
+
+    def __init__(
+        self,
+        bounds: Floats,
+        groups: tuple[Sequence[Ints], Sequence[Ints]],
+        *,
+        displaced: Callable[[Ints], Floats],
+        rates: Callable[[Floats], Floats],
+    ) -> None:
+        self._bounds, self._displaced, self._rates = bounds, displaced, rates
+        self._reach, self._groups = groups
+        self.limits = _by_group(bounds, self._reach)
+        self._most = max(CHUNK // max(sum(map(len, self._groups)), 1), 1)  # frames that are kept
+        self._kept: dict[int, Floats] = {}
+
+    def rate(self, step: Floats) -> Field:
+        """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
+        return Rate(self, step, _by_group(self._rates(step), self._reach))
+
+    def vectors(self, group: int, frames: Ints) -> Floats:
+        """Return the vectors (V_g, 3, f) of a group's vertices in some frames."""
+        starts = range(0, len(frames), self._most)
+        return np.concatenate([self._some(group, frames[i : i + self._most].tolist()) for i in starts], axis=-1)
+
+    def joint(self, group: int, frame: int, vertex: int) -> int:
+        """Return which joint of the surface can move any vertex of a group most in a frame."""
+        del vertex
+        reach = self._reach[group]
+        return int(reach[self._bounds[reach, frame].argmax()])
+
+    def _some(self, group: int, frames: list[int]) -> Floats:
+        missing = [frame for frame in frames if frame not in self._kept]
+        if len(self._kept) + len(missing) > self._most:
+            self._kept.clear()
+            missing = frames
+        if missing:
+            found = np.moveaxis(self._displaced(np.array(missing, np.int64)), -1, 0)
+            self._kept.update(zip(missing, found, strict=True))
+        return np.stack([self._kept[frame][self._groups[group]] for frame in frames], axis=-1)
+
+
+class Rate:
+    """How fast the vectors of any field change from each frame to the next.
+
+    step: (F − 1,) s between frames. limits: (G, F − 1), where known; else what the field's own limits give.
+    """
+
+    def __init__(self, field: Field, step: Floats, limits: Floats | None = None) -> None:
+        self._field, self._step = field, step
+        loose = (field.limits[:, 1:] + field.limits[:, :-1]) / step
+        self.limits = loose if limits is None else np.minimum(loose, limits)
+
+    def rate(self, step: Floats) -> Field:
+        """Return how fast the rates themselves change."""
+        return Rate(self, step)
+
+    def vectors(self, group: int, frames: Ints) -> Floats:
+        """Return the vectors (V_g, 3, f) of a group's vertices in some frames, per second."""
+        both = np.unique(np.concatenate((frames, frames + 1)))
+        found = self._field.vectors(group, both)
+        first, second = np.searchsorted(both, frames), np.searchsorted(both, frames + 1)
+        return np.asarray((found[..., second] - found[..., first]) / self._step[frames])
+
+    def joint(self, group: int, frame: int, vertex: int) -> int:
+        """Return which joint of the surface moves a vertex of a group most at the end of a step."""
+        return self._field.joint(group, frame + 1, vertex)
+
+
+@dataclass(frozen=True, slots=True)
+class Longest:
+    """The longest vector of a field. vertex: its number within the group, −1 where only the bound was looked at."""
+
+    length: float
+    group: int
+    frame: int
+    vertex: int
+
+
+def lengths(field: Field, group: int, frames: Ints) -> Floats:
+    """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
+    vectors = field.vectors(group, frames)
+    vectors *= vectors
+    return np.asarray(np.sqrt(vectors.sum(axis=1)))
+
+
+def longest(field: Field, *, floor: float, slack: float, most: int) -> Longest:
+    """Return the longest vector; never shorter than it is, and no more than `slack` times or `floor` above.
+
+    floor: nothing is searched where no bound is longer. slack: ≥ 1. most: vertices times frames gone through; beyond,
+    the bound of what is left is returned.
+    """
+    tops = field.limits.max(axis=1)
+    group = int(tops.argmax())
+    found = Longest(0.0, group, int(field.limits[group].argmax()), -1)
+    left = 0.0  # the longest bound of what was not looked at
+    for group in np.argsort(-tops, kind="stable").tolist():
+        limits = field.limits[group]
+        waiting = np.argsort(-limits, kind="stable")
+        size = FIRST
+        while len(waiting):
+            at_most = float(limits[waiting[0]])
+            if at_most <= max(found.length * slack, floor) or most <= 0:
+                left = max(left, at_most)
+                break
+            frames, waiting = waiting[:size], waiting[size:]
+            lengths_here = lengths(field, group, frames)
+            vertex, column = np.unravel_index(int(lengths_here.argmax()), lengths_here.shape)
+            if lengths_here[vertex, column] > found.length:
+                found = Longest(float(lengths_here[vertex, column]), group, int(frames[column]), int(vertex))
+            most -= lengths_here.size
+            size = max(min(2 * size, CHUNK // max(len(lengths_here), 1)), 1)
+    return found if left <= found.length else Longest(left, found.group, found.frame, found.vertex)
+
+
+def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:
+    """Bounds of joints (J, F) as those of groups (G, F)."""
+    return np.array([bounds[joints].max(axis=0) for joints in reach])
+
+
+def largest_over(points: Floats, moved: Floats) -> Floats:
+    """Return the largest displacement (J, F) of any of the points (J, P, 3) by differences of matrices (J, F, 3, 4)."""
+    displaced = moved[..., :3] @ np.swapaxes(points, -1, -2)[:, None]  # (J, F, 3, P)
+    displaced += moved[..., 3, None]
+    displaced *= displaced
+    return np.asarray(np.sqrt(displaced.sum(axis=-2).max(axis=-1)))

@@ -1,0 +1,106 @@
+"""Which things of two files are the same: by name, then by place."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Ints
+from anim.model import Scene, Skeleton
+
+
+def by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
+    """Return for each name of `old` (N,) the number of the same name in `new`, −1 where there is none.
+
+    Of names that come several times the first belongs to the first, the second to the second. Empty ones match nothing.
+    by_name(["a", "b", "a"], ["b", "a"]) → 1, 0, −1
+    """
+    waiting: dict[str, list[int]] = defaultdict(list)
+    for i, name in enumerate(new):
+        waiting[name].append(i)
+    waiting[""].clear()
+    return np.array([waiting[name].pop(0) if waiting.get(name) else -1 for name in old], np.int64)
+
+
+def by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
+    """Return for each name of `old` (N,) its number in `new`, −1 where it has none: by name, then in order.
+
+    By order only where one of both has no name, or where no name is in both: two that are called differently beside
+    others that are found are two different things.
+    by_name_then_order(["walk", ""], ["run", "walk"]) → 1, 0
+    """
+    found = by_name(old, new)
+    left = [i for i in range(len(new)) if i not in set(found.tolist())]
+    nothing_found = not (found >= 0).any()
+    for i, name in enumerate(old):
+        if found[i] < 0 and left and (nothing_found or not name or not new[left[0]]):
+            found[i] = left.pop(0)
+    return found
+
+
+def nodes(old: Scene, new: Scene) -> Ints:
+    """Return for each node of `old` (N,) its number in `new`, −1 where it has none.
+
+    By name; then joints by their order in skins that are of one size; then by order among the children of one parent,
+    where one of both has no name or no name is in both files.
+    """
+    return _Nodes(old.skeleton, new.skeleton).joined(_skins(old), _skins(new))
+
+
+class _Nodes:
+    """Nodes of two skeletons while they are being joined."""
+
+    def __init__(self, old: Skeleton, new: Skeleton) -> None:
+        self._old, self._new = old, new
+        self._children = _children(old), _children(new)
+        self.found = by_name(old.names, new.names)
+        self._taken = set(self.found[self.found >= 0].tolist())
+        self._renamed = not self._taken
+
+    def joined(self, old_skins: list[Ints], new_skins: list[Ints]) -> Ints:
+        for one, other in zip(old_skins, new_skins, strict=False):
+            if len(one) == len(other):
+                self._join(one.tolist(), other.tolist())
+        self._join_children(-1, -1)
+        for level in self._old.levels():
+            for parent in level[self.found[level] >= 0].tolist():
+                self._join_children(parent, int(self.found[parent]))
+        return self.found
+
+    def _join_children(self, parent: int, partner: int) -> None:
+        """Join what is left of two nodes' children where they are equally many: those that are parents first."""
+        old_children, new_children = self._children
+        one = [i for i in old_children.get(parent, ()) if self.found[i] < 0]
+        other = [i for i in new_children.get(partner, ()) if i not in self._taken]
+        inner, others_inner = [i for i in one if i in old_children], [i for i in other if i in new_children]
+        if len(inner) == len(others_inner):
+            self._join(inner, others_inner)
+            self._join_equal([i for i in one if i not in inner], [i for i in other if i not in others_inner])
+        else:
+            self._join_equal(one, other)
+
+    def _join_equal(self, old: list[int], new: list[int]) -> None:
+        if len(old) == len(new):
+            self._join(old, new)
+
+    def _join(self, old: list[int], new: list[int]) -> None:
+        for one, other in zip(old, new, strict=True):
+            is_free = self.found[one] < 0 and other not in self._taken
+            if is_free and (self._renamed or not self._old.names[one] or not self._new.names[other]):
+                self.found[one] = other
+                self._taken.add(other)
+
+
+def _children(skeleton: Skeleton) -> dict[int, list[int]]:
+    result: dict[int, list[int]] = {}
+    for node, parent in enumerate(skeleton.parents.tolist()):
+        result.setdefault(parent, []).append(node)
+    return result
+
+
+def _skins(scene: Scene) -> list[Ints]:
+    """Joints (J,) of the skins that are used, each once, in order."""
+    unique = {id(i.skin): i.skin.joints for i in scene.instances if i.skin is not None}
+    return list(unique.values())

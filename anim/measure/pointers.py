@@ -1,0 +1,33 @@
+"""How far apart two versions of tracks are that move no node: colors, factors, whatever a JSON pointer names."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Clip, Kind, Track
+from anim.sampling.track import sample
+
+
+def pointer_error(before: Clip, after: Clip, times: Floats) -> tuple[float, str]:
+    """Return the largest difference between tracks that move no node, as a share of the old track's range, and whose.
+
+    Tracks that only one of the clips has don't count. times: (F,) s.
+    """
+    worst, where = 0.0, ""
+    new = {track.target: track for track in after.tracks if track.path == "pointer"}
+    for track in before.tracks:
+        if track.path != "pointer" or track.target not in new:
+            continue
+        size = _relative_difference(track, new[track.target], times)
+        if size > worst:
+            worst, where = size, track.pointer or ""
+    return worst, where
+
+
+def _relative_difference(old: Track, new: Track, times: Floats) -> float:
+    a, b = sample(old, times), sample(new, times)
+    if old.kind is Kind.ROTATION:
+        return float(np.minimum(np.abs(a - b).max(axis=1), np.abs(a + b).max(axis=1)).max())
+    extent = float((a.max(axis=0) - a.min(axis=0)).max())
+    return float(np.abs(a - b).max()) / (extent or max(float(np.abs(a).max()), 1e-30))

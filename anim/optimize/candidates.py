@@ -1,0 +1,89 @@
+"""Tracks on time axes: the keys they get there, as stored, and what players show of them between."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.optimize import coding, play
+from anim.optimize.axes import Axis
+from anim.optimize.coding import Form, Stored
+from anim.optimize.fit import Fit
+from anim.optimize.limits import Packing
+from anim.optimize.truth import PATHS, Truth
+from anim.sampling.track import Located, locate
+
+ROTATION = PATHS.index("rotation")
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One track with its keys. shown: (W, C), along arcs or lines, at the times to measure at."""
+
+    stored: Stored
+    shown: Floats
+
+
+class Candidates:
+    """Candidates for the tracks of one clip: each made once, and kept for the next trial that asks for it."""
+
+    def __init__(self, truth: Truth, packing: Packing) -> None:
+        self._truth = truth
+        self._packing = packing
+        self._paths = [PATHS.index(each.path) for each in truth.moving]
+        self._places: dict[bytes, Located] = {}
+        self._fits: dict[bytes, Fit] = {}
+        self._keys: dict[tuple[bytes, int], Floats] = {}
+        self._made: dict[tuple[bytes, int, Form], Candidate] = {}
+
+    def of(self, axis: Axis, misses: Sequence[float]) -> Iterable[tuple[int, Candidate]]:
+        """Return every member of an axis with its candidate. misses: (G,) what storing may miss, in units of values."""
+        name = axis.keys.tobytes()
+        self._fit(axis, name)
+        forms = {
+            i: coding.form(self._keys[name, i], PATHS[self._paths[i]], misses[i], self._packing) for i in axis.members
+        }
+        new = [i for i in axis.members if (name, i, forms[i]) not in self._made]
+        for path in range(len(PATHS)):
+            self._make(axis, name, [i for i in new if self._paths[i] == path], forms, rotations=path == ROTATION)
+        return [(i, self._made[name, i, forms[i]]) for i in axis.members]
+
+    def by_chords(self, axis: Axis, rotations: Sequence[Stored]) -> Floats:
+        """Return what players that mix by components show of rotations on an axis, (W, G, 4)."""
+        keys = np.stack([each.values for each in rotations], axis=1)
+        return play.along_chords(keys, self._place(axis, axis.keys.tobytes()))
+
+    def _make(self, axis: Axis, name: bytes, members: list[int], forms: dict[int, Form], *, rotations: bool) -> None:
+        if not members:
+            return
+        stored = [coding.stored(self._keys[name, i], forms[i]) for i in members]
+        keys = np.stack([each.values for each in stored], axis=1)
+        way = play.along_arcs if rotations and len(keys) > 1 else play.on_lines
+        shown = way(keys, self._place(axis, name))
+        for k, i in enumerate(members):
+            self._made[name, i, forms[i]] = Candidate(stored[k], shown[:, k])
+
+    def _fit(self, axis: Axis, name: bytes) -> None:
+        """Keys of members that are new on the axis: their own values where it has every key, else fitted ones."""
+        at = self._truth.on_grid[axis.keys]
+        for path in range(len(PATHS)):
+            new = [i for i in axis.members if self._paths[i] == path and (name, i) not in self._keys]
+            if not new:
+                continue
+            values = np.stack([self._truth.moving[i].values for i in new], axis=1)
+            keys = values[at]
+            if not axis.keys.all():
+                if name not in self._fits:
+                    self._fits[name] = Fit(self._place(axis, name), len(at))
+                fit = self._fits[name]
+                keys = fit.rotations(values, keys) if path == ROTATION else fit.vectors(values)
+            for k, i in enumerate(new):
+                self._keys[name, i] = keys[:, k]
+
+    def _place(self, axis: Axis, name: bytes) -> Located:
+        if name not in self._places:
+            self._places[name] = locate(self._truth.grid[axis.keys], self._truth.at)
+        return self._places[name]

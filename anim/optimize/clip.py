@@ -1,0 +1,268 @@
+"""One clip, optimized: every track sorted by what can be done with it, searched, and put together again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import FLOAT32, Clip, Interpolation, Track
+from anim.optimize import lossless, morph, pointers
+from anim.optimize.coding import Stored
+from anim.optimize.limits import Drop
+from anim.optimize.search import search
+from anim.optimize.setting import Setting
+from anim.optimize.trial import Bench, Fate, Outcome
+from anim.optimize.truth import PATHS, Truth, key_grid, truth
+from anim.sampling import times
+
+MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
+MORPH_ALONE = 0.95
+NOT_UNIT = 1e-3  # off the length 1: tracks with such rotations are kept as they are
+CHORDS_NOTICED = 0.02  # of the bound: chords and arcs that are closer count as one
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A clip to optimize. shared: per track, values that other clips hold it at, the best first.
+
+    unused: (tracks of the clip) whether no clip moves the property away from rest. bound: m, what the search may use.
+    """
+
+    clip: Clip
+    shared: tuple[tuple[Floats, ...], ...]
+    unused: tuple[bool, ...]
+    bound: float
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """A clip in fewer bytes. stored: per track of it, how its values are stored. None of them where nothing was found
+    that keeps the bounds. dropped: numbers of the tracks of the source that are gone."""
+
+    clip: Clip
+    stored: tuple[Stored, ...]
+    dropped: tuple[int, ...]
+
+
+def solve(setting: Setting, task: Task) -> Solution | None:
+    """Return the clip in as few bytes as the effort finds; None where no way keeps the bounds."""
+    return _Sorted(setting, task).solution()
+
+
+class _Sorted:
+    """The tracks of one clip, by what can be done with them."""
+
+    def __init__(self, setting: Setting, task: Task) -> None:
+        self._setting = setting
+        self._task = task
+        self._clip = task.clip
+        self._done: dict[int, tuple[Track, Stored]] = {}
+        self._dropped: list[int] = []
+        self._free: list[int] = []
+        self._spent = 0.0
+        for i, track in enumerate(task.clip.tracks):
+            self._sort(i, track)
+        self._thin_weights()
+
+    def solution(self) -> Solution | None:
+        found = self._searched(self._free)
+        splines = [i for i in self._free if self._clip.tracks[i].interpolation is Interpolation.CUBICSPLINE]
+        if found is not None:
+            splines = [i for i in splines if _spline_is_smaller(self._clip.tracks[i], found.get(i))]
+        if splines:  # smaller than lines, or maybe too bent for any
+            for i in splines:
+                self._keep_exactly(i)
+            found = self._searched([i for i in self._free if i not in splines])
+        if found is None:
+            return None
+        every = {**self._done, **found}
+        dropped = [i for i in range(len(self._clip.tracks)) if i not in every]
+        return _with_ends(self._clip, every, dropped)
+
+    def _sort(self, i: int, track: Track) -> None:
+        policy, exact = self._setting.policy, self._setting.bounds.max_error == 0
+        if track.node is None or track.path == "pointer":
+            self._put(i, pointers.thinned(track, self._setting.bounds.max_pointer_error))
+        elif self._is_unseen(i):
+            self._dropped.append(i)
+        elif track.path == "weights":
+            pass
+        elif track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or _is_bent(track):
+            self._keep_exactly(i)
+        else:
+            self._free.append(i)
+
+    def _is_unseen(self, i: int) -> bool:
+        node = self._clip.tracks[i].node
+        policy = self._setting.policy
+        return policy.drop_invisible and node not in policy.keep and bool(self._setting.unseen[node])
+
+    def _keep_exactly(self, i: int) -> None:
+        track = self._clip.tracks[i]
+        slim = lossless.lossless(track)
+        if len(slim.times) == 1 and self._droppable(i) and track.node is not None and track.path in PATHS:
+            rest = getattr(self._setting.skeleton, track.path)[track.node].astype(np.float32)
+            value = slim.values[0].astype(np.float32)
+            if (value == rest).all() or (track.path == "rotation" and (value == -rest).all()):
+                self._dropped.append(i)
+                return
+        self._put(i, slim)
+
+    def _put(self, i: int, track: Track) -> None:
+        self._done[i] = track, Stored(track.values, "as it is")
+
+    def _droppable(self, i: int) -> bool:
+        policy = self._setting.policy
+        if self._clip.tracks[i].node in policy.keep:
+            return False
+        return policy.drop is Drop.REST or (policy.drop is Drop.UNUSED and self._task.unused[i])
+
+    def _thin_weights(self) -> None:
+        """Morph weights have a share of the bound of their own; what they use of it the search may not."""
+        setting = self._setting
+        weights = [i for i, track in enumerate(self._clip.tracks) if track.path == "weights" and i not in self._done]
+        share = MORPH_SHARE if self._free else MORPH_ALONE
+        bound = share * self._task.bound / max(len(weights), 1)
+        for i in weights:
+            track = self._clip.tracks[i]
+            assert track.node is not None
+            reach = setting.morph_reach(track.node)
+            exact = setting.bounds.max_error == 0 or track.node in setting.policy.keep
+            if exact or not reach.size or track.interpolation is Interpolation.STEP:
+                self._put(i, lossless.lossless(track))
+                continue
+            from_rest = morph.off(track, setting.weights_at_rest(track.node), reach)
+            if self._droppable(i) and from_rest <= bound:
+                self._dropped.append(i)
+                self._spent += from_rest
+                continue
+            new, stored, off = morph.thinned(track, reach, bound, key_grid([track]), setting.coding.packing)
+            self._done[i] = new, stored
+            self._spent += off
+
+    def _searched(self, free: Sequence[int]) -> dict[int, tuple[Track, Stored]] | None:
+        """The free tracks as the search left them, without those that it dropped; None where it found no way."""
+        setting = self._setting
+        if not free:
+            return {}
+        bound = self._task.bound
+        found = truth(
+            setting.skeleton,
+            self._clip,
+            free,
+            setting.points,
+            reference=setting.policy.reference,
+            noticed=CHORDS_NOTICED * bound,
+        )
+        bench = Bench(
+            setting.skeleton,
+            found,
+            setting.points,
+            np.full(len(setting.points), bound - self._spent),
+            setting.coding,
+            np.array([self._droppable(i) for i in free], np.bool_),
+            [self._task.shared[i] for i in free],
+            replace(setting.bounds, max_error=bound),
+        )
+        outcome = search(bench, bound, setting.effort)
+        return None if outcome is None else _tracks(self._clip, found, outcome)
+
+
+def _is_bent(track: Track) -> bool:
+    """Whether rotations are so far from unit length that players which don't normalize them show something else."""
+    if track.path != "rotation" or track.interpolation is Interpolation.CUBICSPLINE:
+        return False
+    return bool((np.abs(np.linalg.norm(track.values, axis=1) - 1) > NOT_UNIT).any())
+
+
+def _tracks(clip: Clip, found: Truth, outcome: Outcome) -> dict[int, tuple[Track, Stored]]:
+    axes: dict[bytes, Floats] = {}
+    result = {}
+    for k, moving in enumerate(found.moving):
+        if outcome.fates[k] == Fate.DROPPED:
+            continue
+        stored = outcome.keys[k]
+        if k in outcome.on:
+            keys = outcome.on[k]
+            at = axes.setdefault(keys.tobytes(), times.key_times(found.grid[keys]))
+        else:
+            at = axes.setdefault(b"", times.key_times(np.array([clip.start])))
+        result[moving.number] = _new_track(clip.tracks[moving.number], at, stored), stored
+    return result
+
+
+def _new_track(track: Track, at: Floats, stored: Stored) -> Track:
+    return replace(
+        track,
+        interpolation=Interpolation.LINEAR,
+        times=at,
+        values=stored.exact(),
+        in_tangents=None,
+        out_tangents=None,
+        storage=lossless.INT16 if stored.form in ("int16", "quaternion") else FLOAT32,
+    )
+
+
+def _spline_is_smaller(track: Track, found: tuple[Track, Stored] | None) -> bool:
+    """Whether the source's own spline takes fewer bytes than the lines that were found for it."""
+    if found is None or len(found[0].times) == 1:
+        return False
+    width = track.values.shape[1]
+    lines = len(found[0].times) * (4 + width * (2 if found[1].form in ("int16", "quaternion") else 4))
+    return bool(len(track.times) * (4 + 12 * width) < lines)
+
+
+def _with_ends(clip: Clip, every: dict[int, tuple[Track, Stored]], dropped: list[int]) -> Solution:
+    """The solution, with at least one track, and with keys at the clip's start and end."""
+    if not every and clip.tracks:
+        first = clip.tracks[0]
+        every = {0: (_held(first), Stored(first.values[:1], "as it is"))}
+        dropped = dropped[1:] if dropped and dropped[0] == 0 else dropped
+    made = Clip(clip.name, tuple(track for track, _ in every.values()))
+    if every and (made.end < clip.end or made.start > clip.start):
+        number = min(every, key=lambda i: (len(every[i][0].times), every[i][0].values.shape[1], i))
+        track, _ = every[number]
+        longer = _stretched(track, clip.start, clip.end)
+        every[number] = longer, Stored(longer.values, "as it is")
+    ordered = sorted(every)
+    return Solution(
+        Clip(clip.name, tuple(every[i][0] for i in ordered)), tuple(every[i][1] for i in ordered), tuple(dropped)
+    )
+
+
+def _held(track: Track) -> Track:
+    """The first value of a track as its only key."""
+    return replace(
+        track,
+        interpolation=Interpolation.STEP if track.interpolation is Interpolation.STEP else Interpolation.LINEAR,
+        times=track.times[:1],
+        values=track.values[:1],
+        in_tangents=None,
+        out_tangents=None,
+    )
+
+
+def _stretched(track: Track, start: float, end: float) -> Track:
+    """The track with its first value held from `start` on, and its last one up to `end`; a spline by zero tangents."""
+    head, tail = bool(track.times[0] > start), bool(track.times[-1] < end)
+    rows = [0] * head + list(range(len(track.times))) + [-1] * tail
+    at = np.concatenate(([start] * head, track.times, [end] * tail))
+    new = replace(
+        track,
+        times=at,
+        values=track.values[rows],
+        in_tangents=None,
+        out_tangents=None,
+        interpolation=Interpolation.STEP,
+    )
+    if track.in_tangents is None or track.out_tangents is None:
+        return replace(new, interpolation=track.interpolation)
+    arriving, leaving = track.in_tangents[rows], track.out_tangents[rows]
+    if head:
+        leaving[0] = arriving[1] = 0
+    if tail:
+        leaving[-2] = arriving[-1] = 0
+    return replace(new, interpolation=track.interpolation, in_tangents=arriving, out_tangents=leaving)

@@ -1,0 +1,93 @@
+"""How the keyed tracks of a clip come to their time axes: by bytes, all on one, or every so many frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.optimize.axes import Axis, merged
+from anim.optimize.coding import Coding
+from anim.optimize.keys import jointly_needed, needed
+from anim.optimize.segments import Segments, fits
+from anim.optimize.truth import Truth
+
+
+class Layouts:
+    """Time axes for one clip; what was found for a track and a budget is kept."""
+
+    def __init__(self, truth: Truth, coding: Coding) -> None:
+        self.grid = truth.grid
+        self.coding = coding
+        self.key_bytes = np.array([coding.key_bytes(each.path) for each in truth.moving])
+        self._scaled = _scaled(truth)
+        table = fits(len(truth.moving), len(truth.grid))
+        self._segments = Segments(self._scaled, truth.grid) if table else None
+        self._rows: dict[tuple[int, float], Bools] = {}
+
+    def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[Axis]:
+        """Return the axes of the tracks `keyed` under their budgets (G,) in metres, by the layout of that name."""
+        return LAYOUTS[name](self, keyed, budgets) if len(keyed) else []
+
+    def scaled(self, keyed: Ints, budgets: Floats) -> Floats:
+        """Return the values of tracks on the grid (k, K, 4) in units of their budgets."""
+        return np.asarray(self._scaled[keyed] / budgets[keyed][:, None, None])
+
+    def needed(self, keyed: Ints, budgets: Floats) -> Bools:
+        """Return which keys (k, K) each track must keep by itself."""
+        names = [(i, float(budgets[i])) for i in keyed.tolist()]
+        new = [k for k, name in enumerate(names) if name not in self._rows]
+        if new:
+            found = self._searched(keyed[new], budgets)
+            self._rows.update((names[k], row) for k, row in zip(new, found, strict=True))
+        return np.array([self._rows[name] for name in names])
+
+    def _searched(self, keyed: Ints, budgets: Floats) -> Bools:
+        if self._segments is not None:
+            return self._segments.needed(keyed, budgets[keyed])
+        return needed(self.scaled(keyed, budgets), self.grid)
+
+
+def _merged(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+    coding = layouts.coding
+    axes = merged(
+        layouts.needed(keyed, budgets),
+        layouts.key_bytes[keyed],
+        axis_bytes=coding.prices.axis,
+        time_bytes=coding.time_bytes,
+    )
+    return [Axis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+
+
+def _joint(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+    keys = jointly_needed(layouts.scaled(keyed, budgets), layouts.grid)
+    return [Axis(keys, tuple(keyed.tolist()))]
+
+
+def _every(nth: int) -> Layout:
+    def layout(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+        keys = np.zeros(len(layouts.grid), np.bool_)
+        keys[::nth] = keys[-1] = True
+        return [Axis(keys, tuple(keyed.tolist()))]
+
+    return layout
+
+
+Layout: TypeAlias = Callable[[Layouts, Ints, Floats], list[Axis]]
+LAYOUTS: dict[str, Layout] = {
+    "merged": _merged,
+    "joint": _joint,
+    "full": _every(1),
+    "second": _every(2),
+    "third": _every(3),
+}
+
+
+def _scaled(truth: Truth) -> Floats:
+    """Values on the grid, in metres, padded to four components (G, K, 4)."""
+    scaled = np.zeros((len(truth.moving), len(truth.grid), 4))
+    for i, each in enumerate(truth.moving):
+        scaled[i, :, : each.values.shape[1]] = each.values[truth.on_grid] * each.meters
+    return scaled

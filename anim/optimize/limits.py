@@ -1,0 +1,103 @@
+"""What an optimization may cost the motion, what it may remove, and how hard it tries: all options in three values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Drop(StrEnum):
+    """Which channels that only repeat the rest pose may go."""
+
+    REST = "rest"  # every channel that stays within the bound of the rest pose, clip by clip
+    UNUSED = "unused"  # only what no clip ever moves away from the rest pose: safe where a player blends clips
+    NEVER = "never"  # none; they become a single key
+
+
+class Reference(StrEnum):
+    """What the result must stay near to."""
+
+    CURVE = "curve"  # the motion at every moment
+    KEYS = "keys"  # the motion at the source's key times
+
+
+class Packing(StrEnum):
+    """How the numbers of animations are stored."""
+
+    CORE = "core"  # plain accessors: every player reads them
+    EXT = "ext"  # EXT_meshopt_compression
+    KHR = "khr"  # KHR_meshopt_compression, bitstream version 1
+
+    @property
+    def extension(self) -> str:
+        """The glTF extension it needs; empty for none."""
+        return {"core": "", "ext": "EXT_meshopt_compression", "khr": "KHR_meshopt_compression"}[self.value]
+
+
+class Objective(StrEnum):
+    """What is counted when two ways compete."""
+
+    FILE = "file"  # bytes on disk
+    GZIP = "gzip"  # bytes after gzip, where JSON is nearly free
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """How far the result may be from the source.
+
+    max_error: m on the surface, 0 for lossless in float32. shell: m, radius of the sphere on which a node without
+    vertices counts. max_pointer_error: share of the range of a track that moves no node. max_angle: rad of any node's
+    own rotation, or None. max_speed_error: m/s of any vertex, or None.
+    """
+
+    max_error: float
+    shell: float
+    max_pointer_error: float = 1e-4
+    max_angle: float | None = None
+    max_speed_error: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """What may be removed or moved beside keys.
+
+    keep: numbers of the nodes whose channels stay exact. rebase_rest: the rest pose may move where every
+    clip drives the property. drop_invisible: channels of nodes that carry no vertex may go.
+    """
+
+    drop: Drop = Drop.UNUSED
+    reference: Reference = Reference.CURVE
+    rebase_rest: bool = False
+    drop_invisible: bool = False
+    keep: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How long a search goes on.
+
+    rounds: of feedback. thresholds: shares of the bound tried as what a track may be off to be held. axes: further
+    ways to choose time axes. finishing: factors tried on all budgets at the end. strays: random changes tried.
+    descent: times that each track is tried with coarser storage.
+    """
+
+    rounds: int
+    thresholds: tuple[float, ...] = ()
+    axes: tuple[str, ...] = ()
+    finishing: tuple[float, ...] = (1.05,)
+    strays: int = 0
+    descent: int = 0
+
+
+EFFORTS = {
+    "fast": Effort(5),
+    "balanced": Effort(7, (0.15, 0.35, 0.6, 0.85), ("full", "joint"), (1.1, 1.04, 1.02), 30),
+    "max": Effort(
+        10,
+        (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9),
+        ("full", "joint", "second", "third"),
+        (1.2, 1.1, 1.05, 1.02),
+        400,
+        2,
+    ),
+}

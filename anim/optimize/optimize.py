@@ -1,0 +1,86 @@
+"""A document whose animations take fewer bytes, and whose motion stays within bounds that are measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from anim.gltf import read
+from anim.gltf.document import Document
+from anim.model import Clip, Scene
+from anim.optimize import seal
+from anim.optimize.clip import Solution, Task
+from anim.optimize.constants import known
+from anim.optimize.crew import crew
+from anim.optimize.rebase import rebase
+from anim.optimize.request import Request
+from anim.optimize.site import Site, finished
+from anim.optimize.verify import Verdict
+from anim.optimize.written import differing, written
+
+MARGIN = 0.985  # of the bound, that a search may use
+
+
+@dataclass(frozen=True, slots=True)
+class Optimized:
+    """The new document, and by number of the clip what became of it and how far it is from its source.
+
+    moved: (node, path) of rest values that moved. unchanged: whether the input is the output of the same request.
+    """
+
+    document: Document
+    solutions: Mapping[int, Solution]
+    verdicts: Mapping[int, Verdict]
+    moved: tuple[tuple[int, str], ...] = ()
+    unchanged: bool = False
+
+
+def optimize(
+    document: Document,
+    scene: Scene,
+    clips: Sequence[Clip],
+    request: Request,
+    *,
+    chosen: Sequence[int] | None = None,
+    workers: int = 1,
+    start: str = "spawn",
+    detailed: bool = False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Optimized:
+    """Return the document with its animations in fewer bytes, each within the bounds as measured on what was written.
+
+    scene, clips: of the document. chosen: numbers of the clips to optimize, all by default. workers: processes; the
+    result is the same for any number. start: how they start, as `multiprocessing` calls it. detailed: verdicts with
+    statistics. progress: called with the share done.
+    A clip for which no lossy way holds all bounds is kept without loss. Output of the same request comes back as it is.
+    """
+    chosen = range(len(clips)) if chosen is None else chosen
+    options = f"{request} {tuple(chosen)}"
+    if seal.is_sealed(document, clips, options):
+        return Optimized(document, {}, {}, unchanged=True)
+    base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
+    site = Site(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
+    tasks = _tasks(site, chosen)
+    solutions: dict[int, Solution] = {}
+    verdicts: dict[int, Verdict] = {}
+    with crew(min(workers, len(tasks)), site, start=start) as workforce:
+        for (number, _), each in zip(tasks, workforce.each(finished, tasks), strict=True):
+            solutions[number], verdicts[number] = each.solution, each.verdict
+            progress(len(solutions) / len(tasks))
+    new = written(base.document if base else document, solutions, request.packing)
+    for number, clip in differing(new, solutions).items():
+        verdicts[number] = site.judged(number, clip)
+    done = seal.sealed(new, read.clips(new), options)
+    return Optimized(done, solutions, verdicts, base.moved if base else ())
+
+
+def _tasks(site: Site, chosen: Sequence[int]) -> list[tuple[int, Task]]:
+    shared = known(site.setting(), site.clips)
+    tasks = []
+    for i in chosen:
+        clip = site.clips[i]
+        targets = [(-1 if track.node is None else track.node, track.path) for track in clip.tracks]
+        values = tuple(shared.values.get(target, ()) for target in targets)
+        unused = tuple(target in shared.unused for target in targets)
+        tasks.append((i, Task(clip, values, unused, MARGIN * site.request.bounds.max_error)))
+    return tasks

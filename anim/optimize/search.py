@@ -1,0 +1,143 @@
+"""The cheapest way found to write one clip within its bounds: budgets per track, fed back from the measured error."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.optimize import coding
+from anim.optimize.limits import Effort
+from anim.optimize.trial import Bench, Fate, Outcome, Plan
+
+START = 1 / 3  # of the bound: the first budget of every track
+AIM = 0.97  # of the bound, that budgets are steered to
+GAIN = 0.6  # how strongly a budget follows the error it led to
+STEPS = (0.5, 1.8)  # least and greatest change of a budget from round to round
+SHRINK = 0.6
+ENOUGH = 1e3  # times what storing may miss, so that integers are taken
+SEED = 2026
+SPREAD = (0.4, 0.05)  # standard deviation of the logarithm of random changes: the first, and the least
+STRAYING = 0.3  # share of tracks changed at a time
+LEAST = 1e-6  # of the bound; smaller budgets mean that storage can't do better
+
+
+def search(bench: Bench, bound: float, effort: Effort) -> Outcome | None:
+    """Return the smallest outcome found that keeps all bounds; None where none does.
+
+    bound: m, for the size of budgets only; what counts is the outcome's own strain.
+    """
+    return _Search(bench, bound, effort).run()
+
+
+class _Search:
+    def __init__(self, bench: Bench, bound: float, effort: Effort) -> None:
+        self._bench = bench
+        self._bound = bound
+        self._effort = effort
+        self._best: Outcome | None = None
+
+    def run(self) -> Outcome | None:
+        tracks = len(self._bench.truth.moving)
+        start = Plan(np.full(tracks, START * self._bound), 0.0, "merged", np.ones(tracks))
+        self._adapt(start, self._effort.rounds)
+        for share in self._effort.thresholds:
+            before = self._best
+            plan = replace(before.plan if before else start, threshold=share * self._bound)
+            self._adapt(replace(plan, budgets=0.9 * plan.budgets), self._effort.rounds)
+            if self._best is before:
+                break
+        if self._best is not None and self._effort.thresholds:
+            self._adapt(self._dearer_first(self._best), self._effort.rounds)
+        for axes in self._effort.axes if self._best else ():
+            assert self._best is not None
+            self._adapt(replace(self._best.plan, axes=axes), max(self._effort.rounds // 2, 2))
+        if self._best is None:
+            self._shrink(start)
+        if self._best is not None:
+            self._finish()
+        return self._best
+
+    def _attempt(self, plan: Plan) -> Outcome:
+        limit = math.inf if self._best is None else self._best.size
+        outcome = self._bench.run(plan, smaller_than=limit)
+        if outcome.worst <= 1 and (self._best is None or outcome.size < self._best.size):
+            self._best = outcome
+        return outcome
+
+    def _adapt(self, plan: Plan, rounds: int) -> None:
+        """Try, let each budget follow what the points that answer for it showed, and try again."""
+        for number in range(rounds):
+            outcome = self._attempt(plan)
+            if number + 1 < rounds:
+                plan = replace(plan, budgets=self._followed(plan.budgets, outcome))
+
+    def _followed(self, budgets: Floats, outcome: Outcome) -> Floats:
+        answering = self._bench.truth.answering
+        strain = np.where(answering, outcome.strain, 0.0).max(axis=1, initial=0.0)
+        strain = np.maximum(strain, outcome.own)
+        factor = np.clip((AIM / np.maximum(strain, 1e-9)) ** GAIN, *STEPS)
+        return np.asarray(np.minimum(budgets * factor, 4 * self._bound))
+
+    def _shrink(self, plan: Plan) -> None:
+        """Smaller and smaller budgets until something holds."""
+        factor = SHRINK
+        while self._best is None and factor > LEAST:
+            self._attempt(replace(plan, budgets=plan.budgets * factor))
+            factor *= SHRINK
+
+    def _dearer_first(self, outcome: Outcome) -> Plan:
+        """Larger budgets for tracks with many bytes: n keys fall about as budget^-½, so least bytes in all for what
+        budgets in a row add up to asks for budgets that grow as n^⅔."""
+        plan = outcome.plan
+        bytes_of = np.array([outcome.keys[i].values.size if i in outcome.on else 0 for i in range(len(plan.budgets))])
+        mean = bytes_of[bytes_of > 0].mean() if bytes_of.any() else 1.0
+        share = np.where(bytes_of > 0, np.maximum(bytes_of, 1) / mean, 1.0)
+        return replace(plan, budgets=plan.budgets * share ** (2 / 3))
+
+    def _finish(self) -> None:
+        """A little more for every track, another form for some, and then chance."""
+        assert self._best is not None
+        plan = self._best.plan
+        for factor in self._effort.finishing:
+            self._attempt(replace(plan, budgets=plan.budgets * factor))
+        self._store_coarser()
+        self._stray(self._effort.strays)
+        for _ in range(self._effort.descent):
+            before = self._best
+            keyed = np.flatnonzero(self._best.fates == Fate.KEYED).tolist()
+            for i in sorted(keyed, key=lambda i: -_length(self._best, i)):
+                self._attempt(self._coarser(i, 2.0))
+            if self._best is before:
+                break
+
+    def _store_coarser(self) -> None:
+        """Rotations kept as float32 for the sake of their budget, one by one as integers."""
+        assert self._best is not None
+        for i, stored in sorted(self._best.keys.items()):
+            if stored.form == "float32" and len(stored.values) > coding.FEW and stored.values.shape[1] == 4:
+                self._attempt(self._coarser(i, ENOUGH))
+
+    def _coarser(self, track: int, factor: float) -> Plan:
+        assert self._best is not None
+        coarser = self._best.plan.coarser.copy()
+        coarser[track] *= factor
+        return replace(self._best.plan, coarser=coarser)
+
+    def _stray(self, count: int) -> None:
+        """Budgets of some tracks changed at random, by less where nothing is found; always the same random numbers."""
+        chance = np.random.default_rng(SEED)
+        spread = SPREAD[0]
+        for _ in range(count):
+            best = self._best
+            assert best is not None
+            tracks = len(best.plan.budgets)
+            changes = spread * chance.standard_normal(tracks) * (chance.random(tracks) < STRAYING)
+            self._attempt(replace(best.plan, budgets=best.plan.budgets * np.exp(changes)))
+            spread = spread * 1.3 if self._best is not best else max(0.96 * spread, SPREAD[1])
+
+
+def _length(outcome: Outcome | None, track: int) -> int:
+    return len(outcome.keys[track].values) if outcome and track in outcome.keys else 0

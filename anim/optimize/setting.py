@@ -1,0 +1,109 @@
+"""What all clips of a file are optimized under: the scene's measured points, the bounds, and what may be removed."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.measure.surface import Surface, surfaces
+from anim.model import Clip, Scene, Skeleton
+from anim.optimize import morph
+from anim.optimize import points as points_
+from anim.optimize.coding import Coding
+from anim.optimize.limits import Bounds, Effort, Policy
+from anim.optimize.points import Points
+from anim.sampling.pose import rest, world_by_node
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """All that a clip's optimization needs beside the clip.
+
+    rest_world: (N, 3, 4) world matrices of the rest pose. surfaces: those with morph targets.
+    unseen: (N,) nodes that carry no vertex, nor does a node on them.
+    """
+
+    skeleton: Skeleton
+    rest_world: Floats
+    points: Points
+    surfaces: tuple[Surface, ...]
+    unseen: Bools
+    bounds: Bounds
+    policy: Policy
+    coding: Coding
+    effort: Effort
+
+    def morph_reach(self, node: int) -> Floats:
+        """Return how far (M, V), in metres, each morph target of a node's mesh moves each vertex at weight 1."""
+        return morph.reach(self.surfaces, node, self.widening(node))
+
+    def weights_at_rest(self, node: int) -> Floats:
+        """Return the morph weights (M,) of a node in the rest pose."""
+        return next(part.rest_weights for part in self.surfaces if part.owner == node)
+
+    def widening(self, node: int) -> float:
+        """Return how many metres of the world one unit of a node's own space is at most, in the rest pose.
+
+        Of a skinned mesh the joints' spaces count, not its node's.
+        """
+        carriers = [node, *(n for part in self.surfaces if part.owner == node for n in part.nodes.tolist())]
+        return float(np.sqrt((self.rest_world[carriers, :, :3] ** 2).sum(axis=1)).max())
+
+
+def setting(
+    scene: Scene,
+    clips: tuple[Clip, ...],
+    *,
+    bounds: Bounds,
+    policy: Policy,
+    coding: Coding,
+    effort: Effort,
+    extra: Set[tuple[int, int]] = frozenset(),
+) -> Setting:
+    """Return the setting for the clips of a scene.
+
+    extra: vertices to measure beside those that stick out, (number of the surface, number of the vertex).
+    """
+    skeleton = scene.skeleton
+    unseen = ~_seen(scene)
+    shells = set(np.flatnonzero(unseen & _moved(skeleton, clips)).tolist())
+    if policy.drop_invisible:
+        shells = {node for node in shells if node in policy.keep}
+    world = world_by_node(skeleton, rest(skeleton))[:, 0]
+    return Setting(
+        skeleton,
+        world,
+        points_.of_scene(scene, shells, bounds.shell, extra),
+        tuple(surface for surface in surfaces(scene) if len(surface.targets)),
+        unseen,
+        bounds,
+        policy,
+        coding,
+        effort,
+    )
+
+
+def _seen(scene: Scene) -> Bools:
+    """Which nodes (N,) carry a vertex, or have a node below that does."""
+    seen = np.zeros(len(scene.skeleton), np.bool_)
+    if any(len(instance.mesh.positions) for instance in scene.instances):
+        for surface in surfaces(scene):
+            seen[surface.nodes[np.unique(surface.joints[surface.weights > 0])]] = True
+    for level in reversed(scene.skeleton.levels()[1:]):
+        np.logical_or.at(seen, scene.skeleton.parents[level], seen[level])
+    return seen
+
+
+def _moved(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:
+    """Which nodes (N,) any clip moves, by a track of their own or of a node above."""
+    moved = np.zeros(len(skeleton), np.bool_)
+    for clip in clips:
+        for track in clip.tracks:
+            if track.node is not None and track.path != "weights":
+                moved[track.node] = True
+    for level in skeleton.levels()[1:]:
+        moved[level] |= moved[skeleton.parents[level]]
+    return moved

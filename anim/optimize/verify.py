@@ -1,0 +1,76 @@
+"""What a written clip is worth: how far it is from its source, played by every kind of player, against its bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from anim.measure.error import MotionError, Ruler, check_times, dense_times
+from anim.measure.statistics import Statistics, statistics
+from anim.model import Clip
+from anim.optimize.limits import Bounds, Reference
+
+NOTHING = 1e-9  # of the diagonal: what rounding in float64 may show of motion that is the same
+PLAYERS = ("spec", "raw", "nlerp")
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One clip against its source.
+
+    error: the largest distance, and where. player: who showed it. statistics: the rest, as the first player shows it;
+    None where nobody asked.
+    strain: the largest share of any bound; up to 1 all hold.
+    """
+
+    error: MotionError
+    player: str
+    statistics: Statistics | None
+    strain: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether all bounds hold."""
+        return self.strain <= 1
+
+
+def verdict(
+    ruler: Ruler,
+    before: Clip,
+    after: Clip,
+    *,
+    bounds: Bounds,
+    reference: Reference,
+    players: Sequence[str] = PLAYERS,
+    detailed: bool = True,
+) -> Verdict:
+    """Return how far `after`, as read from the written file, is from `before`.
+
+    Looked at: all keys of both, the middles between them, and 120 frames per second; with Reference.KEYS the source's
+    keys only. players: names in `anim.measure.players.PLAYERS`; each plays both versions. detailed: statistics too,
+    even where no bound asks for them.
+    """
+    if reference is Reference.KEYS:
+        times = check_times(before)[::2]
+    else:
+        times = dense_times(before, after)
+    found = [(ruler.error_at(before, after, times, player=player), player) for player in players]
+    error, player = max(found, key=lambda each: each[0].max_error)
+    wanted = detailed or bounds.max_angle is not None or bounds.max_speed_error is not None
+    about = statistics(ruler, before, after, times=times, player=players[0]) if wanted else None
+    least = NOTHING * (ruler.diagonal or 1.0)
+    shares = [
+        _share(error.max_error, bounds.max_error, least),
+        _share(error.max_pointer_error, bounds.max_pointer_error, NOTHING),
+    ]
+    if bounds.max_angle is not None and about is not None:
+        shares.append(_share(about.angle.size, bounds.max_angle, NOTHING))
+    if bounds.max_speed_error is not None and about is not None:
+        shares.append(_share(about.speed.size, bounds.max_speed_error, least))
+    if (before.start, before.end) != (after.start, after.end):
+        shares.append(float("inf"))
+    return Verdict(error, player, about, max(shares))
+
+
+def _share(size: float, bound: float, least: float) -> float:
+    return size / max(bound, least)

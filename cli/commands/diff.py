@@ -1,0 +1,153 @@
+"""`gltf-anim diff`: how far apart is the motion of two files?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import PurePath
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from anim.errors import AnimError
+from anim.gltf import read
+from anim.gltf.accessors import Accessors
+from anim.measure.diff import diff as compared
+from anim.measure.error import FPS, Ruler
+from anim.measure.footprint import Footprint, footprints
+from anim.measure.players import PLAYERS
+from anim.measure.profile import profile
+from anim.measure.stored import stored
+from anim.measure.surface import diagonal
+from anim.model import Clip, Scene
+from anim.ops.selection import Selection
+from anim.show import diff as picture
+from anim.show.sheet import FORMATS
+from cli import differences, options, streams, units
+from cli.differences import File, Found
+from cli.errors import CheckError, UsageError
+from cli.report import Voice, length, plural, size
+
+OFF = ("0", "0%", "0m")
+
+
+class Format(StrEnum):
+    """What the report looks like."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
+SPEC = Player("spec")
+
+
+def diff(
+    old: Annotated[str, typer.Argument(metavar="A", help="A .glb or .gltf file, '-' for stdin.", show_default=False)],
+    new: Annotated[str, typer.Argument(metavar="B", help="What to hold against it.", show_default=False)],
+    *,
+    format: Annotated[Format, typer.Option("--format", help="Text to read, or one JSON document.")] = Format.TEXT,
+    plot: Annotated[
+        str | None, typer.Option("--plot", metavar="OUT", help="Draw the error over time: a .png or .svg file.")
+    ] = None,
+    fail_above: Annotated[
+        str | None,
+        typer.Option("--fail-above", metavar="LENGTH", help="Exit 6 where more is found: 0.5mm, or 0.1% of the size."),
+    ] = None,
+    player: Annotated[
+        Player,
+        typer.Option("--player", help="; ".join(f"{name}: {each.about}" for name, each in PLAYERS.items()) + "."),
+    ] = SPEC,
+    fps: Annotated[float, typer.Option("--fps", metavar="N", help="Look so often per second, besides at keys.")] = FPS,
+    shell: Annotated[
+        str, typer.Option("--shell", metavar="LENGTH", help="How far around nodes without vertices; 0: leave them out.")
+    ] = "1%",
+    clip: options.Clips = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Say how far apart the motion of two files is, in metres on the surface.
+
+    Clips and nodes are matched by name, then by order. A's vertices are carried through both files, by B's joints as
+    they stand in B: quantized, merged and reordered meshes don't count as motion. Nodes that move no vertex count by
+    six points around them. Looked at: all keys of both, half-way between, and a grid of 120 frames per second.
+
+    Per clip, worst first: the largest distance with joint, vertex and time; p99 and mean over all vertices; the largest
+    turn of a node against the world; the largest difference in speed (jitter), in morph weights, in pointers (of their
+    range); ends that differ, and tracks that only A (−) or only B (+) has. --fail-above also says no where B lacks a
+    clip. --player plays rotations as others than glTF's own rule do; keys that are not of unit length show there.
+    """
+    voice, selection = Voice(quiet), Selection(clip or ())
+    if old == new == streams.PIPE:
+        raise UsageError("A and B can't both be stdin")
+    if fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    kind = "" if plot is None else _kind(plot)
+    one, other = _opened(old, voice), _opened(new, voice)
+    scale = diagonal(one.scene)
+    limit = None if fail_above is None else units.meters(fail_above, "--fail-above", lambda: scale)
+    radius = 0.0 if shell.strip() in OFF else units.meters(shell, "--shell", lambda: scale)
+    ruler = Ruler(one.scene, other.scene, shell=radius / scale if radius and scale else None)
+    chosen = selection.chosen_clips(one.file.clips) if clip else None
+    found = compared(ruler, one.clips, other.clips, chosen=chosen, player=str(player), fps=fps)
+    report = Found(one.file, other.file, found, str(player), fps, radius)
+    streams.write_text(differences.as_json(report) if format is Format.JSON else differences.text(report))
+    if plot is not None:
+        drawn = _drawn(report, ruler, one, other, kind, limit)
+        streams.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
+        voice.say(f"{plot}  {size(len(drawn))}")
+    if limit is not None:
+        _check(report, limit)
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """One of the two inputs, read."""
+
+    file: File
+    clips: tuple[Clip, ...]
+    scene: Scene
+
+
+def _opened(path: str, voice: Voice) -> _Side:
+    with streams.source(path) as source:
+        document = source.document
+        accessors = Accessors(document)
+        clips = read.clips(document, accessors)
+        try:
+            scene = read.scene(document, accessors)
+        except AnimError as error:  # vertices that can't be read leave the nodes to be measured
+            voice.say(f"note: {source.name}: measured at nodes, not on the surface: {error}")
+            scene = Scene(read.skeleton(document), ())
+        cost = Footprint(stored(document), footprints(document)[1].json)
+        return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
+
+
+def _kind(path: str) -> str:
+    ending = PurePath(path).suffix.lower().lstrip(".")
+    if ending not in FORMATS:
+        raise UsageError(f"{path}: --plot writes .png or .svg")
+    streams.check_file(path)
+    return ending
+
+
+def _drawn(found: Found, ruler: Ruler, one: _Side, other: _Side, kind: str, limit: float | None) -> bytes:
+    worst = found.diff.clips[: picture.LIMIT]
+    profiles = [
+        profile(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps) for each in worst
+    ]
+    count = plural(len(found.diff.clips), "clip")
+    note = f"the worst {len(worst)} of {count}" if len(worst) < len(found.diff.clips) else count
+    title = f"{PurePath(found.old.name).name} → {PurePath(found.new.name).name}"
+    return picture.diff(profiles, title=title, kind=kind, limit=limit, note=note)
+
+
+def _check(found: Found, limit: float) -> None:
+    """Raise CheckError where a clip is farther away than `limit`, in m, or missing."""
+    if found.diff.missing_clips:
+        number = found.diff.missing_clips[0]
+        raise CheckError(f"{found.new.name}: {read.label(found.old.clips[number], number)} is missing")
+    above = [each for each in found.diff.clips if each.error.max_error > limit]
+    if above:
+        more = f" and {len(above) - 1} more" if len(above) > 1 else ""
+        raise CheckError(f"{found.new.name}: {differences.worst(found)}{more} (limit {length(limit)})")

@@ -1,0 +1,261 @@
+"""What `optimize` says of its work: a line or two for a person, every figure for a script."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json as jsonlib
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from anim.gltf import read
+from anim.gltf.document import Document
+from anim.measure.footprint import footprints
+from anim.measure.stored import stored
+from anim.model import Clip
+from anim.optimize.clip import Solution
+from anim.optimize.limits import Drop
+from anim.optimize.optimize import Optimized
+from anim.optimize.request import Request
+from anim.optimize.tradeoff import Sized
+from anim.optimize.verify import Verdict
+from cli.errors import CheckError
+from cli.report import change, length, plural, size
+
+SCHEMA = 1
+LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """Everything there is to say. size_before, size_after: bytes of the files; scale: m, the diagonal."""
+
+    name: str
+    before: Document
+    after: Document
+    clips: Sequence[Clip]
+    found: Optimized
+    request: Request
+    scale: float
+    size_before: int
+    size_after: int
+    seconds: float
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether the input was given back."""
+        return self.after is self.before
+
+
+def is_long(clips: Sequence[Clip], chosen: Sequence[int]) -> bool:
+    """Return whether the work takes so long that several processes are faster than one."""
+    return len(chosen) > 1 and sum(track.values.size for i in chosen for track in clips[i].tracks) > LONG
+
+
+def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: float) -> None:
+    """Raise CheckError where a clip does not keep its bounds."""
+    bad = {i: each for i, each in found.verdicts.items() if not each.holds}
+    if bad:
+        worst = max(bad, key=lambda i: bad[i].strain)
+        off = bad[worst].error
+        raise CheckError(
+            f"{read.label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
+            f"{off.time:.3f} s (bound {length(request.bounds.max_error)}); nothing was written"
+        )
+
+
+def smaller(found: Optimized, document: Document, size_of: Callable[[Document], int]) -> Document:
+    """Return the optimized document, or the old one where it takes no more bytes."""
+    if found.unchanged or size_of(found.document) >= size_of(document):
+        return document
+    return found.document
+
+
+def worst(found: Optimized) -> float:
+    """Return the largest error of any clip, in metres."""
+    return max((each.error.max_error for each in found.verdicts.values()), default=0.0)
+
+
+def lines(about: About, *, dry_run: bool) -> list[str]:
+    """Return what is always said."""
+    dry = " (dry run: nothing written)" if dry_run else ""
+    if about.found.unchanged:
+        return [f"{about.name}  {size(about.size_after)}, unchanged: optimized like this before{dry}"]
+    if about.unchanged:
+        return [f"{about.name}  {size(about.size_after)}, unchanged: no smaller file within the bound{dry}"]
+    keys = f"{_keys(about.clips, about)} → {sum(_count(each.clip) for each in about.found.solutions.values())} keys"
+    summary = [
+        f"{about.name}  {change(about.size_before, about.size_after)}",
+        f"animation {change(_cost(about.before), _cost(about.after))}",
+        keys,
+        _worst_words(about),
+        f"{about.seconds:.1f} s",
+    ]
+    return [", ".join(summary) + dry, *_policy(about)]
+
+
+def details(about: About) -> list[str]:
+    """Return a line per clip."""
+    found = {} if about.unchanged else about.found.solutions
+    return [_clip_line(about, i, solution) for i, solution in found.items()]
+
+
+def _clip_line(about: About, number: int, solution: Solution) -> str:
+    source = about.clips[number]
+    counts = (
+        f"{_count(source)} → {_count(solution.clip)} keys, {len(source.tracks)} → {len(solution.clip.tracks)} tracks"
+    )
+    found = about.found.verdicts[number]
+    assert found.statistics is not None  # -v asks for them
+    usual = f"p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
+    return f"  {read.label(source.name, number)}: {counts}, {_error_words(found, about)}, {usual}"
+
+
+def as_json(about: About) -> str:
+    """Return the report as a JSON document, schema 1."""
+    request = about.request
+    content = {
+        "schema": SCHEMA,
+        "output": about.name,
+        "unchanged": about.unchanged,
+        "seconds": round(about.seconds, 3),
+        "diagonal_m": about.scale,
+        "bounds": {
+            "max_error_m": request.bounds.max_error,
+            "shell_m": request.bounds.shell,
+            "max_pointer_error": request.bounds.max_pointer_error,
+            "max_angle_deg": None if request.bounds.max_angle is None else math.degrees(request.bounds.max_angle),
+            "max_speed_error_m_per_s": request.bounds.max_speed_error,
+        },
+        "policy": {
+            "drop": str(request.policy.drop),
+            "reference": str(request.policy.reference),
+            "rebase_rest": request.policy.rebase_rest,
+            "drop_invisible": request.policy.drop_invisible,
+            "kept_nodes": sorted(request.policy.keep),
+            "packing": str(request.packing),
+            "objective": str(request.objective),
+            "effort": request.effort,
+            "players": list(request.players),
+        },
+        "bytes": {
+            "before": _bytes(about.size_before, about.before),
+            "after": _bytes(about.size_after, about.after),
+        },
+        "moved_rest": [_target(about, node, path) for node, path in about.found.moved],
+        "clips": [] if about.unchanged else [_clip(about, i, each) for i, each in about.found.solutions.items()],
+    }
+    return jsonlib.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def curve_line(sized: Sized, scale: float) -> str:
+    """Return one point of the curve for a person."""
+    percent = 100 * sized.max_error / scale if scale else 0.0
+    return f"  {length(sized.max_error)} ({percent:.2g} %): {size(sized.size)}, max {length(sized.error)}"
+
+
+def curve_csv(sizes: Sequence[Sized], scale: float) -> str:
+    """Return the curve as CSV: bound in metres and as a share of the diagonal, bytes, largest error found."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m"])
+    for each in sizes:
+        writer.writerow([each.max_error, each.max_error / scale if scale else 0.0, each.size, each.error])
+    return text.getvalue()
+
+
+def _cost(document: Document) -> int:
+    return stored(document) + footprints(document)[1].json
+
+
+def _keys(clips: Sequence[Clip], about: About) -> int:
+    return sum(_count(clips[i]) for i in about.found.solutions)
+
+
+def _count(clip: Clip) -> int:
+    return sum(len(track.times) for track in clip.tracks)
+
+
+def _length(meters: float, scale: float) -> str:
+    percent = f" ({100 * meters / scale:.2g} %)" if scale and meters else ""
+    return f"max {length(meters)}{percent}"
+
+
+def _worst_words(about: About) -> str:
+    verdicts = about.found.verdicts
+    if not verdicts:
+        return "no clip"
+    return _error_words(max(verdicts.values(), key=lambda each: each.error.max_error), about)
+
+
+def _error_words(verdict: Verdict, about: About) -> str:
+    error = verdict.error
+    where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
+    words = _length(error.max_error, about.scale) + where
+    if error.max_pointer_error > 0:
+        words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
+    return words
+
+
+def _policy(about: About) -> list[str]:
+    """What was removed and moved, and under which rule."""
+    policy, words = about.request.policy, []
+    dropped = Counter(about.clips[i].tracks[k].path for i, each in about.found.solutions.items() for k in each.dropped)
+    if dropped:
+        rule = {Drop.REST: "at rest", Drop.UNUSED: "at rest in all clips", Drop.NEVER: "unseen"}[policy.drop]
+        seen = f"{rule} or unseen" if policy.drop_invisible and policy.drop is not Drop.NEVER else rule
+        each = ", ".join(f"{count} {path}" for path, count in sorted(dropped.items()))
+        words.append(f"dropped {plural(dropped.total(), 'channel')} {seen} ({each}; --drop {policy.drop})")
+    if about.found.moved:
+        words.append(f"moved {plural(len(about.found.moved), 'rest value')}")
+    return [f"  {'; '.join(words)}"] if words else []
+
+
+def _bytes(file: int, document: Document) -> dict[str, int]:
+    whole = footprints(document)[1]
+    return {"file": file, "data": whole.data, "stored": stored(document), "json": whole.json}
+
+
+def _target(about: About, node: int | None, path: str, pointer: str | None = None) -> dict[str, Any]:
+    if node is None:
+        return {"pointer": pointer, "path": path}
+    names = read.skeleton(about.before).names
+    return {"node": node, "name": names[node] if node < len(names) else "", "path": path}
+
+
+def _clip(about: About, number: int, solution: Solution) -> dict[str, Any]:
+    source, verdict = about.clips[number], about.found.verdicts[number]
+    error, rest = verdict.error, verdict.statistics
+    assert rest is not None  # a report asks for details
+    return {
+        "number": number,
+        "name": source.name,
+        "end_s": source.end,
+        "keys_before": _count(source),
+        "keys_after": _count(solution.clip),
+        "tracks_before": len(source.tracks),
+        "tracks_after": len(solution.clip.tracks),
+        "max_error_m": error.max_error,
+        "max_error_percent": 100 * error.max_error / about.scale if about.scale else 0.0,
+        "at": {
+            "mesh": error.place,
+            "joint": error.joint,
+            "vertex": error.vertex,
+            "time_s": error.time,
+            "player": verdict.player,
+        },
+        "p99_m": rest.p99,
+        "mean_m": rest.mean,
+        "max_angle_deg": math.degrees(rest.angle.size),
+        "max_speed_error_m_per_s": rest.speed.size,
+        "max_weight_error": rest.weight.size,
+        "max_pointer_error": error.max_pointer_error,
+        "times_checked": error.times,
+        "dropped": [
+            _target(about, track.node, track.path, track.pointer)
+            for track in (source.tracks[k] for k in solution.dropped)
+        ],
+    }

@@ -1,0 +1,77 @@
+"""A scene, its clips, and what an optimization of them starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Clip, Scene
+from anim.optimize.coding import PRICES, Coding
+from anim.optimize.limits import EFFORTS, Bounds, Objective, Packing, Policy, Reference
+from anim.optimize.points import Points, of_scene
+from anim.optimize.setting import Setting, setting
+from anim.optimize.truth import Truth, truth
+from tests.anim.skinning.scenes import random_scene
+from tests.clips import clip, track
+
+CORE = Coding(Packing.CORE, PRICES[Objective.FILE])
+JOINTS = 5
+TIMES = np.linspace(0, 2, 25)  # s
+
+
+def scene(seed: int = 1, **more: float) -> Scene:
+    """A skinned tree of five joints with 60 vertices; its mesh hangs on node 5."""
+    return random_scene(seed, joints=JOINTS, vertices=60, **more)
+
+
+def turning(amount: float, axis: Sequence[float] = (0, 0, 1), times: Floats = TIMES) -> Floats:
+    """Quaternions (K, 4) that swing by `amount` rad about an axis, once there and back."""
+    half = amount * np.sin(np.pi * times / times[-1]) / 2
+    direction = np.asarray(axis, float) / np.linalg.norm(axis)
+    return np.concatenate((np.sin(half)[:, None] * direction, np.cos(half)[:, None]), axis=1)
+
+
+def waving(name: str = "wave") -> Clip:
+    """A clip in which joints 1 and 2 turn and the root sways; joint 3 is held where it rests, joint 4 elsewhere."""
+    sway = np.stack((np.sin(3 * TIMES), 0 * TIMES, np.cos(TIMES)), axis=1)
+    return clip(
+        track("translation", TIMES, sway, node=0),
+        track("rotation", TIMES, turning(1.5), node=1),
+        track("rotation", TIMES, turning(-0.8, (1, 2, 0)), node=2),
+        track("scale", TIMES, np.ones((25, 3)), node=3),
+        track("scale", TIMES, np.full((25, 3), 0.75), node=4),
+        name=name,
+    )
+
+
+def every_point(of: Scene) -> Points:
+    """All vertices of a scene as measured points."""
+    count = len(of.instances[0].mesh.positions)
+    return of_scene(of, frozenset(), 0.01, frozenset((0, v) for v in range(count)))
+
+
+def truth_of(of: Scene, what: Clip, points: Points, reference: Reference = Reference.CURVE) -> Truth:
+    """What a clip does to points, all of its tracks free."""
+    return truth(of.skeleton, what, range(len(what.tracks)), points, reference=reference, noticed=1e-6)
+
+
+def setting_of(
+    of: Scene,
+    clips: Sequence[Clip],
+    *,
+    max_error: float = 1e-3,
+    policy: Policy | None = None,
+    effort: str = "fast",
+    packing: Packing = Packing.CORE,
+) -> Setting:
+    """The setting for clips of a scene."""
+    return setting(
+        of,
+        tuple(clips),
+        bounds=Bounds(max_error, 0.02),
+        policy=policy or Policy(),
+        coding=Coding(packing, PRICES[Objective.FILE]),
+        effort=EFFORTS[effort],
+    )

@@ -1,0 +1,34 @@
+"""The picture of size against error: which words it holds, and that it is the same every time."""
+
+from __future__ import annotations
+
+import pytest
+
+from anim.errors import RangeError
+from anim.optimize.tradeoff import Sized
+from anim.show.tradeoff import tradeoff
+from tests.anim.show.reading import png_size, words
+
+SIZES = [Sized(2e-4, 41_234, 1.9e-4), Sized(2e-3, 30_000, 1.9e-3), Sized(2e-2, 12_500, 1e-2)]
+
+
+def test_every_size_and_bound_is_written_out() -> None:
+    said = words(tradeoff(SIZES, 2.0, title="Fox", kind="svg"))
+    for expected in ("Fox", "41.23", "30", "12.5", "0.01", "0.1", "1"):
+        assert expected in said, expected
+
+
+def test_the_same_picture_twice_and_another_for_other_sizes() -> None:
+    one, again = (tradeoff(SIZES, 2.0, title="Fox", kind="png") for _ in range(2))
+    assert one == again
+    assert one != tradeoff(SIZES[:2], 2.0, title="Fox", kind="png")
+    assert min(png_size(one)) > 300
+
+
+def test_one_size() -> None:
+    assert "41.23" in words(tradeoff(SIZES[:1], 2.0, title="", kind="svg"))
+
+
+def test_other_kinds_are_refused() -> None:
+    with pytest.raises(RangeError):
+        tradeoff(SIZES, 2.0, title="", kind="bmp")

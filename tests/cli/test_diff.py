@@ -1,0 +1,263 @@
+"""`diff`: two files, their clips, and a gate."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.gltf import read, write
+from anim.gltf.document import Document
+from anim.model import Clip
+from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.running import help_line, refusal
+from tests.clips import about, clip, track
+from tests.files import glb_of, opened_fixture, opened_path
+from tests.judge import judge, needs_judge
+
+LIFT = 0.0005  # m
+
+
+@pytest.fixture
+def lifted(tmp_path: Path) -> tuple[Path, Path]:
+    """The biped, and the same with one key of its walk's hips half a millimeter higher."""
+    document = opened_fixture("biped")
+    return _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", _lifted(document))
+
+
+def test_a_file_is_0_away_from_itself(fixture: Fixture, call: Call) -> None:
+    for name in ("biped", "morph_cube", "interpolations", "pointer", "tube"):
+        path = fixture(name)
+        found = call("diff", path, path, "--format", "json").json
+        assert found["max_error_m"] == 0
+        for each in found["clips"]:
+            numbers = {key: value for key, value in each.items() if key.startswith(("max_", "p99", "mean"))}
+            assert not any(numbers.values()), numbers
+            assert (each["missing_tracks"], each["added_tracks"]) == ([], [])
+            assert each["end_s"] == each["other_end_s"]
+        assert found["files"][0] == found["files"][1]
+
+
+def test_where_and_when_in_numbers(lifted: tuple[Path, Path], call: Call) -> None:
+    found = call("diff", *lifted, "--format", "json").json
+    assert found["schema"] == 1
+    worst, *others = found["clips"]
+    assert worst["clip"] == worst["other_clip"] == "walk"
+    assert worst["max_error_m"] == pytest.approx(LIFT, rel=2e-3)
+    assert worst["max_error_percent"] == pytest.approx(100 * LIFT / found["diagonal_m"], rel=2e-3)
+    assert found["max_error_m"] == worst["max_error_m"]
+    assert all(each["max_error_m"] == 0 for each in others)
+    assert 0 < worst["mean_m"] < worst["p99_m"] <= worst["max_error_m"] * (1 + 1e-9)
+    assert worst["max_angle_deg"] == 0
+    walk = next(each for each in read.clips(opened_path(lifted[0])) if each.name == "walk")
+    hips = next(each for each in walk.tracks if each.path == "translation")
+    assert worst["time_s"] == hips.times[7]
+    step = float(np.diff(hips.times).min())
+    assert worst["max_speed_error_m_per_s"] == pytest.approx(LIFT / step, rel=0.05)
+    assert worst["joint"]
+    assert isinstance(worst["vertex"], int)
+
+
+def test_the_page_is_a_row_per_clip_and_a_line_that_says_it_all(lifted: tuple[Path, Path], call: Call) -> None:
+    run = call("diff", *lifted)
+    lines = run.text.splitlines()
+    assert run.err == ""
+    assert lines[0].split()[:4] == ["clip", "joint", "vertex", "at"]
+    assert lines[1].startswith("walk ")
+    assert "0.5 mm" in lines[1]
+    assert any(line.startswith("3 clips compared, max 0.5 mm (0.0") and "in 'walk' at '" in line for line in lines)
+    assert "a.glb → " in lines[-1]
+    assert "animation" in lines[-1]
+
+
+def test_a_gate(lifted: tuple[Path, Path], call: Call) -> None:
+    assert call("diff", *lifted, "--fail-above", "0.6mm").code == 0
+    assert call("diff", *lifted, "--fail-above", "0.1%").code == 0
+    run = call("diff", *lifted, "--fail-above", "0.4mm")
+    assert run.code == 6
+    assert run.out  # the report all the same
+    assert "b.glb: 0.5 mm (" in run.err
+    assert run.err.rstrip().endswith("(limit 0.4 mm)")
+    assert call("diff", *lifted, "--fail-above", "0.4mm", "--clip", "wave").code == 0
+
+
+def test_a_missing_clip_is_named_and_stops_the_gate(tmp_path: Path, call: Call) -> None:
+    document = opened_fixture("biped")
+    kept = [each for each in document.json["animations"] if each["name"] != "walk"]
+    less = replace(document, json={**document.json, "animations": kept})
+    paths = _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", less)
+    page = call("diff", *paths)
+    assert page.code == 0
+    assert f"1 clip only in {paths[0]}: 'walk'" in page.text
+    run = call("diff", *paths, "--fail-above", "1m")
+    assert run.code == 6
+    assert run.err == f"gltf-anim: {paths[1]}: clip 'walk' is missing\n"
+    back = call("diff", *reversed(paths), "--format", "json", "--fail-above", "1m")
+    assert back.code == 0
+    assert back.json["added_clips"] == ["walk"]
+
+
+def test_clips_are_chosen_by_the_first_files_names(lifted: tuple[Path, Path], call: Call) -> None:
+    found = call("diff", *lifted, "--clip", "wa*", "--format", "json").json
+    assert sorted(each["clip"] for each in found["clips"]) == ["walk", "wave"]
+    run = call("diff", *lifted, "--clip", "wakl")
+    assert "no clip matches 'wakl'" in refusal(run, 5)
+    assert help_line(run) == "did you mean 'walk'?"
+
+
+def test_one_of_both_may_be_a_pipe(lifted: tuple[Path, Path], call: Call) -> None:
+    expected = call("diff", *lifted, "--format", "json").json["clips"]
+    found = call("diff", "-", lifted[1], "--format", "json", stdin=lifted[0].read_bytes()).json
+    assert (found["files"][0]["file"], found["clips"]) == ("stdin", expected)
+    assert "both be stdin" in refusal(call("diff", "-", "-"), 2)
+
+
+def test_a_shell_shows_nodes_without_vertices(tmp_path: Path, call: Call) -> None:
+    """A camera beside the cubes of `interpolations` turns by 2°; off, nothing is seen to move."""
+    document = opened_fixture("interpolations")
+    nodes = [*document.json["nodes"], {"name": "camera"}]
+    number = len(nodes) - 1
+    document = replace(document, json={**document.json, "nodes": nodes, "scenes": _with_root(document, number)})
+    turned = clip(*read.clips(document)[0].tracks, track("rotation", [0], about("y", [2]), node=number))
+    changed = write.replace_clips(document, {0: Clip(read.names(document)[0], turned.tracks)})
+    paths = _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", changed)
+    found = call("diff", *paths, "--format", "json").json
+    chord = 2 * np.sin(np.radians(1))
+    assert found["shell_m"] == pytest.approx(0.01 * found["diagonal_m"])
+    assert found["max_error_m"] == pytest.approx(chord * found["shell_m"], rel=2e-3)
+    assert (found["clips"][0]["joint"], found["clips"][0]["vertex"]) == ("camera", None)
+    assert found["clips"][0]["added_tracks"] == [{"target": "camera", "path": "rotation"}]
+    wider = call("diff", *paths, "--format", "json", "--shell", "10cm").json
+    assert wider["max_error_m"] == pytest.approx(0.1 * chord, rel=2e-3)
+    assert call("diff", *paths, "--format", "json", "--shell", "0").json["max_error_m"] == 0
+
+
+def test_a_picture(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> None:
+    for ending, start in (("png", b"\x89PNG"), ("svg", b"<?xml")):
+        run = call("diff", *lifted, "--plot", tmp_path / f"e.{ending}")
+        assert run.code == 0
+        assert (tmp_path / f"e.{ending}").read_bytes().startswith(start)
+        assert f"e.{ending}  " in run.err
+    assert "--plot writes .png or .svg" in refusal(call("diff", *lifted, "--plot", tmp_path / "e.jpg"), 2)
+    assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 2)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (("--fail-above", "3deg"), "--fail-above is '3deg' (expected a length above 0"),
+        (("--fail-above", "0"), "--fail-above is '0' (expected a length above 0"),
+        (("--shell", "-1mm"), "--shell is '-1mm' (expected a length above 0"),
+        (("--fps", "0"), "--fps is 0 (expected a number above 0)"),
+        (("--player", "unity"), "'unity' is none of spec, three, raw, nlerp"),
+    ],
+)
+def test_options_out_of_range(options: tuple[str, str], problem: str, lifted: tuple[Path, Path], call: Call) -> None:
+    assert problem in refusal(call("diff", *lifted, *options), 2)
+
+
+def test_bad_input_names_the_file_that_is_bad(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> None:
+    broken = tmp_path / "broken.glb"
+    broken.write_bytes(lifted[0].read_bytes()[:500])
+    for pair in ((lifted[0], broken), (broken, lifted[0])):
+        assert refusal(call("diff", *pair), 3).startswith(f"gltf-anim: {broken}: ")
+    assert "nowhere.glb" in refusal(call("diff", lifted[0], tmp_path / "nowhere.glb"), 3)
+
+
+def test_files_without_clips_can_be_held_against_each_other(tmp_path: Path, call: Call) -> None:
+    document = opened_fixture("biped")
+    bare = replace(document, json={key: value for key, value in document.json.items() if key != "animations"})
+    path = _saved(tmp_path / "bare.glb", bare)
+    assert "no clips to compare" in call("diff", path, path).text
+    found = call("diff", path, path, "--format", "json").json
+    assert (found["clips"], found["max_error_m"]) == ([], 0)
+
+
+def test_hidden_vertices_leave_the_nodes(tmp_path: Path, call: Call) -> None:
+    """Draco hides vertices; the motion of nodes can be held against each other all the same."""
+    document = opened_fixture("biped")
+    meshes = [
+        {**mesh, "primitives": [{**p, "extensions": {"KHR_draco_mesh_compression": {}}} for p in mesh["primitives"]]}
+        for mesh in document.json["meshes"]
+    ]
+    hidden = replace(
+        document, json={**document.json, "meshes": meshes, "extensionsUsed": ["KHR_draco_mesh_compression"]}
+    )
+    paths = _saved(tmp_path / "a.glb", hidden), _saved(tmp_path / "b.glb", _lifted(hidden))
+    run = call("diff", *paths, "--format", "json")
+    assert run.json["max_error_m"] == pytest.approx(LIFT, rel=2e-3)
+    assert "measured at nodes, not on the surface" in run.err
+
+
+# Against three.js, and on what peers write
+
+
+@needs_judge
+def test_three_says_the_same(asset: Find, tmp_path: Path, call: Call) -> None:
+    run = call("resample", asset("Fox.glb"), tmp_path / "b.glb", "--fps", "12")
+    assert run.code == 0
+    verdict = judge(asset("Fox.glb"), tmp_path / "b.glb")
+    found = call("diff", asset("Fox.glb"), tmp_path / "b.glb", "--format", "json", "--player", "three").json
+    assert found["diagonal_m"] == pytest.approx(verdict.diagonal, rel=1e-5)
+    by_name = {each["clip"]: each for each in found["clips"]}
+    for each in verdict.clips:
+        assert by_name[each.name]["max_error_m"] == pytest.approx(each.max_error, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["Fox.glb", "Robot.glb"])
+def test_what_gltfpack_does_by_default_is_seen(name: str, asset: Find, tmp_path: Path, call: Call) -> None:
+    """30 frames a second, joints without names, quantized and reordered vertices: seen as motion only where it is."""
+    default = _peer(tmp_path, "gltfpack", "-i", asset(name), "-o", tmp_path / "default.glb")
+    same_keys = _peer(tmp_path, "gltfpack", "-i", asset(name), "-o", tmp_path / "keys.glb", "-kn", "-af", "0", "-cc")
+    found: list[dict[str, Any]] = [
+        call("diff", asset(name), path, "--format", "json").json for path in (default, same_keys)
+    ]
+    assert found[0]["max_error_percent"] > (8 if name == "Robot.glb" else 1)
+    assert found[1]["max_error_percent"] < 0.2  # 12 bits
+    assert not found[1]["meshes_agree_by_vertex"]
+    assert call("diff", asset(name), default, "--fail-above", "1%").code == 6
+
+
+def test_quantized_meshes_are_not_motion(asset: Find, tmp_path: Path, call: Call) -> None:
+    quantized = _peer(tmp_path, "gltf-transform", "quantize", asset("Fox.glb"), tmp_path / "q.glb")
+    found = call("diff", asset("Fox.glb"), quantized, "--format", "json").json
+    assert found["meshes_agree_by_vertex"]
+    assert found["max_error_percent"] < 1e-5
+
+
+def _peer(folder: Path, program: str, *args: str | Path) -> Path:
+    """Run a peer's command that writes a GLB into the folder; skip where the peer is not installed."""
+    packages = Path(os.environ.get("GLTF_VALIDATOR_DIR", "node_modules"))
+    path = shutil.which(program, path=f"{packages / '.bin'}{os.pathsep}{os.environ['PATH']}")
+    if path is None:
+        pytest.skip(f"{program} is not installed")
+    subprocess.run([path, *map(str, args)], check=True, capture_output=True)
+    return next(Path(arg) for arg in args if str(arg).startswith(str(folder)))
+
+
+def _lifted(document: Document) -> Document:
+    number = read.names(document).index("walk")
+    walk = read.clips(document)[number]
+    index = next(i for i, each in enumerate(walk.tracks) if each.path == "translation")
+    values = walk.tracks[index].values.copy()
+    values[7, 1] += LIFT
+    tracks = (*walk.tracks[:index], replace(walk.tracks[index], values=values), *walk.tracks[index + 1 :])
+    return write.replace_clips(document, {number: Clip(walk.name, tracks)})
+
+
+def _with_root(document: Document, node: int) -> list[dict[str, Any]]:
+    scenes: list[dict[str, Any]] = json.loads(json.dumps(document.json["scenes"]))
+    scenes[0]["nodes"].append(node)
+    return scenes
+
+
+def _saved(path: Path, document: Document) -> Path:
+    path.write_bytes(glb_of(document))
+    return path
