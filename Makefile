@@ -4,7 +4,7 @@ BIN := .venv/bin
 OUT := demo-out
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test format clean
+.PHONY: demo test slow format clean
 
 demo: $(BIN)/.installed
 	@$(BIN)/python -m fixtures $(OUT)/fixtures 2>/dev/null
@@ -14,7 +14,11 @@ test: $(BIN)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
+
+# What takes minutes: real files under three bounds, judged by three.js. CI runs it too.
+slow: $(BIN)/.installed
+	$(BIN)/python -m pytest -n auto -m slow
 
 format: $(BIN)/.installed
 	$(BIN)/ruff check --fix .

@@ -20,8 +20,9 @@ from anim.optimize.clip import Solution
 from anim.optimize.limits import Drop
 from anim.optimize.optimize import Optimized
 from anim.optimize.request import Request
+from anim.optimize.seal import KEY
 from anim.optimize.tradeoff import Sized
-from anim.optimize.verify import Verdict
+from anim.optimize.verify import NOTHING, Verdict
 from cli.errors import CheckError
 from cli.report import change, length, plural, size
 
@@ -85,7 +86,8 @@ def lines(about: About, *, dry_run: bool) -> list[str]:
     if about.found.unchanged:
         return [f"{about.name}  {size(about.size_after)}, unchanged: optimized like this before{dry}"]
     if about.unchanged:
-        return [f"{about.name}  {size(about.size_after)}, unchanged: no smaller file within the bound{dry}"]
+        said = f"{about.name}  {size(about.size_after)}, unchanged: no smaller file within the bound{dry}"
+        return [said, *_earlier(about)]
     keys = f"{_keys(about.clips, about)} → {sum(_count(each.clip) for each in about.found.solutions.values())} keys"
     summary = [
         f"{about.name}  {change(about.size_before, about.size_after)}",
@@ -94,7 +96,7 @@ def lines(about: About, *, dry_run: bool) -> list[str]:
         _worst_words(about),
         f"{about.seconds:.1f} s",
     ]
-    return [", ".join(summary) + dry, *_policy(about)]
+    return [", ".join(summary) + dry, *_policy(about), *_earlier(about)]
 
 
 def details(about: About) -> list[str]:
@@ -193,11 +195,26 @@ def _worst_words(about: About) -> str:
 
 def _error_words(verdict: Verdict, about: About) -> str:
     error = verdict.error
-    where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = _length(error.max_error, about.scale) + where
+    if error.max_error <= NOTHING * about.scale:
+        words = "no vertex moved"
+    else:
+        where = f" at '{error.joint}', {error.time:.3f} s" if error.joint else ""
+        words = _length(error.max_error, about.scale) + where
     if error.max_pointer_error > 0:
         words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
     return words
+
+
+def _earlier(about: About) -> list[str]:
+    """What to know where the input was lossy before: nothing in a file tells its motion from its own source's."""
+    if not _is_marked(about.before):
+        return []
+    return ["  note: the input was optimized before; errors are measured from it, not from its source"]
+
+
+def _is_marked(document: Document) -> bool:
+    extras = document.json["asset"].get("extras", {})
+    return isinstance(extras, dict) and KEY in extras
 
 
 def _policy(about: About) -> list[str]:

@@ -20,7 +20,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = tuple(ROOT / "tests" / "threejs" / f"{name}.mjs" for name in ("judge", "load", "match", "play", "surfaces"))
@@ -94,6 +96,13 @@ def judge(truth: Path, other: Path, *, rate: float = RATE) -> Verdict:
     if run.returncode:
         raise RuntimeError(f"{other.name}: {run.stderr.decode(errors='replace').strip()}")
     return _verdict(json.loads(run.stdout))
+
+
+def vertices(file: Path, *, clip: int, time: float) -> NDArray[np.float32]:
+    """Return all vertices (V, 3) at a time of a clip, in world space, in the order in which three.js meets them."""
+    command = ["node", str(SCRIPTS[0].with_name("vertices.mjs")), str(_package()), str(file), str(clip), str(time)]
+    run = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=True)
+    return np.frombuffer(run.stdout, np.float32).reshape(-1, 3)
 
 
 def _verdict(found: dict[str, Any]) -> Verdict:

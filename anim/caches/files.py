@@ -7,7 +7,7 @@ folders and pipes.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import PurePath
@@ -105,6 +105,3 @@ class _Kept(io.BytesIO):
         if not self.closed:
             self._files[self._name] = self.getvalue()
         super().close()
-
-
-Sizes = Mapping[str, int]

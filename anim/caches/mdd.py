@@ -45,4 +45,5 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
         file.write(cache.times.astype(">f4").tobytes())
         raw.write(cache, file, ">f4")
-    return Written(notes=rest.write(cache, outputs, writing.rest))
+    rest.write(cache, outputs, writing.rest)
+    return Written()

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from anim.arrays import AnyArray, Floats
+from anim.caches import raw
 from anim.caches.files import PIECE, Inputs, Outputs
 from anim.caches.settings import Reading, Writing, Written
 from anim.errors import AnimError, FormatError
@@ -195,7 +196,7 @@ def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> I
             name: _frames(_opened(stack.enter_context(inputs.open(inputs.main))), name, shape)
             for name in ("positions", *present)
         }
-        step = max(1, PIECE // max(12 * vertices, 1))
+        step = raw.per_chunk(vertices)
         for start in range(0, frames, step):
             count = min(step, frames - start)
             yield Chunk(start, **{name: rows(count) for name, rows in following.items()})

@@ -58,7 +58,8 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(MAGIC, 1, cache.vertex_count, start, 1.0, cache.frame_count))
         raw.write(cache, file, "<f4")
-    return Written(notes=notes + rest.write(cache, outputs, writing.rest, fps=fps))
+    rest.write(cache, outputs, writing.rest, fps=fps)
+    return Written(notes=notes)
 
 
 def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:

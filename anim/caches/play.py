@@ -18,15 +18,16 @@ from anim.skinning.bake import bake
 def play(document: Document, *, clip: int = 0, fps: float | None = None) -> VertexCache:
     """Return every vertex of the file while a clip plays, in world space, nodes depth-first, primitives in order.
 
-    At `fps` frames per second, else at the clip's own keys; without clips the rest pose. A file that we wrote says
-    which axis is up. Raises NotFoundError where the file has no vertices.
+    At `fps` frames per second, else at the clip's own keys; without clips the rest pose. The cache's `chosen` says
+    which clip it is. A file that we wrote says which axis is up. Raises NotFoundError where the file has no vertices.
     """
     scene, clips = read.scene(document), read.clips(document)
     chosen = clips[clip] if clips else Clip("", ())
     if not scene.vertex_count:
         raise NotFoundError("has no mesh with vertices")
     times = grid(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
-    return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document))
+    said = f"clip '{chosen.name or clip}', one of {len(clips)}" if len(clips) > 1 else ""
+    return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
 
 
 def _keys(clip: Clip) -> Floats:

@@ -26,18 +26,17 @@ class Rest:
     up: str = "y"
 
 
-def write(cache: VertexCache, outputs: Outputs, ending: str, *, fps: float | None = None) -> tuple[str, ...]:
-    """Write `NAME-rest.ply` (or .obj) beside the cache and return a note that says so; "" writes none."""
+def write(cache: VertexCache, outputs: Outputs, ending: str, *, fps: float | None = None) -> None:
+    """Write `NAME-rest.ply` (or .obj) beside the cache; "" writes none. Raises RangeError for another ending."""
     if ending not in REST_ENDINGS:
         raise RangeError(f"rest is '{ending}' (expected .ply, .obj or nothing)")
     if not ending:
-        return ()
+        return
     remark = {"up": cache.up} | ({} if fps is None else {"fps": f"{fps:.9g}"})
     name = beside(outputs.main, f"-rest{ending}")
     mesh = still.Still(positions(cache).astype(np.float32), cache.faces, None, remark)
     with outputs.create(name) as file:
         file.write(still.write(mesh, ending))
-    return ()
 
 
 def read(inputs: Inputs, vertices: int) -> Rest:

@@ -22,12 +22,15 @@ HEAD = 1024  # bytes in which our remark lies
 def read(inputs: Inputs, reading: Reading) -> VertexCache:
     """Return the frames that belong together: of walk.ply if it is there, else of all walk_*.ply in order.
 
+    Frames that a longer sequence of ours left behind a shorter one are no part of it: the first file says how many are.
     Times are those that our own files say, else frames at `reading.fps` or 24 per second. The first frame gives the
     faces; every other must have as many vertices.
     """
     names = _members(inputs)
     with whole(inputs, names[0]) as data:
         first = still.read(data, suffix(names[0]))
+    count = first.remark.get("frames", "")
+    names = names[: int(count)] if count.isdecimal() and int(count) else names
     return VertexCache(
         _times(inputs, names, reading.fps),
         len(first.positions),
@@ -46,7 +49,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         for i, positions in enumerate(chunk.positions):
             frame = chunk.first + i
             normals = chunk.normals[i] if chunk.normals is not None and ending != ".stl" else None
-            remark = {"time": f"{cache.times[frame]:.9g}", "up": cache.up}
+            remark = {"time": f"{cache.times[frame]:.9g}", "up": cache.up, "frames": str(cache.frame_count)}
             name = outputs.main if cache.frame_count == 1 else numbered(outputs.main, frame + 1)
             with outputs.create(name) as file:
                 file.write(still.write(still.Still(positions, faces, normals, remark), ending))

@@ -41,6 +41,3 @@ class Written:
 
     max_error: float | None = None
     notes: tuple[str, ...] = ()
-
-
-READING, WRITING = Reading(), Writing()

@@ -15,7 +15,6 @@ import numpy as np
 from anim.arrays import AnyArray, Ints
 from anim.errors import FormatError
 
-STILLS = (".ply", ".obj", ".stl")
 OBJ_DIGITS = 9  # behind the point
 REMARK = re.compile(rb"gltf-anim ((?:[a-z]+=\S+ ?)+)")
 _TRIMESH = b"https://github.com/mikedh/trimesh"

@@ -84,7 +84,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     )  # fmt: skip
     if cache.has_normals:
         name = beside(outputs.main, f"-normal{ending}")
-        turned = Packed(kind, np.full(3, -1.0), np.full(3, 2.0)) if kind == "unorm16" else _plain(kind)
+        turned = of_directions(kind)
         _write_image(_normal_bands(cache, engine, turned), outputs, name, grid, turned)
         about = about.with_normals(name)
     _write_mesh(cache, still, grid, engine, outputs, about.mesh)
@@ -103,6 +103,11 @@ def _grid(cache: VertexCache) -> Grid:
             help="choose fewer frames with --fps, or cut the clip",
         )
     return found
+
+
+def of_directions(kind: str) -> Packed:
+    """Return how numbers from −1 to 1 become pixels."""
+    return Packed(kind, np.full(3, -1.0), np.full(3, 2.0)) if kind == "unorm16" else _plain(kind)
 
 
 def _plain(kind: str) -> Packed:

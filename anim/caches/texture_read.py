@@ -9,7 +9,7 @@ from anim.caches import exr, png16, presets, texture_about
 from anim.caches.files import Inputs, suffix, whole
 from anim.caches.presets import Preset
 from anim.caches.settings import Reading
-from anim.caches.texture import Packed
+from anim.caches.texture import Packed, of_directions
 from anim.caches.texture_about import About
 from anim.errors import FormatError
 from anim.gltf import container
@@ -66,9 +66,6 @@ def _pixels(inputs: Inputs, name: str, about: About) -> AnyArray:
 
 
 def _normals(inputs: Inputs, name: str, about: About, engine: Preset) -> Floats:
-    if about.format == "unorm16":
-        packed = Packed(about.format, np.full(3, -1.0), np.full(3, 2.0))
-    else:
-        packed = Packed(about.format, np.zeros(3), np.ones(3))
-    turned = presets.from_engine(packed.numbers(_pixels(inputs, name, about)), engine, lengths=False)
+    numbers = of_directions(about.format).numbers(_pixels(inputs, name, about))
+    turned = presets.from_engine(numbers, engine, lengths=False)
     return turned.astype(np.float32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -108,19 +108,18 @@ class _Stage:
 
     def normals(self, code: float) -> Floats:
         """Normals of all meshes at a time code, turned as their meshes."""
-        rows = []
-        for mesh in self._meshes:
-            matrix = np.array(mesh.ComputeLocalToWorldTransform(code))[:3, :3]
-            turned = np.asarray(self._normals(mesh, code), np.float64) @ np.linalg.inv(matrix).T
-            rows.append(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30))
-        return np.concatenate(rows)
+        return self._turned(self._normals, code, lambda matrix: np.asarray(np.linalg.inv(matrix).T, np.float64))
 
     def tangents(self, code: float) -> Floats:
         """Tangents of all meshes at a time code, turned as their meshes."""
+        return self._turned(self._tangents, code, lambda matrix: matrix)
+
+    def _turned(self, of: Callable[[Any, Any], Any], code: float, turn: Callable[[Floats], Floats]) -> Floats:
+        """Unit directions of all meshes, as rows times what `turn` makes of each mesh's matrix (3, 3)."""
         rows = []
         for mesh in self._meshes:
             matrix = np.array(mesh.ComputeLocalToWorldTransform(code))[:3, :3]
-            turned = np.asarray(self._tangents(mesh, code), np.float64)[:, :3] @ matrix
+            turned = np.asarray(of(mesh, code), np.float64)[:, :3] @ turn(matrix)
             rows.append(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30))
         return np.concatenate(rows)
 

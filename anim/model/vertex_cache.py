@@ -53,7 +53,8 @@ class VertexCache:
     times: (F,) s, increasing. faces: (T, 3). chunks: called for a new pass over all frames, in order, each frame once.
     rest: (V, 3) m, the mesh at rest in the same order, or None. has_normals: whether every chunk carries them.
     parts: the primitives, in order, covering all vertices; empty where unknown. up: "y" or "z". handedness: (V,) ±1
-    where every chunk carries tangents too, else None.
+    where every chunk carries tangents too, else None. chosen: of which clip the frames are, in words, where
+    the file has others.
     """
 
     times: Floats
@@ -65,6 +66,7 @@ class VertexCache:
     parts: tuple[Part, ...] = field(default=())
     up: str = "y"
     handedness: Floats | None = None
+    chosen: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", arrays.times(self.times))

@@ -61,6 +61,10 @@ def _suggestion(glob: str, names: Iterable[str], what: str) -> str:
     if near:
         return f"did you mean '{folded[near[0]]}'?"
     if not known:
-        return f"the file has no {what}s"
+        return f"the file has no {_plural(what)}"
     listed = ", ".join(f"'{name}'" for name in known[:8])
-    return f"the {what}s are {listed}{f' and {len(known) - 8} more' if len(known) > 8 else ''}"
+    return f"the {_plural(what)} are {listed}{f' and {len(known) - 8} more' if len(known) > 8 else ''}"
+
+
+def _plural(noun: str) -> str:
+    return f"{noun}es" if noun.endswith("sh") else f"{noun}s"

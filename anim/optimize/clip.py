@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.model import FLOAT32, Clip, Interpolation, Track
-from anim.optimize import lossless, morph, pointers
+from anim.optimize import ends, lossless, morph, pointers
 from anim.optimize.coding import Stored
 from anim.optimize.limits import Drop
 from anim.optimize.search import search
 from anim.optimize.setting import Setting
-from anim.optimize.trial import Bench, Fate, Outcome
+from anim.optimize.trial import CHORDS_NOTICED, Bench, Fate, Outcome
 from anim.optimize.truth import PATHS, Truth, key_grid, truth
 from anim.sampling import times
 
 MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
 MORPH_ALONE = 0.95
 NOT_UNIT = 1e-3  # off the length 1: tracks with such rotations are kept as they are
-CHORDS_NOTICED = 0.02  # of the bound: chords and arcs that are closer count as one
+NUMBERS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # for each value of a key
+SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ class _Sorted:
         found = self._searched(self._free)
         splines = [i for i in self._free if self._clip.tracks[i].interpolation is Interpolation.CUBICSPLINE]
         if found is not None:
-            splines = [i for i in splines if _spline_is_smaller(self._clip.tracks[i], found.get(i))]
+            splines = [i for i in splines if i in found and self._spline_is_smaller(i, found[i][0], found)]
         if splines:  # smaller than lines, or maybe too bent for any
             for i in splines:
                 self._keep_exactly(i)
@@ -112,7 +113,7 @@ class _Sorted:
         self._put(i, slim)
 
     def _put(self, i: int, track: Track) -> None:
-        self._done[i] = track, Stored(track.values, "as it is")
+        self._done[i] = _as_it_is(track)
 
     def _droppable(self, i: int) -> bool:
         policy = self._setting.policy
@@ -140,8 +141,24 @@ class _Sorted:
                 self._spent += from_rest
                 continue
             new, stored, off = morph.thinned(track, reach, bound, key_grid([track]), setting.coding.packing)
+            if track.interpolation is Interpolation.CUBICSPLINE and self._spline_is_smaller(i, new, {i: (new, stored)}):
+                self._put(i, lossless.lossless(track))
+                continue
             self._done[i] = new, stored
             self._spent += off
+
+    def _spline_is_smaller(self, i: int, lines: Track, found: Mapping[int, tuple[Track, Stored]]) -> bool:
+        """Whether the source's own spline takes fewer bytes than lines do, each with its part of a time axis."""
+        if len(lines.times) == 1:
+            return False
+        own = self._bytes(self._clip.tracks[i], self._clip.tracks)
+        return own < self._bytes(lines, [track for track, _ in found.values()])
+
+    def _bytes(self, track: Track, all_tracks: Sequence[Track]) -> float:
+        sharing = sum(each.times is track.times for each in all_tracks)
+        axis = self._setting.coding.prices.axis + 4 * len(track.times)
+        values = NUMBERS[track.interpolation] * SIZES[track.storage.component_type] * track.values.size
+        return values + axis / sharing
 
     def _searched(self, free: Sequence[int]) -> dict[int, tuple[Track, Stored]] | None:
         """The free tracks as the search left them, without those that it dropped; None where it found no way."""
@@ -154,6 +171,7 @@ class _Sorted:
             self._clip,
             free,
             setting.points,
+            setting.answering,
             reference=setting.policy.reference,
             noticed=CHORDS_NOTICED * bound,
         )
@@ -206,63 +224,19 @@ def _new_track(track: Track, at: Floats, stored: Stored) -> Track:
     )
 
 
-def _spline_is_smaller(track: Track, found: tuple[Track, Stored] | None) -> bool:
-    """Whether the source's own spline takes fewer bytes than the lines that were found for it."""
-    if found is None or len(found[0].times) == 1:
-        return False
-    width = track.values.shape[1]
-    lines = len(found[0].times) * (4 + width * (2 if found[1].form in ("int16", "quaternion") else 4))
-    return bool(len(track.times) * (4 + 12 * width) < lines)
-
-
 def _with_ends(clip: Clip, every: dict[int, tuple[Track, Stored]], dropped: list[int]) -> Solution:
     """The solution, with at least one track, and with keys at the clip's start and end."""
     if not every and clip.tracks:
-        first = clip.tracks[0]
-        every = {0: (_held(first), Stored(first.values[:1], "as it is"))}
-        dropped = dropped[1:] if dropped and dropped[0] == 0 else dropped
+        every = {0: _as_it_is(ends.held(clip.tracks[0]))}
+        dropped = [i for i in dropped if i != 0]
     made = Clip(clip.name, tuple(track for track, _ in every.values()))
     if every and (made.end < clip.end or made.start > clip.start):
         number = min(every, key=lambda i: (len(every[i][0].times), every[i][0].values.shape[1], i))
-        track, _ = every[number]
-        longer = _stretched(track, clip.start, clip.end)
-        every[number] = longer, Stored(longer.values, "as it is")
-    ordered = sorted(every)
-    return Solution(
-        Clip(clip.name, tuple(every[i][0] for i in ordered)), tuple(every[i][1] for i in ordered), tuple(dropped)
-    )
+        every[number] = _as_it_is(ends.stretched(every[number][0], clip.start, clip.end))
+    ordered = [every[i] for i in sorted(every)]
+    tracks, stored = tuple(track for track, _ in ordered), tuple(each for _, each in ordered)
+    return Solution(Clip(clip.name, tracks), stored, tuple(dropped))
 
 
-def _held(track: Track) -> Track:
-    """The first value of a track as its only key."""
-    return replace(
-        track,
-        interpolation=Interpolation.STEP if track.interpolation is Interpolation.STEP else Interpolation.LINEAR,
-        times=track.times[:1],
-        values=track.values[:1],
-        in_tangents=None,
-        out_tangents=None,
-    )
-
-
-def _stretched(track: Track, start: float, end: float) -> Track:
-    """The track with its first value held from `start` on, and its last one up to `end`; a spline by zero tangents."""
-    head, tail = bool(track.times[0] > start), bool(track.times[-1] < end)
-    rows = [0] * head + list(range(len(track.times))) + [-1] * tail
-    at = np.concatenate(([start] * head, track.times, [end] * tail))
-    new = replace(
-        track,
-        times=at,
-        values=track.values[rows],
-        in_tangents=None,
-        out_tangents=None,
-        interpolation=Interpolation.STEP,
-    )
-    if track.in_tangents is None or track.out_tangents is None:
-        return replace(new, interpolation=track.interpolation)
-    arriving, leaving = track.in_tangents[rows], track.out_tangents[rows]
-    if head:
-        leaving[0] = arriving[1] = 0
-    if tail:
-        leaving[-2] = arriving[-1] = 0
-    return replace(new, interpolation=track.interpolation, in_tangents=arriving, out_tangents=leaving)
+def _as_it_is(track: Track) -> tuple[Track, Stored]:
+    return track, Stored(track.values, "as it is")

@@ -12,9 +12,9 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track
 from anim.optimize import morph
 from anim.optimize.setting import Setting
+from anim.optimize.truth import PATHS
 
 STILL = 0.5  # of the bound: a track that stays this near a value may be held at it
-PATHS = ("translation", "rotation", "scale")
 
 Target = tuple[int, str]
 

@@ -14,17 +14,25 @@ from anim.optimize.keys import jointly_needed, needed
 from anim.optimize.segments import Segments, fits
 from anim.optimize.truth import Truth
 
+STILL = 0.1  # of the bound: a track that is less off its middle value gets no table
+
 
 class Layouts:
-    """Time axes for one clip; what was found for a track and a budget is kept."""
+    """Time axes for one clip; what was found for a track and a budget is kept.
 
-    def __init__(self, truth: Truth, coding: Coding) -> None:
+    bound: m, the largest error of all: tracks that stay far below it by themselves are hardly ever keyed.
+    """
+
+    def __init__(self, truth: Truth, coding: Coding, bound: float) -> None:
         self.grid = truth.grid
         self.coding = coding
         self.key_bytes = np.array([coding.key_bytes(each.path) for each in truth.moving])
         self._scaled = _scaled(truth)
-        table = fits(len(truth.moving), len(truth.grid))
-        self._segments = Segments(self._scaled, truth.grid) if table else None
+        moved = np.array([each.from_middle for each in truth.moving])
+        self._tabled = np.flatnonzero(moved > STILL * bound)
+        if not fits(len(self._tabled), len(truth.grid)):
+            self._tabled = np.empty(0, np.int64)
+        self._segments = Segments(self._scaled[self._tabled], truth.grid)
         self._rows: dict[tuple[int, float], Bools] = {}
 
     def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[Axis]:
@@ -45,9 +53,15 @@ class Layouts:
         return np.array([self._rows[name] for name in names])
 
     def _searched(self, keyed: Ints, budgets: Floats) -> Bools:
-        if self._segments is not None:
-            return self._segments.needed(keyed, budgets[keyed])
-        return needed(self.scaled(keyed, budgets), self.grid)
+        """The same, from the table for the tracks in it, else anew."""
+        rows = np.searchsorted(self._tabled, keyed)
+        there = np.isin(keyed, self._tabled)
+        found = np.zeros((len(keyed), len(self.grid)), np.bool_)
+        if there.any():
+            found[there] = self._segments.needed(rows[there], budgets[keyed[there]])
+        if not there.all():
+            found[~there] = needed(self.scaled(keyed[~there], budgets), self.grid)
+        return found
 
 
 def _merged(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:

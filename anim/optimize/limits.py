@@ -91,13 +91,6 @@ class Effort:
 
 EFFORTS = {
     "fast": Effort(5),
-    "balanced": Effort(7, (0.15, 0.35, 0.6, 0.85), ("full", "joint"), (1.1, 1.04, 1.02), 30),
-    "max": Effort(
-        10,
-        (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9),
-        ("full", "joint", "second", "third"),
-        (1.2, 1.1, 1.05, 1.02),
-        400,
-        2,
-    ),
+    "balanced": Effort(5, (0.25, 0.6), ("full",), (1.1, 1.05), 25),
+    "max": Effort(10, (0.1, 0.25, 0.4, 0.6, 0.8), ("full", "joint", "second", "third"), (1.2, 1.1, 1.05, 1.02), 400, 2),
 }

@@ -11,8 +11,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.gltf.document import Document, Json, items
 from anim.model import Clip, Scene, Skeleton
+from anim.optimize.truth import PATHS
 
-PATHS = ("translation", "rotation", "scale")
 SAME = 2e-4  # in units of the value: constants this near count as one
 STILL = 1e-4  # a track that stays this near its first value is a constant
 WORTH = 1e-5  # a rest value nearer than this to the constant stays

@@ -19,7 +19,7 @@ STEPS = (0.5, 1.8)  # least and greatest change of a budget from round to round
 SHRINK = 0.6
 ENOUGH = 1e3  # times what storing may miss, so that integers are taken
 SEED = 2026
-SPREAD = (0.4, 0.05)  # standard deviation of the logarithm of random changes: the first, and the least
+SPREAD = (0.25, 0.05)  # standard deviation of the logarithm of random changes: the first, and the least
 STRAYING = 0.3  # share of tracks changed at a time
 LEAST = 1e-6  # of the bound; smaller budgets mean that storage can't do better
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,13 +23,15 @@ class Setting:
     """All that a clip's optimization needs beside the clip.
 
     rest_world: (N, 3, 4) world matrices of the rest pose. surfaces: those with morph targets.
-    unseen: (N,) nodes that carry no vertex, nor does a node on them.
+    answering: by node that any clip moves, which points (P,) hang on it. unseen: (N,) nodes that carry no vertex, nor
+    does a node on them.
     """
 
     skeleton: Skeleton
     rest_world: Floats
     points: Points
     surfaces: tuple[Surface, ...]
+    answering: Mapping[int, Bools]
     unseen: Bools
     bounds: Bounds
     policy: Policy
@@ -73,11 +75,14 @@ def setting(
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
     world = world_by_node(skeleton, rest(skeleton))[:, 0]
+    points = points_.of_scene(scene, shells, bounds.shell, extra)
+    driven = sorted({track.node for clip in clips for track in clip.tracks if track.node is not None})
     return Setting(
         skeleton,
         world,
-        points_.of_scene(scene, shells, bounds.shell, extra),
+        points,
         tuple(surface for surface in surfaces(scene) if len(surface.targets)),
+        {node: points.on(skeleton.below(node)) for node in driven},
         unseen,
         bounds,
         policy,

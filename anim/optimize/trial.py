@@ -105,7 +105,7 @@ class Bench:
         self._from_middle = np.array([each.from_middle for each in truth.moving])
         self._rest = [_rest(truth, path) for path in PATHS]
         self._shared = [_near(each, values) for each, values in zip(truth.moving, shared, strict=True)]
-        self._layouts = Layouts(truth, coding)
+        self._layouts = Layouts(truth, coding, bounds.max_error)
         self._candidates = Candidates(truth, coding.packing)
 
     def run(self, plan: Plan, *, smaller_than: float = math.inf) -> Outcome:

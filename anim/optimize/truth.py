@@ -3,7 +3,7 @@ track can carry a measured point."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,7 @@ class Moving:
 
     number: in its clip. values: (W, C) at the times to measure at; rotations unit, without jumps of sign. rest: (C,),
     for rotations on the side of the first value. middle: (C,), the single value that fits best. meters: how far a
-    point moves per unit of the value, at most. from_rest, from_middle: m, how far rest and middle are off, at most.
+    point moves per unit of the value, about. from_rest, from_middle: m, how far rest and middle are off, at most.
     """
 
     number: int
@@ -66,11 +66,19 @@ class Truth:
 
 
 def truth(
-    skeleton: Skeleton, clip: Clip, free: Sequence[int], points: Points, *, reference: Reference, noticed: float
+    skeleton: Skeleton,
+    clip: Clip,
+    free: Sequence[int],
+    points: Points,
+    below: Mapping[int, Bools],
+    *,
+    reference: Reference,
+    noticed: float,
 ) -> Truth:
     """Return what `clip` does to `points`; the tracks numbered in `free` may change, all others stay as they are.
 
-    noticed: m; where chords and arcs are closer than this they count as one.
+    below: by node of a free track, which points (P,) hang on it. noticed: m; where chords and arcs are closer than this
+    they count as one.
     """
     tracks = [clip.tracks[i] for i in free]
     grid = key_grid(tracks)
@@ -78,8 +86,9 @@ def truth(
     local = _local(skeleton, clip, at)
     levels = needed_levels(skeleton, points.nodes)
     world = worlds(skeleton, local, levels)
-    below = {track.node: points.on(skeleton.below(track.node)) for track in tracks if track.node is not None}
-    reach, widening = _reach(world, points, below), _widening(skeleton, world, levels)
+    nodes = {track.node for track in tracks if track.node is not None}
+    reach = _reach(world, points, {node: below[node] for node in nodes})
+    widening = _widening(skeleton, world, levels)
     moving = tuple(
         _moving(number, track, skeleton, local, reach, widening) for number, track in zip(free, tracks, strict=True)
     )

@@ -59,7 +59,7 @@ def interpolate(
     tangents: in and out, shaped as the values, per second, for CUBICSPLINE. Rotations come out normalized.
     """
     start = values[place.left]
-    if interpolation is Interpolation.STEP or len(values) == 1:
+    if interpolation is Interpolation.STEP or not place.u.any():  # all at keys, where the curve's own value is theirs
         return quaternion.normalize(start) if kind is Kind.ROTATION else start
     shape = place.u.shape + (1,) * (values.ndim - 1)
     u, end = place.u.reshape(shape), values[place.right]

@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches import axes, frames
+from anim.caches.frames import SAME
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.sticks import sticks
 from anim.gltf import read
@@ -23,6 +24,7 @@ from anim.skinning.methods import SKINNING_METHODS
 AROUND = 48  # frames of the whole motion that the camera is framed on
 MOST_FRAMES = 3000
 THICKER = 1.9  # times as wide as the sticks that go into files
+WIDEST = 1.5  # times the middle one: links to helpers far away don't hide the others
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,12 @@ class When:
     fps: float | None = None
     begin: float | None = None
     end: float | None = None
+
+    def check(self, start: float, end: float) -> None:
+        """Raise RangeError for a wanted time outside all motions, which go from `start` to `end` s."""
+        for time in self.at:
+            if not start - SAME <= time <= end + SAME:
+                raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
 
     def times(self, start: float, end: float) -> Floats:
         """Return times (F,) s of a motion from `start` to `end`. Raises RangeError where none lies in it."""
@@ -81,6 +89,8 @@ def of_document(document: Document, clips: Sequence[int], methods: Sequence[str]
     scene = _visible(read.scene(document))
     known = read.clips(document)
     chosen = [(known[i].name, known[i]) for i in clips] or [("", Clip("", ()))]
+    moving = [clip for _, clip in chosen if clip.tracks]
+    when.check(min((clip.start for clip in moving), default=0.0), max((clip.end for clip in moving), default=0.0))
     found = []
     for name, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
@@ -99,8 +109,8 @@ def of_cache(cache: VertexCache, when: When) -> list[Shot]:
         raise NotFoundError("has no faces to draw", help="put the rest mesh beside it: NAME-rest.ply")
     cache = axes.turned(cache, "y")
     start, end = float(cache.times[0]), float(cache.times[-1])
-    times = when.times(start, end)
-    chosen = frames.at_times(cache, times)
+    when.check(start, end)
+    chosen = frames.at_times(cache, when.times(start, end))
     whole = frames.at_times(cache, _spread(start, end))
     return [Shot("", "", chosen, whole, palette.of_faces(cache))]
 
@@ -147,7 +157,9 @@ def _thicker(mesh: Mesh) -> Mesh:
     bodies = mesh.positions.reshape(-1, 24, 3).copy()
     ring = np.array([1, 2, 4, 5, 7, 8, 10, 11, 13, 14, 16, 17, 19, 20, 22, 23])
     middle = (bodies[:, [1]] + bodies[:, [13]]) / 2  # corners of the ring that face each other
-    bodies[:, ring] = middle + THICKER * (bodies[:, ring] - middle)
+    radius = np.linalg.norm(bodies[:, [1]] - middle, axis=-1, keepdims=True)
+    wanted = THICKER * np.minimum(radius, WIDEST * np.median(radius))
+    bodies[:, ring] = middle + wanted / radius * (bodies[:, ring] - middle)
     return replace(mesh, positions=bodies.reshape(-1, 3))
 
 

@@ -12,11 +12,10 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError, UnsupportedError
 from anim.model import Clip, Instance, Part, Primitive, Scene, VertexCache
-from anim.sampling import pose
-from anim.sampling.pose import world_by_node
 from anim.skinning.buffers import Buffers
 from anim.skinning.bulge import Clamped
-from anim.skinning.layer import Frames, Layer, Make, layer
+from anim.skinning.frames import Playback
+from anim.skinning.layer import Layer, Make, layer
 from anim.skinning.linear_blend import LinearBlend
 from anim.skinning.methods import SKINNING_METHODS
 from anim.skinning.mixed import Mixed
@@ -98,15 +97,14 @@ def baker(
         layer(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
-    still = pose(scene.skeleton, Clip("", ()), np.zeros(1))
-    frames = Frames(still, world_by_node(scene.skeleton, still))
+    still = Playback(scene.skeleton, Clip("", ())).at(np.zeros(1))
     return Baker(
         scene,
         layers,
         int(starts[-1]),
         np.concatenate([each.rig.faces + each.at for each in layers]),
         tuple(_parts(scene, layers)),
-        np.concatenate([each.at_rest(frames) for each in layers]),
+        np.concatenate([each.at_rest(still) for each in layers]),
         normals,
         _handedness(chosen) if tangents else None,
         threads or _cores(),
@@ -175,7 +173,7 @@ def _handedness(chosen: Sequence[Instance]) -> Floats:
     signs = []
     for instance in chosen:
         if instance.mesh.tangents is None:
-            name = instance.mesh.name or f"of node {instance.node}"
+            name = instance.mesh.name or f"node {instance.node}"
             raise UnsupportedError(f"mesh '{name}' has no tangents", help="--normals needs nothing of the file")
         signs.append(instance.mesh.tangents[:, 3])
     return np.concatenate(signs)

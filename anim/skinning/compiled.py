@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-Kernel: TypeAlias = Callable[..., None]
+Kernel: TypeAlias = Callable[..., Any]
 
 APP = "gltf-anim"  # whose folder in the user's cache keeps machine code from one run to the next
 ROOM = __name__.rpartition(".")[0]

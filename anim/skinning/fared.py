@@ -9,13 +9,12 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.model import Chunk, Clip, Skeleton
-from anim.sampling import pose
-from anim.sampling.pose import world_by_node
 from anim.skinning.bake import Baker
 from anim.skinning.bulge import Links, links, placed, stand_off
 from anim.skinning.closed import closed_faces, volumes
 from anim.skinning.compiled import compiled
-from anim.skinning.layer import Frames, Layer
+from anim.skinning.frames import Frames, Playback
+from anim.skinning.layer import Layer
 from anim.skinning.stretch import topmost
 
 BULGE = 1.05  # distance from the links, against that in bind pose, above which a vertex bulges
@@ -69,9 +68,9 @@ def subject(layer: Layer) -> Subject:
 def fared(baker: Baker, method: str, subjects: list[Subject], clip: Clip, times: Floats) -> Iterator[Fared]:
     """Yield how each of the baker's meshes fares at `times` (F,) s while a clip plays."""
     seen = [_Seen(each, len(times)) for each in subjects]
+    playback = Playback(baker.scene.skeleton, clip)
     for chunk in baker.bake(clip, times=times).chunks():
-        local = pose(baker.scene.skeleton, clip, times[chunk.first : chunk.first + len(chunk.positions)])
-        frames = Frames(local, world_by_node(baker.scene.skeleton, local))
+        frames = playback.at(times[chunk.first : chunk.first + len(chunk.positions)])
         for each in seen:
             each.add(chunk, frames)
     for each in seen:

@@ -11,7 +11,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import AnimError, RangeError
 from anim.maths import matrix
-from anim.model import Instance, Pose, Skeleton
+from anim.model import Instance, Skeleton
+from anim.skinning.frames import Frames
 from anim.skinning.kernels.lanes import NOTHING, Shape, Singles, Target
 from anim.skinning.rig import Rig, rig
 from anim.skinning.skinner import Skinner, filled
@@ -20,14 +21,6 @@ from anim.skinning.smooth_normals import SmoothNormals
 Make: TypeAlias = Callable[[Rig, bool], Skinner]
 
 PIECE = 4096  # vertices that a thread takes at a time
-
-
-@dataclass(frozen=True, slots=True)
-class Frames:
-    """Some frames of the whole scene: local transforms, and world_from_node (N, F, 3, 4)."""
-
-    pose: Pose
-    world: Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,11 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.model import Clip, Scene, Skeleton
-from anim.sampling import pose
-from anim.sampling.pose import world_by_node
 from anim.skinning.compiled import compiled
+from anim.skinning.frames import Playback
 from anim.skinning.kernels.lanes import LANES, Singles, room
 from anim.skinning.kernels.shrinkage import shrinkage
-from anim.skinning.layer import Frames, Layer
+from anim.skinning.layer import Layer
 from anim.skinning.rig import whole_weights
 from anim.skinning.skinner import filled, lanes
 from anim.skinning.stretch import pivots, split, topmost
@@ -61,12 +60,13 @@ def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     scales are divided out. Joints of scale 0 don't count as collapse.
     """
     rig = layer.rig
+    playback = Playback(scene.skeleton, clip)
     held, space = rig.held._replace(weight=whole_weights(rig)), room(rig.most)
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
     by_frame = np.zeros(len(times))
     for first in range(0, len(times), LANES):
-        matrices = _matrices(scene, layer, clip, times[first : first + LANES])
+        matrices = layer.matrices(playback.at(times[first : first + LANES]), slice(None))
         factors: Singles = np.empty((len(rig.points), len(matrices)), np.float32)
         compiled(shrinkage)(held, lanes(matrices), _logs(matrices), space, factors)
         factors[~np.isfinite(factors) | (np.diff(rig.start) == 0)[:, None]] = 1
@@ -78,13 +78,8 @@ def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     root = np.sqrt(np.clip(least.astype(np.float64), 0, None))
     worst = int(least.argmin())
     time = float(times[when[worst]])
-    narrow = _narrow(scene, layer, clip, worst, time, float(root[worst]))
+    narrow = _narrow(scene.skeleton, layer, playback, worst, time, float(root[worst]))
     return Indices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
-
-
-def _matrices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Floats:
-    local = pose(scene.skeleton, clip, times)
-    return layer.matrices(Frames(local, world_by_node(scene.skeleton, local)), slice(None))
 
 
 def _logs(matrices: Floats) -> Singles:
@@ -93,13 +88,13 @@ def _logs(matrices: Floats) -> Singles:
     return filled(np.log(np.where(sizes > 0, sizes, np.nan)).T)
 
 
-def _narrow(scene: Scene, layer: Layer, clip: Clip, vertex: int, time: float, index: float) -> Narrow:
-    rig, names = layer.rig, scene.skeleton
+def _narrow(names: Skeleton, layer: Layer, playback: Playback, vertex: int, time: float, index: float) -> Narrow:
+    rig = layer.rig
     held = rig.joint[rig.start[vertex] : rig.start[vertex + 1]].tolist()
     if not held:
         return Narrow(index, vertex, "", "", time, 0.0, False)
     a, b = held[0], held[1] if len(held) > 1 else held[0]
-    matrices = _matrices(scene, layer, clip, np.array([time]))
+    matrices = layer.matrices(playback.at(np.array([time])), slice(None))
     rotation = split(matrices, pivots(rig), topmost(rig.above)).rotation[0]
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(rotation[a]), rotation[b]))
     angle, link = float(np.linalg.norm(turn)), np.diff(pivots(rig)[[a, b]], axis=0)[0]

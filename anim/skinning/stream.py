@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from anim.arrays import Floats
 from anim.model import Chunk, Clip, Skeleton
-from anim.sampling.pose import Poses, world_by_node
 from anim.skinning.buffers import Buffers
+from anim.skinning.frames import Frames, Playback
 from anim.skinning.kernels.lanes import LANES, NOTHING, Target
-from anim.skinning.layer import PIECE, Frames, Layer
+from anim.skinning.layer import PIECE, Layer
 
 CHUNK = 1 << 23  # bytes of positions in a chunk, about; never less than LANES frames
 MOST = 32  # blocks of LANES frames in a chunk, for their poses take memory too
@@ -35,26 +35,24 @@ class Stream:
         """Yield the frames at `times` (F,) s in order. progress: called with how many the caller is done with."""
         blocks = min(CHUNK // (12 * self.vertices * LANES), MOST, -(-len(times) // LANES))
         step = LANES * max(blocks, 1)
-        poses = Poses(self.skeleton, clip)
+        playback = Playback(self.skeleton, clip)
         with ThreadPoolExecutor(self.threads) as pool, ThreadPoolExecutor(1) as sampler:
             ahead: deque[Future[_Begun]] = deque()
             for first in range(-AHEAD * step, len(times), step):
                 following = times[max(first + AHEAD * step, 0) :][:step]
                 if len(following):
-                    ahead.append(sampler.submit(self._begin, poses, following, pool))
+                    ahead.append(sampler.submit(self._begin, playback, following, pool))
                 if first >= 0:
                     yield self._finished(first, ahead.popleft().result())
                     progress(min(first + step, len(times)))
 
-    def _begin(self, poses: Poses, times: Floats, pool: Executor) -> _Begun:
+    def _begin(self, playback: Playback, times: Floats, pool: Executor) -> _Begun:
         """Sample the poses of a chunk and set its blocks going."""
-        local = poses.at(times)
-        frames = Frames(local, world_by_node(self.skeleton, local))
         shape = (len(times), self.vertices, 3)
         wanted = (True, self.normals, self.tangents)
         whole = Target(0, *(self.buffers.array(*shape) if each else NOTHING for each in wanted))
         blocks = [slice(low, low + LANES) for low in range(0, len(times), LANES)]
-        begun = _Begun(frames, whole, [])
+        begun = _Begun(playback.at(times), whole, [])
         begun.blocks.extend(
             pool.submit(_placing, begun, layer, block, pool) for layer in self.layers for block in blocks
         )

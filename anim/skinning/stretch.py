@@ -8,6 +8,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
+from anim.skinning.compiled import compiled
+from anim.skinning.kernels.rigid_turns import rigid_turns
 from anim.skinning.rig import Rig
 
 RIGID = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what float32 bind matrices leave behind
@@ -34,8 +36,9 @@ def split(matrices: Floats, pivots: Floats, top: int = 0) -> Split:
     Source: polar decomposition, Shoemake & Duff 1992.
     """
     linear, moved = matrices[..., :3], matrices[..., 3]
-    if _is_rigid(linear):
-        return Split(quaternion.from_matrix(linear), moved, None)
+    turns: Floats = np.empty((*matrices.shape[:2], 4))
+    if compiled(rigid_turns)(matrices, RIGID, turns):
+        return Split(turns, moved, None)
     common = np.cbrt(np.linalg.det(linear[:, top]))
     common = np.where(common != 0, common, 1.0)[:, None]
     square = np.swapaxes(linear, -1, -2) @ linear
@@ -60,17 +63,6 @@ def pivots(rig: Rig) -> Floats:
 def topmost(above: Ints) -> int:
     """Return the first joint that hangs on no other."""
     return int(np.argmax(above < 0))
-
-
-def _is_rigid(linear: Floats) -> bool:
-    """Whether all matrices are rotations; spelled out, since numpy's own products of small matrices are slow."""
-    x, y, z = np.ascontiguousarray(np.moveaxis(linear, -1, 0).transpose(0, -1, *range(1, linear.ndim - 1)))
-    crossed = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    volume = crossed[0] * z[0] + crossed[1] * z[1] + crossed[2] * z[2]
-    pairs = ((x, x, 1.0), (y, y, 1.0), (z, z, 1.0), (x, y, 0.0), (y, z, 0.0), (z, x, 0.0))
-    return bool((volume > 0).all()) and all(
-        bool(np.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] - wanted).max(initial=0) < RIGID) for a, b, wanted in pairs
-    )
 
 
 def _polar(linear: Floats, square: Floats) -> tuple[Floats, Floats]:

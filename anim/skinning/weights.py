@@ -14,8 +14,9 @@ TOLERANCE = 1e-4  # of a sum; rounding to float32 or to 8 bits by a careful expo
 
 @dataclass(frozen=True, slots=True)
 class BadSums:
-    """Vertices of one mesh whose weights don't add up to 1. none: how many have no weight at all.
+    """Vertices of one mesh whose weights don't add up to 1. mesh: its name, or the number of its node.
 
+    count: how many. none: how many of them have no weight at all.
     least, most: the sums farthest below and above 1 among the others.
     """
 
@@ -38,5 +39,6 @@ def bad_sums(instances: Iterable[Instance]) -> list[BadSums]:
         if wrong.any():
             some = sums[wrong & (sums > 0)]
             least, most = (float(some.min()), float(some.max())) if len(some) else (0.0, 0.0)
-            found[id(mesh)] = BadSums(mesh.name, int(wrong.sum()), int((sums == 0).sum()), least, most)
+            name = mesh.name or f"node {instance.node}"
+            found[id(mesh)] = BadSums(name, int(wrong.sum()), int((sums == 0).sum()), least, most)
     return list(found.values())

@@ -19,18 +19,17 @@ from anim.model import Clip, Instance, VertexCache
 from anim.ops.selection import Selection
 from anim.sampling.times import grid
 from anim.skinning.bake import baked, baker
-from anim.skinning.methods import SKINNING_METHODS
 from anim.skinning.weights import bad_sums
 from cli import cache_files, cache_options, meshes, options, report, streams, units
 from cli.cache_files import Saved
 from cli.errors import UsageError
 from cli.progress import Progress
 from cli.report import Voice, plural
+from cli.skinning_methods import ABOUT, Method
 
 PLACE = "{clip}"  # in OUT: where the name of the clip goes
 FORBIDDEN = frozenset('/\\:*?"<>|')  # what some file system doesn't take in a name
 
-Method = StrEnum("Method", [(name, name) for name in SKINNING_METHODS])  # type: ignore[misc]
 LBS = Method("lbs")
 
 
@@ -45,10 +44,7 @@ def bake(
     input: options.Input = "-",
     output: cache_options.Product = "-",
     *,
-    method: Annotated[
-        Method,
-        typer.Option("--method", help="; ".join(f"{name}: {m.about}" for name, m in SKINNING_METHODS.items()) + "."),
-    ] = LBS,
+    method: Annotated[Method, typer.Option("--method", help=ABOUT)] = LBS,
     blend: Annotated[
         float | None, typer.Option("--blend", metavar="0..1", help="Share of the method; the rest is lbs.")
     ] = None,
@@ -131,9 +127,8 @@ def bake(
             _say_notes(done, voice)
             if len(files) > 1:
                 voice.detail(f"  {_summary(done[-1:], cache.vertex_count, method.value)}")
-    words = _summary(done, made.vertices, method.value)
-    tail = " (dry run: nothing written)" if dry_run else ""
-    voice.say(f"{words}, {time.perf_counter() - began:.1f} s{tail}")
+    took = f"{time.perf_counter() - began:.1f} s" + (" (dry run: nothing written)" if dry_run else "")
+    voice.say(f"{_summary(done, made.vertices, method.value)}, {took}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +184,9 @@ def _summary(done: list[_Done], vertices: int, method: str) -> str:
     parts = [f"{name}  {report.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
     parts.append(f"{frames} of {vertices} vertices")
     errors = [each.saved.written.max_error for each in done if each.saved.written.max_error is not None]
-    return ", ".join([*parts, *([f"max {report.length(max(errors))}"] if errors else [])])
+    parts += [f"max {report.length(max(errors))}"] if errors else []
+    count = sum(len(each.saved.files) for each in done)
+    return ", ".join([*parts, *([plural(count, "file")] if count > len(done) else [])])
 
 
 def _times(clip: Clip, fps: float | None) -> Floats:

@@ -18,15 +18,14 @@ from anim.show.collapse import collapse as picture_of
 from anim.skinning.advice import Found, advice
 from anim.skinning.collapse import LOW, Comparison, MeshCollapse
 from anim.skinning.fared import BULGE, Fared
-from anim.skinning.methods import SKINNING_METHODS
 from cli import meshes, options, streams, tables
 from cli.errors import UsageError
 from cli.progress import Progress
-from cli.report import plural
+from cli.report import Voice, plural, size
+from cli.skinning_methods import Method
 
 SCHEMA = 1
 
-Method = StrEnum("Method", [(name, name) for name in SKINNING_METHODS])  # type: ignore[misc]
 USUAL = ("lbs", "dqs")
 
 
@@ -83,6 +82,7 @@ def collapse(
         kind = PurePath(plot).suffix.lower()[1:]
         picture = picture_of(_worst_of_clips(found), title=PurePath(source.name).stem, kind=kind)
         streams.write_bytes([np.frombuffer(picture, np.uint8)], plot)
+        Voice(quiet).say(f"{plot}  {size(len(picture))}")
     if format is Format.JSON:
         streams.write_text(_json(source.name, methods, fps, found))
     else:

@@ -79,6 +79,8 @@ def convert_cache(
         finally:
             progress.close()
         size = loaded.size
+    if cache.chosen:
+        voice.say(f"note: {cache.chosen}; bake takes others by --clip")
     for note in saved.written.notes:
         voice.say(f"note: {note}")
     name = loaded.name if output == streams.PIPE else output

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import re
-import sys
 import time
-from collections.abc import Callable
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import Annotated
@@ -15,23 +10,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.errors import AnimError
-from anim.gltf import read
-from anim.gltf.accessors import Accessors
-from anim.gltf.document import Document
-from anim.measure.surface import diagonal
-from anim.model import Scene
-from anim.ops.selection import Selection
-from anim.optimize.limits import EFFORTS, Bounds, Drop, Objective, Packing, Policy, Reference
+from anim.optimize.limits import EFFORTS, Drop, Objective, Packing, Policy, Reference
 from anim.optimize.optimize import Optimized
-from anim.optimize.optimize import optimize as optimized
 from anim.optimize.request import Request
-from anim.optimize.tradeoff import Sized, curve, fitting
+from anim.optimize.tradeoff import curve
 from anim.optimize.verify import PLAYERS
-from cli import optimization, options, streams, units
-from cli.errors import CheckError, UsageError
-from cli.progress import Progress
+from cli import optimization, optimize_request, options, streams
+from cli.errors import UsageError
+from cli.optimize_job import Job, job
 from cli.report import Voice
+
+PICTURES = (".png", ".svg")
+GLTF = (".glb", ".gltf", ".bin", ".vrm")
 
 
 class Meshopt(StrEnum):
@@ -50,8 +40,6 @@ class Player(StrEnum):
 
 Effort = StrEnum("Effort", [(name, name) for name in EFFORTS])  # type: ignore[misc]
 BALANCED = Effort("balanced")
-ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
-BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "kib": 1024, "mib": 1 << 20}
 
 
 def optimize(
@@ -59,12 +47,20 @@ def optimize(
     output: options.Output = "-",
     *,
     max_error: Annotated[
-        str,
-        typer.Option("--max-error", metavar="LENGTH", help="How far any vertex may move: 0.5mm, 0.01% of the size, 0."),
-    ] = "0.01%",
+        str | None,
+        typer.Option(
+            "--max-error",
+            metavar="LENGTH",
+            help="How far any vertex may move: 0.5mm, 2cm, 0 (without loss), 0.01% of the size (without this option).",
+        ),
+    ] = None,
     max_bytes: Annotated[
         str | None,
-        typer.Option("--max-bytes", metavar="N", help="Instead: the smallest error for a file of 800kB at most."),
+        typer.Option(
+            "--max-bytes",
+            metavar="N",
+            help="The smallest error, up to --max-error if that is given, for a file of 800kB.",
+        ),
     ] = None,
     meshopt: Annotated[
         Meshopt | None,
@@ -123,171 +119,103 @@ def optimize(
     """Make animations smaller, within an error that no vertex exceeds.
 
     The bound is kept on every skinned and morphed vertex at every time, in players that slerp and in those that mix
-    quaternions by components, and it is measured on the bytes that are written. Where it can't be kept nothing is
-    written (exit 6). Start and end of each clip stay exact; every clip stays; STEP stays STEP. Channels that do nothing
+    quaternions by components, and it is measured on the bytes that are written. A clip for which no lossy way keeps all
+    bounds is kept without loss. Exit 6, and nothing written: --max-bytes can't be met, or what would be written fails
+    its measurement. Start and end of each clip stay exact; every clip stays; STEP stays STEP. Channels that do nothing
     go, constants become one key, equal data is shared, keys and time axes are chosen together, rotations become int16.
-    The same command on its own output changes nothing.
+    The same command on its own output changes nothing; another bound counts from there, and errors add up.
     """
     began = time.perf_counter()
     voice = Voice(quiet, verbose)
-    _check_outputs(output, report, curve_file, dry_run=dry_run)
+    max_count = None if max_bytes is None else optimize_request.count_of_bytes(max_bytes)
+    _check_outputs(input, output, report, curve_file, dry_run=dry_run)
+    if curve_file is not None and (max_bytes is not None or report is not None):
+        raise UsageError("--curve goes with neither --max-bytes nor --report")
     with streams.source(input) as source:
-        document = source.document
-        accessors = Accessors(document)
-        clips, scene = read.clips(document, accessors), _scene(document, accessors, voice)
-        scale = diagonal(scene)
-        chosen = Selection(clip or ()).chosen_clips(read.names(document))
+        work = job(source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice)
         request = Request(
-            Bounds(
-                _length(max_error, "--max-error", scale),
-                _length(shell, "--shell", scale),
-                0.0 if max_pointer_error in ("0", "0%") else units.share(max_pointer_error, "--max-pointer-error"),
-                None if max_angle is None else units.angle(max_angle, "--max-angle"),
-                None if max_speed_error is None else _length(max_speed_error, "--max-speed-error", scale),
+            optimize_request.bounds(
+                work.scene,
+                max_error=max_error,
+                shell=shell,
+                max_pointer_error=max_pointer_error,
+                max_angle=max_angle,
+                max_speed_error=max_speed_error,
             ),
-            Policy(drop, reference, rebase_rest, drop_invisible, _kept(keep_node, scene)),
+            Policy(drop, reference, rebase_rest, drop_invisible, optimize_request.kept(keep_node or (), work.scene)),
             Packing.CORE if meshopt is None else Packing(meshopt.value),
             objective,
             str(effort),
             PLAYERS if player is Player.ANY else ("spec",),
         )
-        workers = jobs or os.cpu_count() or 1
-        progress = Progress("optimize", 1000, shown=not quiet)
-
-        def run(request: Request) -> Optimized:
-            found = optimized(
-                document,
-                scene,
-                clips,
-                request,
-                chosen=chosen,
-                workers=workers if optimization.is_long(clips, chosen) else 1,
-                detailed=report is not None or verbose,
-                start="fork" if sys.platform == "linux" else "spawn",
-                progress=lambda share: progress(round(1000 * share)),
-            )
-            progress.close()
-            return found
-
         if curve_file is not None:
-            _draw_curve(document, request, scale, run, curve_file, output, source.folder, voice)
+            _draw_curve(work, request, curve_file, voice, dry_run=dry_run)
             return
-        if max_bytes is not None:
-            request = _fitted(document, request, scale, run, _bytes(max_bytes), output, source.folder)
-        found = run(request)
-        optimization.check(found, clips, request, scale)
-        result = optimization.smaller(found, document, lambda each: _size(each, output, source.folder))
-        size = streams.write(result, output, source.folder, dry_run=dry_run)
-        name = source.name if output == streams.PIPE else output
-        about = optimization.About(
-            name, document, result, clips, found, request, scale, source.size, size, time.perf_counter() - began
-        )
-        for line in optimization.lines(about, dry_run=dry_run):
-            voice.say(line)
-        for line in optimization.details(about) if verbose else ():
-            voice.detail(line)
-        if report is not None:
-            streams.write_text(optimization.as_json(about), report)
+        if max_count is None:
+            found = work.run(request)
+        else:
+            ceiling = None if max_error is None else request.bounds.max_error
+            request, found = work.fitted(request, max_count, ceiling=ceiling)
+        optimization.check(found, work.clips, request, work.scale)
+        about = _written(work, request, found, began, dry_run=dry_run)
+    _say(about, voice, report, dry_run=dry_run)
 
 
-def _check_outputs(output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
-    """Refuse at once what can't be written."""
+def _written(work: Job, request: Request, found: Optimized, began: float, *, dry_run: bool) -> optimization.About:
+    """Write what was found, and return all there is to say of it."""
+    source, result = work.source, work.smaller(found)
+    size = streams.write(result, work.output, source.folder, dry_run=dry_run)
+    name = source.name if work.output == streams.PIPE else work.output
+    seconds = time.perf_counter() - began
+    return optimization.About(
+        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds
+    )
+
+
+def _say(about: optimization.About, voice: Voice, report: str | None, *, dry_run: bool) -> None:
+    for line in optimization.lines(about, dry_run=dry_run):
+        voice.say(line)
+    for line in optimization.details(about) if voice.verbose else ():
+        voice.detail(line)
+    if report is not None and (report == streams.PIPE or not dry_run):
+        streams.write_text(optimization.as_json(about), report)
+
+
+def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
+    """Refuse at once what can't be written, or would be written over something else."""
     if curve_file is not None:
         streams.check_file(curve_file)
-        if PurePath(curve_file).suffix.lower() not in (".csv", ".png", ".svg"):
+        if PurePath(curve_file).suffix.lower() not in (".csv", *PICTURES):
             raise UsageError(f"{curve_file}: is no .csv, .png or .svg file")
     elif not dry_run:
         streams.check_output(output)
     if report is not None and report != streams.PIPE:
-        streams.check_file(report)
+        _check_report(report, input, output)
     if report == output == streams.PIPE and curve_file is None and not dry_run:
         raise UsageError("--report and OUT can't both be stdout")
 
 
-def _scene(document: Document, accessors: Accessors, voice: Voice) -> Scene:
-    try:
-        return read.scene(document, accessors)
-    except AnimError as error:  # vertices that can't be read leave the nodes to be measured
-        voice.say(f"note: measured at nodes, not on the surface: {error}")
-        return Scene(read.skeleton(document), ())
+def _check_report(report: str, input: str, output: str) -> None:
+    """Refuse a report in the place of a model."""
+    streams.check_file(report)
+    if PurePath(report).suffix.lower() in GLTF or Path(report).resolve() in {
+        Path(other).resolve() for other in (input, output) if other != streams.PIPE
+    }:
+        raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
 
-def _length(text: str, option: str, scale: float) -> float:
-    """Metres, 0 allowed."""
-    if ZERO.fullmatch(text):
-        return 0.0
-    return units.meters(text, option, lambda: scale)
-
-
-def _kept(globs: list[str] | None, scene: Scene) -> frozenset[int]:
-    return frozenset(Selection((), globs).chosen_nodes(scene.skeleton)) if globs else frozenset()
-
-
-def _bytes(text: str) -> int:
-    """A number of bytes: 800kB, 1.5 MB, 65536."""
-    number = text.strip().lower().rstrip("bkmi ")
-    unit = text.strip().lower()[len(number) :].strip()
-    try:
-        count = int(float(number) * BYTES[unit])
-    except (ValueError, KeyError):
-        count = 0
-    if count <= 0:
-        raise UsageError(f"--max-bytes is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
-    return count
-
-
-def _size(document: Document, output: str, folder: Path | None) -> int:
-    return streams.write(document, output, folder, dry_run=True)
-
-
-def _sizer(
-    document: Document, request: Request, run: Callable[[Request], Optimized], output: str, folder: Path | None
-) -> Callable[[float], Sized]:
-    """What makes sizes of bounds, fast."""
-
-    def tried(max_error: float) -> Sized:
-        found = run(replace(request, bounds=replace(request.bounds, max_error=max_error), effort="fast"))
-        smallest = optimization.smaller(found, document, lambda each: _size(each, output, folder))
-        return Sized(max_error, _size(smallest, output, folder), optimization.worst(found))
-
-    return tried
-
-
-def _fitted(
-    document: Document,
-    request: Request,
-    scale: float,
-    run: Callable[[Request], Optimized],
-    max_bytes: int,
-    output: str,
-    folder: Path | None,
-) -> Request:
-    """The request with the smallest bound that fits."""
-    found = fitting(max_bytes, scale, _sizer(document, request, run, output, folder))
-    if found is None:
-        raise CheckError(f"doesn't fit {max_bytes} bytes, however large the error: all else in the file takes too much")
-    return replace(request, bounds=replace(request.bounds, max_error=found.max_error))
-
-
-def _draw_curve(
-    document: Document,
-    request: Request,
-    scale: float,
-    run: Callable[[Request], Optimized],
-    path: str,
-    output: str,
-    folder: Path | None,
-    voice: Voice,
-) -> None:
+def _draw_curve(work: Job, request: Request, path: str, voice: Voice, *, dry_run: bool) -> None:
     sizes = []
-    for sized in curve(scale, _sizer(document, request, run, output, folder)):
-        voice.say(optimization.curve_line(sized, scale))
+    for sized in curve(work.scale, lambda max_error: work.sized(request, max_error)):
+        voice.say(optimization.curve_line(sized, work.scale))
         sizes.append(sized)
+    if dry_run:
+        return
     kind = PurePath(path).suffix.lower()[1:]
     if kind == "csv":
-        streams.write_text(optimization.curve_csv(sizes, scale), path)
+        streams.write_text(optimization.curve_csv(sizes, work.scale), path)
     else:
         from anim.show.tradeoff import tradeoff as picture
 
-        drawn = picture(sizes, scale, title=PurePath(path).stem, kind=kind)
+        drawn = picture(sizes, work.scale, title=PurePath(work.source.name).name, kind=kind)
         streams.write_bytes([np.frombuffer(drawn, np.uint8)], path)

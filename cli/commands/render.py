@@ -24,9 +24,9 @@ from anim.show import filmstrip, image_file, shots
 from anim.show.camera import AZIMUTH, ELEVATION
 from anim.show.filmstrip import HEIGHT, Look
 from anim.show.shots import Shot, When
-from anim.skinning.methods import SKINNING_METHODS
 from cli import cache_files, options, report, streams
 from cli.errors import UsageError
+from cli.skinning_methods import Method
 
 ENDINGS = (".png", *image_file.MOVING)
 FRAMES, FPS = 8, 24.0
@@ -60,8 +60,7 @@ def render(
     end: options.To = None,
     clip: options.Clips = None,
     method: Annotated[
-        list[str] | None,
-        typer.Option("--method", help=f"Skinning: {', '.join(SKINNING_METHODS)}; repeat to compare."),
+        list[Method] | None, typer.Option("--method", help="How skin is bent; repeat to compare.  [default: lbs]")
     ] = None,
     heat: Annotated[
         bool, typer.Option("--heat", help="Color the distance to the first method; of one method, to the rest pose.")
@@ -97,7 +96,7 @@ def render(
         else:
             names = read.names(seen)
             numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
-            found = shots.of_document(seen, numbers, method or (), when)
+            found = shots.of_document(seen, numbers, [str(each) for each in method or ()], when)
         rows, around = shots.rows(found, heated=heat)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
         look = Look(size, azimuth, elevation)

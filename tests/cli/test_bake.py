@@ -120,6 +120,21 @@ def test_rigid_meshes_only_on_request(call: Call, fixture: Fixture, tmp_path: Pa
     assert call("bake", source, tmp_path / "{clip}.npz", "--rigid").code == 0
 
 
+def test_a_mesh_is_chosen_by_its_own_name_or_its_nodes(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    for name in ("arm", "arm_mesh"):
+        assert call("bake", fixture("arm"), tmp_path / f"{name}.npz", "--clip", "twist", "--mesh", name).code == 0
+    assert (tmp_path / "arm.npz").read_bytes() == (tmp_path / "arm_mesh.npz").read_bytes()
+    run = call("bake", fixture("arm"), tmp_path / "{clip}.npz", "--mesh", "zzz")
+    assert help_line(run) == "the meshes are 'arm', 'arm_mesh'"
+
+
+def test_how_many_files_a_sequence_has_is_said(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("bake", fixture("arm"), tmp_path / "walk.ply", "--clip", "twist", "--fps", "2")
+    assert "3 frames of" in run.err
+    assert ", 3 files, " in run.err
+    assert ", 1 file" not in call("bake", fixture("arm"), tmp_path / "a.npz", "--clip", "twist").err
+
+
 def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
     weights = np.array([[0.5, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]])
     content = buffered(("VEC3", 5126, np.eye(3)), ("VEC4", 5121, np.zeros((3, 4))), ("VEC4", 5126, weights))

@@ -49,7 +49,9 @@ def test_one_json_document(call: Call, fixture: Fixture) -> None:
 @pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_a_picture(ending: str, start: bytes, call: Call, fixture: Fixture, tmp_path: Path) -> None:
     out = tmp_path / f"tube.{ending}"
-    assert call("collapse", fixture("tube"), "--plot", out).code == 0
+    run = call("collapse", fixture("tube"), "--plot", out)
+    assert run.code == 0
+    assert run.err.startswith(f"{out}  ")
     once = out.read_bytes()
     assert once.startswith(start)
     assert call("collapse", tmp_path / "tube.glb", "--plot", out).code == 0

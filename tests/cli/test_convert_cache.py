@@ -141,8 +141,11 @@ def test_what_can_t_be_done_is_exit_2(args: list[str], words: str, walk: Path, c
 
 
 def test_a_gltf_is_played(fixture: Fixture, call: Call, tmp_path: Path) -> None:
-    call("convert-cache", fixture("arm"), tmp_path / "arm.npz", "--read-fps", "10").product()
+    run = call("convert-cache", fixture("arm"), tmp_path / "arm.npz", "--read-fps", "10")
+    assert run.err.startswith("note: clip 'twist', one of 2; bake takes others by --clip\n")
     assert positions(tmp_path / "arm.npz").shape[0] == 11
+    assert "note: clip" not in call("convert-cache", tmp_path / "arm.npz", tmp_path / "arm.glb").err
+    assert "note: clip" not in call("convert-cache", tmp_path / "arm.glb", tmp_path / "arm.mdd").err
 
 
 def test_uneven_frames_get_an_advice(fixture: Fixture, call: Call, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,9 @@ import pytest
 
 from anim.gltf import read
 from anim.gltf.document import Document
+from anim.optimize.limits import EFFORTS, Effort
 from anim.optimize.seal import KEY
+from cli import optimization
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal, shell, table
 from tests.cli.untouched import around
@@ -95,7 +98,8 @@ def test_larger_real_files(name: str, asset: Find, tmp_path: Path, call: Call) -
 
 def test_a_kept_node_stays_exact(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     source, output = fixture("biped"), tmp_path / "out.glb"
-    assert call("optimize", source, output, "--max-error", "1%", "--keep-node", "hips", *FAST).code == 0
+    run = call("optimize", source, output, "--max-error", "1%", "--keep-node", "hips", "--clip", "w*", *FAST)
+    assert run.code == 0, run.err
     document = opened_path(source)
     number = read.skeleton(document).names.index("hips")
     for old, new in zip(read.clips(document), read.clips(opened_path(output)), strict=True):
@@ -160,9 +164,10 @@ def test_every_clip_survives(fixture: Fixture, tmp_path: Path, call: Call) -> No
 def test_a_dry_run_writes_nothing(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     source = fixture("noop")
     before = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    run = call("optimize", source, tmp_path / "out.glb", "--dry-run", *FAST)
-    assert (run.code, run.out) == (0, b"")
-    assert "(dry run: nothing written)" in run.err
+    for options in ((), ("--report", tmp_path / "report.json"), ("--curve", tmp_path / "curve.csv")):
+        run = call("optimize", source, tmp_path / "out.glb", "--dry-run", *options, *FAST)
+        assert (run.code, run.out) == (0, b"")
+        assert ("(dry run: nothing written)" in run.err) is ("--curve" not in options)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
 
 
@@ -198,6 +203,17 @@ def test_a_file_may_be_its_own_output(fixture: Fixture, call: Call) -> None:
     assert len(path.read_bytes()) < len(source)
 
 
+def test_another_bound_on_its_own_output_says_from_where_it_counts(
+    fixture: Fixture, tmp_path: Path, call: Call
+) -> None:
+    once, twice = tmp_path / "once.glb", tmp_path / "twice.glb"
+    words = "optimized before; errors are measured from it"
+    assert words not in call("optimize", fixture("noop"), once, *FAST).err
+    assert words in call("optimize", once, twice, "--max-error", "1%", *FAST).err
+    assert words in call("optimize", once, twice, "--max-error", "0", *FAST).err
+    assert words not in call("optimize", once, twice, *FAST).err  # unchanged: optimized like this before
+
+
 def test_never_a_file_that_grew(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     """What is optimized already, under another bound, and so a mark that says so: smaller or just the same."""
     path = fixture("arm")
@@ -208,17 +224,12 @@ def test_never_a_file_that_grew(fixture: Fixture, tmp_path: Path, call: Call) ->
         path = output
 
 
-def test_the_same_bytes_for_any_number_of_jobs(tmp_path: Path) -> None:
-    """In processes of their own, as users run them; the biped is copied until it is long enough for several."""
-    document = opened_fixture("biped")
-    clips = document.json["animations"]
-    many = [{**each, "name": f"{each['name']}{i}"} for i in range(4) for each in clips]
-    source = tmp_path / "many.glb"
-    source.write_bytes(glb_of(replace(document, json={**document.json, "animations": many})))
-    for jobs in (1, 2):
-        run = shell(
-            f"gltf-anim optimize many.glb {jobs}.glb --max-error 1% --effort fast --clip 'w*' -j {jobs}", tmp_path
-        )
+def test_the_same_bytes_for_any_number_of_jobs(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(optimization, "LONG", 0)  # several processes, however little there is to do
+    for jobs in ("1", "2"):
+        run = call("optimize", fixture("noop"), tmp_path / f"{jobs}.glb", "--max-error", "1%", "-j", jobs, *FAST)
         assert run.code == 0, run.err
     assert (tmp_path / "1.glb").read_bytes() == (tmp_path / "2.glb").read_bytes()
 
@@ -277,6 +288,8 @@ def test_words(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert len(lines) == len(read.clips(opened_fixture("noop")))
     assert all("p99 " in line and "mean " in line for line in lines)
     assert call("optimize", fixture("noop"), tmp_path / "quiet.glb", "-q", *FAST).err == ""
+    exact = call("optimize", fixture("noop"), tmp_path / "exact.glb", "--max-error", "0", *FAST).err
+    assert ", no vertex moved, " in exact.splitlines()[0]
     assert (tmp_path / "quiet.glb").is_file()
 
 
@@ -329,10 +342,55 @@ def test_the_smallest_error_that_fits(fixture: Fixture, tmp_path: Path, call: Ca
     assert max(each["max_error_m"] for each in roomy.json["clips"]) <= 1e-9 * roomy.json["diagonal_m"]
 
 
+def test_a_search_that_ends_elsewhere_still_fits(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sizes are tried fast; here the longer search does worse, as chance may have it."""
+    assert call("optimize", fixture("noop"), tmp_path / "any.glb", "--max-error", "0.1%", *FAST).code == 0
+    limit = (tmp_path / "any.glb").stat().st_size
+    monkeypatch.setitem(EFFORTS, "balanced", Effort(1, finishing=()))
+    assert call("optimize", fixture("noop"), tmp_path / "out.glb", "--max-bytes", str(limit)).code == 0
+    assert (tmp_path / "out.glb").stat().st_size <= limit
+    assert call("optimize", tmp_path / "out.glb", tmp_path / "again.glb", "--max-bytes", str(limit)).code == 0
+    assert (tmp_path / "again.glb").read_bytes() == (tmp_path / "out.glb").read_bytes()
+
+
 def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     run = call("optimize", fixture("arm"), tmp_path / "out.glb", "--max-bytes", "100", *FAST)
     assert "doesn't fit 100 bytes" in refusal(run, 6)
     assert not (tmp_path / "out.glb").exists()
+    still = int(re.findall(r"still takes (\d+) bytes", run.err)[0])
+    assert call("optimize", fixture("arm"), tmp_path / "out.glb", "--max-error", "10%", *FAST).code == 0
+    assert (tmp_path / "out.glb").stat().st_size == still
+
+
+def test_bytes_and_error_both_count(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """The size at the bound itself fits, a byte less does not, though a larger error would do."""
+    at_bound, output = tmp_path / "bound.glb", tmp_path / "out.glb"
+    bound = ("--max-error", "0.01%", "--clip", "wave", *FAST)
+    assert call("optimize", fixture("biped"), at_bound, *bound).code == 0
+    limit = at_bound.stat().st_size
+    assert call("optimize", fixture("biped"), output, "--max-bytes", str(limit), *bound).code == 0
+    assert output.stat().st_size <= limit
+    assert _apart(call, fixture("biped"), output)["max_error_percent"] <= 0.01
+    roomy = call("optimize", fixture("biped"), tmp_path / "no.glb", "--max-bytes", str(limit - 1), *bound[2:])
+    assert roomy.code == 0, roomy.err
+    (tmp_path / "no.glb").unlink()
+    tight = call("optimize", fixture("biped"), tmp_path / "no.glb", "--max-bytes", str(limit - 1), *bound)
+    assert f"doesn't fit {limit - 1} bytes" in refusal(tight, 6)
+    assert not (tmp_path / "no.glb").exists()
+
+
+@pytest.mark.parametrize("place", ["in.data", "out.data"])
+def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """Whatever the models are called; a dry run counts too."""
+    source = tmp_path / "in.data"
+    source.write_bytes(fixture("arm").read_bytes())
+    for dry in ((), ("-n",)):
+        run = call("optimize", source, tmp_path / "out.data", "--report", tmp_path / "." / place, *dry, *FAST)
+        assert "--report would take the place of a model" in refusal(run, 2)
+    assert source.read_bytes() == fixture("arm").read_bytes()
+    assert not (tmp_path / "out.data").exists()
 
 
 # Refusals
@@ -349,6 +407,7 @@ def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
         (("--max-pointer-error", "1mm"), "--max-pointer-error is '1mm'"),
         (("--max-angle", "1"), "--max-angle is '1'"),
         (("--max-speed-error", "0deg"), "--max-speed-error is '0deg'"),
+        (("--max-speed-error", "0"), "--max-speed-error is '0'"),
         (("--max-bytes", "many"), "--max-bytes is 'many'"),
         (("--max-bytes", "0"), "--max-bytes is '0'"),
         (("--max-bytes", "-5kB"), "--max-bytes is '-5kB'"),
@@ -359,10 +418,13 @@ def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
         (("--curve", "c.txt"), "c.txt: is no .csv, .png or .svg file"),
         (("--curve", "nowhere/c.csv"), "there is no folder"),
         (("--report", "nowhere/r.json"), "there is no folder"),
+        (("--report", "r.glb"), "r.glb: --report would take the place of a model"),
+        (("--curve", "c.csv", "--max-bytes", "1kB"), "--curve goes with neither"),
+        (("--curve", "c.csv", "--report", "-"), "--curve goes with neither"),
     ],
 )
 def test_options_out_of_range(
-    options: tuple[str, str], problem: str, fixture: Fixture, tmp_path: Path, call: Call
+    options: tuple[str, ...], problem: str, fixture: Fixture, tmp_path: Path, call: Call
 ) -> None:
     run = call("optimize", fixture("arm"), tmp_path / "out.glb", *options)
     assert problem in refusal(run, 2)

@@ -90,9 +90,10 @@ def test_every_fixture(name: str, fixture: Fixture, call: Call) -> None:
     [
         (["a.jpg"], 2, "no picture is called '.jpg'"),
         (["a.png", "--clip", "no"], 5, "no clip matches 'no'"),
-        (["a.png", "--method", "foo"], 2, "expected lbs"),
+        (["a.png", "--method", "foo"], 2, "'foo' is none of lbs, dqs, cor"),
         (["a.png", "--at", "1", "--frames", "2"], 2, "--at excludes"),
         (["a.png", "--from", "7"], 2, "nothing lies"),
+        (["a.png", "--at", "0.5", "--at", "7"], 2, "there is no frame at 7 s (the motion goes from 0 s to "),
         (["a.png", "--size", "3"], 2, "too small"),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from anim.caches.files import Memory
-from anim.caches.frames import at_time
+from anim.caches.frames import at_time, at_times
 from anim.caches.settings import Reading
 from anim.errors import FormatError
 from tests.anim.caches.making import FACES, by_trimesh, cache, normals_of, opened, positions_of, written
@@ -53,6 +53,18 @@ def test_back_again(ending: str) -> None:
         assert back.times == pytest.approx(source.times, abs=1e-8)
         assert positions_of(back) == pytest.approx(positions_of(source), abs=1e-9)
         assert normals_of(back) == pytest.approx(normals_of(source), abs=1e-7)
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj", ".stl"])
+def test_what_a_longer_sequence_left_behind_is_no_part_of_a_shorter_one(ending: str) -> None:
+    source = cache()
+    files, _ = written(source, f"walk{ending}")
+    shorter, _ = written(at_times(source, source.times[:3]), f"walk{ending}")
+    files.files |= shorter.files
+    assert len(files.files) == 7
+    back = opened(files)
+    assert back.times == pytest.approx(source.times[:3], abs=1e-8)
+    assert len(positions_of(back)) == 3
 
 
 def test_one_frame_is_the_file_itself() -> None:

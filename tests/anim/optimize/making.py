@@ -54,7 +54,8 @@ def every_point(of: Scene) -> Points:
 
 def truth_of(of: Scene, what: Clip, points: Points, reference: Reference = Reference.CURVE) -> Truth:
     """What a clip does to points, all of its tracks free."""
-    return truth(of.skeleton, what, range(len(what.tracks)), points, reference=reference, noticed=1e-6)
+    below = {track.node: points.on(of.skeleton.below(track.node)) for track in what.tracks if track.node is not None}
+    return truth(of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, noticed=1e-6)
 
 
 def setting_of(

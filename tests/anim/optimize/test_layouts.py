@@ -12,7 +12,7 @@ from tests.anim.optimize.making import CORE, every_point, scene, truth_of, wavin
 
 def _layouts() -> Layouts:
     of = scene()
-    return Layouts(truth_of(of, waving(), every_point(of)), CORE)
+    return Layouts(truth_of(of, waving(), every_point(of)), CORE, 1e-3)
 
 
 KEYED = np.array([0, 1, 2])

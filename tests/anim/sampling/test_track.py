@@ -81,6 +81,14 @@ def test_keys_are_exact(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TRACKS)
+def test_a_key_has_the_same_bits_alone_as_between_other_times(name: str) -> None:
+    """Times that are all keys take a shorter way."""
+    times = TRACKS[name].times
+    among = sample(TRACKS[name], np.append(times, times[0] + 0.1))
+    np.testing.assert_array_equal(sample(TRACKS[name], times), among[:-1])
+
+
+@pytest.mark.parametrize("name", TRACKS)
 def test_outside_the_keys_the_ends_hold(name: str) -> None:
     first, last = TRACKS[name].times[[0, -1]]
     ends = sample(TRACKS[name], np.array([first, last]))

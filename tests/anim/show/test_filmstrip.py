@@ -10,10 +10,12 @@ import pytest
 
 from anim.caches.axes import turned
 from anim.errors import NotFoundError, RangeError
+from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
 from anim.show import shots
 from anim.show.filmstrip import Look, Row, filmstrip, moving
 from anim.show.shots import When
+from tests.clips import skeleton
 from tests.files import opened_fixture
 
 SMALL = Look(height=64)
@@ -81,6 +83,15 @@ def test_a_skeleton_without_a_mesh_is_drawn_as_sticks() -> None:
     assert len(rows[0].faces) >= 8 * 10
     assert np.ptp(around[:, 1]) > 1
     assert filmstrip(rows, around, look=SMALL).std() > 5
+
+
+def test_a_long_stick_is_no_wider_than_half_more_than_the_middle_one() -> None:
+    joints = skeleton([-1, 0, 1, 2, 0], translation=[[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0], [0, 0.1, 0], [1, 0, 0]])
+    (instance,) = shots._visible(Scene(joints, ())).instances
+    bodies = instance.mesh.positions.reshape(-1, 24, 3)
+    assert np.ptp(bodies, axis=1).max() == pytest.approx(1)
+    widths = np.linalg.norm(bodies[:, 1] - bodies[:, 13], axis=1)
+    assert widths.max() == pytest.approx(1.5 * np.median(widths))
 
 
 def test_a_cache_with_z_up_stands() -> None:

@@ -16,7 +16,8 @@ from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import grid
 from anim.skinning.bake import baker
-from anim.skinning.layer import Frames, Layer
+from anim.skinning.frames import Frames
+from anim.skinning.layer import Layer
 from tests.files import opened_path
 
 pxr = pytest.importorskip("pxr")

@@ -1,0 +1,123 @@
+"""One file on its way through `optimize`: searched as often as it takes, sized as it will be written."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from anim.errors import AnimError
+from anim.gltf import read
+from anim.gltf.accessors import Accessors
+from anim.gltf.document import Document
+from anim.measure.surface import diagonal
+from anim.model import Clip, Scene
+from anim.ops.selection import Selection
+from anim.optimize.optimize import Optimized, optimize
+from anim.optimize.request import Request
+from anim.optimize.tradeoff import MOST, Sized, fitting
+from cli import optimization, streams
+from cli.errors import CheckError
+from cli.progress import Progress
+from cli.report import Voice, length, plural
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A file, what of it is to be optimized, and where it goes.
+
+    chosen: numbers of clips. scale: m, the diagonal. detailed: whether verdicts are to have statistics.
+    """
+
+    source: streams.Source
+    clips: tuple[Clip, ...]
+    scene: Scene
+    chosen: Sequence[int]
+    scale: float
+    output: str
+    workers: int
+    detailed: bool
+    progress: Progress
+
+    def run(self, request: Request) -> Optimized:
+        """Return what the search makes of it."""
+        found = optimize(
+            self.source.document,
+            self.scene,
+            self.clips,
+            request,
+            chosen=self.chosen,
+            workers=self.workers if optimization.is_long(self.clips, self.chosen) else 1,
+            detailed=self.detailed,
+            start="fork" if sys.platform == "linux" else "spawn",
+            progress=lambda share: self.progress(round(1000 * share)),
+        )
+        self.progress.close()
+        return found
+
+    def smaller(self, found: Optimized) -> Document:
+        """Return the optimized document, or the source where that takes no more bytes."""
+        return optimization.smaller(found, self.source.document, self.size)
+
+    def size(self, document: Document) -> int:
+        """Return the bytes of a document as it would be written."""
+        return streams.write(document, self.output, self.source.folder, dry_run=True)
+
+    def sized(self, request: Request, max_error: float) -> Sized:
+        """Return what a bound, in m, leads to, searched fast."""
+        found = self.run(replace(request, bounds=replace(request.bounds, max_error=max_error), effort="fast"))
+        return Sized(max_error, self.size(self.smaller(found)), optimization.worst(found))
+
+    def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
+        """Return what fits with the smallest error, and the request that led there.
+
+        ceiling: m, what the error may not exceed; None for a tenth of the diagonal. Raises CheckError where nothing
+        fits.
+        """
+        most = MOST * self.scale if ceiling is None else ceiling
+        if ceiling is not None:
+            self._check_fit(self.sized(request, most), max_bytes)
+        best = fitting(max_bytes, self.scale, lambda max_error: self.sized(request, max_error))
+        if best is None:
+            self._check_fit(self.sized(request, most), max_bytes)
+        bound = most if best is None else min(best.max_error, most)
+        request = replace(request, bounds=replace(request.bounds, max_error=bound))
+        found = self.run(request)
+        if self.size(self.smaller(found)) > max_bytes:  # a fast search fits, and a longer one may end elsewhere
+            found = self.run(replace(request, effort="fast"))
+        return request, found
+
+    def _check_fit(self, sized: Sized, max_bytes: int) -> None:
+        if sized.size > max_bytes:
+            percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
+            raise CheckError(
+                f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {length(sized.max_error)}{percent} "
+                f"it still takes {plural(sized.size, 'byte')}; nothing was written"
+            )
+
+
+def job(source: streams.Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:
+    """Return the job for a source. clip: globs. jobs: processes, 0 for one per core. Raises NotFoundError."""
+    document = source.document
+    accessors = Accessors(document)
+    clips, scene = tuple(read.clips(document, accessors)), _scene(document, accessors, voice)
+    return Job(
+        source,
+        clips,
+        scene,
+        Selection(clip).chosen_clips(read.names(document)),
+        diagonal(scene),
+        output,
+        jobs or os.cpu_count() or 1,
+        detailed,
+        Progress("optimize", 1000, shown=not voice.quiet),
+    )
+
+
+def _scene(document: Document, accessors: Accessors, voice: Voice) -> Scene:
+    try:
+        return read.scene(document, accessors)
+    except AnimError as error:  # vertices that can't be read leave the nodes to be measured
+        voice.say(f"note: measured at nodes, not on the surface: {error}")
+        return Scene(read.skeleton(document), ())
