@@ -112,8 +112,9 @@ def _clip_line(about: About, number: int, solution: Solution) -> str:
     )
     found = about.found.verdicts[number]
     assert found.statistics is not None  # -v asks for them
-    usual = f"p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
-    return f"  {read.label(source.name, number)}: {counts}, {_error_words(found, about)}, {usual}"
+    usual = f", p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
+    moved = found.error.max_error > NOTHING * about.scale
+    return f"  {read.label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
 
 
 def as_json(about: About) -> str:
@@ -228,6 +229,9 @@ def _policy(about: About) -> list[str]:
         words.append(f"dropped {plural(dropped.total(), 'channel')} {seen} ({each}; --drop {policy.drop})")
     if about.found.moved:
         words.append(f"moved {plural(len(about.found.moved), 'rest value')}")
+    if about.found.without_loss:
+        names = [about.clips[i].name or str(i) for i in about.found.without_loss]
+        words.append(f"kept without loss, as no smaller way held all bounds: {', '.join(names)}")
     return [f"  {'; '.join(words)}"] if words else []
 
 
@@ -271,6 +275,7 @@ def _clip(about: About, number: int, solution: Solution) -> dict[str, Any]:
         "max_weight_error": rest.weight.size,
         "max_pointer_error": error.max_pointer_error,
         "times_checked": error.times,
+        "without_loss": number in about.found.without_loss,
         "dropped": [
             _target(about, track.node, track.path, track.pointer)
             for track in (source.tracks[k] for k in solution.dropped)

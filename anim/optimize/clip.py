@@ -20,7 +20,7 @@ from anim.sampling import times
 
 MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
 MORPH_ALONE = 0.95
-NOT_UNIT = 1e-3  # off the length 1: tracks with such rotations are kept as they are
+NOT_UNIT = 0.1  # of the bound, that a rotation's length may move the farthest point in players that don't normalize
 NUMBERS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # for each value of a key
 SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
@@ -91,10 +91,17 @@ class _Sorted:
             self._dropped.append(i)
         elif track.path == "weights":
             pass
-        elif track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or _is_bent(track):
+        elif track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or self._is_bent(track):
             self._keep_exactly(i)
         else:
             self._free.append(i)
+
+    def _is_bent(self, track: Track) -> bool:
+        """Whether rotations are so far from unit length that players which don't normalize them show something else."""
+        if track.path != "rotation" or track.interpolation is Interpolation.CUBICSPLINE:
+            return False
+        off = np.abs(np.linalg.norm(track.values, axis=1) - 1).max()
+        return bool(2 * off * self._setting.size > NOT_UNIT * self._task.bound)
 
     def _is_unseen(self, i: int) -> bool:
         node = self._clip.tracks[i].node
@@ -187,13 +194,6 @@ class _Sorted:
         )
         outcome = search(bench, bound, setting.effort)
         return None if outcome is None else _tracks(self._clip, found, outcome)
-
-
-def _is_bent(track: Track) -> bool:
-    """Whether rotations are so far from unit length that players which don't normalize them show something else."""
-    if track.path != "rotation" or track.interpolation is Interpolation.CUBICSPLINE:
-        return False
-    return bool((np.abs(np.linalg.norm(track.values, axis=1) - 1) > NOT_UNIT).any())
 
 
 def _tracks(clip: Clip, found: Truth, outcome: Outcome) -> dict[int, tuple[Track, Stored]]:

@@ -25,13 +25,15 @@ MARGIN = 0.985  # of the bound, that a search may use
 class Optimized:
     """The new document, and by number of the clip what became of it and how far it is from its source.
 
-    moved: (node, path) of rest values that moved. unchanged: whether the input is the output of the same request.
+    moved: (node, path) of rest values that moved. without_loss: numbers of the clips that no lossy way was found for.
+    unchanged: whether the input is the output of the same request.
     """
 
     document: Document
     solutions: Mapping[int, Solution]
     verdicts: Mapping[int, Verdict]
     moved: tuple[tuple[int, str], ...] = ()
+    without_loss: tuple[int, ...] = ()
     unchanged: bool = False
 
 
@@ -63,15 +65,17 @@ def optimize(
     tasks = _tasks(site, chosen)
     solutions: dict[int, Solution] = {}
     verdicts: dict[int, Verdict] = {}
+    without_loss: list[int] = []
     with crew(min(workers, len(tasks)), site, start=start) as workforce:
         for (number, _), each in zip(tasks, workforce.each(finished, tasks), strict=True):
             solutions[number], verdicts[number] = each.solution, each.verdict
+            without_loss += [number] if each.without_loss else []
             progress(len(solutions) / len(tasks))
     new = written(base.document if base else document, solutions, request.packing)
     for number, clip in differing(new, solutions).items():
         verdicts[number] = site.judged(number, clip)
     done = seal.sealed(new, read.clips(new), options)
-    return Optimized(done, solutions, verdicts, base.moved if base else ())
+    return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 
 def _tasks(site: Site, chosen: Sequence[int]) -> list[tuple[int, Task]]:

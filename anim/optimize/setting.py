@@ -22,12 +22,13 @@ from anim.sampling.pose import rest, world_by_node
 class Setting:
     """All that a clip's optimization needs beside the clip.
 
-    rest_world: (N, 3, 4) world matrices of the rest pose. surfaces: those with morph targets.
-    answering: by node that any clip moves, which points (P,) hang on it. unseen: (N,) nodes that carry no vertex, nor
-    does a node on them.
+    size: m, the diagonal of the box around the points at rest. rest_world: (N, 3, 4) world matrices of the rest pose.
+    surfaces: those with morph targets. answering: by node that any clip moves, which points (P,) hang on it.
+    unseen: (N,) nodes that carry no vertex, nor does a node on them.
     """
 
     skeleton: Skeleton
+    size: float
     rest_world: Floats
     points: Points
     surfaces: tuple[Surface, ...]
@@ -77,8 +78,10 @@ def setting(
     world = world_by_node(skeleton, rest(skeleton))[:, 0]
     points = points_.of_scene(scene, shells, bounds.shell, extra)
     driven = sorted({track.node for clip in clips for track in clip.tracks if track.node is not None})
+    places = points.places(world[:, None])[:, 0]
     return Setting(
         skeleton,
+        float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0,
         world,
         points,
         tuple(surface for surface in surfaces(scene) if len(surface.targets)),

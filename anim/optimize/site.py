@@ -22,10 +22,14 @@ ROUNDS = 6  # of searching and verifying; after them a clip that still fails is 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A clip that needs no more work: what became of it, and how far it is from its source."""
+    """A clip that needs no more work: what became of it, and how far it is from its source.
+
+    without_loss: whether no lossy way was found that holds all bounds.
+    """
 
     solution: Solution
     verdict: Verdict
+    without_loss: bool = False
 
 
 class Site:
@@ -111,4 +115,4 @@ def finished(site: Site, item: tuple[int, Task]) -> Finished:
     usual = site.setting()
     exact = solve(replace(usual, bounds=replace(usual.bounds, max_error=0.0)), task)
     assert exact is not None
-    return Finished(exact, site.judged(number, exact.clip))
+    return Finished(exact, site.judged(number, exact.clip), without_loss=site.request.bounds.max_error > 0)

@@ -286,9 +286,10 @@ def test_words(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert "--drop rest)" in run.err
     lines = [line for line in run.err.splitlines() if line.startswith("  clip ")]
     assert len(lines) == len(read.clips(opened_fixture("noop")))
-    assert all("p99 " in line and "mean " in line for line in lines)
+    assert all(("p99 " in line and "mean " in line) is ("no vertex moved" not in line) for line in lines)
+    assert any("p99 " in line for line in lines)
     assert call("optimize", fixture("noop"), tmp_path / "quiet.glb", "-q", *FAST).err == ""
-    exact = call("optimize", fixture("noop"), tmp_path / "exact.glb", "--max-error", "0", *FAST).err
+    exact = call("optimize", fixture("biped"), tmp_path / "exact.glb", "--max-error", "0", *FAST).err  # rounding only
     assert ", no vertex moved, " in exact.splitlines()[0]
     assert (tmp_path / "quiet.glb").is_file()
 
