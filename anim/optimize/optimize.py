@@ -72,9 +72,10 @@ def optimize(
             without_loss += [number] if each.without_loss else []
             progress(len(solutions) / len(tasks))
     new = written(base.document if base else document, solutions, request.packing)
-    for number, clip in differing(new, solutions).items():
-        verdicts[number] = site.judged(number, clip)
-    done = seal.sealed(new, read.clips(new), options)
+    read_back = read.clips(new)
+    for number in differing(read_back, solutions):
+        verdicts[number] = site.judged(number, read_back[number])
+    done = seal.sealed(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from anim.gltf import pack, read, renumber, write
+from anim.gltf import pack, renumber, write
 from anim.gltf.document import Document
 from anim.model import Clip, Track
 from anim.optimize.clip import Solution
@@ -30,10 +30,9 @@ def written(document: Document, solutions: Mapping[int, Solution], packing: Pack
     return renumber.compacted(write.replace_clips(document, clips, packing=how))
 
 
-def differing(document: Document, solutions: Mapping[int, Solution]) -> dict[int, Clip]:
-    """Return, by number, the clips that read back from the document in any number unlike their solution: none."""
-    clips = read.clips(document)
-    return {i: clips[i] for i, each in solutions.items() if not _is_same(clips[i], each.clip)}
+def differing(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) -> list[int]:
+    """Return the numbers of the clips that, read from the new document, are unlike their solution: none."""
+    return [i for i, each in solutions.items() if not _is_same(read_back[i], each.clip)]
 
 
 def _is_same(a: Clip, b: Clip) -> bool:

@@ -33,7 +33,7 @@ def test_every_number_is_read_back_as_it_was_solved(name: str, packing: Packing)
     document = opened_fixture(name)
     solutions = _solutions(name, packing)
     new = opened(glb_of(written(document, solutions, packing)))
-    assert differing(new, solutions) == {}
+    assert differing(read.clips(new), solutions) == []
     for i, clip in enumerate(read.clips(new)):
         for a, b in zip(solutions[i].clip.tracks, clip.tracks, strict=True):
             assert (a.target, a.interpolation) == (b.target, b.interpolation)
@@ -54,9 +54,9 @@ def test_clips_that_differ_are_found() -> None:
     )
     for change in changes:
         clip = replace(solution.clip, tracks=(replace(track, **change), *others))
-        assert list(differing(new, {**solutions, number: replace(solution, clip=clip)})) == [number]
+        assert differing(read.clips(new), {**solutions, number: replace(solution, clip=clip)}) == [number]
     fewer = replace(solution, clip=replace(solution.clip, tracks=solution.clip.tracks[1:]))
-    assert list(differing(new, {number: fewer})) == [number]
+    assert differing(read.clips(new), {number: fewer}) == [number]
 
 
 def test_only_solved_clips_are_replaced() -> None:
