@@ -26,6 +26,7 @@ NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is s
 SLACK = 1.001  # a bound this close to what was found is as good as found
 MAX_SEARCHED = 40_000_000  # vertices gone through per surface and block; beyond, the bound of what is left is reported
 BLOCK = 40_000  # matrices of nodes at once, each some 600 bytes with what is made from it
+SAME_MOMENT = 1e-6  # s; times nearer than this are one, written as float32 and as float64
 FPS = 120.0  # frames per second of the grid that shows what lies between keys
 
 
@@ -134,7 +135,7 @@ def check_times(*clips: Clip) -> Floats:
 
 def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     """Return what `check_times` does, a grid of `fps` frames per second over all of it from 0 s on, and the last moment
-    before each STEP key, in seconds, increasing."""
+    before each STEP key, in seconds, increasing. Frames that only rounding keeps apart from a key are that key."""
     steps = {
         id(track.times): track.times
         for clip in clips
@@ -143,4 +144,7 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     }
     before = [np.nextafter(times[1:], 0) for times in steps.values()]
     end = max((clip.end for clip in clips), default=0.0)
-    return sorted_unique(np.concatenate((check_times(*clips), grid(0.0, end, fps=fps), *before)))
+    keys, frames = check_times(*clips), grid(0.0, end, fps=fps)
+    after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
+    apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
+    return sorted_unique(np.concatenate((keys, frames[apart > SAME_MOMENT], *before)))

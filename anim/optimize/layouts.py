@@ -30,7 +30,7 @@ class Layouts:
         self._scaled = _scaled(truth)
         moved = np.array([each.from_middle for each in truth.moving])
         self._tabled = np.flatnonzero(moved > STILL * bound)
-        if not fits(len(self._tabled), len(truth.grid)):
+        if not fits(len(self._tabled), truth.grid):
             self._tabled = np.empty(0, np.int64)
         self._segments = Segments(self._scaled[self._tabled], truth.grid)
         self._rows: dict[tuple[int, float], Bools] = {}

@@ -6,18 +6,18 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 
-SPAN = 64  # keys that one segment skips at most, and one more
+SPANS = (32, 128)  # keys that one segment covers at most: those of a second, but no fewer and no more than these
 MOST = 40_000_000  # numbers in a table; beyond, callers search anew for each budget (`keys.needed`)
 NEATNESS = 1e-3  # of a key: among the ways with fewest keys the one that misses least is taken
 
 
-def fits(tracks: int, keys: int) -> bool:
-    """Return whether a table for so many tracks and keys is affordable."""
-    return tracks * keys * min(SPAN, keys) <= MOST
+def fits(tracks: int, times: Floats) -> bool:
+    """Return whether a table for so many tracks with keys at `times` (K,), in seconds, is affordable."""
+    return tracks * len(times) * _span(times) <= MOST
 
 
 class Segments:
-    """What lines between two keys miss of a track, for G tracks and all pairs of their K keys up to SPAN apart.
+    """What lines between two keys miss of a track, for G tracks and all pairs of their K keys up to a second apart.
 
     values: (G, K, C) in metres. times: (K,) s.
     """
@@ -25,7 +25,7 @@ class Segments:
     def __init__(self, values: Floats, times: Floats) -> None:
         tracks, count, _ = values.shape
         self._count = count
-        span = min(SPAN, max(count - 1, 1))
+        span = _span(times)
         # missed[e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite where there is none
         self._missed = np.full((count, tracks, span), np.inf, np.float32)
         for n in range(span):
@@ -47,6 +47,12 @@ class Segments:
             total[:, end] = ways[every, best]
             came[:, end] = end - 1 - best
         return _traced(came)
+
+
+def _span(times: Floats) -> int:
+    duration = float(times[-1] - times[0])
+    per_second = int(np.ceil((len(times) - 1) / duration)) if duration > 0 else 1
+    return max(min(max(per_second, SPANS[0]), SPANS[1], len(times) - 1), 1)
 
 
 def _missed(values: Floats, times: Floats, length: int) -> Floats:

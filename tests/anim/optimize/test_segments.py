@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from anim.arrays import Bools, Floats
 from anim.optimize import segments
 from anim.optimize.keys import needed
-from anim.optimize.segments import SPAN, Segments, fits
+from anim.optimize.segments import SPANS, Segments, fits
 
 
 def _missed(values: Floats, times: Floats, keep: Bools) -> float:
@@ -82,8 +82,8 @@ def test_long_lines_have_a_key_now_and_then() -> None:
     times = np.arange(300.0)
     keep = Segments(times[None, :, None] * np.ones(3), times).needed(np.array([0]), np.array([1e-3]))
     at = np.flatnonzero(keep[0])
-    assert np.diff(at).max() <= SPAN
-    assert len(at) == 2 + (299 - 1) // SPAN
+    assert np.diff(at).max() <= SPANS[0]
+    assert len(at) == 2 + (299 - 1) // SPANS[0]
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -93,7 +93,8 @@ def test_one_and_two_keys_stay(count: int) -> None:
 
 
 def test_tables_are_kept_within_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert fits(100, 2000)
-    assert not fits(2000, 20_000)
+    assert fits(100, np.arange(2000) / 30)
+    assert not fits(2000, np.arange(20_000) / 30)
+    assert not fits(200, np.arange(2000) / 240)
     monkeypatch.setattr(segments, "MOST", 10)
-    assert not fits(2, 4)
+    assert not fits(2, np.arange(4.0))
