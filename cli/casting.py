@@ -52,7 +52,7 @@ def pairs(path: str | None) -> dict[str, str]:
     """Return what an alias file says, nothing for none."""
     if path is None:
         return {}
-    with streams.content(path) as (data, _):
+    with streams.content(path, ending=".csv") as (data, _):
         return aliases.read(data.tobytes())
 
 

@@ -12,11 +12,12 @@ from anim.measure.diff import ClipDiff, Diff
 from anim.measure.footprint import Footprint
 from anim.measure.statistics import Peak
 from cli import tables
-from cli.report import change, length, plural, speed
+from cli.report import change, digits, length, plural, speed
 
 SCHEMA = 1
 SAME_END = 1e-6  # s; ends that are nearer than this differ by rounding
 LISTED = 5  # names of things that only one file has
+STRANGERS = "no clip and no node has the same name in both files"
 HEADER = ("clip", "joint", "vertex", "at s", "max", "%", "p99", "mean", "turn", "speed", "weights", "pointers", "end s")
 
 
@@ -32,22 +33,42 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What was found about two files, and how it was measured: by which player, at how many frames per second."""
+    """What was found about two files, and how it was measured.
+
+    nodes_by_name: how many nodes of the old file have a namesake in the new one. are_named: whether both files call
+    anything by a name. player: who plays both. fps: frames per second of the grid. shell: m.
+    """
 
     old: File
     new: File
     diff: Diff
+    nodes_by_name: int
+    are_named: bool
     player: str
     fps: float
     shell: float
 
+    @property
+    def clips_by_name(self) -> int:
+        """How many of the clips that are compared have the same name in both files."""
+        return sum(bool(each.name) and each.name == each.new_name for each in self.diff.clips)
+
+    @property
+    def are_strangers(self) -> bool:
+        """Whether names are given, and none is in both files: order alone says what is held against what."""
+        return self.are_named and not self.clips_by_name and not self.nodes_by_name
+
 
 def text(found: Found) -> str:
-    """Return a row per clip, the worst first, then what only one file has, and one line that says it all."""
+    """Return a row per clip, the worst first, then what only one file has, and one line that says it all.
+
+    Files in which nothing has the same name are called that before anything else.
+    """
+    head = f"{STRANGERS}: what follows holds things against each other by their order\n" if found.are_strangers else ""
     clips = found.diff.clips
     rows = [_row(each, found.diff.diagonal) for each in clips]
     table = tables.text([*HEADER, "tracks"], rows, left=2, indent="") + "\n" if rows else ""
-    return table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
+    return head + table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
 
 
 def as_json(found: Found) -> str:
@@ -61,6 +82,8 @@ def as_json(found: Found) -> str:
         "shell_m": found.shell,
         "diagonal_m": diff.diagonal,
         "meshes_agree_by_vertex": diff.by_vertex,
+        "clips_matched_by_name": found.clips_by_name,
+        "nodes_matched_by_name": found.nodes_by_name,
         "max_error_m": diff.clips[0].error.max_error if diff.clips else 0.0,
         "max_error_percent": _percent(diff.clips[0].error.max_error, diff.diagonal) if diff.clips else 0.0,
         "clips": [_clip(each, diff.diagonal) for each in diff.clips],
@@ -90,7 +113,7 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
     ends = f"{each.end_old:.4g} → {each.end_new:.4g}" if abs(each.end_old - each.end_new) > SAME_END else ""
     changed = [f"−{len(each.missing)}"] * bool(each.missing) + [f"+{len(each.added)}"] * bool(each.added)
     return [
-        _name(each.name, each.old) + (f" → {each.new_name}" if each.new_name != each.name else ""),
+        _name(each.name, each.old) + (f" → {_name(each.new_name, each.new)}" if each.new_name != each.name else ""),
         error.joint,
         str(error.vertex) if error.vertex >= 0 else "",
         f"{error.time:.3f}" if moved else "",
@@ -192,7 +215,7 @@ def _share(value: float) -> str:
     """A number with two digits, three above 100, never in the form 2.8e-05."""
     if 0 < value < 1e-4:
         return "<0.0001"
-    return f"{float(f'{value:.{3 if value >= 100 else 2}g}'):.6f}".rstrip("0").rstrip(".")
+    return digits(value, 3 if value >= 100 else 2)
 
 
 def _name(name: str, number: int) -> str:

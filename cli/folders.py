@@ -24,6 +24,7 @@ from anim.errors import FormatError
 from anim.gltf.document import Bytes
 from cli import streams
 from cli.errors import UsageError
+from cli.replacing import mode_of, neighbor
 
 
 def inputs(path: str, stack: ExitStack) -> Folder:
@@ -52,9 +53,9 @@ class Folder:
     def open(self, name: str) -> BinaryIO:
         """The file of this name, from its beginning."""
         path = self._folder / name
-        if path.is_dir():
-            raise FormatError("is a folder")
         try:
+            if path.is_dir():
+                raise FormatError("is a folder")
             file = path.open("rb")
             self.sizes[name] = os.fstat(file.fileno()).st_size
             return file
@@ -69,12 +70,15 @@ class Folder:
 
     def names(self) -> Sequence[str]:
         """Names of all files in the folder."""
-        return sorted(os.listdir(self._folder))
+        try:
+            return sorted(os.listdir(self._folder))
+        except OSError as error:
+            raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 
 
 @dataclass
 class Staged:
-    """Outputs as temporary files in the folder where they belong."""
+    """Outputs as temporary files beside those whose place they are to take, where links lead."""
 
     folder: Path
     main: str
@@ -92,7 +96,10 @@ class Staged:
 
     def create(self, name: str) -> BinaryIO:
         """A new file of this name, open for writing and reading back."""
-        handle, temporary = tempfile.mkstemp(prefix=f".{name}.", suffix=".tmp", dir=self.folder)
+        path = Path(os.path.realpath(self.folder / name))
+        if path.exists() and not path.is_file():  # what lies beside /dev/null is not for everybody to write
+            path = Path(tempfile.gettempdir()) / name
+        handle, temporary = neighbor(path)
         self.files[name] = Path(temporary)
         return os.fdopen(handle, "w+b")
 
@@ -106,7 +113,7 @@ class Staged:
                 with temporary.open("rb") as source, path.open("wb") as target:
                     shutil.copyfileobj(source, target, PIECE)
             elif not path.exists() or not filecmp.cmp(temporary, path, shallow=False):
-                os.chmod(temporary, streams.mode_of(path))
+                os.chmod(temporary, mode_of(path))
                 os.replace(temporary, path)
 
     def to_stdout(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from anim import __version__
 from cli.coerce import quicken
@@ -178,10 +178,10 @@ class LazyGroup(TyperGroup):
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command, imported now, None where there is none of this name."""
+        """Return the command, imported now, None where there is none of this name; a stand-in where there is one."""
         row = COMMANDS.get(cmd_name)
-        if row is None:
-            return None
+        if row is None or cmd_name in self.commands:
+            return self.commands.get(cmd_name)
         name = cmd_name.replace("-", "_")
         function = getattr(importlib.import_module(f"cli.commands.{name}"), name)
         single = typer.Typer(add_completion=False, rich_markup_mode=None)
@@ -189,9 +189,14 @@ class LazyGroup(TyperGroup):
         single.command(cmd_name, epilog=f"\b\nExamples:\n{examples}", no_args_is_help=False)(function)
         return quicken(typer.main.get_command(single))
 
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Return the commands and options that begin so; the words beside a command are the table's, none imported."""
+        self.commands = {name: TyperCommand(name, short_help=row.about) for name, row in COMMANDS.items()}
+        return super().shell_complete(ctx, incomplete)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that `args` name; a misspelled one is answered with the nearest."""
-        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+        """Return the command that `args` name; a misspelled one is answered with the nearest, but not to a shell."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
             near = difflib.get_close_matches(args[0], COMMANDS, n=1)
             hint = f" Did you mean '{near[0]}'?" if near else f" The commands are {', '.join(COMMANDS)}."
             ctx.fail(f"no such command '{args[0]}'.{hint}")

@@ -29,6 +29,16 @@ class Path(StrEnum):
 
 
 Paths = Annotated[list[Path] | None, typer.Option("--path", help="Only tracks of this property; may be repeated.")]
+
+
+class Format(StrEnum):
+    """What a report looks like."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+Report = Annotated[Format, typer.Option("--format", help="Text to read, or one JSON document.")]
 From = Annotated[float | None, typer.Option("--from", metavar="S", help="From so many seconds of the clip on.")]
 To = Annotated[float | None, typer.Option("--to", metavar="S", help="Up to so many seconds of the clip.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do everything but write.")]

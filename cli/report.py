@@ -48,18 +48,18 @@ def length(meters: float) -> str:
     if meters == 0:
         return "0 mm"
     for unit, factor, limit in (("nm", 1e9, 1e-6), ("µm", 1e6, 1e-4), ("mm", 1e3, 1e-2), ("cm", 1e2, 1.0)):
-        if meters < limit:
-            return f"{_digits(meters * factor, 2)} {unit}"
-    return f"{_digits(meters, 3)} m"
+        if float(f"{meters:.2g}") < limit:
+            return f"{digits(meters * factor, 2)} {unit}"
+    return f"{digits(meters, 3)} m"
 
 
 def speed(meters_per_second: float) -> str:
     """Return a speed with two digits: "0.46 m/s", "280 m/s"."""
-    return f"{_digits(meters_per_second, 2)} m/s"
+    return f"{digits(meters_per_second, 2)} m/s"
 
 
-def _digits(value: float, count: int) -> str:
-    """The value rounded to so many digits, never in the form 2.8e+02."""
+def digits(value: float, count: int) -> str:
+    """Return the value rounded to so many digits, never in the form 2.8e+02."""
     return f"{float(f'{value:.{count}g}'):.10f}".rstrip("0").rstrip(".")
 
 

@@ -11,7 +11,7 @@ from anim.measure.continuity import Grade, Largest, Seam, TrackContinuity
 from anim.measure.facts import ClipFacts
 from cli import tables
 from cli.inspection import Inspected, Smoothness
-from cli.report import length, plural, speed
+from cli.report import digits, length, plural
 from cli.tables import Cell
 
 
@@ -101,13 +101,8 @@ def _seam(track: TrackContinuity) -> str:
 def _amount(size: float, unit: str, per: str) -> str:
     """A jump with its unit, two digits: "0.46 m/s", "12 °/s", "3.1 /s²"."""
     if unit == "m":
-        return speed(size).removesuffix("/s") + per if per else length(size)
+        return f"{digits(size, 2)} m{per}" if per else length(size)
     if unit == "rad":
-        degrees = _number(math.degrees(size))
+        degrees = digits(math.degrees(size), 2)
         return f"{degrees} °{per}" if per else f"{degrees}°"
-    return f"{_number(size)} {per}".rstrip()
-
-
-def _number(value: float) -> str:
-    """A value rounded to two digits, never in the form 2.8e+02."""
-    return speed(value).removesuffix(" m/s")
+    return f"{digits(size, 2)} {per}".rstrip()

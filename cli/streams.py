@@ -1,14 +1,13 @@
 """Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path, but
-`cli.folders` for what is streamed."""
+`cli.folders` for what is streamed, and `cli.replacing` to write."""
 
 from __future__ import annotations
 
 import mmap
 import os
 import sys
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from anim.errors import AnimError, FormatError
 from anim.gltf import container, uri
 from anim.gltf.document import Bytes, Document, items
 from cli.errors import UsageError
+from cli.replacing import replace_all
 
 PIPE = "-"
 OTHERS = frozenset((".bin", ".bvh", ".csv", ".dae", ".fbx", ".json", ".npz", ".obj", ".usd", ".usda", ".usdc", ".usdz"))
@@ -49,11 +49,14 @@ def source(path: str) -> Iterator[Source]:
 
 
 @contextmanager
-def content(path: str) -> Iterator[tuple[Bytes, str]]:
-    """Give the bytes at `path`, "-" for stdin, and what messages call them; errors raised inside name the input."""
+def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
+    """Give the bytes at `path`, "-" for stdin, and what messages call them; errors raised inside name the input.
+
+    ending: of the files that are meant, for the hint where `path` is a folder.
+    """
     name = _called(path)
     try:
-        yield _stdin() if path == PIPE else _mapped(Path(path)), name
+        yield _stdin() if path == PIPE else _mapped(Path(path), ending), name
     except UsageError:
         raise
     except AnimError as error:
@@ -73,7 +76,7 @@ def write(document: Document, path: str, beside: Path | None, *, dry_run: bool =
         pieces = {target.parent / name: content for name, content in files.items()}
         if not dry_run:
             own = target.with_suffix(".gltf")  # x.GLTF stays that
-            _replace_all({target if file == own else file: content for file, content in pieces.items()})
+            replace_all({target if file == own else file: content for file, content in pieces.items()})
         return sum(len(piece) for content in pieces.values() for piece in content)
     content = container.glb(document)
     if not dry_run:
@@ -87,7 +90,7 @@ def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
         _no_terminal()
         _to_stdout(pieces)
     else:
-        _replace(Path(path), list(pieces))
+        replace_all({Path(path): list(pieces)})
 
 
 def write_text(text: str, path: str = PIPE) -> None:
@@ -99,7 +102,7 @@ def write_text(text: str, path: str = PIPE) -> None:
     if path == PIPE:
         _to_stdout([content])
     else:
-        _replace(Path(path), [content])
+        replace_all({Path(path): [content]})
 
 
 def check_output(path: str) -> None:
@@ -117,10 +120,13 @@ def check_file(path: str) -> None:
     if not path:
         raise UsageError("the output has an empty name")
     target = Path(path)
-    if target.is_dir():
-        raise UsageError(f"{path}: is a folder (expected a file name)")
-    if not target.parent.is_dir():
-        raise UsageError(f"{path}: there is no folder '{target.parent}'")
+    try:
+        if target.is_dir():
+            raise UsageError(f"{path}: is a folder (expected a file name)")
+        if not target.parent.is_dir():
+            raise UsageError(f"{path}: there is no folder '{target.parent}'")
+    except OSError as error:  # a name that no file can have
+        raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
 
 
 def _called(path: str) -> str:
@@ -154,10 +160,10 @@ def _stdin() -> Bytes:
     return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
 
 
-def _mapped(path: Path) -> Bytes:
-    if path.is_dir():
-        raise FormatError("is a folder", help=f"name the files: {path}/*.glb")
+def _mapped(path: Path, ending: str = ".glb") -> Bytes:
     try:
+        if path.is_dir():
+            raise FormatError("is a folder", help=f"name the files: {path}/*{ending}")
         with path.open("rb") as file:
             if not path.is_file() or os.fstat(file.fileno()).st_size == 0:
                 return np.frombuffer(file.read(), np.uint8)
@@ -194,53 +200,6 @@ def _place(folder: Path, address: str) -> Path:
 
 def _external_size(document: Document) -> int:
     return sum(b.byte_length for b in document.buffers if b.uri is not None and not b.uri.startswith("data:"))
-
-
-def _replace(path: Path, pieces: list[Bytes]) -> None:
-    _replace_all({path: pieces})
-
-
-def _replace_all(files: Mapping[Path, list[Bytes]]) -> None:
-    """Write temporary neighbours and rename them, once all are whole, over files whose bytes differ."""
-    waiting: dict[Path, str] = {}
-    named = next(iter(files))
-    try:
-        for named, pieces in files.items():
-            path = Path(os.path.realpath(named))
-            if path.exists() and not os.access(path, os.W_OK):
-                raise UsageError(f"{named}: is read-only")
-            if path.exists() and not path.is_file():  # /dev/null, a named pipe
-                with path.open("wb") as file:
-                    file.writelines(piece.data for piece in pieces)
-            elif not _is_same(path, pieces):
-                handle, waiting[path] = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-                with os.fdopen(handle, "wb") as file:
-                    file.writelines(piece.data for piece in pieces)
-                os.chmod(waiting[path], mode_of(path))
-        for path, temporary in waiting.items():
-            os.replace(temporary, path)
-    except OSError as error:
-        raise UsageError(f"{named}: can't be written ({(error.strerror or str(error)).lower()})") from None
-    finally:
-        for temporary in waiting.values():
-            with suppress(FileNotFoundError):
-                os.unlink(temporary)
-
-
-def mode_of(path: Path) -> int:
-    """Return the permissions that a file at `path` has or would get."""
-    if path.exists():
-        return path.stat().st_mode & 0o7777
-    umask = os.umask(0)
-    os.umask(umask)
-    return 0o666 & ~umask
-
-
-def _is_same(path: Path, pieces: list[Bytes]) -> bool:
-    if not path.is_file() or path.stat().st_size != sum(len(piece) for piece in pieces):
-        return False
-    with path.open("rb") as file:
-        return all(file.read(len(piece)) == piece.tobytes() for piece in pieces)
 
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:

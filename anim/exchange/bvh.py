@@ -11,6 +11,7 @@ from anim.errors import UnsupportedError
 from anim.exchange import bvh_frames, bvh_hierarchy, bvh_write, curve
 from anim.exchange.bvh_hierarchy import BvhJoint
 from anim.exchange.curve import Curve, Mode
+from anim.exchange.labels import unique
 from anim.exchange.lines import text_of
 from anim.exchange.motion import Convention, EulerMotion, EulerNode
 from anim.maths.euler import Frame
@@ -35,7 +36,8 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
         lines.pop()
     joints, start, column = bvh_hierarchy.hierarchy(lines)
     found = bvh_frames.frames(lines, start, column, sum(len(joint.channels) for joint in joints))
-    names, renamed = _unique([joint.name for joint in joints])
+    names = unique([joint.name for joint in joints])
+    renamed = [name for name, joint in zip(names, joints, strict=True) if name != joint.name]
     times = np.arange(len(found.rows)) / found.fps
     nodes, first = [], 0
     for joint, name in zip(joints, names, strict=True):
@@ -51,22 +53,6 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     if convention.frame != Frame.INTRINSIC:
         raise UnsupportedError("a BVH's angles are intrinsic", help="give --frame intrinsic; the order reads backwards")
     return bvh_write.write(motion)
-
-
-def _unique(names: list[str]) -> tuple[list[str], list[str]]:
-    """The names with numbers where one came before, and those that got a number."""
-    taken, unique, renamed = set(names), list[str](), list[str]()
-    seen: set[str] = set()
-    for name in names:
-        new, number = name, 1
-        while new in seen or (number > 1 and new in taken):
-            number += 1
-            new = f"{name}.{number}"
-        seen.add(new)
-        unique.append(new)
-        if number > 1:
-            renamed.append(new)
-    return unique, renamed
 
 
 def _node(joint: BvhJoint, name: str, times: Floats, rows: Floats, position: BvhPosition) -> EulerNode:

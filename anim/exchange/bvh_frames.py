@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.bvh_hierarchy import fail
-from anim.exchange.lines import LIMIT
+from anim.exchange.lines import GROUPED, LIMIT
 from anim.exchange.lines import number as number_of
 
 RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100,
@@ -79,9 +79,10 @@ def _find(lines: list[str], start: int, pattern: str, expected: str) -> tuple[in
 
 
 def _numbers(lines: list[str], body: int) -> Floats:
+    words = " ".join(lines[body:])
     try:
-        numbers: Floats = np.array([*map(float, " ".join(lines[body:]).split())], np.float64)
-        if not len(numbers) or np.abs(numbers).max() <= LIMIT:  # NaN is not
+        numbers: Floats = np.array([*map(float, words.split())], np.float64)
+        if GROUPED not in words and (not len(numbers) or np.abs(numbers).max() <= LIMIT):  # NaN is not
             return numbers
     except ValueError:
         pass

@@ -42,7 +42,7 @@ def write(motion: EulerMotion) -> bytes:
     rows = np.round(np.stack(columns, axis=-1), DIGITS) + 0.0
     pattern = " ".join([f"%.{DIGITS}f"] * rows.shape[1])
     lines += [pattern % tuple(row) for row in rows.tolist()]
-    return ("\n".join(lines) + "\n").encode()
+    return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # half a surrogate pair, which JSON can name
 
 
 def _frame_times(motion: EulerMotion) -> Floats:
@@ -85,6 +85,5 @@ def _columns(node: EulerNode, times: Floats, with_position: bool) -> list[Floats
 
 
 def _numbers(vector: Floats) -> str:
-    return " ".join(
-        f"{round(x, DIGITS) + 0.0:g}" if x == round(x) else f"{x + 0.0:.{DIGITS}f}" for x in vector.tolist()
-    )
+    rounded = (np.round(vector, DIGITS) + 0.0).tolist()
+    return " ".join(str(int(x)) if x == int(x) else f"{x:.{DIGITS}f}" for x in rounded)

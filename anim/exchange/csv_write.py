@@ -38,7 +38,7 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     columns = [column for node in motion.nodes for column in _columns(node, convention)]
     straight = all((curve.modes == Mode.LINEAR).all() for _, _, curve in columns)
     (_write_frames if straight else _write_keys)(rows, columns)
-    return out.getvalue().encode()
+    return out.getvalue().encode(errors="backslashreplace")  # half a surrogate pair, which JSON can name
 
 
 def _columns(node: EulerNode, convention: Convention) -> list[Column]:
@@ -63,13 +63,15 @@ def _write_frames(rows: Any, columns: list[Column]) -> None:
 
 def _write_keys(rows: Any, columns: list[Column]) -> None:
     words = [mode.name.lower() for mode in Mode]
-    rows.writerow([*KEY_COLUMNS, *EXTRA_COLUMNS])
-    for node, channel, curve in columns:
+    would_be_comments = any(node.startswith("#") for node, _, _ in columns)
+    first, second = (1, 0) if would_be_comments else (0, 1)
+    rows.writerow([KEY_COLUMNS[first], KEY_COLUMNS[second], *KEY_COLUMNS[2:], *EXTRA_COLUMNS])
+    for *named, curve in columns:
         handles = [getattr(curve, name) for name in HANDLES]
         extra = [[""] * len(curve.times) if h is None else [*map(_text, h.tolist())] for h in handles]
         keys = zip(curve.times.tolist(), curve.values.tolist(), curve.modes.tolist(), *extra, strict=True)
         for time, value, mode, *cells in keys:
-            rows.writerow([node, channel, _text(time), _text(value), words[mode], *cells])
+            rows.writerow([named[first], named[second], _text(time), _text(value), words[mode], *cells])
 
 
 def _text(value: float) -> str:

@@ -185,7 +185,7 @@ def _numbers(
     if key not in about:
         return default
     given = about[key]
-    good = isinstance(given, list) and all(type(x) in (int, float) for x in given)
+    good = isinstance(given, list) and all(type(x) is int or isinstance(x, float) for x in given)
     if not good or (lengths is not None and len(given) not in lengths):
         count = "" if lengths is None else " or ".join(map(str, lengths)) + " "
         raise FormatError(f"{key} is not a list of {count}numbers", where=where)

@@ -9,6 +9,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import FormatError
 
+GROUPED = "_"  # Python reads 1_000 as a number; no file means that
 LIMIT = 1e15  # greatest number that is taken: float32 and products of lengths stay far from overflow
 
 
@@ -40,6 +41,8 @@ def number(text: str) -> float | None:
     try:
         value = float(text)
     except ValueError:
+        return None
+    if GROUPED in text:
         return None
     return value if math.isfinite(value) and abs(value) <= LIMIT else None
 

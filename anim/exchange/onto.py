@@ -38,7 +38,7 @@ def onto(
 
     Joints are those of the character's skins, or all its nodes where it has none. See `match` and `retarget`.
     nested: whether the motion has a hierarchy; if not, its curves are the nodes' own and go to them as they are.
-    Raises NotFoundError where no joint is matched.
+    Raises NotFoundError where no joint is matched, or there is none.
     """
     joints = {int(node) for each in target.instances if each.skin is not None for node in each.skin.joints}
     matching = match(
@@ -48,6 +48,8 @@ def onto(
         of_source=_parents_first(source),
         of_target=sorted(joints) if joints and nested else list(range(len(target.skeleton))),
     )
+    if not target.skeleton.names:
+        raise NotFoundError("the character has no nodes that a motion could move")
     if not matching.pairs:
         first = source.skeleton.names[0], target.skeleton.names[min(joints, default=0)]
         raise NotFoundError(

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from anim.arrays import Floats, sorted_unique
-from anim.errors import NotFoundError
+from anim.errors import NotFoundError, RangeError
 from anim.exchange import between
 from anim.exchange.floor import at_or_below, heights_above_contact, soles
 from anim.exchange.from_euler import Converted
@@ -20,6 +20,7 @@ from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.sampling import pose as posed
 from anim.sampling import rest, world_matrices
 
+LONGEST = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
 CONTACT_STEP = 1 / 30  # s between times at which soles are looked at, where keys stand farther apart
 
 
@@ -54,15 +55,18 @@ def retarget(
     floor: CONTACT moves the hips up or down so that the soles stand where they stand at rest while a foot of the
     source is down; KEEP scales heights only. rest_at: s, the time at which the source stands in its rest pose; None
     for the pose in which every angle is zero.
-    Raises NotFoundError where no joint is matched.
+    Raises NotFoundError where no joint is matched, RangeError for CONTACT in a motion of over a day.
     """
     if not matching.pairs:
         raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
+    if floor == Floor.CONTACT and source.clip.end - source.clip.start > LONGEST:
+        seconds = source.clip.end - source.clip.start
+        raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
     follow = transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
     times = _times(source.clip)
-    looked_at = times if source.tolerance is None else _no_farther(times, CONTACT_STEP)
-    lowered = np.zeros(len(looked_at))
+    looked_at, lowered = times, np.zeros(len(times))
     if floor == Floor.CONTACT:
+        looked_at = times if source.tolerance is None else _no_farther(times, CONTACT_STEP)
         lowered = _too_high(follow, target, matching, looked_at)
 
     def at(when: Floats) -> tuple[dict[int, Floats], Floats]:

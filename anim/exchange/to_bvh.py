@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from anim.arrays import Floats, sorted_unique
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.curve import Curve, linear
+from anim.exchange.labels import label_of, labels, left_out, unique
 from anim.exchange.motion import NO_TURN, ZERO, EulerMotion, EulerNode
 from anim.exchange.orders import Orders
-from anim.exchange.to_euler import FILE_LOCK, left_out, unique_names, what_of
+from anim.exchange.to_euler import FILE_LOCK
 from anim.exchange.turns import world_rotations
 from anim.maths import euler, quaternion
 from anim.maths.euler import Frame
@@ -22,6 +23,7 @@ EVEN = 1e-3  # share of a frame by which frames may be off an even grid
 MAX_FRAMES = 10_000_000
 ROUNDING = 2e-7  # share of a time that float32 may be off
 STILL = 1e-5  # share of the skeleton's size by which an offset may differ and still be one
+BRACES = "{}"
 END = "_end"  # a leaf of this name that nothing moves is where its parent ends
 
 
@@ -44,46 +46,58 @@ def to_bvh(
     joints: nodes to write, with what lies between them; empty for all. Lengths are divided by meters_per_unit.
     """
     orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
-    chosen, names = _chosen(skeleton, clip, joints), unique_names(skeleton)
+    chosen, names = _chosen(skeleton, clip, joints), _names(skeleton)
     if not chosen:
         raise UnsupportedError("there is no node to write")
     orders.check([names[node] for node in chosen])
     shown, times = _frames(clip, fps)
-    moving, still = pose(skeleton, clip, times), rest(skeleton)
-    places, home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
-    turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
-    turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
-    size = float(np.ptp(home[chosen], axis=0).max()) or 1.0
-    numbers = {node: i for i, node in enumerate(chosen)}
-    nodes = []
-    for node in chosen:
-        parent = _above(skeleton, node, numbers)
-        above = (ZERO, NO_TURN[None], ZERO)
-        if parent >= 0:
-            above = (home[parent], turns[parent], places[:, parent])
-        offset, turn, path = _seen_from((home[node], turns[node], places[:, node]), above)
-        moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * size)
-        end = parent >= 0 and not moved and _is_end(skeleton, clip, node, numbers)
-        own = orders.of(names[node], turn)
-        angles = euler.continuous(turn, order=own, frame=Frame.INTRINSIC, lock=FILE_LOCK)
-        nodes.append(
-            EulerNode(
-                names[node],
-                numbers.get(parent, -1),
-                offset / meters_per_unit,
-                own,
-                Frame.INTRINSIC,
-                np.zeros(3),
-                (None, None, None) if end else tuple(_curves(shown, angles)),
-                dict(enumerate(_curves(shown, path / meters_per_unit))) if moved else {},
-                end=end,
-            )
-        )
-    lost = [what_of(track, names) for track in clip.tracks if track.path not in ("translation", "rotation")]
-    return EulerMotion(tuple(nodes), sampled=True, notes=(left_out(lost),) if lost else ())
+    figure = _Figure(skeleton, clip, chosen, times)
+    nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
+    notes = left_out(_lost(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen)
+    return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 
 Placed = tuple[Floats, Floats, Floats]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
+
+
+class _Figure:
+    """The nodes to write, numbered in their order, and where they are at times (F,) and at rest."""
+
+    def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
+        moving, still = pose(skeleton, clip, times), rest(skeleton)
+        self.skeleton, self.clip = skeleton, clip
+        self.numbers = {node: i for i, node in enumerate(chosen)}
+        self._places, self._home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
+        turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
+        self._turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
+        self.size = float(np.ptp(self._home[chosen], axis=0).max()) or 1.0
+
+    def placed(self, node: int) -> Placed:
+        """Where a node is in the world; −1 is the world itself."""
+        if node < 0:
+            return ZERO, NO_TURN[None], ZERO
+        return self._home[node], self._turns[node], self._places[:, node]
+
+
+def _node(figure: _Figure, node: int, name: str, orders: Orders, shown: Floats, meters_per_unit: float) -> EulerNode:
+    """A joint with the curves that it needs; lengths in the file's unit, keys at times `shown`."""
+    parent = _above(figure.skeleton, node, figure.numbers)
+    offset, turn, path = _seen_from(figure.placed(node), figure.placed(parent))
+    moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * figure.size)
+    end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
+    order = orders.of(name, turn)
+    angles = euler.continuous(turn, order=order, frame=Frame.INTRINSIC, lock=FILE_LOCK)
+    return EulerNode(
+        name,
+        figure.numbers.get(parent, -1),
+        offset / meters_per_unit,
+        order,
+        Frame.INTRINSIC,
+        np.zeros(3),
+        (None, None, None) if end else tuple(_curves(shown, angles)),
+        dict(enumerate(_curves(shown, path / meters_per_unit))) if moved else {},
+        end=end,
+    )
 
 
 def _seen_from(node: Placed, parent: Placed) -> Placed:
@@ -133,6 +147,30 @@ def _is_end(skeleton: Skeleton, clip: Clip, node: int, among: Collection[int]) -
     leaf = not (skeleton.parents == node).any()
     named = parent >= 0 and skeleton.names[node].casefold().endswith(END)
     return named and leaf and parent in among and all(track.node != node for track in clip.tracks)
+
+
+def _names(skeleton: Skeleton) -> list[str]:
+    """Names of all nodes; braces, between which a BVH has its joints, become parentheses."""
+    return unique([name.translate(str.maketrans(BRACES, "()")) for name in labels(skeleton)])
+
+
+def _renamed(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:
+    changed = [names[node] for node in sorted(chosen) if set(skeleton.names[node]) & set(BRACES)]
+    return (f"braces in names became parentheses: {', '.join(changed)}",) if changed else ()
+
+
+def _lost(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
+    """What of the clip a BVH of the chosen nodes doesn't show, in words."""
+    carrying = set(chosen)
+    for node in chosen:
+        while (node := int(skeleton.parents[node])) >= 0 and node not in carrying:
+            carrying.add(node)
+    names = labels(skeleton)
+    return [
+        label_of(track, names)
+        for track in clip.tracks
+        if track.path not in ("translation", "rotation") or track.node not in carrying
+    ]
 
 
 def _above(skeleton: Skeleton, node: int, among: Collection[int]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Floats, sorted_unique
 from anim.errors import RangeError
 from anim.exchange.curve import Curve, Mode, uniform_modes
+from anim.exchange.labels import label_of, labels, left_out
 from anim.exchange.motion import EulerMotion, EulerNode
 from anim.exchange.orders import Orders
 from anim.maths import euler, quaternion
@@ -20,7 +21,6 @@ from anim.sampling.times import key_times
 from anim.sampling.track import sample
 
 FILE_LOCK = 1e-6  # rad; what a file's float32 quaternions leave of a lock
-LISTED = 3  # of what is left out
 BETWEEN = np.array((0.25, 0.5, 0.75))
 MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
 ROUNDS, MOST_PIECES, MAX_KEYS = 24, 32, 500_000
@@ -50,7 +50,8 @@ def to_euler(
     """Return the clip as Euler curves in radians, straight between keys, and the rest of all nodes.
 
     Each key gets the equivalent triple nearest to the key before; at lock see `euler.continuous`. Keys stand where the
-    tracks have theirs, or at `fps` frames per second; steps stay steps. Translations and scales keep their cubics.
+    tracks have theirs, or at `fps` frames per second; steps stay steps, at their times. Translations and scales keep
+    their cubics where no `fps` is given.
     order: one of the twelve for all nodes, or `Orders`; auto looks at the clip's keys and half way between.
     tolerance: rad; keys are added where straight curves would leave the motion by more. Raises RangeError below 1e-6.
     without: nodes to leave out where nothing moves them and nothing hangs on them, such as those that hold a skin.
@@ -59,61 +60,24 @@ def to_euler(
     if tolerance is not None and not 1e-6 <= tolerance < np.inf:
         raise RangeError(f"tolerance is {tolerance:g} rad (expected 1e-06 or more)")
     frames = key_times(grid(clip.start, clip.end, fps=fps)) if fps is not None else None
-    names = unique_names(skeleton)
+    names = labels(skeleton)
     orders.check(names)
     by_node, lost = _by_node(clip, names)
-    nodes, deviation = [], 0.0
-    for number, name in enumerate(names):
-        tracks = by_node.get(number, {})
-        turn = tracks.get("rotation")
-        rotation: tuple[Curve | None, ...] = (None, None, None)
-        own = orders.of(name, skeleton.rotation[number] if turn is None else _seen(turn), frame)
-        if turn is not None:
-            rotation, off = _rotation(turn, own, frame, frames, tolerance)
-            deviation = max(deviation, off)
-        rest = euler.from_quaternion(skeleton.rotation[number], order=own, frame=frame)
-        nodes.append(
-            EulerNode(
-                name,
-                int(skeleton.parents[number]),
-                skeleton.translation[number],
-                own,
-                frame,
-                rest,
-                rotation,
-                _axes(tracks.get("translation"), frames),
-                skeleton.scale[number],
-                _axes(tracks.get("scale"), frames),
-            )
-        )
+    asked = _Asked(orders, frame, frames, tolerance)
+    found = [_node(skeleton, number, name, by_node.get(number, {}), asked) for number, name in enumerate(names)]
+    nodes, deviation = [node for node, _ in found], max((off for _, off in found), default=0.0)
     kept = [n for n in range(len(nodes)) if n not in without or n in by_node or (skeleton.parents == n).any()]
-    return EulerCurves(EulerMotion(_renumbered(nodes, kept), notes=(left_out(lost),) if lost else ()), deviation)
+    return EulerCurves(EulerMotion(_renumbered(nodes, kept), notes=left_out(lost)), deviation)
 
 
-def unique_names(skeleton: Skeleton) -> list[str]:
-    """Return a name for every node, no two alike: "hip", "hip.2", "node 7" where it has none."""
-    taken: set[str] = set()
-    names = []
-    for number, given in enumerate(skeleton.names):
-        name = base = " ".join(given.split()) or f"node {number}"
-        count = 1
-        while name in taken:
-            count += 1
-            name = f"{base}.{count}"
-        taken.add(name)
-        names.append(name)
-    return names
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """How curves shall be. frames: (F,) s, where their keys stand; None for the tracks' own. tolerance: rad."""
 
-
-def left_out(what: Sequence[str]) -> str:
-    """Return "left out: weights of 'head', scale of 'arm' and 3 more"."""
-    more = f" and {len(what) - LISTED} more" if len(what) > LISTED else ""
-    return f"left out: {', '.join(what[:LISTED])}{more}"
-
-
-def what_of(track: Track, names: Sequence[str]) -> str:
-    """Return what a track moves, in words: "weights of 'head'"."""
-    return f"{track.path} of '{names[track.node]}'" if track.node is not None else f"{track.pointer}"
+    orders: Orders
+    frame: Frame
+    frames: Floats | None
+    tolerance: float | None
 
 
 def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]], list[str]]:
@@ -122,10 +86,35 @@ def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]],
     lost = []
     for track in clip.tracks:
         if track.node is None or track.path not in ("translation", "rotation", "scale"):
-            lost.append(what_of(track, names))
+            lost.append(label_of(track, names))
         else:
             by_node.setdefault(track.node, {})[track.path] = track
     return by_node, lost
+
+
+def _node(
+    skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Asked
+) -> tuple[EulerNode, float]:
+    """A node with curves of its tracks by path, and how far those of its rotation leave it between keys, rad."""
+    turn, still, frame = tracks.get("rotation"), skeleton.rotation[number], asked.frame
+    order = asked.orders.of(name, still if turn is None else _seen(turn), frame)
+    rotation: tuple[Curve | None, ...] = (None, None, None)
+    deviation = 0.0
+    if turn is not None:
+        rotation, deviation = _rotation(turn, order, asked)
+    node = EulerNode(
+        name,
+        int(skeleton.parents[number]),
+        skeleton.translation[number],
+        order,
+        frame,
+        euler.from_quaternion(still, order=order, frame=frame),
+        rotation,
+        _axes(tracks.get("translation"), asked.frames),
+        skeleton.scale[number],
+        _axes(tracks.get("scale"), asked.frames),
+    )
+    return node, deviation
 
 
 def _renumbered(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...]:
@@ -139,12 +128,10 @@ def _seen(track: Track) -> Floats:
     return sample(track, sorted_unique(np.concatenate((track.times, halves))))
 
 
-def _rotation(
-    track: Track, order: str, frame: Frame, frames: Floats | None, tolerance: float | None
-) -> tuple[tuple[Curve, ...], float]:
+def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...], float]:
     """The three curves of a rotation, and how far they leave it between keys."""
-    stepped = track.interpolation is Interpolation.STEP
-    times = track.times if frames is None else frames
+    stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
+    times = track.times if asked.frames is None or stepped else asked.frames
     for _ in range(ROUNDS):
         angles = euler.continuous(sample(track, times), order=order, frame=frame, lock=FILE_LOCK)
         if stepped or len(times) == 1:
@@ -189,7 +176,7 @@ def _axes(track: Track | None, frames: Floats | None) -> dict[int, Curve]:
         return dict(enumerate(_curves(track.times, track.values, mode)))
     modes = uniform_modes(len(track.times), mode)
     parts = zip(track.values.T, track.in_tangents.T, track.out_tangents.T, strict=True)
-    return {axis: Curve(track.times, *((part[0], modes, part[1], part[2]))) for axis, part in enumerate(parts)}
+    return {axis: Curve(track.times, part[0], modes, part[1], part[2]) for axis, part in enumerate(parts)}
 
 
 def _curves(times: Floats, values: Floats, mode: Mode) -> tuple[Curve, ...]:

@@ -8,42 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.model import Interpolation, Kind, Track
+from anim.model import Track
+from anim.sampling.alike import Alike, Rule, Tangents, put_together, rule
 from anim.sampling.track import Located, interpolate
 
 KEYS_AT_ONCE = 4096  # in one group: what is computed from them stays in the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
-class Joined:
-    """T tracks of one path, interpolation, kind and width, one after the other: S keys in all.
+class Joined(Alike):
+    """T tracks of one rule, one after the other: S keys in all.
 
     numbers: (T,) which of the given tracks they are. counts: (T,) keys of each. starts: (T,) where each one begins.
     times: (S,) s. values: (S, C). tangents: in and out, both (S, C) per second, for CUBICSPLINE.
     """
 
-    tracks: tuple[Track, ...]
     numbers: Ints
     counts: Ints
     starts: Ints
     times: Floats
     values: Floats
-    tangents: tuple[Floats, Floats] | None
-
-    @property
-    def path(self) -> str:
-        """The one path of all tracks."""
-        return self.tracks[0].path
-
-    @property
-    def interpolation(self) -> Interpolation:
-        """The one interpolation of all tracks."""
-        return self.tracks[0].interpolation
-
-    @property
-    def kind(self) -> Kind:
-        """The one kind of all tracks."""
-        return self.tracks[0].kind
+    tangents: Tangents | None
 
     def sample(self, at: Floats) -> Floats:
         """Return the values (T, F, C) of each track at times of its own: `at` (T, F) in seconds."""
@@ -63,14 +48,14 @@ class Joined:
 
 
 def joined(tracks: Sequence[Track]) -> list[Joined]:
-    """Return the tracks by path, interpolation, kind and width, each group laid end to end in their order.
+    """Return the tracks by `alike.rule`, each group laid end to end in their order.
 
     A group of over KEYS_AT_ONCE keys is split between its tracks.
     """
-    groups: dict[tuple[str, Interpolation, Kind, int], list[list[int]]] = {}
-    room: dict[tuple[str, Interpolation, Kind, int], int] = {}
+    groups: dict[Rule, list[list[int]]] = {}
+    room: dict[Rule, int] = {}
     for i, track in enumerate(tracks):
-        key = (track.path, track.interpolation, track.kind, track.values.shape[1])
+        key = rule(track)
         left = room.get(key, 0)
         if left <= 0:
             groups.setdefault(key, []).append([])
@@ -83,17 +68,6 @@ def joined(tracks: Sequence[Track]) -> list[Joined]:
 
 def _laid(tracks: tuple[Track, ...], numbers: Ints) -> Joined:
     counts = np.array([len(track.times) for track in tracks])
-    tangents = None
-    if tracks[0].interpolation is Interpolation.CUBICSPLINE:
-        arriving = [track.in_tangents for track in tracks if track.in_tangents is not None]
-        leaving = [track.out_tangents for track in tracks if track.out_tangents is not None]
-        tangents = np.concatenate(arriving), np.concatenate(leaving)
-    return Joined(
-        tracks,
-        numbers,
-        counts,
-        np.cumsum(counts) - counts,
-        np.concatenate([track.times for track in tracks]),
-        np.concatenate([track.values for track in tracks]),
-        tangents,
-    )
+    starts = np.cumsum(counts) - counts
+    times = np.concatenate([track.times for track in tracks])
+    return Joined(tracks, numbers, counts, starts, times, *put_together(tracks, np.concatenate))

@@ -18,7 +18,7 @@ from anim.gltf import read
 from anim.model import Clip, Instance, VertexCache
 from anim.ops.selection import Selection
 from anim.sampling.times import grid
-from anim.skinning.bake import baked, baker
+from anim.skinning.bake import SPACES, baked, baker
 from anim.skinning.weights import bad_sums
 from cli import cache_files, cache_options, meshes, options, report, streams, units
 from cli.cache_files import Saved
@@ -31,13 +31,8 @@ PLACE = "{clip}"  # in OUT: where the name of the clip goes
 FORBIDDEN = frozenset('/\\:*?"<>|')  # what some file system doesn't take in a name
 
 LBS = Method("lbs")
-
-
-class Space(StrEnum):
-    """Whose axes positions are in."""
-
-    WORLD = "world"
-    MESH = "mesh"
+Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc]
+WORLD = Space("world")
 
 
 def bake(
@@ -57,9 +52,7 @@ def bake(
     ] = None,
     clip: options.Clips = None,
     mesh: meshes.Meshes = None,
-    space: Annotated[
-        Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")
-    ] = Space.WORLD,
+    space: Annotated[Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")] = WORLD,
     normals: Annotated[
         bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(cache_options.holding('normals'))}).")
     ] = False,

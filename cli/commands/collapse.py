@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated, Any
 
@@ -20,6 +19,7 @@ from anim.skinning.collapse import LOW, Comparison, MeshCollapse
 from anim.skinning.fared import BULGE, Fared
 from cli import meshes, options, streams, tables
 from cli.errors import UsageError
+from cli.options import Format
 from cli.progress import Progress
 from cli.report import Voice, plural, size
 from cli.skinning_methods import Method
@@ -27,13 +27,6 @@ from cli.skinning_methods import Method
 SCHEMA = 1
 
 USUAL = ("lbs", "dqs")
-
-
-class Format(StrEnum):
-    """What the product looks like."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 def collapse(
@@ -45,7 +38,7 @@ def collapse(
     fps: Annotated[float, typer.Option("--fps", metavar="N", help="Frames per second to look at.")] = 30,
     clip: options.Clips = None,
     mesh: meshes.Meshes = None,
-    format: Annotated[Format, typer.Option("--format", help="Text to read, or one JSON document.")] = Format.TEXT,
+    format: options.Report = Format.TEXT,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="OUT", help="Draw index and volume over time into a .png or .svg.")
     ] = None,

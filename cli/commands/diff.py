@@ -16,6 +16,7 @@ from anim.gltf.accessors import Accessors
 from anim.measure.diff import diff as compared
 from anim.measure.error import FPS, Ruler
 from anim.measure.footprint import Footprint, footprints
+from anim.measure.matching import by_name
 from anim.measure.players import PLAYERS
 from anim.measure.profile import profile
 from anim.measure.stored import stored
@@ -27,16 +28,10 @@ from anim.show.sheet import FORMATS
 from cli import differences, options, streams, units
 from cli.differences import File, Found
 from cli.errors import CheckError, UsageError
+from cli.options import Format
 from cli.report import Voice, length, plural, size
 
 OFF = ("0", "0%", "0m")
-
-
-class Format(StrEnum):
-    """What the report looks like."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
@@ -47,7 +42,7 @@ def diff(
     old: Annotated[str, typer.Argument(metavar="A", help="A .glb or .gltf file, '-' for stdin.", show_default=False)],
     new: Annotated[str, typer.Argument(metavar="B", help="What to hold against it.", show_default=False)],
     *,
-    format: Annotated[Format, typer.Option("--format", help="Text to read, or one JSON document.")] = Format.TEXT,
+    format: options.Report = Format.TEXT,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="OUT", help="Draw the error over time: a .png or .svg file.")
     ] = None,
@@ -90,7 +85,9 @@ def diff(
     ruler = Ruler(one.scene, other.scene, shell=radius / scale if radius and scale else None)
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=str(player), fps=fps)
-    report = Found(one.file, other.file, found, str(player), fps, radius)
+    report = Found(one.file, other.file, found, *_names(one, other), str(player), fps, radius)
+    if report.are_strangers:
+        voice.say(f"warning: {differences.STRANGERS}: are they two versions of one thing?")
     streams.write_text(differences.as_json(report) if format is Format.JSON else differences.text(report))
     if plot is not None:
         drawn = _drawn(report, ruler, one, other, kind, limit)
@@ -121,6 +118,13 @@ def _opened(path: str, voice: Voice) -> _Side:
             scene = Scene(read.skeleton(document), ())
         cost = Footprint(stored(document), footprints(document)[1].json)
         return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
+
+
+def _names(one: _Side, other: _Side) -> tuple[int, bool]:
+    """How many nodes of one have a namesake in the other, and whether both have any names at all."""
+    nodes = one.scene.skeleton.names, other.scene.skeleton.names
+    are_named = all(any((*side.file.clips, *names)) for side, names in zip((one, other), nodes, strict=True))
+    return int((by_name(*nodes) >= 0).sum()), are_named
 
 
 def _kind(path: str) -> str:

@@ -27,11 +27,8 @@ class Per(StrEnum):
     RANGE = "range"
 
 
-class Output(StrEnum):
-    """What the new keys are."""
-
-    CUBICSPLINE = "cubicspline"
-    LINEAR = "linear"
+Interpolation = StrEnum("Interpolation", [(name, name) for name in by_segment.OUTPUTS])  # type: ignore[misc]
+CUBIC = Interpolation("cubicspline")
 
 
 def ease(
@@ -54,8 +51,8 @@ def ease(
         str, typer.Option("--angle-tolerance", metavar="ANGLE", help="The same for rotations: 0.05deg, 0.001rad.")
     ] = "0.05deg",
     interpolation: Annotated[
-        Output, typer.Option("--interpolation", help="cubicspline needs few keys, linear plays everywhere.")
-    ] = Output.CUBICSPLINE,
+        Interpolation, typer.Option("--interpolation", help="cubicspline needs few keys, linear plays everywhere.")
+    ] = CUBIC,
     clip: options.Clips = None,
     node: options.Nodes = None,
     path: options.Paths = None,

@@ -14,7 +14,7 @@ from anim.errors import FormatError, RangeError
 from anim.exchange import formats
 from anim.exchange.bvh import BvhPosition
 from anim.exchange.convention import Stated
-from anim.exchange.formats import Reading
+from anim.exchange.formats import TRACK_FORMATS, Reading
 from anim.exchange.from_euler import from_euler as converted_from
 from anim.exchange.gimbal import gimbal
 from anim.exchange.local import extent, skeleton
@@ -30,6 +30,7 @@ from cli import conversion, options, report, streams, units
 from cli.casting import Casting, cast, pairs, renamed
 from cli.conversion import Conversion
 from cli.errors import UsageError
+from cli.options import Format
 
 TALL = 10.0  # m; a skeleton that is taller is hardly in meters
 
@@ -46,13 +47,6 @@ class Mesh(StrEnum):
 
     NONE = "none"
     STICKS = "sticks"
-
-
-class Format(StrEnum):
-    """What the report looks like."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 def from_euler(
@@ -118,7 +112,7 @@ def from_euler(
     if onto is None and (alias, fail_unmatched, rest_at, floor) != (None, None, None, Floor.CONTACT):
         raise UsageError("--alias, --fail-unmatched, --floor and --rest-at are about a character (--onto names it)")
     stated = Stated(_order(order), frame, unit)
-    with streams.content(source) as (data, called):
+    with streams.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = formats.of_path(source) or formats.of_content(data.tobytes())
         motion = kind.read(data.tobytes(), Reading(stated, bvh_position))
         motion = turned_up(motion) if up is Up.Z else motion
@@ -135,9 +129,10 @@ def from_euler(
         document = author.author(bones, [converted.clip], bodies)
         before, size = len(data), streams.write(document, output, None, dry_run=dry_run)
     else:
+        names = pairs(alias)
         with streams.source(onto) as character:
             made = made if name else renamed(made, character.document)
-            casting = Casting(pairs(alias), floor, rest_at, fail_unmatched)
+            casting = Casting(names, floor, rest_at, fail_unmatched)
             made, document = cast(made, character.document, casting)
             before, size = character.size, streams.write(document, output, character.folder, dry_run=dry_run)
     if format is Format.JSON:

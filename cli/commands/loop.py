@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -19,16 +18,10 @@ from anim.ops.selection import Selection
 from cli import options, streams, tables
 from cli.edit import edit
 from cli.errors import UsageError
+from cli.options import Format
 from cli.report import Voice, length, speed
 
 SCHEMA = 1
-
-
-class Format(StrEnum):
-    """What the report looks like."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 def loop(
@@ -46,7 +39,7 @@ def loop(
     shortest: Annotated[
         float | None, typer.Option("--shortest", metavar="S", help="For --find; half of the clip by default.")
     ] = None,
-    format: Annotated[Format, typer.Option("--format", help="Of the report.")] = Format.TEXT,
+    format: options.Report = Format.TEXT,
     clip: options.Clips = None,
     dry_run: options.DryRun = False,
     quiet: options.Quiet = False,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from anim.ops.resample import INTERPOLATIONS, KEEP
 from anim.ops.resample import resample as resampled
 from anim.ops.selection import Selection
 from cli import options
@@ -14,14 +15,8 @@ from cli.edit import edit
 from cli.errors import UsageError
 from cli.report import Voice
 
-
-class Interpolation(StrEnum):
-    """What the new keys are."""
-
-    KEEP = "keep"
-    STEP = "step"
-    LINEAR = "linear"
-    CUBICSPLINE = "cubicspline"
+Interpolation = StrEnum("Interpolation", [(name, name) for name in INTERPOLATIONS])  # type: ignore[misc]
+AS_IT_IS = Interpolation(KEEP)
 
 
 def resample(
@@ -33,7 +28,7 @@ def resample(
     ],
     interpolation: Annotated[
         Interpolation, typer.Option("--interpolation", help="What lies between the new keys.")
-    ] = Interpolation.KEEP,
+    ] = AS_IT_IS,
     snap: Annotated[bool, typer.Option("--snap", help="Move the jumps of STEP tracks onto the grid too.")] = False,
     clip: options.Clips = None,
     node: options.Nodes = None,

@@ -16,7 +16,7 @@ from anim.errors import NotFoundError
 from anim.gltf import read
 from anim.model import Clip, Skeleton
 from anim.ops.selection import Selection
-from anim.sampling.sample import Sampled
+from anim.sampling.sample import SPACES, Sampled
 from anim.sampling.sample import sample as sampled
 from anim.sampling.times import grid
 from cli import options, streams, tables
@@ -33,12 +33,8 @@ class Format(StrEnum):
     NPZ = "npz"
 
 
-class Space(StrEnum):
-    """Whose axes the transforms are in."""
-
-    LOCAL = "local"
-    WORLD = "world"
-
+Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc]
+LOCAL = Space("local")
 
 Product = Annotated[
     str, typer.Argument(metavar="OUT", help="A .json, .csv or .npz file, '-' for stdout.", show_default=False)
@@ -57,7 +53,7 @@ def sample(
     ] = None,
     space: Annotated[
         Space, typer.Option("--space", help="local: in the parent's space. world: in the scene's.")
-    ] = Space.LOCAL,
+    ] = LOCAL,
     format: Annotated[
         Format | None, typer.Option("--format", help="Default: by OUT's ending; json for '-'.", show_default=False)
     ] = None,

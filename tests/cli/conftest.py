@@ -11,7 +11,7 @@ import pytest
 
 import fixtures
 from cli import main
-from tests.cli.running import Run
+from tests.cli.running import Run, built
 
 Call = Callable[..., Run]
 Find = Callable[[str], Path]  # `asset` and `bad_input` of tests/conftest.py
@@ -43,3 +43,23 @@ def fixture(tmp_path: Path) -> Fixture:
         return tmp_path / next(iter(files))
 
     return written
+
+
+@pytest.fixture
+def noop() -> bytes:
+    """The fixture with a clip for each thing that `inspect` finds fault with."""
+    return built("noop")
+
+
+@pytest.fixture
+def biped() -> bytes:
+    """The fixture of a walking figure."""
+    return built("biped")
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    """The biped in the test's folder, as walk.glb."""
+    path = tmp_path / "walk.glb"
+    path.write_bytes(built("biped"))
+    return path

@@ -64,6 +64,12 @@ def shell(line: str, folder: Path) -> Run:
     return Run(run.returncode, run.stdout, run.stderr.decode())
 
 
+def started(*args: str | Path, stdin: int | None = None, stdout: int | None = None) -> subprocess.Popen[bytes]:
+    """Return the command in a process of its own, to be watched and stopped."""
+    command = [str(Path(sys.executable).parent / "gltf-anim"), *map(str, args)]
+    return subprocess.Popen(command, env=ENVIRONMENT, stdin=stdin, stdout=stdout, stderr=subprocess.PIPE)
+
+
 def refusal(run: Run, code: int) -> str:
     """Return the first line of a refusal, after checking its manners: exit code, no product, a line and maybe help."""
     assert run.code == code, run.err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -235,6 +236,20 @@ def test_chunks_of_others_and_extras_stay(call: Call) -> None:
     assert out.endswith(chunk)
     length = int.from_bytes(out[12:16], "little")
     assert json.dumps(json.loads(out[20 : 20 + length])) == json.dumps(document)
+
+
+@pytest.mark.parametrize("line", [["convert"], ["resample", "--fps", "12"], ["optimize", "--effort", "fast"]])
+def test_numbers_in_extras_that_no_float_holds_stay(line: list[str], call: Call, tmp_path: Path) -> None:
+    """Valid JSON, infinite to most readers: it goes through every command that writes, as it is spelled."""
+    path, middle, back = tmp_path / "in.gltf", tmp_path / "middle.glb", tmp_path / "back.gltf"
+    path.write_bytes(
+        fixtures.build_files("gltf_embedded")["gltf_embedded.gltf"].replace(b"{", b'{"extras":[-1E+999],', 1)
+    )
+    name, *options = line
+    call(name, path, middle, *options).product()
+    call(name, middle, back, *options).product()
+    for written in (middle, back):
+        assert re.search(rb'"extras": ?\[-1E\+999\]', written.read_bytes())
 
 
 def test_what_it_cannot_hold_is_refused(call: Call, bad_input: Find, tmp_path: Path) -> None:

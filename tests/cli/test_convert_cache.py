@@ -112,7 +112,25 @@ def test_cut_off_files_are_exit_3_in_one_line_and_leave_nothing(ending: str, wal
     assert sorted(walk.parent.iterdir()) == there
 
 
-@pytest.mark.parametrize("name", ["no.pc2", "no.usdc", "no.ply", "no.npz", "no.exr"])
+def test_links_are_written_through(walk: Path, tmp_path: Path, call: Call) -> None:
+    (tmp_path / "away").mkdir()
+    link, real = tmp_path / "a.pc2", tmp_path / "away" / "real.pc2"
+    real.write_bytes(b"old")
+    link.symlink_to(real)
+    call("convert-cache", walk, link).product()
+    assert link.is_symlink()
+    assert real.read_bytes().startswith(b"POINTCACHE2")
+    assert list(real.parent.iterdir()) == [real]
+
+
+def test_a_device_takes_the_place_of_no_file(walk: Path, tmp_path: Path, call: Call) -> None:
+    before = sorted(tmp_path.iterdir())
+    call("convert-cache", walk, "/dev/null", "--format", "npz").product()
+    assert Path("/dev/null").is_char_device()
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["no.pc2", "no.usdc", "no.ply", "no.npz", "no.exr", "no/a.0001.ply"])
 def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
     assert f"{name}: " in refusal(call("convert-cache", tmp_path / name, tmp_path / "a.npz"), 3)
 

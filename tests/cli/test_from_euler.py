@@ -220,6 +220,17 @@ def test_refusals(call: Call, args: tuple[str, ...], data: bytes, code: int, wor
     assert words in refusal(call("from-euler", "-", "-", *args, stdin=data), code)
 
 
+def test_a_folder_is_refused_with_a_way_out(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("from-euler", tmp_path, "--dry-run")
+    assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
+    assert help_line(run) == f"name the files: {tmp_path}/*.bvh"
+    run = call("from-euler", "-", "--onto", fixture("biped"), "--alias", tmp_path, "--dry-run", stdin=SMALL)
+    assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
+    assert help_line(run) == f"name the files: {tmp_path}/*.csv"
+    run = call("from-euler", "-", "--onto", tmp_path, "--dry-run", stdin=SMALL)
+    assert help_line(run) == f"name the files: {tmp_path}/*.glb"
+
+
 def test_a_rest_pose_must_be_in_the_motion(call: Call, fixture: Fixture, asset: Find) -> None:
     run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", fixture("biped"), "--rest-at", "9")
     assert "rest at 9 s (the motion runs from 0 to 0.03333 s)" in refusal(run, 2)

@@ -1,4 +1,4 @@
-"""`inspect`: counts agree with a plain reader, every fault has its finding, and all three formats say the same."""
+"""`inspect`: counts agree with a plain reader, every fault has its finding, and real files give known numbers."""
 
 from __future__ import annotations
 
@@ -6,38 +6,17 @@ import json
 import math
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fixtures
 from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.inspecting import Json, by_name, only
 from tests.cli.playing import Player
-from tests.cli.running import built, refusal, table
+from tests.cli.running import built
 from tests.files import REAL
 from tests.fixtures.reading import decode, split
-
-Json = dict[str, Any]
-
-
-@pytest.fixture(scope="module")
-def noop() -> bytes:
-    return built("noop")
-
-
-def only(call: Call, data: bytes | Path, *options: str) -> Json:
-    """The facts about one file."""
-    run = call("inspect", "-", *options, "--format", "json", stdin=data) if isinstance(data, bytes) else None
-    document = (run or call("inspect", str(data), *options, "--format", "json")).json
-    assert document["schema"] == 1
-    (facts,) = document["files"]
-    found: Json = facts
-    return found
-
-
-def by_name(facts: Json) -> dict[str, Json]:
-    return {clip["name"]: clip for clip in facts["clips"]}
 
 
 def names_of_findings(facts: Json) -> set[str]:
@@ -168,40 +147,6 @@ def test_tracks_are_listed_when_asked_for(call: Call) -> None:
     assert listed[4]["widest_step_rad"] == pytest.approx(math.radians(80))
 
 
-def test_csv_is_one_table_with_the_numbers_of_the_json(noop: bytes, call: Call, tmp_path: Path) -> None:
-    for name in ("one.glb", "two.glb"):
-        (tmp_path / name).write_bytes(noop)
-    paths = [str(tmp_path / name) for name in ("one.glb", "two.glb")]
-    files = call("inspect", *paths, "--format", "json").json["files"]
-    rows = table(call("inspect", *paths, "--format", "csv").product())
-    clips = [(facts["file"], clip) for facts in files for clip in facts["clips"]]
-    assert len(rows) == len(clips) == 18
-    for row, (file, clip) in zip(rows, clips, strict=True):
-        assert row["file"] == file
-        for key in ("name", "keys", "end_s", "seam_m", "frame_rate_fps", "share"):
-            assert row[key] == ("" if clip[key] is None else str(clip[key]))
-        assert int(row["rotation_tracks"]) == clip["tracks"].get("rotation", 0)
-    tracks = table(call("inspect", *paths, "--format", "csv", "--tracks").product())
-    assert len(tracks) == sum(sum(clip["tracks"].values()) for _, clip in clips)
-    assert {row["constant"] for row in tracks} == {"true", "false"}
-
-
-def test_the_text_names_what_matters(noop: bytes, call: Call) -> None:
-    text = call("inspect", "-", stdin=noop).product().decode()
-    assert text.startswith("stdin  8.73 kB: 1 node, 1 mesh, 36 vertices, 0 skins, 9 clips\n")
-    for clip in by_name(only(call, noop)):
-        assert clip in text
-    for finding in only(call, noop)["findings"]:
-        assert f"{finding['name']}: {finding['where']}: {finding['problem']}; {finding['advice']}" in text
-    listed = call("inspect", "-", "--tracks", "--clip", "half_turn", stdin=noop).product().decode()
-    assert "tracks of half_turn" in listed
-    assert "179.0°" in listed
-
-
-def test_a_sound_file_is_called_healthy(call: Call) -> None:
-    assert "healthy" in call("inspect", "-", stdin=built("interpolations")).product().decode()
-
-
 @pytest.mark.parametrize("name", ["gltf_external", "gltf_embedded"])
 def test_text_files_count_with_their_buffers(name: str, fixture: Fixture, call: Call) -> None:
     path = fixture(name)
@@ -241,34 +186,6 @@ def test_what_does_not_concern_the_animation_is_a_finding(name: str, finding: st
     assert finding in names_of_findings(only(call, fixtures.BROKEN[name].data))
 
 
-def test_of_several_files_a_bad_one_is_reported_and_the_others_go_on(noop: bytes, call: Call, tmp_path: Path) -> None:
-    good, bad, lost = (str(tmp_path / name) for name in ("good.glb", "bad.glb", "lost.glb"))
-    Path(good).write_bytes(noop)
-    Path(bad).write_bytes(fixtures.BROKEN["truncated_glb"].data)
-    run = call("inspect", bad, good, lost, "--format", "json")
-    assert run.code == 3
-    assert [facts["file"] for facts in run.json["files"]] == [good]
-    assert [line.split(": ")[1] for line in run.err.splitlines()] == [bad, lost]
-    clip = call("inspect", good, bad, "--clip", "nowhere")
-    assert clip.code == 5  # the worst of 5 and 3
-
-
-def test_codes_and_breaks_in_names_are_shown_not_obeyed(call: Call, fixture: Fixture) -> None:
-    path = fixture("gltf_embedded")
-    path.write_bytes(path.read_bytes().replace(b'"slide"', rb'"a\u001b[31m\nb\ud83d"'))
-    text = call("inspect", path, "--tracks").product().decode()
-    assert r"a\x1b[31m\nb\ud83d" in text
-    assert "\x1b" not in text
-    assert by_name(only(call, path)).keys() == {"a\x1b[31m\nb\ud83d"}
-    assert len(table(call("inspect", path, "--format", "csv").product())) == 1
-
-
-def test_a_folder_is_refused_with_a_way_out(call: Call, tmp_path: Path) -> None:
-    run = call("inspect", tmp_path)
-    assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
-    assert run.err.splitlines()[1] == f"help: name the files: {tmp_path}/*.glb"
-
-
 @pytest.mark.parametrize("name", REAL)
 def test_real_files_give_finite_numbers(name: str, call: Call, asset: Find) -> None:
     path = asset(name)
@@ -295,13 +212,3 @@ def test_known_numbers_of_known_files(call: Call, asset: Find) -> None:
         "image 7",
         "image 11",
     }
-
-
-def test_fail_on_makes_it_a_gate(call: Call, fixture: Fixture) -> None:
-    path = fixture("noop")
-    assert call("inspect", path, "--fail-on", "error").code == 0
-    run = call("inspect", path, "--fail-on", "warning", "--format", "json")
-    assert run.code == 6
-    assert run.json["files"]
-    assert run.err.startswith("gltf-anim: ")
-    assert "warning" in run.err

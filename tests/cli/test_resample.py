@@ -2,41 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import re
-from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fixtures
-from anim.gltf import read
-from anim.measure.error import Ruler
-from tests import khronos
-from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Channel, Floats, Player, apart, value_at
 from tests.cli.running import built, refusal
 from tests.cli.untouched import check_only_animations_changed
-from tests.files import ASSETS, REAL, opened, opened_path
-from tests.fixtures.reading import decode
 
 MODES = ("STEP", "LINEAR", "CUBICSPLINE")
 EXACT = 1e-6  # files hold float32
-# Splines of rotations with few keys: a multiple of their rate comes near their motion, but is not the same.
-COARSE = {"CubicRotate/01_cs_rotate.gltf": 5e-3}
-
-
-@pytest.fixture(scope="module")
-def noop() -> bytes:
-    return built("noop")
-
-
-@pytest.fixture(scope="module")
-def biped() -> bytes:
-    return built("biped")
 
 
 def resampled(call: Call, data: bytes, *options: str) -> Player:
@@ -185,78 +164,6 @@ def test_pointers_are_resampled_too(call: Call) -> None:
     assert {finding["name"] for finding in check["findings"]} <= {"redundant-keys"}
 
 
-def test_the_reported_error_is_that_of_the_skin(biped: bytes, call: Call) -> None:
-    run = call("resample", "-", "-", "--fps", "7", "--clip", "walk", stdin=biped)
-    found = re.search(r"\(([\d.]+) %\) at '\w+', ([\d.]+) s", run.err)
-    assert found, run.err
-    old, new = Player(biped), Player(run.product())
-    axes = {time for player in (old, new) for channel in player.channels(0) for time in channel.times}
-    times = sorted(axes | {(a + b) / 2 for a, b in itertools.pairwise(sorted(axes))})
-    skin = Skin(old)
-    far = [np.linalg.norm(skin.at(old, time) - skin.at(new, time), axis=1).max() for time in times]
-    assert reported(run.err) == pytest.approx(max(far), rel=0.05)  # two digits are reported
-    assert float(found[2]) == pytest.approx(times[int(np.argmax(far))], abs=1e-3)
-    rest = skin.positions
-    diagonal = np.linalg.norm(rest.max(axis=0) - rest.min(axis=0))
-    assert float(found[1]) == pytest.approx(100 * max(far) / diagonal, rel=0.05)
-
-
-def reported(line: str) -> float:
-    """The largest error in metres that a line speaks of."""
-    found = re.search(r"max ([\d.]+) (nm|µm|mm|cm|m)\b", line)
-    assert found, line
-    return float(found[1]) * {"nm": 1e-9, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}[found[2]]
-
-
-class Skin:
-    """The only skin of a file, blended vertex by vertex as the specification says."""
-
-    def __init__(self, player: Player) -> None:
-        document = player.document
-        attributes = [primitive["attributes"] for primitive in document["meshes"][0]["primitives"]]
-        self.positions, self.joints, self.weights = (
-            np.concatenate([decode(document, player.blob, each[key]) for each in attributes])
-            for key in ("POSITION", "JOINTS_0", "WEIGHTS_0")
-        )
-        self.nodes = document["skins"][0]["joints"]
-        self.bind = np.array(decode(document, player.blob, document["skins"][0]["inverseBindMatrices"]))
-
-    def at(self, player: Player, time: float) -> Floats:
-        """Vertices (V, 3) of the first clip at a time in seconds."""
-        matrices = player.world(0, time)[self.nodes] @ self.bind
-        blended = np.einsum("vi,vijk->vjk", self.weights, matrices[self.joints.astype(int)])
-        points: Floats = (blended @ np.c_[self.positions, np.ones(len(self.positions))][..., None])[:, :3, 0]
-        return points
-
-
-def test_the_last_line_says_what_came_of_it(biped: bytes, call: Call, tmp_path: Path) -> None:
-    source, out = tmp_path / "in.glb", tmp_path / "out.glb"
-    source.write_bytes(biped)
-    run = call("resample", source, out, "--fps", "12", "-v")
-    size = len(out.read_bytes())
-    assert (run.code, run.out) == (0, b"")
-    *clips, line = run.err.splitlines()
-    assert [clip.split("'")[1] for clip in clips] == ["walk", "wave", "jump"]
-    percent = round(100 * (size / len(biped) - 1))
-    assert line.startswith(f"{out}  271 kB → {size / 1000:.0f} kB ({percent:+} %), 1030 → ")
-    counted = sum(len(c.times) for n in range(3) for c in Player(out.read_bytes()).channels(n))
-    assert f"→ {counted} keys, max " in line
-    assert reported(line) == max(map(reported, clips)) > min(map(reported, clips))
-    assert line.endswith(" s")
-    assert call("resample", source, out, "--fps", "12", "--quiet").err == ""
-
-
-def test_a_dry_run_says_the_same_and_writes_nothing(biped: bytes, call: Call, tmp_path: Path) -> None:
-    real = call("resample", "-", "-", "--fps", "12", stdin=biped)
-    for out in ("-", tmp_path / "out.glb", tmp_path / "out.gltf"):
-        dry = call("resample", "-", out, "--fps", "12", "--dry-run", stdin=biped)
-        assert (dry.code, dry.out) == (0, b"")
-        assert dry.err.endswith(" (dry run: nothing written)\n")
-        if out == "-":
-            assert dry.err.split(", ")[1:3] == real.err.split(", ")[1:3]
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("name", fixtures.FIXTURES)
 def test_nothing_else_changes(name: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
     path = fixture(name)
@@ -318,79 +225,3 @@ def test_a_rate_that_is_none_is_refused(fps: str, biped: bytes, call: Call) -> N
 
 def test_too_many_frames_are_refused_before_memory_is_gone(biped: bytes, call: Call) -> None:
     assert "limit" in refusal(call("resample", "-", "--fps", "1e12", stdin=biped), 2)
-
-
-# Real files.
-
-
-@khronos.needs_validator
-def test_real_files_get_no_new_validator_errors(call: Call, tmp_path: Path) -> None:
-    names = [name for name in REAL if (ASSETS / name).is_file()]
-    if not names:
-        pytest.skip("shared/assets is not there")
-    outputs = []
-    for name in names:
-        call("resample", ASSETS / name, tmp_path / "out.glb", "--fps", "30").product()
-        outputs.append((tmp_path / "out.glb").read_bytes())
-    before = khronos.validate_many([(ASSETS / name).read_bytes() for name in names], resources=_beside())
-    after = khronos.validate_many(outputs, resources=_beside())
-    for name, old, new in zip(names, before, after, strict=True):
-        if old["issues"]["truncated"]:
-            assert set(_codes(new)) <= set(_codes(old)), name
-        else:
-            assert _codes(new) <= _codes(old), name
-
-
-def _beside() -> dict[str, bytes]:
-    """Everything that lies in the assets' folders, by the relative URI that the files use."""
-    found = {}
-    for path in ASSETS.rglob("*"):
-        if path.suffix in (".bin", ".png", ".jpg"):
-            parts = path.relative_to(ASSETS).parts
-            found["/".join(parts[1:] if len(parts) > 1 else parts)] = path.read_bytes()
-    return found
-
-
-def _codes(report: dict[str, Any]) -> Counter[str]:
-    # An embedded buffer has another pointer, so only kinds are compared; IO_ERRORs are about missing textures.
-    return Counter(line.split(" ")[0] for line in khronos.errors(report))
-
-
-@pytest.mark.parametrize("name", REAL)
-def test_real_files_change_in_nothing_else(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
-    source, out = asset(name), tmp_path / "out.glb"
-    call("resample", source, out, "--fps", "24").product()
-    check_only_animations_changed(source, out)
-
-
-@pytest.mark.parametrize("name", REAL)
-def test_real_files_play_the_same_at_twice_their_rate(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
-    source, out = asset(name), tmp_path / "out.glb"
-    clips = call("inspect", source, "--format", "json").json["files"][0]["clips"]
-    regular = [clip for clip in clips if clip["frame_rate_regular"] == 1 and _ends_on_grid(clip)]
-    if not regular:
-        pytest.skip("no clip has a frame rate")
-    rate = Counter(clip["frame_rate_fps"] for clip in regular).most_common(1)[0][0]
-    chosen = [clip for clip in regular if clip["frame_rate_fps"] == rate]
-    globs = [f"--clip={clip['name'] or clip['index']}" for clip in chosen]
-    call("resample", source, out, "--fps", str(2 * rate), *globs).product()
-    before, after = opened_path(source), opened(out.read_bytes())
-    ruler = Ruler(read.scene(before))
-    old, new = read.clips(before), read.clips(after)
-    for clip in chosen:
-        number = clip["index"]
-        times = np.arange(0, clip["end_s"] + 1 / 240, 1 / 240)
-        error = ruler.error_at(old[number], new[number], times)
-        assert error.max_error <= COARSE.get(name, 1e-5) * ruler.diagonal, clip["name"]
-        assert error.max_pointer_error <= 1e-5, (clip["name"], error.pointer)
-
-
-def _ends_on_grid(clip: dict[str, Any]) -> bool:
-    frames = clip["duration_s"] * clip["frame_rate_fps"]
-    return bool(abs(frames - round(frames)) < 1e-3)
-
-
-@pytest.mark.parametrize("name", ["Knight.glb", "Robot.glb", "Fox.glb"])
-def test_real_files_never_grow_at_their_own_rate(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
-    call("resample", asset(name), tmp_path / "out.glb", "--fps", "24").product()
-    assert (tmp_path / "out.glb").stat().st_size <= asset(name).stat().st_size * 1.01

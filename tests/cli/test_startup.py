@@ -102,13 +102,14 @@ def test_a_wrong_command_line_imports_nothing_heavy_either() -> None:
         assert not tops(set(json.loads(run.stderr.splitlines()[-1])[1])) & HEAVY
 
 
-@pytest.mark.xfail(strict=True, reason="typer imports every command whose name fits, for the words beside it")
-def test_completion_of_a_command_imports_none() -> None:
+def completed(words: str, shell: str = "bash") -> tuple[str, set[str]]:
+    """What a shell is told that completes the last of these words, and the modules that took."""
     environment = {
         **ENVIRONMENT,
-        "_GLTF_ANIM_COMPLETE": "complete_bash",
-        "COMP_WORDS": "gltf-anim re",
-        "COMP_CWORD": "1",
+        "_GLTF_ANIM_COMPLETE": f"complete_{shell}",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split(" ")) - 1),
+        "_TYPER_COMPLETE_ARGS": words,
     }
     script = (
         "import sys, atexit; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); sys.argv = ['gltf-anim']; "
@@ -117,5 +118,38 @@ def test_completion_of_a_command_imports_none() -> None:
     run = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
     )
-    assert "resample" in run.stdout.split()
-    assert not {"numpy", "pydantic"} & set(run.stderr.split())
+    (modules,) = run.stderr.splitlines()  # and no word to the person who types
+    return run.stdout, set(modules.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [("gltf-anim re", {"resample", "retime", "render"}), ("gltf-anim ", set(main.COMMANDS)), ("gltf-anim zzz", set())],
+)
+def test_completion_of_a_command_imports_none(words: str, found: set[str]) -> None:
+    shown, names = completed(words)
+    assert set(shown.split()) == found
+    assert not tops(names) & (HEAVY | {"numpy"})
+    assert not {name for name in names if name.startswith("cli.commands.")}
+
+
+def test_a_shell_that_shows_words_beside_names_gets_those_of_the_table() -> None:
+    shown, names = completed("gltf-anim ren", "zsh")
+    assert main.COMMANDS["render"].about in shown
+    assert "cli.commands.render" not in names
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("gltf-anim --ver", {"--version"}),
+        ("gltf-anim resample --f", {"--fps"}),
+        ("gltf-anim resample --interpolation c", {"cubicspline"}),
+    ],
+)
+def test_options_and_their_choices_are_completed(words: str, found: set[str]) -> None:
+    assert set(completed(words)[0].split()) == found
+
+
+def test_completion_behind_a_command_that_is_none_says_nothing_of_it() -> None:
+    assert "resample" in completed("gltf-anim zzz re")[0]

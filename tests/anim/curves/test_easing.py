@@ -9,35 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from anim.arrays import Floats
 from anim.curves.ease import Easing, evaluate
-from anim.curves.easing import EASING_MAKERS, EASINGS, parse, sparkline
-from anim.curves.physical import settle_time, spring
-from anim.errors import RangeError
+from anim.curves.easing import EASINGS, parse
+from tests.anim.curves.eases import FAMILIES, SMOOTH, STEPS, U
 
-WITH_ARGUMENTS = [
-    "cubic-bezier(0.2, 0, 0, 1)",
-    "cubic-bezier(1/3, -0.4, 2/3, 1.7)",
-    "cubic-bezier(0, 1.5, 1, -0.5)",
-    "cubic-bezier(0.5, 0.5, 0.5, 0.5)",
-    "cubic-bezier(1, 0, 0, 1)",
-    "spring(100, 10)",
-    "spring(100, 2)",
-    "spring(100, 20)",
-    "spring(100, 300)",
-    "hermite(-1, 4)",
-    "back(3)",
-    "back-in(0.5)",
-    "back-in-out(2)",
-]
-SMOOTH = [*EASINGS, *WITH_ARGUMENTS]
-STEPS = ["steps(1)", "steps(5)", "steps(4, jump-start)", "steps(3, both)", "steps(3, none)"]
-U = np.linspace(0, 1, 1001)
 EDGES = np.array([0.0, 1.0])
-FAMILIES = ["quad", "cubic", "quart", "quint", "sine", "expo", "circ", "back", "elastic", "bounce"]
 
 
 @pytest.mark.parametrize("name", [*SMOOTH, "steps(5)", "steps(3, none)"])
@@ -194,36 +173,6 @@ def test_bezier_meets_its_ends_and_stays_a_function(x1: float, x2: float, y1: fl
     assert not np.isnan(ease.derivative(U)).any()
 
 
-@pytest.mark.parametrize(("stiffness", "damping"), [(100, 3), (100, 10), (40, 2 * 40**0.5), (100, 21), (9, 300)])
-def test_spring_solves_its_equation(stiffness: float, damping: float) -> None:
-    end = settle_time(stiffness, damping)
-    u = np.linspace(0, 1, 50)
-    path = solve_ivp(
-        lambda _, y: [y[1], stiffness * (1 - y[0]) - damping * y[1]],
-        (0, end),
-        [0.0, 0.0],
-        t_eval=u * end,
-        method="LSODA",
-        rtol=1e-9,
-        atol=1e-11,
-    )
-    assert abs(path.y[0, -1] - 1) < 1.001e-3
-    np.testing.assert_allclose(spring(stiffness, damping).value(u), path.y[0] / path.y[0, -1], atol=1e-6)
-
-
-def test_spring_swings_past_by_the_closed_form() -> None:
-    ratio = 0.3
-    peak = 1 + math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2))
-    assert spring(25, 2 * ratio * 5).extent[1] == pytest.approx(peak, rel=1.1e-3)
-    assert not spring(25, 10).overshoots
-
-
-def test_settle_time_does_not_jump_with_the_damping() -> None:
-    times = np.array([settle_time(100, d) for d in np.linspace(19.6, 20.4, 81)])
-    assert np.abs(np.diff(times)).max() < 0.01
-    assert settle_time(100, 20) == pytest.approx(0.9233, abs=1e-4)
-
-
 def test_steps_by_hand() -> None:
     u = np.array([0, 0.49, 0.5, 0.99, 1])
     np.testing.assert_allclose(parse("steps(2)").value(u), [0, 0, 0.5, 0.5, 1])
@@ -244,65 +193,6 @@ def test_overshoot_is_known() -> None:
     assert EASINGS["back-out"].extent == pytest.approx((0, 1.1), abs=1e-5)
     assert EASINGS["back-in-out"].extent == pytest.approx((-0.1, 1.1), abs=2e-4)
     assert parse("back(3)").extent == pytest.approx((0, 1.25))
-
-
-@pytest.mark.parametrize("name", [*SMOOTH, *STEPS])
-def test_name_is_what_makes_it(name: str) -> None:
-    ease = parse(name)
-    np.testing.assert_allclose(parse(ease.name).value(U), ease.value(U), atol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("text", "message", "help"),
-    [
-        ("quadin", "no ease is called 'quadin'", "'quad-in'"),
-        ("easeInOutQuad", "no ease is called", "did you mean 'quad-in-out'?"),
-        ("elastic", "no ease is called", "'elastic-in' or 'elastic-out'"),
-        ("qwxyz", "no ease is called", "one of linear, smoothstep"),
-        ("spring", "needs arguments", "write spring(stiffness, damping)"),
-        ("spring(1)", "number of arguments is 1 (expected 2)", "write spring"),
-        ("spring(0, 1)", "expected finite and above 0", ""),
-        ("spring(100, 0.01)", "hardly settles", "a damping of 0.1 or more"),
-        ("cubic-bezier(2, 0, 1, 1)", "time can't run backwards", "write cubic-bezier"),
-        ("cubic-bezier(0, nan, 1, 1)", "finite", ""),
-        ("hermite(1, inf)", "finite", ""),
-        ("hermite(1, two)", "'two' is not a number", ""),
-        ("steps(1.5)", "whole number", "write steps"),
-        ("steps(nan)", "whole number", ""),
-        ("steps(1, none)", "expected 2", ""),
-        ("steps(3, jump-up)", "expected jump-start", ""),
-        ("back(-1)", "overshoot is -1", ""),
-        ("linear(1)", "takes no arguments", ""),
-        ("ease(", "can't read ease", ""),
-        ("", "can't read ease", ""),
-    ],
-)
-def test_refusals(text: str, message: str, help: str) -> None:
-    with pytest.raises(RangeError) as refusal:
-        parse(text)
-    assert message in str(refusal.value)
-    assert help in refusal.value.help
-
-
-def test_case_and_spaces_do_not_matter() -> None:
-    assert parse("  Quad-In ") is EASINGS["quad-in"]
-    assert parse("Spring ( 100 ,10 )").name == "spring(100, 10)"
-
-
-def test_table_names_are_the_eases_names() -> None:
-    assert all(name == ease.name for name, ease in EASINGS.items())
-    assert all(maker.usage.startswith(f"{name}(") for name, maker in EASING_MAKERS.items())
-    assert [f"{f}-{way}" for f in FAMILIES for way in ("in", "out", "in-out")] == [
-        n for n in EASINGS if n.split("-")[0] in FAMILIES
-    ]
-
-
-def test_sparkline() -> None:
-    assert sparkline(EASINGS["linear"], 8) == "▁▂▃▄▅▆▇█"
-    assert sparkline(EASINGS["back-out"], 16)[-1] != "█"
-    assert all(len(sparkline(ease, 30)) == 30 for ease in EASINGS.values())
-    with pytest.raises(RangeError):
-        sparkline(EASINGS["linear"], 1)
 
 
 def test_any_shape_goes() -> None:

@@ -190,6 +190,7 @@ def test_z_up_becomes_y_up() -> None:
         ("OFFSET 0 -5 0\n    CH", "OFFSET 0 0\n    CH", "line 9: OFFSET holds 'CHANNELS'"),
         ("0 90 90", "0 90 nan", "line 20: number 7 is 'nan'"),
         ("0 90 90", "0 90 1e40", "line 20: number 7 is '1e40'"),
+        ("0 90 90", "0 90 9_0", "line 20: number 7 is '9_0'"),
         ("0 90 90", "0 90 1,5", "line 20: number 7 is '1,5'"),
         ("0 90 90", "0 90", "line 20: 6 numbers in a row .expected 7, one per channel; truncated"),
         ("0 90 90", "0 90 90 5", "line 20: 8 numbers in a row .expected 7, one per channel.$"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,16 @@ def test_what_is_written_is_read_as_the_same(text: str) -> None:
                 assert (a.out_weights is None) == (b.out_weights is None)
 
 
+def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
+    motion = csv.read(KEYS.encode(), XYZ)
+    nodes = (replace(motion.nodes[0], name="#1"), *motion.nodes[1:])
+    again = csv.read(csv.write(replace(motion, nodes=nodes), Convention("XYZ", Frame.EXTRINSIC, Unit.DEG)), NOTHING)
+    assert again.nodes[0].name == "#1"
+    curves = [[curve is not None for curve in each.nodes[0].rotation] for each in (motion, again)]
+    assert curves[0] == curves[1]
+    assert any(curves[0])
+
+
 @pytest.mark.parametrize(
     ("stated", "problem"),
     [
@@ -144,6 +156,7 @@ def test_two_conventions_are_refused() -> None:
         ("0,90,0,0", "0,90,0", "line 5: 3 columns .expected 4"),
         ("1,95,90,30", "1,95,90,30,1", "line 8: 5 columns .expected 4"),
         ("1,95", "1,nan", "line 8: hips.ty is 'nan'"),
+        ("1,95", "1,9_5", "line 8: hips.ty is '9_5'"),
         ("1,95", "1,x", "line 8: hips.ty is 'x'"),
         ("0.5,,45", "2,,45", "line 8: time 1 s after 2 s"),
         ("hips.rz", "hips.rw", "line 4: unknown channel"),

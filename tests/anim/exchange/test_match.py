@@ -103,3 +103,5 @@ def test_alias_files() -> None:
         aliases.read(b"a,b\na,b,c\n")
     with pytest.raises(FormatError, match="'a' has 1"):
         aliases.read(b'{"a": 1}')
+    with pytest.raises(FormatError, match="line 2: broken CSV"):
+        aliases.read(b'a,b\nc,"d')

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.errors import NotFoundError
 from anim.exchange import bvh
-from anim.exchange.curve import Curve, Mode, linear, uniform_modes
 from anim.exchange.from_euler import Converted, from_euler
-from anim.exchange.local import extent, skeleton
-from anim.exchange.motion import Convention, EulerMotion, EulerNode, Unit, scaled
-from anim.exchange.onto import Onto, onto
+from anim.exchange.motion import Convention, Unit
+from anim.exchange.onto import onto
 from anim.exchange.retarget import Floor
 from anim.exchange.to_bvh import to_bvh
-from anim.exchange.turns import world_rotations
-from anim.exchange.units import guess_unit
-from anim.gltf import author, read
-from anim.gltf.document import Document
+from anim.gltf import read
 from anim.maths import quaternion
 from anim.maths.euler import Frame
-from anim.model import Clip, Interpolation, Scene, Skeleton, Track
+from anim.model import Clip, Scene
 from anim.sampling import pose, rest, world_matrices
-from anim.sampling.track import sample
-from tests.files import glb_of, opened, opened_fixture, opened_path
+from tests.anim.exchange.figures import Find, character, put_on, recorded
+from tests.files import opened_fixture
 
 CESIUM = {
     "Hips": "Skeleton_torso_joint_1", "Spine": "Skeleton_torso_joint_2", "Spine1": "torso_joint_3",
@@ -41,21 +31,7 @@ CESIUM = {
     "RightForeArm": "Skeleton_arm_joint_R__2_",
     "RightHand": "Skeleton_arm_joint_R__3_",
 }  # fmt: skip
-Find = Callable[[str], Path]
 BVH = Convention("ZXY", Frame.INTRINSIC, Unit.DEG)
-
-
-def _recorded(name: str, asset: Find) -> Converted:
-    motion = bvh.read(asset(f"bvh/{name}").read_bytes())
-    return from_euler(scaled(motion, guess_unit(extent(skeleton(motion))).scale), tolerance=1e-3, name="cmu")
-
-
-def _character(name: str, asset: Find) -> Document:
-    return opened_fixture("biped") if name == "biped" else opened_path(asset(name))
-
-
-def _on(document: Document, source: Converted, aliases: dict[str, str], floor: Floor = Floor.CONTACT) -> Onto:
-    return onto(source, read.scene(document), aliases=aliases, nested=True, floor=floor)
 
 
 def _lowest(scene: Scene, clip: Clip, times: Floats) -> tuple[Floats, float]:
@@ -89,9 +65,9 @@ CHARACTERS = pytest.mark.parametrize(
 @CHARACTERS
 def test_soles_stand_on_the_floor(name: str, aliases: dict[str, str], least: int, asset: Find) -> None:
     """While the recorded feet are down, the lowest vertex is within 2 % of the height of the floor."""
-    source, document = _recorded("cmu_01_01.bvh", asset), _character(name, asset)
+    source, document = recorded("cmu_01_01.bvh", asset), character(name, asset)
     scene = read.scene(document)
-    done = _on(document, source, aliases)
+    done = put_on(document, source, aliases)
     assert len(done.matching.pairs) >= least
     times = done.clip.tracks[0].times[120::60]
     theirs = world_matrices(source.skeleton, pose(source.skeleton, source.clip, times))[..., 1, 3].min(axis=1)
@@ -104,9 +80,9 @@ def test_soles_stand_on_the_floor(name: str, aliases: dict[str, str], least: int
 
 @CHARACTERS
 def test_a_walk_is_on_the_floor_in_every_frame(name: str, aliases: dict[str, str], least: int, asset: Find) -> None:
-    source, document = _recorded("freebvh.bvh", asset), _character(name, asset)
+    source, document = recorded("freebvh.bvh", asset), character(name, asset)
     named = {f"mixamorig:{joint}": node for joint, node in aliases.items()}
-    done = _on(document, source, named)
+    done = put_on(document, source, named)
     assert len(done.matching.pairs) >= least
     lowest, height = _lowest(read.scene(document), done.clip, done.clip.tracks[0].times)
     assert np.abs(lowest).max() < 0.01 * height
@@ -114,9 +90,9 @@ def test_a_walk_is_on_the_floor_in_every_frame(name: str, aliases: dict[str, str
 
 @pytest.mark.parametrize("name", ["biped", "Knight.glb"])
 def test_arms_and_legs_point_as_the_recorded_ones(name: str, asset: Find) -> None:
-    source, document = _recorded("cmu_01_01.bvh", asset), _character(name, asset)
+    source, document = recorded("cmu_01_01.bvh", asset), character(name, asset)
     bones = read.skeleton(document)
-    done = _on(document, source, {})
+    done = put_on(document, source, {})
     times = source.clip.tracks[0].times[::300]
     one = world_matrices(source.skeleton, pose(source.skeleton, source.clip, times))[..., 3]
     two = world_matrices(bones, pose(bones, done.clip, times))[..., 3]
@@ -136,7 +112,7 @@ def test_arms_and_legs_point_as_the_recorded_ones(name: str, asset: Find) -> Non
 
 def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
     """Frame 0 of this recording is the pose of all zeros, but for legs and thumbs: for the others nothing changes."""
-    source, document = _recorded("cmu_01_01.bvh", asset), _character("biped", asset)
+    source, document = recorded("cmu_01_01.bvh", asset), character("biped", asset)
     scene = read.scene(document)
     one, two = (onto(source, scene, aliases={}, nested=True, floor=Floor.KEEP, rest_at=at).clip for at in (None, 0.0))
     for a, b in zip(one.tracks, two.tracks, strict=True):
@@ -152,9 +128,9 @@ def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
 
 def test_feet_that_are_flat_stay_flat(asset: Find) -> None:
     """In CMU's rest pose, frame 0 turned off, the biped stands with its soles down although its foot slopes more."""
-    source, document = _recorded("cmu_01_01.bvh", asset), _character("biped", asset)
+    source, document = recorded("cmu_01_01.bvh", asset), character("biped", asset)
     still = Converted(source.skeleton, Clip("rest", source.clip.tracks[:1]), source.ends)
-    done = _on(document, still, {})
+    done = put_on(document, still, {})
     bones = read.skeleton(document)
     foot = bones.names.index("left_foot")
     world = world_matrices(bones, pose(bones, done.clip, np.zeros(1)))
@@ -167,7 +143,7 @@ def test_a_characters_own_motion_comes_back(asset: Find) -> None:
     bones, walk = read.skeleton(document), read.clips(document)[0]
     joints = set(document.json["skins"][0]["joints"])
     text = bvh.write(to_bvh(bones, walk, order="YZX", joints=joints, fps=30), BVH)
-    done = _on(document, from_euler(bvh.read(text), tolerance=1e-3), {}, Floor.KEEP)
+    done = put_on(document, from_euler(bvh.read(text), tolerance=1e-3), {}, Floor.KEEP)
     assert not done.matching.unmatched
     times = np.arange(int(walk.end * 30)) / 30
     before, after = (world_matrices(bones, pose(bones, clip, times))[..., 3] for clip in (walk, done.clip))
@@ -177,9 +153,9 @@ def test_a_characters_own_motion_comes_back(asset: Find) -> None:
 
 def test_legs_and_feet_that_hang_elsewhere_stay_in_their_joints(asset: Find) -> None:
     """The robot's legs do not hang on its hips, nor its feet on its legs: they are for inverse kinematics."""
-    source, document = _recorded("freebvh.bvh", asset), _character("Robot.glb", asset)
+    source, document = recorded("freebvh.bvh", asset), character("Robot.glb", asset)
     bones = read.skeleton(document)
-    done = _on(document, source, {})
+    done = put_on(document, source, {})
     times = done.clip.tracks[0].times
     moved = [bones.names[track.node or 0] for track in done.clip.tracks if track.path == "translation"]
     assert sorted(moved) == ["Foot.L", "Foot.R", "Hips", "UpperLeg.L", "UpperLeg.R"]  # lower legs hang on upper ones
@@ -195,122 +171,7 @@ def test_legs_and_feet_that_hang_elsewhere_stay_in_their_joints(asset: Find) -> 
         np.testing.assert_allclose(after, np.broadcast_to(before, after.shape), atol=1e-4 * np.abs(before).max())
 
 
-def test_the_clip_is_added_and_nothing_else(asset: Find) -> None:
-    document = opened_fixture("biped")
-    done = _on(document, _recorded("cmu_01_01.bvh", asset), {})
-    written = opened(glb_of(author.add_clips(document, [done.clip])))
-    assert [clip.name for clip in read.clips(written)] == ["walk", "wave", "jump", "cmu"]
-    for key in ("nodes", "meshes", "skins", "materials", "scenes"):
-        assert written.json[key] == document.json[key]
-
-
-def _tail(turn: Floats) -> Skeleton:
-    """Three joints in a row, no person's, at rest along x, the whole turned."""
-    return Skeleton(
-        ("tail1", "tail2", "tail3"), np.array([-1, 0, 1]), np.array([[0, 0, 0], [1.0, 0, 0], [1, 0, 0]]),
-        np.array([turn, [0, 0, 0, 1], [0, 0, 0, 1]]), np.ones((3, 3)),
-    )  # fmt: skip
-
-
-def test_other_chains_point_alike() -> None:
-    times = np.array((0.0, 1.0))
-    curve = linear(times, np.radians((0.0, 50.0)))
-    nodes = tuple(
-        EulerNode(f"Tail.{i + 1}", i - 1, np.array((2.0 * (i > 0), 0, 0)), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
-        for i in range(3)
-    )
-    source = from_euler(EulerMotion(nodes), tolerance=1e-4)
-    target = _tail(quaternion.from_rotation_vector(np.array((0, 1.2, 0))))
-    done = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP)
-    one, two = (
-        world_matrices(bones, pose(bones, clip, np.array((0.5,))))[0, :, :, 3]
-        for bones, clip in ((source.skeleton, source.clip), (target, done.clip))
-    )
-    np.testing.assert_allclose(np.diff(two, axis=0), np.diff(one, axis=0) / 2, atol=1e-6)
-    assert done.scale == pytest.approx(0.5)
-
-
-def _keyed(name: str, parent: int, *degrees: tuple[float, ...], mode: Mode = Mode.LINEAR) -> EulerNode:
-    """A joint a metre out on x, keyed every two seconds on X, Y and Z."""
-    curves = []
-    for values in degrees:
-        times = np.array([2.0 * key for key in range(len(values))])
-        curves.append(Curve(times, np.radians(values), uniform_modes(len(values), mode)))
-    offset = np.array((float(parent >= 0), 0, 0))
-    return EulerNode(name, parent, offset, "XYZ", Frame.INTRINSIC, np.zeros(3), tuple(curves))
-
-
-def test_keys_between_keys_keep_the_tolerance() -> None:
-    """A joint between two matched ones turns too: what the outer one does in its new parent is no slerp."""
-    tolerance = np.radians(0.1)
-    nodes = (
-        _keyed("tail1", -1, (0, 80, 0), (0, 30, 60), (0, -50, 0)),
-        _keyed("other", 0, (0, -70, 40), (0, 20, 0), (10, 90, 0)),
-        _keyed("tail2", 1, (0, 60, 0), (0, 0, 50), (0, 70, -170)),
-        _keyed("tail3", 2, (0, 10, 0), (0, 0, 0), (0, 0, 10)),
-    )
-    source = from_euler(EulerMotion(nodes), tolerance=tolerance)
-    target = _tail(quaternion.from_rotation_vector(np.array((0, 0, 0.0))))
-    clip = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP).clip
-    joint, at = target.names.index("tail2"), np.linspace(0, 4, 3001)
-
-    def wanted(times: Floats) -> Floats:
-        turned = world_rotations(source.skeleton, pose(source.skeleton, source.clip, times).rotation)
-        return quaternion.multiply(quaternion.conjugate(turned[0]), turned[2])
-
-    assert quaternion.angle_between(pose(target, clip, at).rotation[:, joint], wanted(at)).max() < tolerance
-    keys = np.unique(np.concatenate([track.times for track in source.clip.tracks]))
-    without = Track(joint, "rotation", Interpolation.LINEAR, keys, quaternion.align_signs(wanted(keys)))
-    assert quaternion.angle_between(sample(without, at), wanted(at)).max() > tolerance
-
-
-def test_steps_stay_steps() -> None:
-    nodes = [_keyed("tail1", -1, (0, 80, 0), (0, 0, 0), (0, 0, 0), mode=Mode.STEP)]
-    source = from_euler(EulerMotion(tuple(nodes)), tolerance=1e-3)
-    clip = onto(source, Scene(_tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True, floor=Floor.KEEP).clip
-    turn = next(track for track in clip.tracks if track.path == "rotation")
-    before, after = sample(turn, np.array((1.999, 2.001)))
-    assert quaternion.angle_between(before, np.array((0, 0, 0, 1.0))) < 1e-6
-    assert quaternion.angle_between(before, after) == pytest.approx(np.radians(80), abs=1e-6)
-
-
 def test_recordings_keep_their_grid(asset: Find) -> None:
-    source = _recorded("freebvh.bvh", asset)
-    times = _on(_character("Knight.glb", asset), source, {}).clip.tracks[0].times
+    source = recorded("freebvh.bvh", asset)
+    times = put_on(character("Knight.glb", asset), source, {}).clip.tracks[0].times
     np.testing.assert_array_equal(times, source.clip.tracks[0].times)
-
-
-def test_curves_without_a_hierarchy_are_the_nodes_own() -> None:
-    curve = linear(np.array((0.0, 1.0)), np.array((0.0, 0.5)))
-    node = EulerNode("tail2", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
-    source = from_euler(EulerMotion((node,), nested=False), tolerance=1e-4)
-    done = onto(source, Scene(_tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=False)
-    assert [(track.node, track.path) for track in done.clip.tracks] == [(1, "rotation")]
-
-
-def test_strangers_are_refused() -> None:
-    node = EulerNode("wing", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),))
-    source = from_euler(EulerMotion((node,)), tolerance=1e-4)
-    with pytest.raises(NotFoundError, match="no joint of the motion"):
-        onto(source, Scene(_tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True)
-
-
-def test_units_are_guessed_by_height() -> None:
-    assert guess_unit(172).unit == "centimeters"
-    assert guess_unit(1.8).scale == 1
-    assert guess_unit(66).unit == "inches"
-    assert guess_unit(1720).unit == "millimeters"
-    assert guess_unit(0).scale == 1
-
-
-def test_the_path_begins_from_where_the_character_stands() -> None:
-    """Both axes of the ground, so that a crowd does not gather in one place."""
-    target = _tail(np.array((0, 0, 0, 1.0)))
-    aside = replace(target, translation=target.translation + (target.parents < 0)[:, None] * [3.0, 0, -2])
-    source = from_euler(EulerMotion((_keyed("tail1", -1, (0, 80, 0), (0, 0, 0), (0, 0, 0)),)), tolerance=1e-3)
-    here, there = (
-        pose(each, clip, np.zeros(1)).translation[0, 0]
-        for each in (target, aside)
-        for clip in [onto(source, Scene(each, ()), aliases={}, nested=True, floor=Floor.KEEP).clip]
-    )
-    np.testing.assert_allclose(there - here, (3, 0, -2), atol=1e-9)

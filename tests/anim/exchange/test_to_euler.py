@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.exchange import bvh
+from anim.exchange.curve import Mode
 from anim.exchange.from_euler import from_euler
 from anim.exchange.local import rest_positions, rotation_at
 from anim.exchange.motion import Convention, EulerMotion, Unit, scaled
@@ -22,9 +24,11 @@ from anim.maths.euler import ORDERS, Frame
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.sampling import pose, world_matrices
 from anim.sampling.track import sample
+from tests.clips import skeleton
 from tests.files import glb_of, opened, opened_fixture, opened_path
 
 BVH = Convention("ZXY", Frame.INTRINSIC, Unit.DEG)
+AT = np.ones((20, 3))
 ONE = Skeleton(("a",), np.array([-1]), np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.ones((1, 3)))
 
 
@@ -46,6 +50,17 @@ def test_curves_are_the_rotation_at_every_key(order: str, frame: Frame) -> None:
     made = rotation_at(found.motion.nodes[0], clip.tracks[0].times)
     assert quaternion.angle_between(made, clip.tracks[0].values).max() < 1e-6
     assert np.abs(np.diff(_values(found.motion), axis=0)).max() < 1.5 * np.pi
+
+
+def test_steps_keep_their_times_under_a_frame_rate() -> None:
+    turns = quaternion.from_rotation_vector(np.array([[0, 0, 0], [0, 0, 1.0]]))
+    steps: tuple[Track, ...] = (Track(0, "rotation", Interpolation.STEP, np.array((0.0, 0.35)), turns),)
+    steps += (Track(0, "scale", Interpolation.STEP, np.array((0.0, 0.35)), np.ones((2, 3))),)
+    (node,) = to_euler(ONE, Clip("c", steps), order="XYZ", fps=4).motion.nodes
+    for curve in (*node.rotation, *node.scales.values()):
+        assert curve is not None
+        assert curve.times.tolist() == [0, 0.35]
+        assert set(curve.modes.tolist()) == {Mode.STEP}
 
 
 def test_keys_are_added_until_straight_curves_follow() -> None:
@@ -138,6 +153,33 @@ def test_what_lies_between_chosen_joints_is_written_too() -> None:
     )
     motion = to_bvh(chain, _turning(), order="ZXY", joints={0, 2})
     assert [(node.name, node.parent) for node in motion.nodes] == [("a", -1), ("b", 0), ("c", 1)]
+
+
+def test_what_a_bvh_of_chosen_joints_does_not_show_is_named() -> None:
+    """Motion above the joints moves them; motion beside and below is lost."""
+    turn = _turning().tracks[0]
+    tracks = (turn, replace(turn, node=1), replace(turn, node=2), replace(turn, node=3, path="translation", values=AT))
+    bones = skeleton([-1, 0, 1, 0])
+    assert to_bvh(bones, Clip("c", tracks), order="ZXY", joints={1}).notes == (
+        "left out: rotation of '2', translation of '3'",
+    )
+
+
+def test_a_bvh_holds_names_between_braces_as_well_as_it_can() -> None:
+    bones = replace(skeleton([-1, 0, 0]), names=("a{b}", "a(b)", "half \ud83d"))
+    motion = to_bvh(bones, _turning(), order="ZXY")
+    assert motion.notes == ("braces in names became parentheses: a(b)",)
+    text = bvh.write(motion, Convention("ZXY", Frame.INTRINSIC, Unit.DEG))
+    found = [node.name for node in bvh.read(text).nodes if not node.end]
+    assert found == ["a(b)", "a(b).2", "half \\ud83d"]
+
+
+def test_offsets_of_a_bvh_keep_their_digits() -> None:
+    offsets = [[0, 0, 0], [1234567, -2.5, 0.1234564], [0, 0, -1e-9]]
+    motion = to_bvh(skeleton([-1, 0, 1], translation=offsets), _turning(), order="ZXY")
+    text = bvh.write(motion, Convention("ZXY", Frame.INTRINSIC, Unit.DEG)).decode()
+    assert "OFFSET 1234567 -2.500000 0.123456\n" in text
+    assert text.count("OFFSET 0 0 0\n") == 3  # root, the last, and its End Site
 
 
 def test_frames_on_keys_take_the_keys_values() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import math
+import pickle
 from typing import Any
 
 import pytest
@@ -53,6 +56,32 @@ def test_a_lone_surrogate_survives_as_an_escape() -> None:
     assert json.loads(text.dump(text.parse(raw), 2)) == json.loads(raw)
 
 
+BEYOND = '{"a":[1,1e999,-2.5E+400],"é":{"c":-1e309,"d":0.5},"e":[{"f":1E310}]}'
+
+
+def test_numbers_beyond_any_float_stay_as_they_were() -> None:
+    """Readers take them for infinite; what is in extras is not ours to judge."""
+    content = text.parse(BEYOND.encode())
+    assert content["a"] == [1, math.inf, -math.inf]
+    assert text.dump(content) == BEYOND.encode()
+    laid_out = text.dump(content, 2)
+    assert b'  "a": [1, 1e999, -2.5E+400],\n' in laid_out
+    assert b'    "c": -1e309,\n' in laid_out
+    assert text.dump(text.parse(laid_out)) == BEYOND.encode()
+
+
+def test_numbers_beyond_any_float_beside_a_lone_surrogate() -> None:
+    raw = b'{"name":"\\ud800","extras":[1e999]}'
+    assert text.dump(text.parse(raw)) == raw
+    assert text.dump(text.parse(raw), 1) == b'{\n "name": "\\ud800",\n "extras": [1e999]\n}'
+
+
+def test_numbers_beyond_any_float_survive_copies() -> None:
+    content = text.parse(b'{"a":1e999}')
+    for copied in (copy.deepcopy(content), pickle.loads(pickle.dumps(content))):
+        assert text.dump(copied) == b'{"a":1e999}'
+
+
 @pytest.mark.parametrize("raw", [b'{"a":NaN}', b'{"a":Infinity}', b'{"a":-Infinity}', b"[1]", b"1", b"null", b"", b"{"])
 def test_what_is_no_json_object_is_refused(raw: bytes) -> None:
     with pytest.raises(FormatError, match="JSON"):
@@ -61,6 +90,8 @@ def test_what_is_no_json_object_is_refused(raw: bytes) -> None:
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
 def test_what_json_can_not_hold_is_refused(number: float) -> None:
-    for indent in (None, 2):
-        with pytest.raises(FormatError, match="JSON"):
-            text.dump({"a": number}, indent)
+    """Nor beside one that was read so."""
+    for content in ({"a": number}, {"a": [number]}, {**text.parse(b'{"b":1e999}'), "a": number}):
+        for indent in (None, 2):
+            with pytest.raises(FormatError, match="JSON"):
+                text.dump(content, indent)

@@ -1,0 +1,53 @@
+"""Tracks that one rule plays, so that their keys can be put into one array."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from anim.arrays import Floats
+from anim.model import Interpolation, Kind, Track
+
+Rule: TypeAlias = tuple[str, Interpolation, Kind, int]
+Tangents: TypeAlias = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """Tracks of one rule, see `rule`."""
+
+    tracks: tuple[Track, ...]
+
+    @property
+    def path(self) -> str:
+        """The one path of all tracks."""
+        return self.tracks[0].path
+
+    @property
+    def interpolation(self) -> Interpolation:
+        """The one interpolation of all tracks."""
+        return self.tracks[0].interpolation
+
+    @property
+    def kind(self) -> Kind:
+        """The one kind of all tracks."""
+        return self.tracks[0].kind
+
+
+def rule(track: Track) -> Rule:
+    """Return what tracks must have in common: path, interpolation, kind, and number of components."""
+    return track.path, track.interpolation, track.kind, track.values.shape[1]
+
+
+def put_together(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:
+    """Return the values of tracks of one rule, and their in and out tangents, None where they have none.
+
+    join: makes one array of each track's (K, C).
+    """
+    values = join([track.values for track in tracks])
+    if tracks[0].interpolation is not Interpolation.CUBICSPLINE:
+        return values, None
+    arriving = [track.in_tangents for track in tracks if track.in_tangents is not None]
+    leaving = [track.out_tangents for track in tracks if track.out_tangents is not None]
+    return values, (join(arriving), join(leaving))

@@ -1,0 +1,47 @@
+"""Recorded motions, and who they are put on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange import bvh
+from anim.exchange.from_euler import Converted, from_euler
+from anim.exchange.local import extent, skeleton
+from anim.exchange.motion import scaled
+from anim.exchange.onto import Onto, onto
+from anim.exchange.retarget import Floor
+from anim.exchange.units import guess_unit
+from anim.gltf import read
+from anim.gltf.document import Document
+from anim.model import Skeleton
+from tests.files import opened_fixture, opened_path
+
+Find = Callable[[str], Path]
+
+
+def recorded(name: str, asset: Find) -> Converted:
+    """Return the motion of a recording in meters."""
+    motion = bvh.read(asset(f"bvh/{name}").read_bytes())
+    return from_euler(scaled(motion, guess_unit(extent(skeleton(motion))).scale), tolerance=1e-3, name="cmu")
+
+
+def character(name: str, asset: Find) -> Document:
+    """Return the document of the biped, or of a real character."""
+    return opened_fixture("biped") if name == "biped" else opened_path(asset(name))
+
+
+def put_on(document: Document, source: Converted, aliases: dict[str, str], floor: Floor = Floor.CONTACT) -> Onto:
+    """Return a motion as a clip of the character."""
+    return onto(source, read.scene(document), aliases=aliases, nested=True, floor=floor)
+
+
+def tail(turn: Floats) -> Skeleton:
+    """Return three joints in a row, no person's, at rest along x, the whole turned."""
+    return Skeleton(
+        ("tail1", "tail2", "tail3"), np.array([-1, 0, 1]), np.array([[0, 0, 0], [1.0, 0, 0], [1, 0, 0]]),
+        np.array([turn, [0, 0, 0, 1], [0, 0, 0, 1]]), np.ones((3, 3)),
+    )  # fmt: skip

@@ -1,0 +1,44 @@
+"""A motion put on a character: whose joints those are, and what becomes of the file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.errors import NotFoundError
+from anim.exchange.curve import linear
+from anim.exchange.from_euler import from_euler
+from anim.exchange.motion import EulerMotion, EulerNode
+from anim.exchange.onto import onto
+from anim.gltf import author, read
+from anim.maths.euler import Frame
+from anim.model import Scene
+from tests.anim.exchange.figures import Find, put_on, recorded, tail
+from tests.clips import skeleton
+from tests.files import glb_of, opened, opened_fixture
+
+
+def test_the_clip_is_added_and_nothing_else(asset: Find) -> None:
+    document = opened_fixture("biped")
+    done = put_on(document, recorded("cmu_01_01.bvh", asset), {})
+    written = opened(glb_of(author.add_clips(document, [done.clip])))
+    assert [clip.name for clip in read.clips(written)] == ["walk", "wave", "jump", "cmu"]
+    for key in ("nodes", "meshes", "skins", "materials", "scenes"):
+        assert written.json[key] == document.json[key]
+
+
+def test_curves_without_a_hierarchy_are_the_nodes_own() -> None:
+    curve = linear(np.array((0.0, 1.0)), np.array((0.0, 0.5)))
+    node = EulerNode("tail2", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
+    source = from_euler(EulerMotion((node,), nested=False), tolerance=1e-4)
+    done = onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=False)
+    assert [(track.node, track.path) for track in done.clip.tracks] == [(1, "rotation")]
+
+
+def test_strangers_are_refused() -> None:
+    node = EulerNode("wing", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),))
+    source = from_euler(EulerMotion((node,)), tolerance=1e-4)
+    with pytest.raises(NotFoundError, match="no joint of the motion"):
+        onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True)
+    with pytest.raises(NotFoundError, match="the character has no nodes"):
+        onto(source, Scene(skeleton([]), ()), aliases={}, nested=True)

@@ -1,0 +1,147 @@
+"""Files are replaced whole, or not at all, and only where their bytes differ."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call, Find
+from tests.cli.running import ENVIRONMENT, ROOT, TIMEOUT, built, refusal, shell, started
+
+# The command line, but it stops before it puts its finished temporary file into place.
+PAUSED = """
+import os, signal, sys, time
+from cli import main
+def paused(source, target):
+    print("paused", file=sys.stderr, flush=True)
+    time.sleep(60)
+os.replace = paused
+signal.signal(signal.SIGINT, signal.default_int_handler)
+main.main()
+"""
+
+
+@pytest.mark.parametrize("before", [None, b"precious"])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_a_killed_run_leaves_what_was_there(
+    number: signal.Signals, code: int, before: bytes | None, walk: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.glb"
+    if before is not None:
+        out.write_bytes(before)
+    command = [sys.executable, "-c", PAUSED, "convert", str(walk), str(out)]
+    run = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stderr=subprocess.PIPE)
+    assert run.stderr is not None
+    assert run.stderr.readline() == b"paused\n"
+    run.send_signal(number)
+    _, err = run.communicate(timeout=TIMEOUT)
+    assert run.returncode in (code, -number)  # either way a shell says 128 + the signal's number
+    assert b"Traceback" not in err
+    assert (out.read_bytes() if out.exists() else None) == before
+    others = {path.name for path in tmp_path.iterdir()} - {"walk.glb", "out.glb"}
+    if number != signal.SIGKILL:
+        assert others == set()
+    else:  # nobody can clear up after that, but what is left is hidden and tells whose it was
+        assert [name.startswith(".out.glb.") and name.endswith(".tmp") for name in others] == [True]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("delay", [0.1, 0.4, 0.8])
+def test_a_run_killed_at_work_leaves_nothing(number: signal.Signals, delay: float, asset: Find, tmp_path: Path) -> None:
+    run = started("resample", asset("Knight.glb"), tmp_path / "out.glb", "--fps", "240")
+    time.sleep(delay)
+    run.send_signal(number)
+    _, err = run.communicate(timeout=TIMEOUT)
+    assert run.returncode in (128 + number, -number)
+    assert list(tmp_path.iterdir()) == []
+    if delay > 0.2:  # before, Python itself may still be starting
+        assert err == b""
+
+
+@pytest.mark.parametrize("fails", ["mkstemp", "write"])
+def test_a_text_file_and_its_buffer_change_together(
+    fails: str, call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call("convert", walk, tmp_path / "out.gltf").product()
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    made: list[str] = []
+
+    def mkstemp(*, prefix: str, suffix: str, dir: Path) -> tuple[int, str]:
+        made.append(prefix)
+        if len(made) == 2 and fails == "mkstemp":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        handle, name = real(prefix=prefix, suffix=suffix, dir=dir)
+        return (os.open(name, os.O_RDONLY) if len(made) == 2 else handle), name
+
+    real = tempfile.mkstemp
+    monkeypatch.setattr(tempfile, "mkstemp", mkstemp)
+    run = call("resample", walk, tmp_path / "out.gltf", "--fps", "9")
+    assert "out.gltf: can't be written (" in refusal(run, 2)
+    assert made == [".out.bin.", ".out.gltf."]
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_ctrl_c_is_130_for_the_shell(walk: Path, tmp_path: Path) -> None:
+    script = tmp_path / "paused.py"
+    script.write_text(PAUSED)
+    line = f"PYTHONPATH='{ROOT}' '{sys.executable}' paused.py convert walk.glb out.glb 2> words & "
+    line += "until grep -q paused words; do sleep 0.05; done; kill -INT $!; wait $!; echo $?"
+    run = shell(line, tmp_path)
+    assert run.text == "130\n"
+    assert (tmp_path / "words").read_text() == "paused\n"
+
+
+@pytest.mark.parametrize("out", ["out.glb", "out.gltf", "out.csv"])
+def test_equal_bytes_are_not_written_again(out: str, call: Call, walk: Path, tmp_path: Path) -> None:
+    line = (
+        ["sample", walk, tmp_path / out, "--at=0"]
+        if out == "out.csv"
+        else ["resample", walk, tmp_path / out, "--fps=9"]
+    )
+    call(*line).product()
+    before = [path.stat() for path in sorted(tmp_path.iterdir())]
+    call(*line).product()
+    after = [path.stat() for path in sorted(tmp_path.iterdir())]
+    assert [(s.st_ino, s.st_mtime_ns) for s in after] == [(s.st_ino, s.st_mtime_ns) for s in before]
+    walk.write_bytes(built("arm"))
+    call(*line).product()
+    changed = [path.stat().st_mtime_ns for path in sorted(tmp_path.glob("out.*"))]
+    assert not set(changed) & {s.st_mtime_ns for s in before}
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o600, 0o755, 0o664])
+def test_mode_bits_are_kept(mode: int, call: Call, walk: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    out.touch()
+    out.chmod(mode)
+    call("convert", walk, out).product()
+    assert out.read_bytes().startswith(b"glTF")
+    assert stat.S_IMODE(out.stat().st_mode) == mode
+
+
+@pytest.mark.parametrize(("mask", "mode"), [("022", 0o644), ("077", 0o600), ("002", 0o664)])
+def test_new_files_have_the_mode_that_any_program_gives(mask: str, mode: int, walk: Path, tmp_path: Path) -> None:
+    shell(f"umask {mask} && gltf-anim convert walk.glb out.glb", tmp_path).product()
+    assert stat.S_IMODE((tmp_path / "out.glb").stat().st_mode) == mode
+
+
+def test_links_are_written_through(call: Call, walk: Path, tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    real, link, dangling = tmp_path / "real" / "out.glb", tmp_path / "link.glb", tmp_path / "dangling.glb"
+    real.write_bytes(b"old")
+    link.symlink_to(real)
+    dangling.symlink_to("real/new.glb")
+    for path in (link, dangling):
+        call("convert", walk, path).product()
+        assert path.is_symlink()
+    assert real.read_bytes() == (tmp_path / "real" / "new.glb").read_bytes() == call("convert", walk).product()
+    assert sorted(path.name for path in (tmp_path / "real").iterdir()) == ["new.glb", "out.glb"]
