@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
-from anim.gltf import meshopt, overlap, text
+from anim.gltf import meshopt, ordering, overlap, text
 from anim.gltf.document import Json
 from anim.gltf.encode import Numbers
 from anim.gltf.pack import Packing
@@ -116,45 +115,15 @@ def _streams(contents: Sequence[Numbers], members: Sequence[int], extension: str
 
 
 def _encoded(contents: Sequence[Numbers], members: Sequence[int], name: str, stride: int, extension: str) -> _Stream:
-    """The smallest of three orders: as the contents come, and calm ones first, by two measures."""
-    codes = {i: _codes(contents[i]) for i in members}
-    bits = {i: _bits(codes[i], stride) for i in members}
-    change = {i: _change(codes[i], stride, name) for i in members}
-    orders = (
-        tuple(members),
-        tuple(sorted(members, key=bits.__getitem__)),
-        tuple(sorted(members, key=change.__getitem__)),
-    )
-    found = []
-    for order in dict.fromkeys(orders):
-        data = b"".join(codes[i] for i in order)
-        rows = np.frombuffer(data, np.uint8).reshape(-1, stride)
-        found.append(_Stream(View(meshopt.encode(rows, extension), len(data), stride, name), order))
-    return min(found, key=lambda stream: len(stream.view.stored))
+    codes = [_codes(contents[i]) for i in members]
+    order = ordering.ordered(codes, stride, extension)
+    data = b"".join(codes[k] for k in order)
+    stored = meshopt.encode(np.frombuffer(data, np.uint8).reshape(-1, stride), extension)
+    return _Stream(View(stored, len(data), stride, name), tuple(members[k] for k in order))
 
 
 def _codes(content: Numbers) -> bytes:
     return content.filtered.codes if content.filtered else _padded(content.data)
-
-
-def _bits(codes: bytes, stride: int) -> float:
-    """Mean bits of a byte's change from element to element, which is what the codec stores."""
-    rows = np.frombuffer(codes, np.uint8).reshape(-1, stride)
-    return _mean(np.log2(1 + np.abs(np.diff(rows, axis=0).view(np.int8).astype(np.float64))))
-
-
-def _change(codes: bytes, stride: int, name: str) -> float:
-    """Mean change of a number from element to element."""
-    if name == "QUATERNION":
-        numbers = np.frombuffer(codes, "<i2").reshape(-1, 4)[:, :3].astype(np.float64)
-    else:  # the mantissa: 24 bits with a sign, under 8 of exponent
-        numbers = (np.frombuffer(codes, "<i4") << 8 >> 8).astype(np.float64).reshape(-1, stride // 4)
-    return _mean(np.abs(np.diff(numbers, axis=0)))
-
-
-def _mean(changes: Floats) -> float:
-    """Single elements, which change nowhere, come last."""
-    return float(changes.mean()) if changes.size else float("inf")
 
 
 def _price(view: View, extension: str) -> int:

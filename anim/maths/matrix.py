@@ -10,22 +10,22 @@ from anim.maths import quaternion
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
     """Return T·R·S as (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4) and scale (..., 3)."""
-    x, y, z, w = rotation[..., 0], rotation[..., 1], rotation[..., 2], rotation[..., 3]
+    x, y, z, w = np.moveaxis(rotation, -1, 0)
+    sx, sy, sz = np.ascontiguousarray(np.moveaxis(scale, -1, 0))
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz = x * x2, y * y2, z * z2
     xy, xz, yz = x * y2, x * z2, y * z2
     wx, wy, wz = w * x2, w * y2, w * z2
     result: Floats = np.empty((*rotation.shape[:-1], 3, 4))
-    result[..., 0, 0] = 1 - (yy + zz)
-    result[..., 0, 1] = xy - wz
-    result[..., 0, 2] = xz + wy
-    result[..., 1, 0] = xy + wz
-    result[..., 1, 1] = 1 - (xx + zz)
-    result[..., 1, 2] = yz - wx
-    result[..., 2, 0] = xz - wy
-    result[..., 2, 1] = yz + wx
-    result[..., 2, 2] = 1 - (xx + yy)
-    result[..., :3] *= scale[..., None, :]
+    np.multiply(1 - (yy + zz), sx, out=result[..., 0, 0])
+    np.multiply(xy - wz, sy, out=result[..., 0, 1])
+    np.multiply(xz + wy, sz, out=result[..., 0, 2])
+    np.multiply(xy + wz, sx, out=result[..., 1, 0])
+    np.multiply(1 - (xx + zz), sy, out=result[..., 1, 1])
+    np.multiply(yz - wx, sz, out=result[..., 1, 2])
+    np.multiply(xz - wy, sx, out=result[..., 2, 0])
+    np.multiply(yz + wx, sy, out=result[..., 2, 1])
+    np.multiply(1 - (xx + yy), sz, out=result[..., 2, 2])
     result[..., 3] = translation
     return result
 

@@ -17,17 +17,18 @@ ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # of the six points, along the n
 class Shells:
     """Six points at `radius` (m, in the rest pose) along the axes of some nodes, each a group of its own.
 
-    nodes, partners: (S,) their numbers in the scenes before and after.
+    nodes, partners: (S,) their numbers in the scenes before and after. points: (S, 6, 3) m, in the nodes' spaces.
+    reach: of each group its node, as a place in `nodes`.
     """
 
     def __init__(self, skeleton: Skeleton, nodes: Ints, partners: Ints, radius: float) -> None:
         self.nodes, self.partners = nodes, partners
-        axes = world_matrices(skeleton, rest(skeleton))[0][nodes, :, :3]
-        scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
-        points = ENDS * (radius / np.where(scale > 0, scale, 1))[:, None]  # (S, 6, 3)
+        points = shells(skeleton, nodes, radius)
         whole = np.concatenate((points, np.ones((len(nodes), 6, 1))), axis=-1)
+        self.points = points
         self.groups: list[Ints] = [np.arange(6, dtype=np.int64)] * len(nodes)
-        self._groups = Groups([np.array([i]) for i in range(len(nodes))], list(whole), points)
+        self.reach: list[Ints] = [np.array([i]) for i in range(len(nodes))]
+        self._groups = Groups(self.reach, list(whole), points)
 
     @property
     def name(self) -> str:
@@ -57,6 +58,13 @@ class Shells:
         """Return −1, for these points are no vertices."""
         del found
         return -1
+
+
+def shells(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
+    """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
+    axes = world_matrices(skeleton, rest(skeleton))[0][nodes, :, :3]
+    scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
+    return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])
 
 
 def hidden(skeleton: Skeleton, surfaces: list[Surface]) -> Bools:

@@ -51,6 +51,16 @@ class Candidates:
             self._make(axis, name, [i for i in new if self._paths[i] == path], forms, rotations=path == ROTATION)
         return [(i, self._made[name, i, forms[i]]) for i in axis.members]
 
+    def aimed(self, axis: Axis, members: Sequence[int], aims: Floats, misses: Sequence[float]) -> list[Candidate]:
+        """Return rotations for the `members` of an axis that aim at others (W, G, 4) than the tracks' own."""
+        place = self._place(axis, axis.keys.tobytes())
+        keys = aims[self._truth.on_grid[axis.keys]]
+        if not axis.keys.all():
+            keys = self._fit_on(axis, axis.keys.tobytes()).rotations(aims, keys)
+        by_track = list(np.moveaxis(keys, 1, 0))
+        forms = [coding.form(by_track[k], "rotation", misses[i], self._packing) for k, i in enumerate(members)]
+        return _candidates(coding.all_stored(by_track, forms), place, rotations=True)
+
     def by_chords(self, axis: Axis, rotations: Sequence[Stored]) -> Floats:
         """Return what players that mix by components show of rotations on an axis, (W, G, 4)."""
         keys = np.stack([each.values for each in rotations], axis=1)
@@ -59,12 +69,9 @@ class Candidates:
     def _make(self, axis: Axis, name: bytes, members: list[int], forms: dict[int, Form], *, rotations: bool) -> None:
         if not members:
             return
-        stored = [coding.stored(self._keys[name, i], forms[i]) for i in members]
-        keys = np.stack([each.values for each in stored], axis=1)
-        way = play.along_arcs if rotations and len(keys) > 1 else play.on_lines
-        shown = way(keys, self._place(axis, name))
-        for k, i in enumerate(members):
-            self._made[name, i, forms[i]] = Candidate(stored[k], shown[:, k])
+        stored = coding.all_stored([self._keys[name, i] for i in members], [forms[i] for i in members])
+        made = _candidates(stored, self._place(axis, name), rotations=rotations)
+        self._made.update(((name, i, forms[i]), each) for i, each in zip(members, made, strict=True))
 
     def _fit(self, axis: Axis, name: bytes) -> None:
         """Keys of members that are new on the axis: their own values where it has every key, else fitted ones."""
@@ -76,14 +83,24 @@ class Candidates:
             values = np.stack([self._truth.moving[i].values for i in new], axis=1)
             keys = values[at]
             if not axis.keys.all():
-                if name not in self._fits:
-                    self._fits[name] = Fit(self._place(axis, name), len(at))
-                fit = self._fits[name]
+                fit = self._fit_on(axis, name)
                 keys = fit.rotations(values, keys) if path == ROTATION else fit.vectors(values)
             for k, i in enumerate(new):
                 self._keys[name, i] = keys[:, k]
+
+    def _fit_on(self, axis: Axis, name: bytes) -> Fit:
+        if name not in self._fits:
+            self._fits[name] = Fit(self._place(axis, name), int(axis.keys.sum()))
+        return self._fits[name]
 
     def _place(self, axis: Axis, name: bytes) -> Located:
         if name not in self._places:
             self._places[name] = locate(self._truth.grid[axis.keys], self._truth.at)
         return self._places[name]
+
+
+def _candidates(stored: Sequence[Stored], place: Located, *, rotations: bool) -> list[Candidate]:
+    keys = np.stack([each.values for each in stored], axis=1)
+    way = play.along_arcs if rotations and len(keys) > 1 else play.on_lines
+    shown = way(keys, place)
+    return [Candidate(each, shown[:, k]) for k, each in enumerate(stored)]

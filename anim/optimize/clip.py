@@ -12,9 +12,11 @@ from anim.model import FLOAT32, Clip, Interpolation, Track
 from anim.optimize import ends, lossless, morph, pointers
 from anim.optimize.coding import Stored
 from anim.optimize.limits import Drop
+from anim.optimize.outcome import Fate, Outcome
 from anim.optimize.search import search
 from anim.optimize.setting import Setting
-from anim.optimize.trial import CHORDS_NOTICED, Bench, Fate, Outcome
+from anim.optimize.strains import Strains
+from anim.optimize.trial import CHORDS_NOTICED, Bench
 from anim.optimize.truth import PATHS, Truth, key_grid, truth
 from anim.sampling import times
 
@@ -182,15 +184,14 @@ class _Sorted:
             reference=setting.policy.reference,
             noticed=CHORDS_NOTICED * bound,
         )
+        allowed = np.full(len(setting.points), bound - self._spent)
         bench = Bench(
             setting.skeleton,
             found,
-            setting.points,
-            np.full(len(setting.points), bound - self._spent),
+            Strains(setting.skeleton, found, setting.points, allowed, replace(setting.bounds, max_error=bound)),
             setting.coding,
             np.array([self._droppable(i) for i in free], np.bool_),
             [self._task.shared[i] for i in free],
-            replace(setting.bounds, max_error=bound),
         )
         outcome = search(bench, bound, setting.effort)
         return None if outcome is None else _tracks(self._clip, found, outcome)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import TypeAlias
 
 import numpy as np
@@ -18,6 +19,8 @@ FEW = 2  # keys up to which float32 takes no more bytes than int16 with its long
 INT16_MISS = 2.5e-5  # quaternion units that rounding to int16 may miss, and be worth it
 FILTER_MISS = 4e-5  # the same for meshopt's quaternion filter, whose output is int16 too
 FILTER_BITS = (5, 16)
+FILTER_STEP = 2.45 / 4  # what that filter may miss, times its largest integer: √3 components by half a step, and √2 / 2
+EXPONENT_STEP = 1.5 / 2  # what meshopt's exponential filter may miss, in its powers of two
 MANTISSA_BITS = 22  # of meshopt's exponential filter, without the sign
 
 
@@ -74,12 +77,14 @@ class Stored:
     """Keys as they will be stored.
 
     values: (K, C) as they decode. form: "int16", "float32", "quaternion" or "exponent", the last two meshopt's
-    filters. codes: their filtered bytes, 8 a key or 4 a component.
+    filters. codes: their filtered bytes, 8 a key or 4 a component. miss: in units of the values, by how much filtering
+    may have missed them.
     """
 
     values: Floats
     form: str
     codes: bytes = b""
+    miss: float = 0.0
 
     def exact(self) -> Floats:
         """Return the values as meshopt itself decodes them: its filter computes in float32, a search needn't."""
@@ -105,10 +110,19 @@ def stored(values: Floats, form: Form) -> Stored:
     if kind == "float32":
         return Stored(values.astype(np.float32).astype(np.float64), kind)
     if kind == "quaternion":
-        codes = _quaternion_codes(values, number)
-        return Stored(_decoded(codes), kind, codes)
+        return all_stored([values], [form])[0]
     mantissa = np.rint(values * 2.0**-number)
-    return Stored(mantissa * 2.0**number, kind, _exponent_codes(mantissa, number))
+    return Stored(mantissa * 2.0**number, kind, _exponent_codes(mantissa, number), EXPONENT_STEP * 2.0**number)
+
+
+def all_stored(values: Sequence[Floats], forms: Sequence[Form]) -> list[Stored]:
+    """Return the keys (K, C) of each track in its form: all quaternions are decoded in one go."""
+    filtered = [i for i, (kind, _) in enumerate(forms) if kind == "quaternion"]
+    codes = [_quaternion_codes(values[i], forms[i][1]) for i in filtered]
+    decoded = np.split(_decoded(b"".join(codes)), np.cumsum([len(each) // 8 for each in codes])[:-1])
+    misses = [FILTER_STEP / ((1 << (forms[i][1] - 1)) - 1) for i in filtered]
+    found = dict(zip(filtered, map(Stored, decoded, repeat("quaternion"), codes, misses), strict=True))
+    return [found[i] if i in found else stored(values[i], forms[i]) for i in range(len(forms))]
 
 
 def held(value: Floats) -> Stored:
@@ -118,12 +132,12 @@ def held(value: Floats) -> Stored:
 
 def filter_bits(miss: float) -> int:
     """Return the bits per component at which the quaternion filter misses by `miss` at most."""
-    return int(np.clip(math.ceil(1 + math.log2(1 + 2.45 / (4 * miss))), *FILTER_BITS))
+    return min(max(math.ceil(1 + math.log2(1 + FILTER_STEP / miss)), FILTER_BITS[0]), FILTER_BITS[1])
 
 
 def exponent(values: Floats, miss: float) -> int:
     """Return the power of two whose multiples miss values by `miss` at most, and still fit a mantissa of 23 bits."""
-    wanted = math.floor(math.log2(2 * miss / 1.5)) if miss > 0 else -40
+    wanted = math.floor(math.log2(miss / EXPONENT_STEP)) if miss > 0 else -40
     largest = float(np.abs(values).max(initial=1e-9)) or 1e-9
     return max(wanted, math.ceil(math.log2(largest)) - MANTISSA_BITS)
 

@@ -77,20 +77,36 @@ class Effort:
     """How long a search goes on.
 
     rounds: of feedback. thresholds: shares of the bound tried as what a track may be off to be held. axes: further
-    ways to choose time axes. finishing: factors tried on all budgets at the end. strays: random changes tried.
-    descent: times that each track is tried with coarser storage.
+    ways to choose time axes. favoring: rounds with more room for long tracks. leeways: where rotations make up for each
+    other, how much of what that shortens levers by is given to their budgets at once, as powers. finishing: factors
+    tried on all budgets at the end. strays: random changes tried. descent: times that each track is tried with coarser
+    storage. cycles: times that all of this is done at most, as long as it saves bytes. after: an effort to begin with.
     """
 
     rounds: int
     thresholds: tuple[float, ...] = ()
     axes: tuple[str, ...] = ()
+    favoring: int = 0
+    leeways: tuple[float, ...] = ()
     finishing: tuple[float, ...] = (1.05,)
     strays: int = 0
     descent: int = 0
+    cycles: int = 1
+    after: Effort | None = None
 
 
-EFFORTS = {
-    "fast": Effort(5),
-    "balanced": Effort(5, (0.25, 0.6), ("full",), (1.1, 1.05), 25),
-    "max": Effort(10, (0.1, 0.25, 0.4, 0.6, 0.8), ("full", "joint", "second", "third"), (1.2, 1.1, 1.05, 1.02), 400, 2),
-}
+FAST = Effort(5)
+BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), strays=15, descent=1)
+MAX = Effort(
+    10,
+    (0.1, 0.25, 0.4, 0.6, 0.8),
+    ("full", "joint", "second", "third"),
+    10,
+    (0.0, 0.25, 0.5, 0.75),
+    (1.2, 1.1, 1.05, 1.02),
+    strays=100,
+    descent=2,
+    cycles=3,
+    after=BALANCED,
+)
+EFFORTS = {"fast": FAST, "balanced": BALANCED, "max": MAX}

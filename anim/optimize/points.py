@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
+from anim.measure.shells import shells as shells_of
 from anim.measure.surface import Surface, surfaces
 from anim.model import Scene
 
@@ -74,19 +75,20 @@ class Rows:
         self._matrix = matrix
 
     def moves(self, columns: Floats) -> Floats:
-        """Return moves (P, F, 3) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
+        """Return moves (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
         moved = self._matrix @ columns.astype(np.float32)  # type: ignore[operator]
-        return np.asarray(moved).reshape(len(moved), -1, 3)
+        return np.asarray(moved).reshape(len(moved), 3, -1)
 
 
 def stacked(world: Floats, nodes: Ints) -> Floats:
-    """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F)."""
+    """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, then all y, then all z."""
     chosen = world[nodes]
-    return chosen.transpose(0, 3, 1, 2).reshape(4 * len(nodes), -1)
+    return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), -1)
 
 
 def of_scene(scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int, int]] = frozenset()) -> Points:
-    """Return the vertices of the scene that stick out, and six points `radius` metres around each node in `shells`.
+    """Return the vertices of the scene that stick out, and six points around each node in `shells`, `radius` metres
+    off in the rest pose.
 
     Of vertices: for each joint and each of 14 directions of its space, the farthest of those that it carries most,
     and of all that it carries noticeably. extra: more of them, (number of the surface, number of the vertex).
@@ -96,7 +98,8 @@ def of_scene(scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int
     for number, surface in enumerate(found):
         wanted = extremes(surface) | {vertex for owner, vertex in extra if owner == number}
         parts.append(_of_surface(surface, np.array(sorted(wanted), np.int64)))
-    parts += [_shell(node, radius) for node in sorted(shells)]
+    around = np.array(sorted(shells), np.int64)
+    parts += [_shell(node, ends) for node, ends in zip(around, shells_of(scene.skeleton, around, radius), strict=True)]
     if not parts:
         return Points(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
     nodes = np.unique(np.concatenate([nodes.reshape(-1) for nodes, _ in parts]))
@@ -132,7 +135,7 @@ def _of_surface(surface: Surface, vertices: Ints) -> tuple[Ints, Floats]:
     return surface.nodes[joints], factors * weights[..., None]
 
 
-def _shell(node: int, radius: float) -> tuple[Ints, Floats]:
-    factors = np.ones((len(DIRECTIONS), 1, 4))
-    factors[:, 0, :3] = radius * DIRECTIONS
-    return np.full((len(DIRECTIONS), 1), node, np.int64), factors
+def _shell(node: int, ends: Floats) -> tuple[Ints, Floats]:
+    factors = np.ones((len(ends), 1, 4))
+    factors[:, 0, :3] = ends
+    return np.full((len(ends), 1), node, np.int64), factors

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
+from anim.measure.shells import hidden
 from anim.measure.surface import Surface, surfaces
 from anim.model import Clip, Scene, Skeleton
 from anim.optimize import morph
@@ -24,7 +25,7 @@ class Setting:
 
     size: m, the diagonal of the box around the points at rest. rest_world: (N, 3, 4) world matrices of the rest pose.
     surfaces: those with morph targets. answering: by node that any clip moves, which points (P,) hang on it.
-    unseen: (N,) nodes that carry no vertex, nor does a node on them.
+    unseen: (N,) nodes that carry no vertex, nor does a node on them; the node of a skinned mesh is none.
     """
 
     skeleton: Skeleton
@@ -71,7 +72,7 @@ def setting(
     extra: vertices to measure beside those that stick out, (number of the surface, number of the vertex).
     """
     skeleton = scene.skeleton
-    unseen = ~_seen(scene)
+    unseen = hidden(skeleton, surfaces(scene) if _has_vertices(scene) else [])
     shells = set(np.flatnonzero(unseen & _moved(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
@@ -94,15 +95,8 @@ def setting(
     )
 
 
-def _seen(scene: Scene) -> Bools:
-    """Which nodes (N,) carry a vertex, or have a node below that does."""
-    seen = np.zeros(len(scene.skeleton), np.bool_)
-    if any(len(instance.mesh.positions) for instance in scene.instances):
-        for surface in surfaces(scene):
-            seen[surface.nodes[np.unique(surface.joints[surface.weights > 0])]] = True
-    for level in reversed(scene.skeleton.levels()[1:]):
-        np.logical_or.at(seen, scene.skeleton.parents[level], seen[level])
-    return seen
+def _has_vertices(scene: Scene) -> bool:
+    return any(len(instance.mesh.positions) for instance in scene.instances)
 
 
 def _moved(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:

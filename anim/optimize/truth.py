@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints, sorted_unique
-from anim.maths import matrix, quaternion
+from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimize import play
 from anim.optimize.limits import Reference
 from anim.optimize.points import Points, stacked
+from anim.optimize.worlds import needed_levels, worlds
 from anim.sampling import pose, times
 from anim.sampling.track import locate
 
@@ -123,25 +124,6 @@ def moments(grid: Floats, tracks: Sequence[Track]) -> Floats:
     jumps = [axis[(axis > grid[0]) & (axis < grid[-1])] for axis in jumps]
     before = [np.nextafter(axis, -np.inf) for axis in jumps]
     return sorted_unique(np.concatenate([grid, (grid[1:] + grid[:-1]) / 2, *jumps, *before]))
-
-
-def needed_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
-    """Return the nodes of each depth, roots first, leaving out those that none of `nodes` hangs on."""
-    needed = np.zeros(len(skeleton), np.bool_)
-    for node in nodes.tolist():
-        while node >= 0 and not needed[node]:
-            needed[node] = True
-            node = int(skeleton.parents[node])
-    return tuple(level[needed[level]] for level in skeleton.levels())
-
-
-def worlds(skeleton: Skeleton, local: tuple[Floats, Floats, Floats], levels: Sequence[Ints]) -> Floats:
-    """Return world matrices (N, F, 3, 4) from translation, rotation and scale (N, F, ·); rotations as they are, unit or
-    not. Nodes outside `levels` hold no meaning."""
-    matrices = matrix.from_trs(*local)
-    if len(skeleton.sheared):
-        matrices[skeleton.sheared] = skeleton.sheared_local[:, None]
-    return matrix.chained(matrices, skeleton.parents, list(levels))
 
 
 def _on_splines(axis: Floats) -> Floats:

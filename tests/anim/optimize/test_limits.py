@@ -29,5 +29,8 @@ def test_each_effort_tries_what_a_smaller_one_does_and_more() -> None:
     for less, more in ((fast, balanced), (balanced, most)):
         assert less.rounds <= more.rounds
         assert set(less.axes) <= set(more.axes)
-        assert (less.strays, less.descent) <= (more.strays, more.descent)
+        assert set(less.leeways) <= set(more.leeways)
+        assert less.favoring <= more.favoring
+        assert less.strays <= more.strays
+        assert less.descent <= more.descent
     assert all(0 < share < 1 for effort in EFFORTS.values() for share in effort.thresholds)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from anim.optimize.limits import EFFORTS, Bounds
+from anim.optimize.outcome import Fate
 from anim.optimize.search import search
-from anim.optimize.trial import Bench, Fate
+from anim.optimize.strains import Strains
+from anim.optimize.trial import Bench
 from tests.anim.optimize.making import CORE, every_point, scene, truth_of, waving
 
 OF = scene()
@@ -18,7 +20,8 @@ def _bench(bound: float) -> Bench:
     truth = truth_of(OF, waving(), points)
     count = len(truth.moving)
     allowed = np.full(len(points), bound)
-    return Bench(OF.skeleton, truth, points, allowed, CORE, np.ones(count, bool), [()] * count, Bounds(bound, 0.0))
+    strains = Strains(OF.skeleton, truth, points, allowed, Bounds(bound, 0.0))
+    return Bench(OF.skeleton, truth, strains, CORE, np.ones(count, bool), [()] * count)
 
 
 def test_more_effort_and_more_room_take_fewer_bytes() -> None:

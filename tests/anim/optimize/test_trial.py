@@ -14,8 +14,10 @@ from anim.measure.error import Ruler
 from anim.model import Clip, Scene
 from anim.optimize.layouts import LAYOUTS
 from anim.optimize.limits import Bounds
+from anim.optimize.outcome import Fate, Outcome, Plan
 from anim.optimize.points import Points
-from anim.optimize.trial import Bench, Fate, Outcome, Plan
+from anim.optimize.strains import Strains
+from anim.optimize.trial import Bench
 from anim.optimize.truth import Truth
 from anim.sampling import pose
 from tests.anim.optimize.making import CORE, every_point, scene, truth_of, turning, waving
@@ -32,10 +34,9 @@ def _bench(
     points: Points = every_point(of)
     truth: Truth = truth_of(of, what, points)
     count = len(truth.moving)
-    return Bench(
-        of.skeleton, truth, points, np.full(len(points), BOUND), CORE, np.full(count, droppable),
-        [() if shared is None else (shared,)] * count, bounds or Bounds(BOUND, 0.0),
-    )  # fmt: skip
+    strains = Strains(of.skeleton, truth, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
+    values = [() if shared is None else (shared,)] * count
+    return Bench(of.skeleton, truth, strains, CORE, np.full(count, droppable), values)
 
 
 def _plan(bench: Bench, budget: float = BOUND / 3, **more: object) -> Plan:

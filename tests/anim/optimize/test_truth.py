@@ -11,7 +11,8 @@ from anim.maths import quaternion
 from anim.model import Scene
 from anim.optimize.limits import Reference
 from anim.optimize.points import Points, stacked
-from anim.optimize.truth import PATHS, key_grid, moments, needed_levels, worlds
+from anim.optimize.truth import PATHS, key_grid, moments
+from anim.optimize.worlds import needed_levels, worlds
 from anim.sampling import pose, world_matrices
 from tests.anim.optimize.making import every_point, scene, truth_of, turning, waving
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
@@ -141,10 +142,10 @@ def test_chords_are_normalized_mixes() -> None:
     rotation = track("rotation", [0, 1], about("z", [0, 120]))
     quarters = track("scale", [0, 0.25, 1], np.ones((3, 3)))
     truth = truth_of(of, clip(rotation, quarters), points)
-    x_axis = truth.by_chord.reshape(4, -1, 3)[0]
+    x_axis = truth.by_chord.reshape(4, 3, -1)[0].T
     quarter = int(np.searchsorted(truth.at, 0.25))
     mix = 0.75 * about("z", 0) + 0.25 * about("z", 120)
     assert truth.at[quarter] == 0.25
     assert x_axis[quarter] == pytest.approx(Rotation.from_quat(mix).as_matrix()[:, 0])
-    along_arc = truth.columns.reshape(4, -1, 3)[0]
+    along_arc = truth.columns.reshape(4, 3, -1)[0].T
     assert along_arc[quarter] == pytest.approx([np.cos(np.radians(30)), 0.5, 0])
