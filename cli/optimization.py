@@ -16,13 +16,14 @@ from anim.gltf.document import Document
 from anim.measure.footprint import footprints
 from anim.measure.stored import stored
 from anim.model import Clip
-from anim.optimize.clip import Solution
 from anim.optimize.limits import Drop
 from anim.optimize.optimize import Optimized
 from anim.optimize.request import Request
 from anim.optimize.seal import KEY
+from anim.optimize.solution import Solution
 from anim.optimize.tradeoff import Sized
 from anim.optimize.verify import NOTHING, Verdict
+from cli import optimize_proof
 from cli.errors import CheckError
 from cli.report import change, length, plural, size
 
@@ -113,6 +114,7 @@ def _clip_line(about: About, number: int, solution: Solution) -> str:
     found = about.found.verdicts[number]
     assert found.statistics is not None  # -v asks for them
     usual = f", p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
+    usual = optimize_proof.of_clip(found, about.request) + usual
     moved = found.error.max_error > NOTHING * about.scale
     return f"  {read.label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
 
@@ -191,7 +193,8 @@ def _worst_words(about: About) -> str:
     verdicts = about.found.verdicts
     if not verdicts:
         return "no clip"
-    return _error_words(max(verdicts.values(), key=lambda each: each.error.max_error), about)
+    words = _error_words(max(verdicts.values(), key=lambda each: each.error.max_error), about)
+    return words + optimize_proof.summary(verdicts.values(), about.request, about.scale)
 
 
 def _error_words(verdict: Verdict, about: About) -> str:
@@ -268,6 +271,8 @@ def _clip(about: About, number: int, solution: Solution) -> dict[str, Any]:
             "time_s": error.time,
             "player": verdict.player,
         },
+        "certified_error_m": verdict.certified,
+        "not_certified_because": optimize_proof.why_not(verdict, about.request),
         "p99_m": rest.p99,
         "mean_m": rest.mean,
         "max_angle_deg": math.degrees(rest.angle.size),

@@ -6,20 +6,22 @@ stays the same however long the clip is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats, sorted_unique
 from anim.measure.fields import longest
 from anim.measure.pairs import Pairs, paired
 from anim.measure.parts import Measured, Part, Posed
-from anim.measure.players import played
+from anim.measure.players import played, sampler
 from anim.measure.pointers import pointer_error
 from anim.measure.shells import Shells, hidden
-from anim.measure.surface import diagonal, surfaces
-from anim.model import Clip, Interpolation, Scene
+from anim.measure.surface import diagonal, has_vertices, surfaces
+from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
+from anim.sampling.pose import Poses
 from anim.sampling.times import grid
 
 NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
@@ -51,6 +53,18 @@ class MotionError:
 
 
 @dataclass(frozen=True, slots=True)
+class Look:
+    """What was seen at some times (F,).
+
+    limits: of each part of the ruler (G, F) in m, no vertex of a group is displaced more; 0 of what nothing carries. In
+    float32, for there are many.
+    """
+
+    error: MotionError
+    limits: Sequence[NDArray[np.float32]]
+
+
+@dataclass(frozen=True, slots=True)
 class Block:
     """Some of the times (F,) in s, both versions posed there."""
 
@@ -65,13 +79,13 @@ class Ruler:
     other: the scene that the second clip is of: another rest pose, other numbers of nodes, another file. What is
     carried through both is the first scene's surface, so that only motion counts (`anim.measure.pairs`).
     shell: as a share of the diagonal, the distance of six points around each node that moves no vertex; None leaves
-    such nodes out of account. (A scene without any vertex is always measured at its nodes.)
+    such nodes out of account, but in a scene without any vertex: that is measured at cubes on its nodes then.
     """
 
     def __init__(self, scene: Scene, other: Scene | None = None, *, shell: float | None = None) -> None:
         self.scene, self.other = scene, other or scene
         self.diagonal = diagonal(scene)
-        found = surfaces(scene)
+        found = surfaces(scene) if shell is None or has_vertices(scene) else []
         self.pairs: Pairs = paired(scene, self.other, found)
         self.parts: list[Measured] = [Part(*each) for each in self.pairs.surfaces]
         if shell is not None:
@@ -87,12 +101,27 @@ class Ruler:
 
         player: a name in PLAYERS, who plays both of them.
         """
+        return self._looked(before, after, times, player, None)
+
+    def look(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> Look:
+        """Return what `error_at` does, with limits for all times and groups of vertices."""
+        limits = [np.zeros((len(part.groups), len(times)), np.float32) for part in self.parts]
+        return Look(self._looked(before, after, times, player, limits), limits)
+
+    def _looked(
+        self, before: Clip, after: Clip, times: Floats, player: str, limits: Sequence[NDArray[np.float32]] | None
+    ) -> MotionError:
+        """What `error_at` returns. limits: to be filled with what `Look` has, or None."""
         size, frame, place, joint, vertex = 0.0, 0, "", -1, -1
         first = 0
         for block in self.blocks(before, after, times, player=player):
-            fields = [(part, field) for part in self.parts if (field := part.field(block.old, block.new)) is not None]
-            for part, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
+            shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.parts))
+            fields = [(i, field) for i, field in shown if field is not None]
+            for i, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
+                part = self.parts[i]
                 found = longest(field, floor=max(size, NOISE * self.diagonal), slack=SLACK, most=MAX_SEARCHED)
+                if limits is not None:
+                    limits[i][:, first : first + len(block.times)] = _rounded_up(found.limits)
                 if found.length > size:
                     size, frame, vertex = found.length, first + found.frame, part.vertex(found)
                     joint = part.node(field.joint(found.group, found.frame, found.vertex))
@@ -112,16 +141,49 @@ class Ruler:
         old, new = (
             played(scene.skeleton, clip, player=player) for scene, clip in ((self.scene, before), (self.other, after))
         )
-        matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
-        length = max(BLOCK // max(matrices, 1), 8)
-        for start in range(0, max(len(times) - overlap, 1), length):
-            chosen = times[start : start + length + overlap]
+        for start in range(0, max(len(times) - overlap, 1), self.length):
+            chosen = times[start : start + self.length + overlap]
             poses = old.at(chosen), new.at(chosen)
             yield Block(chosen, Posed(self.scene.skeleton, poses[0]), Posed(self.other.skeleton, poses[1]))
+
+    @property
+    def length(self) -> int:
+        """How many times are posed at once."""
+        matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
+        return max(BLOCK // max(matrices, 1), 8)
+
+    def posed(self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]) -> tuple[Posed, Posed]:
+        """Return both clips posed at some times (F,) in s by one player, at others by the next, all in one.
+
+        asked: names in PLAYERS, each with its times; not more times than `length` on the whole.
+        """
+        return _posed(self.scene.skeleton, before, asked), _posed(self.other.skeleton, after, asked)
 
     def called(self, node: int) -> str:
         """Return how reports call a node of the scene before: by its name, or "node 7"; nothing for −1."""
         return (self.scene.skeleton.names[node] or f"node {node}") if node >= 0 else ""
+
+
+def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> Posed:
+    poses = Poses(skeleton, clip)
+    each = [poses.sampled(sampler(player)).at(times) for player, times in asked]
+    weights = {node: np.concatenate([one.weights[node] for one in each]) for node in each[0].weights}
+    return Posed(
+        skeleton,
+        Pose(
+            np.concatenate([one.times for one in each]),
+            np.concatenate([one.translation for one in each]),
+            np.concatenate([one.rotation for one in each]),
+            np.concatenate([one.scale for one in each]),
+            weights,
+        ),
+    )
+
+
+def _rounded_up(values: Floats) -> NDArray[np.float32]:
+    """The values as float32, none less than it is."""
+    near = values.astype(np.float32)
+    return np.where(near < values, np.nextafter(near, np.float32(np.inf)), near)
 
 
 def check_times(*clips: Clip) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -164,12 +164,16 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class Longest:
-    """The longest vector of a field. vertex: its number within the group, −1 where only the bound was looked at."""
+    """The longest vector of a field. vertex: its number within the group, −1 where only the bound was looked at.
+
+    limits: (G, F), the field's own, and where vertices were looked at no more than the longest of them.
+    """
 
     length: float
     group: int
     frame: int
     vertex: int
+    limits: Floats
 
 
 def lengths(field: Field, group: int, frames: Ints) -> Floats:
@@ -187,7 +191,7 @@ def longest(field: Field, *, floor: float, slack: float, most: int) -> Longest:
     """
     tops = field.limits.max(axis=1)
     group = int(tops.argmax())
-    found = Longest(0.0, group, int(field.limits[group].argmax()), -1)
+    found = Longest(0.0, group, int(field.limits[group].argmax()), -1, field.limits.copy())
     left = 0.0  # the longest bound of what was not looked at
     for group in np.argsort(-tops, kind="stable").tolist():
         limits = field.limits[group]
@@ -200,12 +204,14 @@ def longest(field: Field, *, floor: float, slack: float, most: int) -> Longest:
                 break
             frames, waiting = waiting[:size], waiting[size:]
             lengths_here = lengths(field, group, frames)
+            found.limits[group, frames] = lengths_here.max(axis=0)
             vertex, column = np.unravel_index(int(lengths_here.argmax()), lengths_here.shape)
             if lengths_here[vertex, column] > found.length:
-                found = Longest(float(lengths_here[vertex, column]), group, int(frames[column]), int(vertex))
+                length = float(lengths_here[vertex, column])
+                found = Longest(length, group, int(frames[column]), int(vertex), found.limits)
             most -= lengths_here.size
             size = max(min(2 * size, CHUNK // max(len(lengths_here), 1)), 1)
-    return found if left <= found.length else Longest(left, found.group, found.frame, found.vertex)
+    return found if left <= found.length else replace(found, length=left)
 
 
 def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:

@@ -100,13 +100,15 @@ class Part:
     """A surface, its vertices in groups by the joint that carries most of each, and boxes around what joints carry.
 
     new: what carries the surface in the second version, where that is not the same.
+    used: numbers of the joints that carry anything. reach: of each group the joints that carry some of it, as places in
+    `used`. share: the largest sum of skin weights of a vertex.
     """
 
     def __init__(self, surface: Surface, new: Carried | None = None) -> None:
         self.surface = surface
         self.old = Carried(surface.nodes, surface.bind, surface.owner, surface.rest_weights)
         self.new = new or self.old
-        share = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
+        self.share = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
         carrying = surface.weights > 0
         self.used = np.array(sorted(set(surface.joints[carrying].tolist())), np.int64)
         place = np.full(len(surface.nodes), -1)
@@ -114,12 +116,12 @@ class Part:
         self._influences = np.where(carrying, place[surface.joints], 0)  # (V, I), into `used`
         found = self._grouped(carrying)
         self._leaders, self.groups = list(found), list(found.values())
-        reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
+        self.reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
         rest = surface.points + np.tensordot(surface.rest_weights, surface.targets, axes=1)
-        products = [self._products(rest, *each) for each in zip(self.groups, reach, strict=True)]
-        self._still = Groups(reach, products, self._boxes(rest), share)
+        products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
+        self._still = Groups(self.reach, products, self._boxes(rest), self.share)
         corners = self._boxes(surface.points) if len(surface.targets) else self._still.corners
-        self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), share)
+        self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.share)
 
     def field(self, old: Posed, new: Posed) -> Field | None:
         """Return how far every vertex is displaced at every time, None where nothing carries any."""

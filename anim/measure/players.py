@@ -16,7 +16,7 @@ from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Skeleton
 from anim.sampling.batch import Batch
-from anim.sampling.pose import Poses
+from anim.sampling.pose import Poses, Sampler
 from anim.sampling.track import Located
 
 SHORT_OF_THREE = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
@@ -42,10 +42,15 @@ def played(skeleton: Skeleton, clip: Clip, *, player: str = "spec") -> Poses:
     player: a name in PLAYERS. With one that does not normalize, rotations of the poses are not of unit length, and
     world matrices from them scale, as they do in that player.
     """
+    return Poses(skeleton, clip, sampler(player))
+
+
+def sampler(player: str) -> Sampler:
+    """Return how a player, a name in PLAYERS, gets the values of tracks."""
     chosen = PLAYERS[player]
     if chosen.between is None:
-        return Poses(skeleton, clip)
-    return Poses(skeleton, clip, lambda batch, at, place: _sampled(chosen, batch, at, place))
+        return Batch.sample
+    return lambda batch, at, place: _sampled(chosen, batch, at, place)
 
 
 def _sampled(player: Player, batch: Batch, at: Floats, place: Located) -> Floats:

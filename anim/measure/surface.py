@@ -35,6 +35,11 @@ class Surface:
     rest_weights: Floats
 
 
+def has_vertices(scene: Scene) -> bool:
+    """Return whether any mesh of the scene has a vertex."""
+    return any(len(instance.mesh.positions) for instance in scene.instances)
+
+
 def surfaces(scene: Scene) -> list[Surface]:
     """Return one surface per mesh instance; where no mesh has a vertex, one per node."""
     found = [_of_instance(scene, instance) for instance in scene.instances if len(instance.mesh.positions)]

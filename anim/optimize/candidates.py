@@ -16,6 +16,7 @@ from anim.optimize.limits import Packing
 from anim.optimize.truth import PATHS, Truth
 from anim.sampling.track import Located, locate
 
+MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
 ROTATION = PATHS.index("rotation")
 
 
@@ -38,10 +39,13 @@ class Candidates:
         self._fits: dict[bytes, Fit] = {}
         self._keys: dict[tuple[bytes, int], Floats] = {}
         self._made: dict[tuple[bytes, int, Form], Candidate] = {}
+        self._kept = 0
 
     def of(self, axis: Axis, misses: Sequence[float]) -> Iterable[tuple[int, Candidate]]:
         """Return every member of an axis with its candidate. misses: (G,) what storing may miss, in units of values."""
         name = axis.keys.tobytes()
+        if self._kept > MOST_KEPT:
+            self._forget()
         self._fit(axis, name)
         forms = {
             i: coding.form(self._keys[name, i], PATHS[self._paths[i]], misses[i], self._packing) for i in axis.members
@@ -72,6 +76,7 @@ class Candidates:
         stored = coding.all_stored([self._keys[name, i] for i in members], [forms[i] for i in members])
         made = _candidates(stored, self._place(axis, name), rotations=rotations)
         self._made.update(((name, i, forms[i]), each) for i, each in zip(members, made, strict=True))
+        self._kept += sum(each.shown.size + each.stored.values.size for each in made)
 
     def _fit(self, axis: Axis, name: bytes) -> None:
         """Keys of members that are new on the axis: their own values where it has every key, else fitted ones."""
@@ -87,6 +92,11 @@ class Candidates:
                 keys = fit.rotations(values, keys) if path == ROTATION else fit.vectors(values)
             for k, i in enumerate(new):
                 self._keys[name, i] = keys[:, k]
+
+    def _forget(self) -> None:
+        for kept in (self._places, self._fits, self._keys, self._made):
+            kept.clear()
+        self._kept = 0
 
     def _fit_on(self, axis: Axis, name: bytes) -> Fit:
         if name not in self._fits:

@@ -15,6 +15,7 @@ from anim.optimize.limits import Drop
 from anim.optimize.outcome import Fate, Outcome
 from anim.optimize.search import search
 from anim.optimize.setting import Setting
+from anim.optimize.solution import Solution, value_bytes
 from anim.optimize.strains import Strains
 from anim.optimize.trial import CHORDS_NOTICED, Bench
 from anim.optimize.truth import PATHS, Truth, key_grid, truth
@@ -23,8 +24,6 @@ from anim.sampling import times
 MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
 MORPH_ALONE = 0.95
 NOT_UNIT = 0.1  # of the bound, that a rotation's length may move the farthest point in players that don't normalize
-NUMBERS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # for each value of a key
-SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +37,6 @@ class Task:
     shared: tuple[tuple[Floats, ...], ...]
     unused: tuple[bool, ...]
     bound: float
-
-
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """A clip in fewer bytes. stored: per track of it, how its values are stored. None of them where nothing was found
-    that keeps the bounds. dropped: numbers of the tracks of the source that are gone."""
-
-    clip: Clip
-    stored: tuple[Stored, ...]
-    dropped: tuple[int, ...]
 
 
 def solve(setting: Setting, task: Task) -> Solution | None:
@@ -166,8 +155,7 @@ class _Sorted:
     def _bytes(self, track: Track, all_tracks: Sequence[Track]) -> float:
         sharing = sum(each.times is track.times for each in all_tracks)
         axis = self._setting.coding.prices.axis + 4 * len(track.times)
-        values = NUMBERS[track.interpolation] * SIZES[track.storage.component_type] * track.values.size
-        return values + axis / sharing
+        return value_bytes(track) + axis / sharing
 
     def _searched(self, free: Sequence[int]) -> dict[int, tuple[Track, Stored]] | None:
         """The free tracks as the search left them, without those that it dropped; None where it found no way."""

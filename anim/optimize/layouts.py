@@ -16,6 +16,8 @@ from anim.optimize.truth import Truth
 
 STILL = 0.1  # of the bound: a track that is less off its middle value gets no table
 
+ASKED = 4.0  # of the bound: larger budgets are hardly ever asked for
+
 
 class Layouts:
     """Time axes for one clip; what was found for a track and a budget is kept.
@@ -32,7 +34,7 @@ class Layouts:
         self._tabled = np.flatnonzero(moved > STILL * bound)
         if not fits(len(self._tabled), truth.grid):
             self._tabled = np.empty(0, np.int64)
-        self._segments = Segments(self._scaled[self._tabled], truth.grid)
+        self._segments = Segments(self._scaled[self._tabled], truth.grid, ASKED * bound)
         self._rows: dict[tuple[int, float], Bools] = {}
 
     def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[Axis]:

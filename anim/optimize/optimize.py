@@ -9,12 +9,13 @@ from anim.gltf import read
 from anim.gltf.document import Document
 from anim.model import Clip, Scene
 from anim.optimize import seal
-from anim.optimize.clip import Solution, Task
+from anim.optimize.clip import Task
 from anim.optimize.constants import known
 from anim.optimize.crew import crew
 from anim.optimize.rebase import rebase
 from anim.optimize.request import Request
 from anim.optimize.site import Site, finished
+from anim.optimize.solution import Solution
 from anim.optimize.verify import Verdict
 from anim.optimize.written import differing, written
 

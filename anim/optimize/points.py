@@ -14,7 +14,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.measure.shells import shells as shells_of
-from anim.measure.surface import Surface, surfaces
+from anim.measure.surface import Surface, has_vertices, surfaces
 from anim.model import Scene
 
 CARRIED = 0.1  # a vertex answers for a node from this much weight on
@@ -93,7 +93,7 @@ def of_scene(scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int
     Of vertices: for each joint and each of 14 directions of its space, the farthest of those that it carries most,
     and of all that it carries noticeably. extra: more of them, (number of the surface, number of the vertex).
     """
-    found = surfaces(scene) if any(len(i.mesh.positions) for i in scene.instances) else []
+    found = surfaces(scene) if has_vertices(scene) else []
     parts = []
     for number, surface in enumerate(found):
         wanted = extremes(surface) | {vertex for owner, vertex in extra if owner == number}

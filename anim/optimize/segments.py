@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 
-SPANS = (32, 128)  # keys that one segment covers at most: those of a second, but no fewer and no more than these
+SPANS = (32, 64)  # keys that one segment covers at most: those of a second, but no fewer and no more than these
 MOST = 40_000_000  # numbers in a table; beyond, callers search anew for each budget (`keys.needed`)
 NEATNESS = 1e-3  # of a key: among the ways with fewest keys the one that misses least is taken
 
@@ -19,17 +19,20 @@ def fits(tracks: int, times: Floats) -> bool:
 class Segments:
     """What lines between two keys miss of a track, for G tracks and all pairs of their K keys up to a second apart.
 
-    values: (G, K, C) in metres. times: (K,) s.
+    values: (G, K, C) in metres. times: (K,) s. limit: m; of segments that miss more it doesn't matter how much.
     """
 
-    def __init__(self, values: Floats, times: Floats) -> None:
+    def __init__(self, values: Floats, times: Floats, limit: float) -> None:
         tracks, count, _ = values.shape
         self._count = count
         span = _span(times)
         # missed[e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite where there is none
         self._missed = np.full((count, tracks, span), np.inf, np.float32)
+        bent = np.arange(tracks)
         for n in range(span):
-            self._missed[n + 1 :, :, n] = _missed(values, times, n + 1).T
+            missed = _missed(values[bent], times, n + 1)
+            self._missed[n + 1 :, bent, n] = missed.T
+            bent = bent[(missed <= limit).any(axis=1)]  # if all segments miss by too much, so do nearly all longer ones
 
     def needed(self, tracks: Ints, budgets: Floats) -> Bools:
         """Return which keys (k, K) the `tracks` (k,) must keep so that lines miss none by over its budget (k,) in m."""

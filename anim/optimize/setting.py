@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.measure.shells import hidden
-from anim.measure.surface import Surface, surfaces
+from anim.measure.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton
 from anim.optimize import morph
 from anim.optimize import points as points_
@@ -72,7 +72,7 @@ def setting(
     extra: vertices to measure beside those that stick out, (number of the surface, number of the vertex).
     """
     skeleton = scene.skeleton
-    unseen = hidden(skeleton, surfaces(scene) if _has_vertices(scene) else [])
+    unseen = hidden(skeleton, surfaces(scene) if has_vertices(scene) else [])
     shells = set(np.flatnonzero(unseen & _moved(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
@@ -93,10 +93,6 @@ def setting(
         coding,
         effort,
     )
-
-
-def _has_vertices(scene: Scene) -> bool:
-    return any(len(instance.mesh.positions) for instance in scene.instances)
 
 
 def _moved(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:

@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from anim.measure.error import Ruler
+from anim.measure.proof.certified import Prover
 from anim.measure.surface import diagonal
 from anim.model import Clip, Scene
-from anim.optimize.clip import Solution, Task, solve
+from anim.optimize.clip import Task, solve
 from anim.optimize.coding import PRICES, Coding
-from anim.optimize.limits import EFFORTS
+from anim.optimize.limits import EFFORTS, Packing
 from anim.optimize.request import Request
 from anim.optimize.setting import Setting, setting
+from anim.optimize.solution import Solution
 from anim.optimize.verify import Verdict, verdict
 
 TIGHTER = 0.97  # of the share that a clip was beyond its bound, for the next search
@@ -64,6 +66,7 @@ class Site:
             reference=self.request.policy.reference,
             players=self.request.players,
             detailed=self.detailed,
+            prover=self._prover,
         )
 
     def worst_vertex(self, found: Verdict) -> frozenset[tuple[int, int]]:
@@ -93,6 +96,10 @@ class Site:
         share = self.request.bounds.shell / (diagonal(self.before) or 1.0)
         return Ruler(self.before, self.after, shell=None if self.request.policy.drop_invisible else share)
 
+    @cached_property
+    def _prover(self) -> Prover:
+        return Prover(self._ruler)
+
 
 def finished(site: Site, item: tuple[int, Task]) -> Finished:
     """Return clip `item[0]` as small as the search makes it within all bounds, judged as it will be stored.
@@ -107,12 +114,27 @@ def finished(site: Site, item: tuple[int, Task]) -> Finished:
             break
         found = site.judged(number, solution.clip)
         if found.holds:
-            return Finished(solution, found)
+            return _unless_exact_is_smaller(site, number, Finished(solution, found), task)
         worst = site.worst_vertex(found)
         factor = HARDLY if worst - extra else min(TIGHTER / found.strain, TIGHTER)
         extra |= worst
         task = replace(task, bound=task.bound * factor)
+    exact = _exact(site, task)
+    return Finished(exact, site.judged(number, exact.clip), without_loss=site.request.bounds.max_error > 0)
+
+
+def _unless_exact_is_smaller(site: Site, number: int, lossy: Finished, task: Task) -> Finished:
+    """Lines in place of a few splines and steps can take more bytes than these."""
+    if site.request.packing is not Packing.CORE:  # what a codec makes of numbers that nobody rounded is no gain
+        return lossy
+    exact, prices = _exact(site, task), PRICES[site.request.objective]
+    if exact.size(prices) >= lossy.solution.size(prices):
+        return lossy
+    return Finished(exact, site.judged(number, exact.clip))
+
+
+def _exact(site: Site, task: Task) -> Solution:
     usual = site.setting()
     exact = solve(replace(usual, bounds=replace(usual.bounds, max_error=0.0)), task)
     assert exact is not None
-    return Finished(exact, site.judged(number, exact.clip), without_loss=site.request.bounds.max_error > 0)
+    return exact

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from anim.measure.error import MotionError, Ruler, check_times, dense_times
+from anim.measure.proof.certified import Prover
 from anim.measure.statistics import Statistics, statistics
 from anim.model import Clip
 from anim.optimize.limits import Bounds, Reference
@@ -21,12 +22,14 @@ class Verdict:
     error: the largest distance, and where. player: who showed it. statistics: the rest, as the first player shows it;
     None where nobody asked.
     strain: the largest share of any bound; up to 1 all hold.
+    certified: m, no vertex is farther off at any time, looked at or not; None where nobody asked, or nothing is proven.
     """
 
     error: MotionError
     player: str
     statistics: Statistics | None
     strain: float
+    certified: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -43,19 +46,25 @@ def verdict(
     reference: Reference,
     players: Sequence[str] = PLAYERS,
     detailed: bool = True,
+    prover: Prover | None = None,
 ) -> Verdict:
     """Return how far `after`, as read from the written file, is from `before`.
 
     Looked at: all keys of both, the middles between them, and 120 frames per second; with Reference.KEYS the source's
     keys only. players: names in `anim.measure.players.PLAYERS`; each plays both versions. detailed: statistics too,
-    even where no bound asks for them.
+    even where no bound asks for them. prover: of the same ruler; looks wherever else it must to prove a bound for all
+    times, unless the bound is exceeded anyway.
     """
     if reference is Reference.KEYS:
-        times = check_times(before)[::2]
+        times, prover = check_times(before)[::2], None
     else:
         times = dense_times(before, after)
-    found = [(ruler.error_at(before, after, times, player=player), player) for player in players]
-    error, player = max(found, key=lambda each: each[0].max_error)
+    looks = {player: ruler.look(before, after, times, player=player) for player in players}
+    player = max(looks, key=lambda each: looks[each].error.max_error)
+    error, certified = looks[player].error, None
+    if prover is not None and error.max_error <= max(bounds.max_error, NOTHING * (ruler.diagonal or 1.0)):
+        proof = prover.certified(before, after, times, looks, enough=bounds.max_error)
+        error, player, certified = proof.error, proof.player, proof.bound
     wanted = detailed or bounds.max_angle is not None or bounds.max_speed_error is not None
     about = statistics(ruler, before, after, times=times, player=players[0]) if wanted else None
     least = NOTHING * (ruler.diagonal or 1.0)
@@ -69,7 +78,7 @@ def verdict(
         shares.append(_share(about.speed.size, bounds.max_speed_error, least))
     if (before.start, before.end) != (after.start, after.end):
         shares.append(float("inf"))
-    return Verdict(error, player, about, max(shares))
+    return Verdict(error, player, about, max(shares), certified)
 
 
 def _share(size: float, bound: float, least: float) -> float:

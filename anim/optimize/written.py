@@ -9,8 +9,8 @@ import numpy as np
 from anim.gltf import pack, renumber, write
 from anim.gltf.document import Document
 from anim.model import Clip, Track
-from anim.optimize.clip import Solution
 from anim.optimize.limits import Packing
+from anim.optimize.solution import Solution
 
 FILTERS = {"quaternion": "QUATERNION", "exponent": "EXPONENTIAL"}  # what meshopt calls the forms of `coding`
 

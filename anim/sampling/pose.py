@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from typing import TypeAlias
 
 import numpy as np
@@ -32,6 +33,12 @@ class Poses:
         self._sample = sample
         nodes = len(skeleton)
         self._batches = batches(track for track in clip.tracks if track.node is not None and track.node < nodes)
+
+    def sampled(self, sample: Sampler) -> Poses:
+        """Return the same clip on the same skeleton, with the values of its tracks given by another sampler."""
+        other = copy(self)
+        other._sample = sample
+        return other
 
     def at(self, at: Floats) -> Pose:
         """Return the local transforms of all nodes at times `at` (F,) in seconds."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from anim.maths import quaternion
+from anim.optimize import candidates as candidates_
 from anim.optimize.axes import Axis
 from anim.optimize.candidates import Candidates
 from anim.optimize.limits import Packing
@@ -66,3 +67,11 @@ def test_chords() -> None:
     mixed = np.transpose([np.interp(TRUTH.at, times, column) for column in quaternion.align_signs(keys).T])
     assert shown[:, 0] == pytest.approx(mixed / np.linalg.norm(mixed, axis=1, keepdims=True), abs=1e-12)
     assert shown.shape == (len(TRUTH.at), 2, 4)
+
+
+def test_what_is_kept_is_let_go_when_it_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(candidates_, "MOST_KEPT", 0)
+    candidates = Candidates(TRUTH, Packing.EXT)
+    first, again = (dict(candidates.of(EVERY_THIRD, [1e-3] * 5)) for _ in range(2))
+    assert all(first[i] is not again[i] for i in first)
+    assert all((first[i].shown == again[i].shown).all() for i in first)

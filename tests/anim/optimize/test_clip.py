@@ -10,9 +10,10 @@ import pytest
 
 from anim.measure.error import Ruler, dense_times
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
-from anim.optimize.clip import Solution, Task, solve
+from anim.optimize.clip import Task, solve
 from anim.optimize.limits import Drop, Packing, Policy
 from anim.optimize.lossless import INT16
+from anim.optimize.solution import Solution
 from anim.sampling.track import sample
 from tests.anim.optimize.making import TIMES, scene, setting_of, turning, waving
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, track

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from anim.arrays import Floats
 from anim.maths import quaternion
+from anim.optimize import fit
 from anim.optimize.fit import ENDS, Fit
 from anim.sampling.track import locate
 
@@ -60,3 +61,14 @@ def test_values_of_the_other_sign_are_the_same_rotations() -> None:
     flips = np.where(RNG.random(41) < 0.5, -1.0, 1.0)[:, None]
     one, other = (Fit(locate(KEYS, AT), 4).rotations(v[:, None], keys[:, None]) for v in (values, flips * values))
     assert one == pytest.approx(other, abs=1e-12)
+
+
+def test_long_clips_are_solved_by_bands_to_the_same_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    values = np.cumsum(RNG.normal(size=(41, 3, 2)), axis=0)
+    turns = quaternion.align_signs(Rotation.from_rotvec(0.1 * np.cumsum(RNG.normal(size=(41, 3)), axis=0)).as_quat())
+    start = turns[[0, 13, 16, 40]][:, None]
+    dense = Fit(locate(KEYS, AT), 4)
+    monkeypatch.setattr(fit, "DENSE", 0)
+    banded = Fit(locate(KEYS, AT), 4)
+    assert banded.vectors(values) == pytest.approx(dense.vectors(values), abs=1e-9)
+    assert banded.rotations(turns[:, None], start) == pytest.approx(dense.rotations(turns[:, None], start), abs=1e-12)

@@ -12,6 +12,7 @@ from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.measure.error import Ruler
 from anim.model import Clip, Scene
+from anim.optimize import layouts
 from anim.optimize.layouts import LAYOUTS
 from anim.optimize.limits import Bounds
 from anim.optimize.outcome import Fate, Outcome, Plan
@@ -102,8 +103,9 @@ def test_held_as_other_clips_hold_it() -> None:
     assert outcome.keys[0].values[0] == pytest.approx([1.2002] * 3, rel=1e-6)
 
 
-def test_chords_are_asked_where_they_matter() -> None:
+def test_chords_are_asked_where_they_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     """150° in a step or two would do along arcs; players that mix components cut the corner."""
+    monkeypatch.setattr(layouts, "ASKED", math.inf)
     times = np.linspace(0, 2, 49)
     angles = np.radians(150) * times / 2
     values = np.stack((0 * angles, 0 * angles, np.sin(angles / 2), np.cos(angles / 2)), axis=1)

@@ -10,6 +10,7 @@ import pytest
 
 from anim.measure import players
 from anim.measure.error import Ruler
+from anim.measure.proof.certified import Prover
 from anim.model import Clip, Scene
 from anim.optimize.limits import Bounds, Reference
 from anim.optimize.verify import PLAYERS, Verdict, verdict
@@ -90,6 +91,47 @@ def test_turns_speeds_and_pointers_have_bounds_of_their_own() -> None:
     other = clip(replace(color, values=np.array([[0.01, 0, 0], [1, 1, 1]])))
     assert _verdict(clip(color), other, replace(loose, max_pointer_error=0.011)).holds
     assert not _verdict(clip(color), other, replace(loose, max_pointer_error=0.009)).holds
+
+
+def test_a_bound_for_every_time() -> None:
+    """A quarter turn in one step and in many, as components are mixed: between the times looked at it is no worse."""
+    many = np.linspace(0, 1, 65)
+    fine = clip(track("rotation", many, about("z", 90 * many)))
+    plain, proven = (
+        verdict(RULER, TURN, fine, bounds=Bounds(1.0, 0.0), reference=Reference.CURVE, prover=prover)
+        for prover in (None, Prover(RULER))
+    )
+    assert plain.certified is None
+    assert proven.certified is not None
+    assert proven.error.max_error == pytest.approx(plain.error.max_error, rel=2e-3)
+    assert proven.error.max_error <= proven.certified <= 1.01 * proven.error.max_error
+
+
+def test_nothing_is_proven_where_the_bound_is_broken_or_only_keys_count() -> None:
+    prover = Prover(RULER)
+    for bound, reference in ((0.001, Reference.CURVE), (1.0, Reference.KEYS)):
+        bounds = Bounds(bound, 0.0)
+        assert verdict(RULER, SLIDE, _lifted(0.01), bounds=bounds, reference=reference, prover=prover).certified is None
+
+
+def test_what_a_proof_comes_across_counts() -> None:
+    """A key that is 1 ‰ too long shows in three.js on one side of its time only: 1.5 mm, just before it."""
+    times = [0, 1, 2]
+    keys = about("z", [0, 60, 61])
+    before, after = (clip(track("rotation", times, keys * long)) for long in (1, np.array([[1], [1.001], [1]])))
+    bounds = Bounds(0.0025, 0.0)
+    plain, found = (
+        verdict(RULER, before, after, bounds=bounds, reference=Reference.CURVE, players=("three",), prover=prover)
+        for prover in (None, Prover(RULER))
+    )
+    assert plain.error.max_error < found.error.max_error
+    assert found.error.time == np.nextafter(1, 0)
+    tight = replace(bounds, max_error=(plain.error.max_error + found.error.max_error) / 2)
+    assert plain.error.max_error < tight.max_error
+    again = verdict(
+        RULER, before, after, bounds=tight, reference=Reference.CURVE, players=("three",), prover=Prover(RULER)
+    )
+    assert not again.holds
 
 
 def test_every_player_that_is_known_is_asked() -> None:

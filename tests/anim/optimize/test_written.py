@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from anim.gltf import read
-from anim.optimize.clip import Solution, Task, solve
+from anim.optimize.clip import Task, solve
 from anim.optimize.limits import Packing
+from anim.optimize.solution import Solution
 from anim.optimize.written import differing, written
 from tests.anim.optimize.making import setting_of
 from tests.files import glb_of, opened, opened_fixture

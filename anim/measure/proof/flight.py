@@ -1,0 +1,150 @@
+"""What the quaternions of one version do within gaps, in figures that no time of the gap exceeds.
+
+A quaternion q, the mix c as it is or divided by its length, obeys q″ = −λq − 2ρq′ + e. On an arc λ = ν², on a line 0,
+with ρ = e = 0. Divided by its length, λ = |q′|², ρ = c·c′/|c|², and e is what of c″/|c| is at right angles to q; on a
+line |c|²|q′| is constant, and ρ′ = λ − ρ².
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+
+LEAST = 1e-3  # shorter mixes have no direction that could be relied on
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """Quaternions of P players, G gaps and U nodes; every figure (P, G, U) where nothing else is said.
+
+    value, slope: (2, 4, P, G, U), q and q′ at both ends. size, speed: neither |q| nor |q′| is larger.
+    pull: (2, P, G, U), λ at both ends; neither λ nor |λ′| is larger than most_pull and pull_rate. drag, most_drag,
+    drag_rate: the same of ρ. own: (2, 4, P, G, U), most_own, own_rate: the same of e; None and 0 where no e is.
+    excess: (3, P, G, U), neither |1 − |q|²| nor its first two derivatives are larger.
+    """
+
+    value: Floats
+    slope: Floats
+    size: Floats
+    speed: Floats
+    pull: Floats
+    most_pull: Floats
+    pull_rate: Floats
+    drag: Floats
+    most_drag: Floats
+    drag_rate: Floats
+    excess: Floats
+    own: Floats | None = None
+    most_own: Floats | float = 0.0
+    own_rate: Floats | float = 0.0
+
+    @property
+    def bend(self) -> Floats:
+        """No |q″| is larger (P, G, U)."""
+        return np.asarray(self.most_pull * self.size + 2 * self.most_drag * self.speed + self.most_own)
+
+
+@dataclass(frozen=True, slots=True)
+class Mix:
+    """Mixes c that are known at both ends of gaps. value, slope: (2, 4, P, G, U), c and c′.
+
+    square, along, rate: (2, P, G, U), |c|², c·c′, |c′|².
+    """
+
+    value: Floats
+    slope: Floats
+    square: Floats
+    along: Floats
+    rate: Floats
+
+    def part(self, players: slice) -> Mix:
+        """Return the same of some players."""
+        return Mix(*(getattr(self, name)[..., players, :, :] for name in Mix.__slots__))
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A mix on a line, scaled to length 1 where a gap starts; each (P, G, U), or (2, P, G, U) at both ends.
+
+    square: |c|², along: c·c′, rate: |c′|². wedge: (|c|²|q′|)², which is constant. nearest, farthest: the least and
+    the largest |c|².
+    """
+
+    square: Floats
+    along: Floats
+    rate: Floats
+    wedge: Floats
+    nearest: Floats
+    farthest: Floats
+
+    def part(self, players: slice) -> Line:
+        """Return the same of some players."""
+        return Line(*(getattr(self, name)[..., players, :, :] for name in Line.__slots__))
+
+
+def mix(value: Floats, slope: Floats) -> Mix:
+    """Return a mix by its values and slopes (2, 4, P, G, U)."""
+    return Mix(value, slope, *((x * y).sum(axis=1) for x, y in ((value, value), (value, slope), (slope, slope))))
+
+
+def line(of: Mix, h: Floats) -> Line:
+    """Return a mix on a line, or the chord of one that isn't. h: (G, 1) s."""
+    first, along, rate = of.square[0], of.along[0], of.rate[0]
+    least = nearest(first, along, rate, h)
+    wedge = np.maximum(first * rate - along**2, 0.0)
+    most = of.square.max(axis=0)
+    return Line(of.square / first, of.along / first, rate / first, wedge / first**2, least / first, most / first)
+
+
+def on_arcs(of: Mix, turn: Floats, h: Floats) -> Flight:
+    """Return the figures of arcs and lines as they are: q = c. turn: (P, G, U) rad, ν times the gap's length."""
+    reach = 1 - turn * turn / 8  # no c is larger than the larger end divided by this, nor is c′, for c″ = −ν²c
+    size, speed = (np.sqrt(each.max(axis=0)) / reach for each in (of.square, of.rate))
+    pull = (turn / h) ** 2
+    none = [np.zeros_like(turn) for _ in range(3)]
+    excess = _excess(of, pull, h)
+    both = np.stack((pull, pull))
+    return Flight(of.value.copy(), of.slope, size, speed, both, pull, none[0], 0 * both, none[1], none[2], excess)
+
+
+def on_lines(of: Mix, chord: Line) -> Flight:
+    """Return the figures of lines that are divided by their length: q = c / |c|. chord: as `line` gives it."""
+    drag = chord.along / chord.square
+    most_drag = np.abs(chord.along).max(axis=0) / chord.nearest
+    pull, most_pull = chord.wedge / chord.square**2, chord.wedge / chord.nearest**2
+    rates = 4 * most_drag * most_pull, np.maximum(most_pull, most_drag**2)
+    value, slope = directed(of, drag)
+    size, none = np.ones_like(most_pull), np.zeros((3, *most_pull.shape))
+    return Flight(value, slope, size, np.sqrt(most_pull), pull, most_pull, rates[0], drag, most_drag, rates[1], none)
+
+
+def put(into: Flight, part: Flight, players: slice, where: Bools) -> None:
+    """Write the figures of some players into those of all. where: (P', G, U), which of the part's."""
+    for name in Flight.__slots__[:11]:
+        np.copyto(getattr(into, name)[..., players, :, :], getattr(part, name), where=where)
+
+
+def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
+    """Return the least |c|² on a line, nan where it is next to nothing: of |c|² and c·c′ at its start, and |c′|²."""
+    until = np.clip(-along / np.where(rate > 0, rate, 1.0), 0.0, h)
+    least = square + until * (2 * along + until * rate)
+    return np.asarray(np.where(least > LEAST**2, least, np.nan))
+
+
+def directed(of: Mix, drag: Floats) -> tuple[Floats, Floats]:
+    """Return the direction of a mix, and how fast that changes (2, 4, P, G, U). drag: (2, P, G, U)."""
+    over = 1 / np.sqrt(of.square)[:, None]
+    value = of.value * over
+    return value, of.slope * over - drag[:, None] * value
+
+
+def _excess(of: Mix, pull: Floats, h: Floats) -> Floats:
+    """By how much |c|² is off 1, with two derivatives: it swings about its mean with 2ν, where it is not constant."""
+    push = 2 * (of.rate[0] - pull * of.square[0])
+    drift = 2 * of.along[0]
+    swing = np.sqrt(push * push + 4 * pull * drift * drift)
+    change = 2 * np.abs(of.along).max(axis=0) + h / 2 * swing
+    return np.stack((np.abs(1 - of.square).max(axis=0) + h * h / 8 * swing, change, swing))

@@ -1,0 +1,98 @@
+"""Gaps: stretches of time within which every track of two clips is one smooth piece."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints, sorted_unique
+from anim.model import Clip
+
+LONG = 0.05  # s; longer gaps are split at all times looked at: how much a motion bends is bounded gap by gap
+
+
+class Gaps:
+    """G gaps. edges: (G + 1,) s, increasing."""
+
+    def __init__(self, edges: Floats) -> None:
+        self.edges = edges
+        self._placed: dict[int, tuple[Floats, Placed]] = {}
+
+    @property
+    def starts(self) -> Floats:
+        """Where they start (G,), in s."""
+        return self.edges[:-1]
+
+    @property
+    def ends(self) -> Floats:
+        """Where they end (G,), in s."""
+        return self.edges[1:]
+
+    @property
+    def lengths(self) -> Floats:
+        """How long they are (G,), in s."""
+        return np.diff(self.edges)
+
+    def __len__(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def first(self) -> Gaps:
+        """The first of them."""
+        return Gaps(self.edges[:2])
+
+    def on(self, keys: Floats) -> Placed:
+        """Return where they lie between keys (K,) in s."""
+        if id(keys) not in self._placed:
+            self._placed[id(keys)] = keys, placed(keys, self)
+        return self._placed[id(keys)][1]
+
+    def number(self, at: Floats) -> Ints:
+        """Return the numbers of the gaps (F,) that times `at` (F,) in s lie in, or start."""
+        return np.clip(np.searchsorted(self.edges, at, side="right") - 1, 0, max(len(self) - 1, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Gaps on the keys of one time axis.
+
+    left, right: (G,) the keys of the piece that the gap is in. start, end: (G,) shares of the way between them, both 0
+    where the first or last key is held. duration: (G,) s from left to right. inside: (G,) whether nothing is held.
+    """
+
+    left: Ints
+    right: Ints
+    start: Floats
+    end: Floats
+    duration: Floats
+    inside: Bools
+
+
+def gaps(times: Floats, *clips: Clip) -> Gaps:
+    """Return the gaps between all keys of the clips; long ones split at those of `times` (F,) in s that are in them.
+
+    The first starts at the first of the times, the last ends at the last of them. times: increasing, with all keys that
+    are between them.
+    """
+    axes = [axis for clip in clips for axis in clip.axes]
+    keys = sorted_unique(np.concatenate([times[:1], *axes, times[-1:]]))
+    keys = keys[(keys >= times[0]) & (keys <= times[-1])]
+    lengths = np.diff(keys)
+    if not len(lengths):
+        return Gaps(keys)
+    within = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(lengths) - 1)
+    return Gaps(sorted_unique(np.concatenate((keys, times[lengths[within] > LONG]))))
+
+
+def placed(keys: Floats, where: Gaps) -> Placed:
+    """Return where gaps lie between keys (K,) in s."""
+    last = len(keys) - 1
+    left = np.clip(np.searchsorted(keys, where.starts, side="right") - 1, 0, last)
+    right = np.minimum(left + 1, last)
+    duration = keys[right] - keys[left]
+    inside = (where.starts >= keys[left]) & (duration > 0)
+    whole = np.where(inside, duration, 1.0)
+    start = np.where(inside, (where.starts - keys[left]) / whole, 0.0)
+    end = np.where(inside, np.minimum((where.ends - keys[left]) / whole, 1.0), 0.0)
+    return Placed(left, right, start, end, duration, inside)

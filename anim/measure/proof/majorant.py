@@ -1,0 +1,39 @@
+"""Majorants: numbers that no motion exceeds, nor its first two derivatives, of a motion and of another version of it.
+
+A majorant is an array (3, 2, ...). [k, 0] is no less than the k-th derivative of the first version, at any time of
+a gap; [k, 1] is [k, 0] and on top of it no less than how far the k-th derivatives of both are apart. So [k, 1] bounds
+the second version, and [k, 1] − [k, 0] the difference. Both rows multiply by Leibniz' rule, and what is left between
+them bounds the difference of the products: b·y − a·x = (b − a)·y + a·(y − x). Hence nothing is lost where two versions
+are alike, however fast they move. A third row, where there is one, is a third version of the same kind.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+
+
+def majorant(first: Floats, apart: Floats) -> Floats:
+    """Return the majorant (3, 2, ...) of what is bounded by `first` (3, ...), with another at most `apart` from it."""
+    return np.stack((first, first + apart), axis=1)
+
+
+def resting(first: Floats, apart: Floats | float = 0.0) -> Floats:
+    """Return the majorant (3, 2, ...) of what does not move; first, apart: (...)."""
+    result = np.zeros((3, 2, *first.shape))
+    result[0, 0] = first
+    result[0, 1] = first + apart
+    return result
+
+
+def product(a: Floats, b: Floats) -> Floats:
+    """Return the majorant of the product of two motions, of matrices with matrices or with vectors."""
+    result = np.empty((3, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
+    np.multiply(a[0], b[0], out=result[0])
+    np.multiply(a[1], b[0], out=result[1])
+    result[1] += a[0] * b[1]
+    np.multiply(a[2], b[0], out=result[2])
+    result[2] += 2 * a[1] * b[1]
+    result[2] += a[0] * b[2]
+    return result

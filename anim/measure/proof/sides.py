@@ -1,0 +1,74 @@
+"""The two versions of a clip, their tracks sorted by what moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Bools
+from anim.model import Clip, Scene, Skeleton
+from anim.sampling.batch import Batch, batches
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One version: nodes at rest, tracks of nodes that move in either version, and tracks of those that don't, of one
+    key each; all stacked."""
+
+    skeleton: Skeleton
+    moving: list[Batch]
+    still: list[Batch]
+
+    def weights(self, node: int, count: int) -> list[Batch]:
+        """Return the track of a node's `count` morph weights, where it has one."""
+        all_ = (track for batch in (*self.moving, *self.still) for track in batch.tracks if batch.path == "weights")
+        return batches(track for track in all_ if track.node == node and track.values.shape[1] == count)
+
+
+def sides(scenes: tuple[Scene, Scene], clips: tuple[Clip, Clip]) -> tuple[Side, Side]:
+    """Return both versions of a clip, each on its scene."""
+    stacked = [_stacked(scene, clip) for scene, clip in zip(scenes, clips, strict=True)]
+    moving = {key for side in stacked for batch in side for key in _keys(batch, ~_is_constant(batch))}
+    first, second = (_sorted(scene.skeleton, side, moving) for scene, side in zip(scenes, stacked, strict=True))
+    return first, second
+
+
+def _stacked(scene: Scene, clip: Clip) -> list[Batch]:
+    count = len(scene.skeleton)
+    return batches(track for track in clip.tracks if track.node is not None and track.node < count)
+
+
+def _sorted(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | None, str]]) -> Side:
+    side = Side(skeleton, [], [])
+    for batch in of:
+        moves = np.array([(track.node, track.path) in moving for track in batch.tracks])
+        if moves.any():
+            side.moving.append(_picked(batch, moves))
+        if not moves.all():
+            rest = _picked(batch, ~moves)
+            tangents = None if rest.tangents is None else (rest.tangents[0][:1], rest.tangents[1][:1])
+            side.still.append(replace(rest, times=rest.times[:1], values=rest.values[:1], tangents=tangents))
+    return side
+
+
+def _is_constant(batch: Batch) -> Bools:
+    """Which of a batch's tracks have one value only."""
+    same = (batch.values == batch.values[:1]).all(axis=(0, 2))
+    if batch.tangents is not None:
+        for tangents in batch.tangents:
+            same &= (tangents == 0).all(axis=(0, 2))
+    return np.asarray(same)
+
+
+def _keys(batch: Batch, chosen: Bools) -> Iterable[tuple[int | None, str]]:
+    return ((track.node, track.path) for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
+
+
+def _picked(batch: Batch, chosen: Bools) -> Batch:
+    if chosen.all():
+        return batch
+    tracks = tuple(track for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
+    tangents = None if batch.tangents is None else (batch.tangents[0][:, chosen], batch.tangents[1][:, chosen])
+    return replace(batch, tracks=tracks, values=batch.values[:, chosen], tangents=tangents)

@@ -1,0 +1,44 @@
+"""The size of a solution, against what a file of it takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from anim.model import FLOAT32, Clip, Interpolation
+from anim.optimize.coding import PRICES, Stored
+from anim.optimize.limits import Objective
+from anim.optimize.lossless import INT16
+from anim.optimize.solution import Solution, value_bytes
+from tests.clips import about, clip, track
+
+PRICE = PRICES[Objective.FILE]
+LINES = track("translation", [0, 1, 2], np.eye(3), node=0)
+TURNS = track("rotation", [0, 1, 2], about("z", [0, 10, 20]), node=0)
+
+
+def _solution(what: Clip) -> Solution:
+    return Solution(what, tuple(Stored(each.values, "as it is") for each in what.tracks), ())
+
+
+def test_values_as_stored() -> None:
+    assert value_bytes(LINES) == 36
+    assert value_bytes(replace(TURNS, storage=INT16)) == 24
+    assert value_bytes(replace(TURNS, storage=FLOAT32)) == 48
+    zeros = np.zeros((3, 3))
+    spline = replace(LINES, interpolation=Interpolation.CUBICSPLINE, in_tangents=zeros, out_tangents=zeros)
+    assert value_bytes(spline) == 108
+
+
+def test_axes_count_once() -> None:
+    times = np.array([0.0, 1, 2])
+    one, other = (track(path, times, np.eye(3), node=0) for path in ("translation", "scale"))
+    apart, shared = _solution(clip(one, other)), _solution(clip(one, replace(other, times=one.times)))
+    assert shared.size(PRICE) == 2 * PRICE.track + 2 * 36 + PRICE.axis + 12
+    assert apart.size(PRICE) - shared.size(PRICE) == PRICE.axis + 12
+
+
+def test_single_keys_are_cheaper() -> None:
+    held = clip(track("translation", [0], [[1, 2, 3]], node=0))
+    assert _solution(held).size(PRICE) == PRICE.held + 12 + PRICE.axis + 4

@@ -1,0 +1,83 @@
+"""`optimize --max-bytes`: the smallest error that fits."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from anim.optimize.limits import EFFORTS, Effort
+from tests.cli.comparing import apart
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import refusal
+
+FAST = ("--effort", "fast")
+
+
+def test_the_smallest_error_that_fits(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    source = fixture("noop")
+    found = {}
+    for percent in ("0", "0.01%", "1%"):
+        path = tmp_path / "any.glb"
+        assert call("optimize", source, path, "--max-error", percent, *FAST).code == 0
+        found[percent] = path.stat().st_size
+    limit = (found["0.01%"] + found["1%"]) // 2
+    run = call("optimize", source, tmp_path / "fits.glb", "--max-bytes", f"{limit / 1000}kB", "--report", "-", *FAST)
+    assert run.code == 0, run.err
+    assert (tmp_path / "fits.glb").stat().st_size <= limit
+    error = max(each["max_error_m"] for each in run.json["clips"])
+    assert 0 < error <= 0.011 * run.json["diagonal_m"]
+    roomy = call("optimize", source, tmp_path / "r.glb", "--max-bytes", str(found["0"] + 100), "--report", "-", *FAST)
+    assert max(each["max_error_m"] for each in roomy.json["clips"]) <= 1e-9 * roomy.json["diagonal_m"]
+
+
+def test_a_search_that_ends_elsewhere_still_fits(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sizes are tried fast; here the longer search does worse, as chance may have it."""
+    assert call("optimize", fixture("noop"), tmp_path / "any.glb", "--max-error", "0.1%", *FAST).code == 0
+    limit = (tmp_path / "any.glb").stat().st_size
+    monkeypatch.setitem(EFFORTS, "balanced", Effort(1, finishing=()))
+    assert call("optimize", fixture("noop"), tmp_path / "out.glb", "--max-bytes", str(limit)).code == 0
+    assert (tmp_path / "out.glb").stat().st_size <= limit
+    assert call("optimize", tmp_path / "out.glb", tmp_path / "again.glb", "--max-bytes", str(limit)).code == 0
+    assert (tmp_path / "again.glb").read_bytes() == (tmp_path / "out.glb").read_bytes()
+
+
+def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    run = call("optimize", fixture("arm"), tmp_path / "out.glb", "--max-bytes", "100", *FAST)
+    assert "doesn't fit 100 bytes" in refusal(run, 6)
+    assert not (tmp_path / "out.glb").exists()
+    still = int(re.findall(r"still takes (\d+) bytes", run.err)[0])
+    assert call("optimize", fixture("arm"), tmp_path / "out.glb", "--max-error", "10%", *FAST).code == 0
+    assert (tmp_path / "out.glb").stat().st_size == still
+
+
+def test_bytes_and_error_both_count(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """The size at the bound itself fits, a byte less does not, though a larger error would do."""
+    at_bound, output = tmp_path / "bound.glb", tmp_path / "out.glb"
+    bound = ("--max-error", "0.01%", "--clip", "wave", *FAST)
+    assert call("optimize", fixture("biped"), at_bound, *bound).code == 0
+    limit = at_bound.stat().st_size
+    assert call("optimize", fixture("biped"), output, "--max-bytes", str(limit), *bound).code == 0
+    assert output.stat().st_size <= limit
+    assert apart(call, fixture("biped"), output)["max_error_percent"] <= 0.01
+    roomy = call("optimize", fixture("biped"), tmp_path / "no.glb", "--max-bytes", str(limit - 1), *bound[2:])
+    assert roomy.code == 0, roomy.err
+    (tmp_path / "no.glb").unlink()
+    tight = call("optimize", fixture("biped"), tmp_path / "no.glb", "--max-bytes", str(limit - 1), *bound)
+    assert f"doesn't fit {limit - 1} bytes" in refusal(tight, 6)
+    assert not (tmp_path / "no.glb").exists()
+
+
+@pytest.mark.parametrize("place", ["in.data", "out.data"])
+def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """Whatever the models are called; a dry run counts too."""
+    source = tmp_path / "in.data"
+    source.write_bytes(fixture("arm").read_bytes())
+    for dry in ((), ("-n",)):
+        run = call("optimize", source, tmp_path / "out.data", "--report", tmp_path / "." / place, *dry, *FAST)
+        assert "--report would take the place of a model" in refusal(run, 2)
+    assert source.read_bytes() == fixture("arm").read_bytes()
+    assert not (tmp_path / "out.data").exists()

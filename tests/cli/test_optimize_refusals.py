@@ -1,0 +1,105 @@
+"""`optimize`: what it refuses, and what the validator says of what it writes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from anim.gltf.document import Document
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import help_line, refusal
+from tests.files import glb_of, opened, opened_fixture
+from tests.khronos import errors, needs_validator, validate_many
+
+FAST = ("--effort", "fast")
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (("--max-error", "-1mm"), "--max-error is '-1mm'"),
+        (("--max-error", "3deg"), "--max-error is '3deg'"),
+        (("--max-error", ""), "--max-error is ''"),
+        (("--max-error", "nan"), "--max-error is 'nan'"),
+        (("--shell", "far"), "--shell is 'far'"),
+        (("--max-pointer-error", "1mm"), "--max-pointer-error is '1mm'"),
+        (("--max-angle", "1"), "--max-angle is '1'"),
+        (("--max-speed-error", "0deg"), "--max-speed-error is '0deg'"),
+        (("--max-speed-error", "0"), "--max-speed-error is '0'"),
+        (("--max-bytes", "many"), "--max-bytes is 'many'"),
+        (("--max-bytes", "0"), "--max-bytes is '0'"),
+        (("--max-bytes", "-5kB"), "--max-bytes is '-5kB'"),
+        (("--drop", "all"), "'all'"),
+        (("--effort", "most"), "'most'"),
+        (("--meshopt", "draco"), "'draco'"),
+        (("--jobs", "-1"), "-1"),
+        (("--curve", "c.txt"), "c.txt: is no .csv, .png or .svg file"),
+        (("--curve", "nowhere/c.csv"), "there is no folder"),
+        (("--report", "nowhere/r.json"), "there is no folder"),
+        (("--report", "r.glb"), "r.glb: --report would take the place of a model"),
+        (("--curve", "c.csv", "--max-bytes", "1kB"), "--curve goes with neither"),
+        (("--curve", "c.csv", "--report", "-"), "--curve goes with neither"),
+    ],
+)
+def test_options_out_of_range(
+    options: tuple[str, ...], problem: str, fixture: Fixture, tmp_path: Path, call: Call
+) -> None:
+    run = call("optimize", fixture("arm"), tmp_path / "out.glb", *options)
+    assert problem in refusal(run, 2)
+    assert not (tmp_path / "out.glb").exists()
+
+
+def test_names_that_do_not_exist(fixture: Fixture, call: Call) -> None:
+    run = call("optimize", fixture("biped"), "-n", "--clip", "wakl")
+    assert "no clip matches 'wakl'" in refusal(run, 5)
+    assert help_line(run) == "did you mean 'walk'?"
+    assert "no node matches 'hipz'" in refusal(call("optimize", fixture("biped"), "-n", "--keep-node", "hipz"), 5)
+
+
+def test_bad_files(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    broken = tmp_path / "broken.glb"
+    broken.write_bytes(fixture("arm").read_bytes()[:500])
+    assert str(broken) in refusal(call("optimize", broken, tmp_path / "out.glb"), 3)
+    assert not (tmp_path / "out.glb").exists()
+    assert refusal(call("optimize", "-", "-", stdin=b"no glTF"), 3)
+
+
+def test_a_file_without_clips(tmp_path: Path, call: Call) -> None:
+    document = opened_fixture("biped")
+    bare = replace(document, json={key: value for key, value in document.json.items() if key != "animations"})
+    source, output = tmp_path / "bare.glb", tmp_path / "out.glb"
+    source.write_bytes(glb_of(bare))
+    assert call("optimize", source, output).code == 0
+    assert output.read_bytes() == source.read_bytes()
+
+
+def test_hidden_vertices_leave_the_nodes(tmp_path: Path, call: Call) -> None:
+    """Draco hides vertices; the bound is then kept at the nodes."""
+    document = opened_fixture("noop")
+    meshes = [
+        {**mesh, "primitives": [{**p, "extensions": {"KHR_draco_mesh_compression": {}}} for p in mesh["primitives"]]}
+        for mesh in document.json["meshes"]
+    ]
+    used = {"meshes": meshes, "extensionsUsed": ["KHR_draco_mesh_compression"]}
+    source = tmp_path / "hidden.glb"
+    source.write_bytes(glb_of(Document({**document.json, **used}, document.buffers)))
+    run = call("optimize", source, tmp_path / "out.glb", *FAST)
+    assert run.code == 0
+    assert "measured at nodes, not on the surface" in run.err
+
+
+@needs_validator
+def test_the_validator_finds_no_new_errors(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    before, after = [], []
+    for name in ("arm", "interpolations", "morph_cube", "noop", "pointer", "accessors"):
+        for options in ((), ("--meshopt", "ext"), ("--meshopt", "khr", "--rebase-rest")):
+            path = tmp_path / "out.glb"
+            assert call("optimize", fixture(name), path, "--max-error", "0.1%", *FAST, *options).code == 0
+            before.append(fixture(name).read_bytes())
+            after.append(path.read_bytes())
+            assert opened(after[-1]).json["animations"]
+    reports = validate_many([*before, *after])
+    for old, new in zip(reports[: len(before)], reports[len(before) :], strict=True):
+        assert set(errors(new)) <= set(errors(old))

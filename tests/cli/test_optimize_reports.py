@@ -1,0 +1,123 @@
+"""`optimize`: pipes, reports and curves, what it says and in which form."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from anim.gltf import read
+from tests.cli.comparing import apart
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import refusal, shell, table
+from tests.files import opened_fixture, opened_path
+
+FAST = ("--effort", "fast")
+
+
+def _numbers(content: Any) -> Iterator[float]:
+    if isinstance(content, dict):
+        content = list(content.values())
+    if isinstance(content, list):
+        for each in content:
+            yield from _numbers(each)
+    elif isinstance(content, float):
+        yield content
+
+
+def test_pipes(tmp_path: Path, fixture: Fixture, call: Call) -> None:
+    source = fixture("noop")
+    run = call("optimize", "-", "-", *FAST, stdin=source.read_bytes())
+    assert len(run.product()) < source.stat().st_size
+    direct = tmp_path / "direct.glb"
+    assert call("optimize", source, direct, *FAST).code == 0
+    assert run.product() == direct.read_bytes()
+    line = f"gltf-anim optimize {source.name} --effort fast -q | gltf-anim inspect --format json"
+    assert json.loads(shell(line, tmp_path).product())["schema"] == 1
+
+
+def test_the_report(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    source, output, report = fixture("noop"), tmp_path / "out.glb", tmp_path / "report.json"
+    run = call("optimize", source, output, "--max-error", "0.1%", "--drop", "rest", "--report", report, *FAST)
+    assert run.code == 0, run.err
+    found = json.loads(report.read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))
+    assert found["schema"] == 1
+    assert all(math.isfinite(number) for number in _numbers(found))
+    assert found["bytes"]["before"]["file"] == source.stat().st_size
+    assert found["bytes"]["after"]["file"] == output.stat().st_size
+    assert found["bounds"]["max_error_m"] == pytest.approx(1e-3 * found["diagonal_m"])
+    assert found["policy"]["drop"] == "rest"
+    old, new = (read.clips(opened_path(path)) for path in (source, output))
+    by_clip = {each["clip"]: each for each in apart(call, source, output)["clips"]}
+    assert [each["name"] for each in found["clips"]] == [each.name for each in old]
+    for each, a, b in zip(found["clips"], old, new, strict=True):
+        assert each["keys_before"] == sum(len(track.times) for track in a.tracks)
+        assert each["keys_after"] == sum(len(track.times) for track in b.tracks)
+        assert (each["tracks_before"], each["tracks_after"]) == (len(a.tracks), len(b.tracks))
+        assert len(each["dropped"]) == len(a.tracks) - len(b.tracks)
+        assert {"name", "node", "path"} <= set().union(*each["dropped"], {"name", "node", "path"})
+        assert each["end_s"] == a.end
+        assert each["mean_m"] <= each["p99_m"] <= each["max_error_m"] * (1 + 1e-9) <= 1e-3 * found["diagonal_m"]
+        assert each["max_error_m"] <= each["certified_error_m"] <= 1e-3 * found["diagonal_m"]
+        assert each["not_certified_because"] is None
+        assert each["max_error_m"] >= by_clip[a.name]["max_error_m"] * (1 - 2e-3)  # that of one player
+    assert any(each["dropped"] for each in found["clips"])
+
+
+def test_the_report_on_stdout_beside_a_file(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    run = call("optimize", fixture("noop"), tmp_path / "out.glb", "--report", "-", *FAST)
+    assert run.json["unchanged"] is False
+    assert "can't both be stdout" in refusal(call("optimize", fixture("noop"), "--report", "-", *FAST), 2)
+
+
+def test_words(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    run = call("optimize", fixture("noop"), tmp_path / "out.glb", "--drop", "rest", "-v", *FAST)
+    assert "dropped " in run.err
+    assert "--drop rest)" in run.err
+    lines = [line for line in run.err.splitlines() if line.startswith("  clip ")]
+    assert len(lines) == len(read.clips(opened_fixture("noop")))
+    assert all(("p99 " in line and "mean " in line) is ("no vertex moved" not in line) for line in lines)
+    assert any("p99 " in line for line in lines)
+    assert all(("at any time" in line) is ("no vertex moved" not in line) for line in lines)
+    assert ", proven for every time, " in run.err.splitlines()[0]
+    keys = call("optimize", fixture("noop"), tmp_path / "keys.glb", "--reference", "keys", "-v", *FAST).err
+    assert "any time" not in keys
+    assert "proven" not in keys
+    assert call("optimize", fixture("noop"), tmp_path / "quiet.glb", "-q", *FAST).err == ""
+    exact = call("optimize", fixture("biped"), tmp_path / "exact.glb", "--max-error", "0", *FAST).err  # rounding only
+    assert ", no vertex moved, " in exact.splitlines()[0]
+    assert (tmp_path / "quiet.glb").is_file()
+
+
+def test_a_curve_as_csv(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    run = call("optimize", fixture("noop"), "--curve", tmp_path / "curve.csv")
+    assert (run.code, run.out) == (0, b"")
+    rows = table((tmp_path / "curve.csv").read_bytes())
+    assert list(rows[0]) == ["max_error_m", "share_of_diagonal", "bytes", "error_m"]
+    shares = [float(row["share_of_diagonal"]) for row in rows]
+    assert [shares[0], shares[-1]] == pytest.approx([1e-5, 1e-2])
+    assert shares == sorted(shares)
+    assert all(float(row["error_m"]) <= float(row["max_error_m"]) for row in rows)
+    assert int(rows[-1]["bytes"]) < int(rows[0]["bytes"]) < fixture("noop").stat().st_size
+    assert len(run.err.splitlines()) == len(rows)
+
+
+@pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_a_curve_as_a_picture(ending: str, start: bytes, fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    path = tmp_path / f"curve.{ending}"
+    assert call("optimize", fixture("arm"), "--curve", path, "-q").code == 0
+    assert path.read_bytes().startswith(start)
+
+
+def test_gzip_as_objective(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    sizes = {}
+    for objective in ("file", "gzip"):
+        path = tmp_path / f"{objective}.glb"
+        assert call("optimize", fixture("noop"), path, "--objective", objective, "--max-error", "1%", *FAST).code == 0
+        sizes[objective] = (path.stat().st_size, len(gzip.compress(path.read_bytes(), 9)))
+    assert sizes["file"][0] <= sizes["gzip"][0]
