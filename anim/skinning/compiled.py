@@ -1,65 +1,105 @@
-"""Kernels compiled when they are first used: numba costs more at start-up than all the rest of the program."""
+"""Kernels as machine code, made when they are first used; kept code needs no numba, which costs more than a bake."""
 
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Iterator
 from functools import cache
 from threading import Lock
 from types import FunctionType
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
+from anim.skinning import kept
+from anim.skinning.machine_code import RESULTS, MachineCode, function, kinds, laid_out, machine
+
 Kernel: TypeAlias = Callable[..., Any]
 
-APP = "gltf-anim"  # whose folder in the user's cache keeps machine code from one run to the next
 ROOM = __name__.rpartition(".")[0]
 NUMBERS = (int, float, np.generic)
-_one_at_a_time = Lock()  # numba is told its folder by a global
+HOW = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+UNLIKE = (AttributeError, ImportError, TypeError, ValueError)  # what a numba with other insides leads to
+_one_at_a_time = Lock()  # numba and LLVM are asked by one thread
 
 
+@cache
 def compiled(kernel: Kernel) -> Kernel:
     """Return a plain function over arrays, with those of this room that it calls, as code free of Python's lock.
 
-    It must not make arrays: nothing counts who uses them, which takes half the time of a loop over rows, and more where
-    threads share the counts. Without fast-math: sums and products come out the same on every machine.
+    Its parameters are arrays, tuples of arrays, int and float; it returns an int, a bool or nothing. It must not make
+    arrays: nothing counts who uses them, which takes half the time of a loop over rows, and more where threads share
+    the counts. Nor may it raise. Without fast-math: sums and products come out the same on every machine.
     Code is kept in the user's cache folder (or $NUMBA_CACHE_DIR), wherever the package lies, under a name made of its
     source; it is made anew in each process where there is no such folder.
     """
-    with _one_at_a_time:
-        return _compiled(kernel)
+    ready: dict[str, Kernel] = {}
+
+    def call(*arguments: Any) -> int:
+        kind = kinds(arguments)
+        if kind not in ready:
+            with _one_at_a_time:
+                if kind not in ready:
+                    ready[kind] = _ready(kernel, kind, arguments)
+        return int(ready[kind](arguments) or 0)
+
+    return call
 
 
-@cache
-def _compiled(kernel: Any) -> Kernel:
-    from numba.core import config
-
-    given = config.CACHE_DIR
-    folder = _folder(given or _own(), _digest(kernel))
-    config.CACHE_DIR = folder
+def _ready(kernel: Kernel, kind: str, arguments: tuple[Any, ...]) -> Kernel:
+    """What runs a kernel, given all its arguments as one tuple."""
     try:
-        fast: Kernel = _jit(_linked(kernel, bool(folder)), keep=bool(folder))
-    finally:
-        config.CACHE_DIR = given
-    return fast
+        found = function(_code(kernel, kind, arguments), laid_out(arguments))
+    except UNLIKE:
+        usual = _by_numba(kernel)
+        return lambda given: usual(*given)
+    return lambda given: found(*laid_out(given))
 
 
-@cache
-def _inlined(helper: Any, keep: bool) -> Any:
-    return _jit(_linked(helper, keep), keep=keep, forceinline=True)  # rows of known length go fast
+def _code(kernel: Any, kind: str, arguments: tuple[Any, ...]) -> MachineCode:
+    name = f"{kernel.__name__}-{_digest(kernel, kind)}"
+    code = kept.read(name)
+    if code is None:
+        code = _made(kernel, arguments)
+        kept.write(name, code)
+    return code
 
 
-def _jit(function: Any, *, keep: bool, **how: bool) -> Any:
+def _made(kernel: Any, arguments: tuple[Any, ...]) -> MachineCode:
+    """What numba makes of a kernel for arguments of these types."""
     import numba
 
-    return numba.njit(nogil=True, error_model="numpy", cache=keep, _nrt=False, **how)(function)
+    types = tuple(numba.typeof(each) for each in arguments)
+    fast = numba.njit(**HOW)(_linked(kernel, _inlined))
+    fast.compile(types)
+    library, symbol = fast.overloads[types].library, fast.overloads[types].fndesc.llvm_func_name
+    taken, given = len(list(library.get_function(symbol).arguments)), len(laid_out(arguments)) + RESULTS
+    if taken != given:
+        raise ValueError(f"numba {numba.__version__} made '{symbol}' with {taken} parameters (expected {given})")
+    _, _, (object_file, _) = library.serialize_using_object_code()
+    return MachineCode(symbol, object_file)
 
 
-def _linked(function: Any, keep: bool) -> Any:
+def _by_numba(kernel: Kernel) -> Kernel:
+    """The kernel as numba itself runs it: slower, larger, and the same numbers."""
+    import numba
+
+    def plain(function: Kernel) -> Kernel:
+        return cast(Kernel, numba.njit(nogil=True, error_model="numpy")(_linked(function, plain)))
+
+    return plain(kernel)
+
+
+@cache
+def _inlined(helper: Kernel) -> Kernel:
+    import numba
+
+    return cast(Kernel, numba.njit(**HOW, forceinline=True)(_linked(helper, _inlined)))  # rows of known length go fast
+
+
+def _linked(function: Any, link: Callable[[Kernel], Kernel]) -> Kernel:
     """The function with compiled ones in place of those that it calls."""
-    known = {**function.__globals__, **{each.__name__: _inlined(each, keep) for each in _called(function)}}
+    known = {**function.__globals__, **{each.__name__: link(each) for each in _called(function)}}
     copy = FunctionType(function.__code__, known, function.__name__)
     copy.__module__ = function.__module__
     return copy
@@ -72,30 +112,13 @@ def _called(function: Any) -> Iterator[Any]:
             yield found
 
 
-def _digest(kernel: Any) -> str:
-    """What tells versions of a kernel and all that it calls apart; numba looks at its file's time and size only."""
-    found, ahead = hashlib.sha256(), [kernel]
+def _digest(kernel: Any, kind: str) -> str:
+    """What tells code for one machine, kind of arguments and source, with all that it calls, from another."""
+    found, ahead = hashlib.sha256(repr((machine(), kind, HOW)).encode()), [kernel]
     while ahead:
         function = ahead.pop()
         code, known = function.__code__, function.__globals__
         values = [known[name] for name in code.co_names if isinstance(known.get(name), NUMBERS)]
         found.update(code.co_code + repr((code.co_names, code.co_consts, values)).encode())
         ahead.extend(_called(function))
-    return found.hexdigest()[:12]
-
-
-def _own() -> str:
-    """Our folder in the user's cache, there or not."""
-    from numba.misc.appdirs import AppDirs
-
-    return str(AppDirs(appname=APP, appauthor=False).user_cache_dir)
-
-
-def _folder(base: str, name: str) -> str:
-    """The folder of this name, there and writable; empty where that can't be."""
-    folder = os.path.join(base, name)
-    try:
-        os.makedirs(folder, exist_ok=True)
-    except OSError:
-        return ""
-    return folder if os.access(folder, os.W_OK) else ""
+    return found.hexdigest()[:24]

@@ -20,15 +20,13 @@ from anim.skinning.smooth_normals import SmoothNormals
 
 Make: TypeAlias = Callable[[Rig, bool], Skinner]
 
-PIECE = 4096  # vertices that a thread takes at a time
-
 
 @dataclass(frozen=True, slots=True)
 class Layer:
     """An instance, its rig and skinner, and its first column.
 
     in_mesh_space: positions are wanted in the space of the instance's node. smooth: what makes normals of the faces
-    where they are wanted and the mesh has none.
+    where they are wanted and the mesh has none. still: its vertices where no morph target counts.
     """
 
     instance: Instance
@@ -37,17 +35,17 @@ class Layer:
     at: int
     in_mesh_space: bool
     smooth: SmoothNormals | None
+    still: Shape
 
     def pack(self, frames: Frames, block: slice) -> tuple[Any, Shape]:
         """Return what `place` needs for some of the frames."""
         return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
 
-    def place(self, packed: tuple[Any, Shape], block: slice, whole: Target, first: int) -> None:
-        """Write a piece of the vertices, from `first` on, of a block of frames of the whole."""
+    def place(self, packed: tuple[Any, Shape], block: slice, whole: Target, first: int, last: int) -> None:
+        """Write vertices first … last, for a block of frames, into the whole."""
         parts, shape = packed
         normals = whole.normals[block] if len(shape.normals) else NOTHING
         tangents = whole.tangents[block] if len(shape.tangents) else NOTHING
-        last = min(first + PIECE, len(self.rig.points))
         self.skinner.place(parts, shape, Target(self.at, whole.positions[block], normals, tangents), first, last)
 
     def finish(self, frames: Frames, whole: Target) -> None:
@@ -67,7 +65,7 @@ class Layer:
     def at_rest(self, frames: Frames) -> Floats:
         """Return the vertices (V, 3) in the first of the frames, blended linearly in float64."""
         bound = self.matrices(frames, slice(0, 1))[0]
-        points = self._points(frames, slice(0, 1))[..., 0]
+        points = _morphed(self.rig.points, self.instance.mesh.targets, self._weights(frames, slice(0, 1)))[..., 0]
         owner = np.repeat(np.arange(len(points)), np.diff(self.rig.start))
         chosen = bound[self.rig.joint]
         moved = np.einsum("eij,ej->ei", chosen[..., :3], points[owner]) + chosen[..., 3]
@@ -91,14 +89,13 @@ class Layer:
         return product.reshape(joints, count, 3, 4).transpose(1, 0, 2, 3)
 
     def _shape(self, frames: Frames, block: slice) -> Shape:
-        points = self._points(frames, block)
         mesh, weights = self.instance.mesh, self._weights(frames, block)
+        if not weights.any():
+            return self.still
+        points = _morphed(self.rig.points, mesh.targets, weights)
         normals = _morphed(self.rig.normals, mesh.normal_targets, weights)
         tangents = _morphed(self.rig.tangents, mesh.tangent_targets, weights)
         return Shape(_rows(points), _rows(normals), _rows(tangents))
-
-    def _points(self, frames: Frames, block: slice) -> Floats:
-        return _morphed(self.rig.points, self.instance.mesh.targets, self._weights(frames, block))
 
     def _weights(self, frames: Frames, block: slice) -> Floats:
         """Morph weights (n, M), or (1, M) where no frame has its own."""
@@ -117,7 +114,8 @@ def layer(
         raise error.at(f"mesh '{name}'") from None
     smooth = SmoothNormals(bound.faces, len(bound.points)) if normals and instance.mesh.normals is None else None
     plain = not len(instance.mesh.targets) and not len(bound.normals) and not len(bound.tangents)
-    return Layer(instance, bound, make(bound, plain), at, space == "mesh", smooth)
+    still = Shape(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))
+    return Layer(instance, bound, make(bound, plain), at, space == "mesh", smooth, still)
 
 
 def _morphed(base: Floats, targets: Floats | None, weights: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.skinning.compiled import compiled
-from anim.skinning.kernels.lanes import LANES, Shape, Singles, Target, aligned, room
+from anim.skinning.kernels.lanes import LANES, TILE, Shape, Singles, Target, aligned, room
 from anim.skinning.kernels.linear import linear
 from anim.skinning.kernels.points_only import points_only
 from anim.skinning.rig import Rig
@@ -53,8 +53,9 @@ class LinearBlend:
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        held, into = self.rig.held, (first, last, room(self.rig.most), target)
+        held = self.rig.held
         if packed.columns is not None:
-            compiled(points_only)(self.coefficients, held, packed.columns, *into)
+            tile = aligned(TILE, 3 * LANES)
+            compiled(points_only)(self.coefficients, held, packed.columns, first, last, tile, target)
         else:
-            compiled(linear)(shape, held, packed.rows, *into)
+            compiled(linear)(shape, held, packed.rows, first, last, room(self.rig.most), target)

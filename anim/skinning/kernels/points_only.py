@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from anim.skinning.kernels.lanes import LANES, TILE, Held, Room, Singles, Target
+from anim.skinning.kernels.lanes import LANES, TILE, Held, Singles, Target
 
 
 def points_only(
-    coefficients: Singles, held: Held, matrices: Singles, first: int, last: int, room: Room, target: Target
+    coefficients: Singles, held: Held, matrices: Singles, first: int, last: int, tile: Singles, target: Target
 ) -> None:
-    """Write Σ w M p: coefficients (E, 4) are w·(x, y, z, 1), matrices (J, 4, 3L) columns, frame by frame x, y, z."""
-    tile = room.points.reshape((TILE, 3 * LANES))
+    """Write Σ w M p: coefficients (E, 4) are w·(x, y, z, 1), matrices (J, 4, 3L) columns, frame by frame x, y, z.
+
+    tile: (TILE, 3L), room to work in.
+    """
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
         for v in range(count):

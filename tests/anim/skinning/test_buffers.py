@@ -5,8 +5,10 @@ from __future__ import annotations
 import gc
 
 import numpy as np
+import pytest
 
 from anim.model import Clip
+from anim.skinning import stream
 from anim.skinning.bake import baker
 from anim.skinning.buffers import Buffers
 from tests.anim.skinning.scenes import random_scene
@@ -38,3 +40,12 @@ def test_chunks_that_are_kept_stay_as_they_were() -> None:
         pass
     assert len(kept) > 1
     assert all(np.array_equal(chunk.positions, copy) for chunk, copy in zip(kept, copies, strict=True))
+
+
+def test_a_stream_takes_memory_for_few_chunks_however_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that is used and one that is made; a third where its maker is faster than the caller lets go of the first."""
+    monkeypatch.setattr(stream, "CHUNK", 1)
+    made = baker(random_scene(2, vertices=300))
+    count = sum(1 for _ in made.bake(Clip("", ()), times=np.linspace(0, 40, 1200)).chunks())
+    assert count == 38
+    assert len(made.buffers._lent) <= 3

@@ -8,23 +8,27 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from anim.skinning import compiled as compiled_module
 from anim.skinning.compiled import compiled
 from anim.skinning.kernels import rows
 from anim.skinning.kernels.around_duals import around_duals
 from anim.skinning.kernels.lanes import LANES, Held, Shape, Target, room
+from anim.skinning.kernels.normals_of_faces import normals_of_faces
+from anim.skinning.kernels.rigid_turns import rigid_turns
+from anim.skinning.machine_code import kinds
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = """
 import sys
 from anim.skinning.bake import bake
-assert "numba" not in sys.modules
+assert not {"numba", "llvmlite"} & set(sys.modules)
 from anim.model import Clip
 from tests.anim.skinning.scenes import random_scene
 import numpy as np
-bake(random_scene(1), Clip("", ()), times=np.zeros(1)).whole()
-assert "numba" in sys.modules
+found = bake(random_scene(1), Clip("", ()), times=np.zeros(1)).whole().positions
+print("numba" in sys.modules, found.tobytes().hex())
 """
 
 
@@ -48,35 +52,87 @@ def test_machine_code_is_the_python_it_came_from() -> None:
         assert np.allclose(plain, fast, rtol=1e-5, atol=1e-5)
 
 
-def test_code_is_kept_in_the_users_cache_and_not_beside_the_package(tmp_path: Path) -> None:
-    _run(tmp_path)
-    kept = {path.name.partition("-")[0] for path in tmp_path.rglob("*.nbi")}
-    assert "points_only.points_only" in kept
-    assert all((tmp_path / "gltf-anim") in path.parents for path in tmp_path.rglob("*.nbi"))
-    assert not list((ROOT / "anim" / "skinning").rglob("*.nbi"))
+def test_arrays_of_any_layout_and_results_are_passed_as_python_does() -> None:
+    random = np.random.default_rng(0)
+    faces = random.integers(0, 20, (30, 3))
+    wide = random.normal(size=(2, 40, 3)).astype(np.float32)
+    for positions in (wide[:, :20], wide[:, ::2], np.asfortranarray(wide[:, ::2]), wide[:1, :20]):
+        plain, fast = (np.full((len(positions), 40, 3), 9, np.float32) for _ in range(2))
+        normals_of_faces(faces, positions, plain[:, 1::2])
+        compiled(normals_of_faces)(faces, positions, fast[:, 1::2])
+        assert np.allclose(plain, fast, rtol=1e-5, atol=1e-5)
+        assert (fast[:, ::2] == 9).all(), "nothing but the view"
+    turn = np.eye(3, 4)[None, None]
+    for size, tolerance, rigid in ((1.0, 1e-6, True), (1.1, 1e-6, False), (1.1, 1.0, True)):
+        assert bool(compiled(rigid_turns)(size * turn, tolerance, np.empty((1, 1, 4)))) is rigid
+
+
+def test_code_is_kept_in_the_users_cache_and_then_needs_no_numba(tmp_path: Path) -> None:
+    made, kept = _run(tmp_path), _run(tmp_path)
+    assert (made[0], kept[0]) == ("True", "False")
+    assert made[1] == kept[1]
+    (folder,) = tmp_path.iterdir()
+    assert folder.name == "gltf-anim"
+    assert {path.name.partition("-")[0] for path in folder.iterdir()} == {"worlds", "points_only"}
+
+
+def test_code_that_is_not_whole_is_made_again(tmp_path: Path) -> None:
+    wanted = _run(tmp_path)
+    for path in (tmp_path / "gltf-anim").iterdir():
+        content = path.read_bytes()
+        path.write_bytes(content[:-100] if path.name.startswith("worlds") else b"")
+    assert _run(tmp_path) == wanted
+    assert _run(tmp_path)[0] == "False", "and kept"
 
 
 def test_a_change_in_what_a_kernel_calls_is_other_code() -> None:
     """Numba alone would take the old code from the cache: it looks at the kernel's own file."""
-    before = compiled_module._digest(around_duals)
+    before = compiled_module._digest(around_duals, "")
     kept = rows.turn.__code__
     try:
         rows.turn.__code__ = rows.clear.__code__.replace(co_name="turn", co_varnames=kept.co_varnames[:3])
-        assert compiled_module._digest(around_duals) != before
+        assert compiled_module._digest(around_duals, "") != before
     finally:
         rows.turn.__code__ = kept
-    assert compiled_module._digest(around_duals) == before
+    assert compiled_module._digest(around_duals, "") == before
+
+
+def test_other_types_or_layouts_are_other_code() -> None:
+    array = np.zeros((2, 3))
+    views = [array, array[:1], array.T, array[:, ::2], array[0], array.astype(np.float32)]
+    likes = [*views, 1, 1.0, (1, array), Held(*views[:3])]
+    found = [kinds([each]) for each in likes]
+    assert found[0] == found[1], "sizes don't count"
+    assert len(set(found)) == len(found) - 1
+    array.flags.writeable = False
+    assert kinds([array]) != found[0]
 
 
 def test_without_a_cache_folder_it_works_all_the_same(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_bytes(b"")
-    _run(blocked)
-    assert not list((ROOT / "anim" / "skinning").rglob("*.nbi"))
+    assert _run(blocked)[0] == "True"
+    assert blocked.read_bytes() == b""
 
 
-def _run(cache: Path) -> None:
+def _run(cache: Path) -> list[str]:
+    """Whether numba was there in the end, and the bytes of what was baked."""
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
     environment |= {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(ROOT)}
     run = subprocess.run([sys.executable, "-c", SCRIPT], cwd=ROOT, env=environment, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
+    return run.stdout.split()
+
+
+def test_a_numba_with_other_insides_runs_the_kernels_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    def foreign(*_: object) -> None:
+        raise AttributeError("no such thing in this numba")
+
+    monkeypatch.setattr(compiled_module, "_code", foreign)
+    faces = np.array([[0, 1, 2], [2, 1, 3]])
+    positions = np.random.default_rng(0).normal(size=(2, 4, 3)).astype(np.float32)
+    plain, fast = (np.zeros((2, 4, 3), np.float32) for _ in range(2))
+    normals_of_faces(faces, positions, plain)
+    compiled.__wrapped__(normals_of_faces)(faces, positions, fast)
+    assert np.allclose(plain, fast, atol=1e-5)
+    assert plain.any()
