@@ -173,6 +173,7 @@ def _clip(each: ClipDiff, diagonal: float) -> dict[str, Any]:
         "other_clip": _name(each.new_name, each.new),
         "max_error_m": error.max_error,
         "max_error_percent": _percent(error.max_error, diagonal),
+        "certified_error_m": each.certified,
         "time_s": error.time,
         "mesh": error.place,
         "joint": error.joint,

@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Ints
 from anim.measure import matching
 from anim.measure.error import FPS, MotionError, Ruler, dense_times
+from anim.measure.proof.certified import Prover
 from anim.measure.statistics import Statistics, statistics
 from anim.model import Clip, Scene
 
@@ -18,7 +19,8 @@ from anim.model import Clip, Scene
 class ClipDiff:
     """Two clips that are meant to be the same.
 
-    old, new: their numbers in the files. end_old, end_new: s, their last keys.
+    old, new: their numbers in the files. certified: m, no vertex is farther off at any time, looked at or not; None
+    where that could not be proven. end_old, end_new: s, their last keys.
     missing, added: what only the old or only the new clip has a track for: (node or pointer, path).
     """
 
@@ -27,6 +29,7 @@ class ClipDiff:
     name: str
     new_name: str
     error: MotionError
+    certified: float | None
     statistics: Statistics
     end_old: float
     end_new: float
@@ -70,8 +73,9 @@ def diff(
     """
     partners = matching.by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     wanted = range(len(old)) if chosen is None else chosen
+    prover = Prover(ruler)
     found = [
-        _compared(ruler, (i, old[i]), (int(partners[i]), new[partners[i]]), player=player, fps=fps)
+        _compared(prover, (i, old[i]), (int(partners[i]), new[partners[i]]), player=player, fps=fps)
         for i in wanted
         if partners[i] >= 0
     ]
@@ -89,16 +93,17 @@ def diff(
     )
 
 
-def _compared(ruler: Ruler, old: tuple[int, Clip], new: tuple[int, Clip], *, player: str, fps: float) -> ClipDiff:
-    before, after = old[1], new[1]
+def _compared(prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, player: str, fps: float) -> ClipDiff:
+    before, after, ruler = old[1], new[1], prover.ruler
     times = dense_times(before, after, fps=fps)
-    error = ruler.error_at(before, after, times, player=player)
+    look = ruler.look(before, after, times, player=player)
+    proof = prover.certified(before, after, times, {player: look})
     found = statistics(ruler, before, after, times=times, player=player, fps=fps)
     one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))
     missing = tuple(name for key, name in one.items() if key not in other)
     added = tuple(name for key, name in other.items() if key not in one)
     names = before.name, after.name
-    return ClipDiff(old[0], new[0], *names, error, found, before.end, after.end, missing, added)
+    return ClipDiff(old[0], new[0], *names, proof.error, proof.bound, found, before.end, after.end, missing, added)
 
 
 def _targets(ruler: Ruler, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:

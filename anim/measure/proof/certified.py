@@ -45,7 +45,7 @@ class Prover:
     """Proves bounds for clips on a ruler's scenes: what depends on no clip is prepared once."""
 
     def __init__(self, ruler: Ruler) -> None:
-        self._ruler = ruler
+        self.ruler = ruler
         found = [(part, reach(part)) for part in ruler.parts if len(part.groups)]
         plain = [(part, each) for part, each in found if each is not None and each.morphing is None]
         others = [(part, each) for part, each in found if each is not None and each.morphing is not None]
@@ -73,7 +73,7 @@ class Prover:
         if not self._knows_all or not set(looks) <= set(LAWS):
             return Proof(None, worst, player)
         bound = worst.max_error
-        room = max(bound * NEAR, NOISE * self._ruler.diagonal)
+        room = max(bound * NEAR, NOISE * self.ruler.diagonal)
         aim = Aim(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
         seen = Seen()
         for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(looks))):
@@ -82,7 +82,7 @@ class Prover:
             bound = max(bound, closed, other.bound)
             seen = max(seen, other, key=lambda each: each.largest)
         if seen.largest > worst.max_error:
-            found = self._ruler.error_at(before, after, np.array([seen.time]), player=seen.player)
+            found = self.ruler.error_at(before, after, np.array([seen.time]), player=seen.player)
             pointers, pointer = worst.max_pointer_error, worst.pointer
             player = seen.player
             worst = replace(found, times=worst.times + 1, max_pointer_error=pointers, pointer=pointer)
@@ -92,13 +92,13 @@ class Prover:
     def _length(self, players: int) -> int:
         """How many stretches are gone through at once."""
         groups = sum(len(part.groups) for part in self._parts)
-        return max(BLOCK // (players * (groups + len(self._ruler.scene.skeleton)) + 1), 8)
+        return max(BLOCK // (players * (groups + len(self.ruler.scene.skeleton)) + 1), 8)
 
     def _proven(
         self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: Aim
     ) -> tuple[float, Seen]:
         """What bounds all stretches that need no second look, and what that shows of the others."""
-        scenes = self._ruler.scene, self._ruler.other
+        scenes = self.ruler.scene, self.ruler.other
         risen = rises(scenes, clips, times, self._reaches, list(limits))
         closed, asked = 0.0, []
         for player, each in limits.items():
@@ -109,7 +109,7 @@ class Prover:
                 parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.room))
                 finest = np.clip(parts, 1, FINEST).astype(np.int64)
                 asked.append(cuts(player, times, risen.rise, is_open, finest))
-        return closed, again(self._ruler, clips, asked, self._parts, target=aim.found + aim.room)
+        return closed, again(self.ruler, clips, asked, self._parts, target=aim.found + aim.room)
 
 
 def _limits(looks: Mapping[str, Look], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
