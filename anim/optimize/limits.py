@@ -80,7 +80,8 @@ class Effort:
     ways to choose time axes. favoring: rounds with more room for long tracks. leeways: where rotations make up for each
     other, how much of what that shortens levers by is given to their budgets at once, as powers. finishing: factors
     tried on all budgets at the end. strays: random changes tried. descent: times that each track is tried with coarser
-    storage. cycles: times that all of this is done at most, as long as it saves bytes. after: an effort to begin with.
+    storage. cycles: times that all of this is done at most, as long as it saves bytes. besides: another effort, whose
+    result counts where it is smaller.
     """
 
     rounds: int
@@ -92,11 +93,15 @@ class Effort:
     strays: int = 0
     descent: int = 0
     cycles: int = 1
-    after: Effort | None = None
+    besides: Effort | None = None
+
+    def all(self) -> list[Effort]:
+        """Return the efforts that are made one after the other: the smallest result counts."""
+        return [*(self.besides.all() if self.besides else ()), self]
 
 
 FAST = Effort(5)
-BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), strays=15, descent=1)
+BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), strays=25, descent=2)
 MAX = Effort(
     10,
     (0.1, 0.25, 0.4, 0.6, 0.8),
@@ -107,6 +112,6 @@ MAX = Effort(
     strays=100,
     descent=2,
     cycles=3,
-    after=BALANCED,
+    besides=BALANCED,
 )
 EFFORTS = {"fast": FAST, "balanced": BALANCED, "max": MAX}

@@ -43,10 +43,7 @@ class _Search:
         self._best: Outcome | None = None
 
     def run(self) -> Outcome | None:
-        if self._effort.after is None:
-            self._begin()
-        else:
-            self._best = search(self._bench, self._bound, self._effort.after)
+        self._begin()
         for _ in range(self._effort.cycles if self._best else 0):
             before = self._best
             self._go_round()

@@ -11,7 +11,7 @@ from anim.measure.surface import diagonal
 from anim.model import Clip, Scene
 from anim.optimize.clip import Task, solve
 from anim.optimize.coding import PRICES, Coding
-from anim.optimize.limits import EFFORTS, Packing
+from anim.optimize.limits import EFFORTS, Effort
 from anim.optimize.request import Request
 from anim.optimize.setting import Setting, setting
 from anim.optimize.solution import Solution
@@ -102,39 +102,37 @@ class Site:
 
 
 def finished(site: Site, item: tuple[int, Task]) -> Finished:
-    """Return clip `item[0]` as small as the search makes it within all bounds, judged as it will be stored.
+    """Return clip `item[0]` in the fewest bytes found within all bounds, judged as it will be stored.
+
+    Splines and steps as they are compete too: lines in place of a few of them can take more.
+    """
+    number, task = item
+    setting = site.setting()
+    found = [each for effort in setting.effort.all() if (each := _within(site, number, task, effort)) is not None]
+    best = min(found, key=lambda each: each.solution.size(setting.coding), default=None)
+    exact = solve(replace(setting, bounds=replace(setting.bounds, max_error=0.0)), task)
+    assert exact is not None
+    if best is not None and best.solution.size(setting.coding) <= exact.size(setting.coding):
+        return best
+    is_last_resort = best is None and site.request.bounds.max_error > 0
+    return Finished(exact, site.judged(number, exact.clip), without_loss=is_last_resort)
+
+
+def _within(site: Site, number: int, task: Task, effort: Effort) -> Finished | None:
+    """What a search finds that holds, None if nothing does.
 
     After each search that fails, the vertex that was off most is measured too, and the search gets less to spend.
     """
-    number, task = item
     extra: frozenset[tuple[int, int]] = frozenset()
     for _ in range(ROUNDS):
-        solution = solve(site.setting(extra), task)
+        solution = solve(replace(site.setting(extra), effort=effort), task)
         if solution is None:
-            break
+            return None
         found = site.judged(number, solution.clip)
         if found.holds:
-            return _unless_exact_is_smaller(site, number, Finished(solution, found), task)
+            return Finished(solution, found)
         worst = site.worst_vertex(found)
         factor = HARDLY if worst - extra else min(TIGHTER / found.strain, TIGHTER)
         extra |= worst
         task = replace(task, bound=task.bound * factor)
-    exact = _exact(site, task)
-    return Finished(exact, site.judged(number, exact.clip), without_loss=site.request.bounds.max_error > 0)
-
-
-def _unless_exact_is_smaller(site: Site, number: int, lossy: Finished, task: Task) -> Finished:
-    """Lines in place of a few splines and steps can take more bytes than these."""
-    if site.request.packing is not Packing.CORE:  # what a codec makes of numbers that nobody rounded is no gain
-        return lossy
-    exact, prices = _exact(site, task), PRICES[site.request.objective]
-    if exact.size(prices) >= lossy.solution.size(prices):
-        return lossy
-    return Finished(exact, site.judged(number, exact.clip))
-
-
-def _exact(site: Site, task: Task) -> Solution:
-    usual = site.setting()
-    exact = solve(replace(usual, bounds=replace(usual.bounds, max_error=0.0)), task)
-    assert exact is not None
-    return exact
+    return None

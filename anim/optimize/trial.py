@@ -140,10 +140,11 @@ class Bench:
 
     def _size(self, fates: Ints, keys: dict[int, Stored], axes: list[Axis]) -> float:
         prices = self._coding.prices
-        text = prices.track * (fates == Fate.KEYED).sum() + prices.held * (fates == Fate.HELD).sum()
+        moving = {(n, keys[i].name): keys[i] for n, axis in enumerate(axes) for i in axis.members}
+        repeated = (fates == Fate.KEYED).sum() - len(moving)
+        text = prices.track * len(moving) + prices.repeated * repeated + prices.held * (fates == Fate.HELD).sum()
         times = sum(prices.axis + self._coding.time_bytes * axis.keys.sum() for axis in axes)
-        moving = [keys[i] for axis in axes for i in axis.members]
-        return float(text + times + self._coding.size(moving))
+        return float(text + times + self._coding.size(list(moving.values())))
 
 
 def _rest(truth: Truth, path: str) -> Floats:

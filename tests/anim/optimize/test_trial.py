@@ -137,3 +137,13 @@ def test_a_bound_on_speed() -> None:
     assert fast.worst > slow.worst
     finer = strict.run(_plan(strict, budget=BOUND / 300))
     assert finer.worst < fast.worst
+
+
+def test_tracks_stored_alike_count_once() -> None:
+    """Joints 1 and 2 turn alike: the second costs but its channel."""
+    times = np.linspace(0, 2, 25)
+    both = _bench(clip(*(track("rotation", times, turning(1.0), node=node) for node in (1, 2))))
+    alone = _bench(clip(track("rotation", times, turning(1.0), node=1)))
+    pair, one = (bench.run(_plan(bench, axes="full")) for bench in (both, alone))
+    assert pair.fates.tolist() == [Fate.KEYED, Fate.KEYED]
+    assert pair.size - one.size == CORE.prices.repeated
