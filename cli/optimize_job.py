@@ -66,7 +66,7 @@ class Job:
 
     def sized(self, request: Request, max_error: float) -> Sized:
         """Return what a bound, in m, leads to, searched fast."""
-        found = self.run(replace(request, bounds=replace(request.bounds, max_error=max_error), effort="fast"))
+        found = self.run(replace(_bounded(request, max_error), effort="fast"))
         return Sized(max_error, self.size(self.smaller(found)), optimization.worst(found))
 
     def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
@@ -82,7 +82,7 @@ class Job:
         if best is None:
             self._check_fit(self.sized(request, most), max_bytes)
         bound = most if best is None else min(best.max_error, most)
-        request = replace(request, bounds=replace(request.bounds, max_error=bound))
+        request = _bounded(request, bound)
         found = self.run(request)
         if self.size(self.smaller(found)) > max_bytes:  # a fast search fits, and a longer one may end elsewhere
             found = self.run(replace(request, effort="fast"))
@@ -95,6 +95,11 @@ class Job:
                 f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {length(sized.max_error)}{percent} "
                 f"it still takes {plural(sized.size, 'byte')}; nothing was written"
             )
+
+
+def _bounded(request: Request, max_error: float) -> Request:
+    """The request with a bound in metres that nobody has given."""
+    return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
 
 
 def job(source: streams.Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from anim.measure.surface import diagonal
 from anim.model import Scene
@@ -17,24 +17,37 @@ ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
 BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
 
 
-def bounds(
-    scene: Scene,
-    *,
-    max_error: str | None,
-    shell: str,
-    max_pointer_error: str,
-    max_angle: str | None,
-    max_speed_error: str | None,
-) -> Bounds:
-    """Return the bounds in metres and radians; percents are of the scene's diagonal. Raises UsageError."""
+def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
+    """Return the bounds in metres and radians; percents are of the scene's diagonal. Raises UsageError.
+
+    said: what was typed, by the names of the bounds; None for those that are not wanted.
+    """
     scale = diagonal(scene)
+
+    def length(name: str) -> float | None:
+        text, option = said[name], f"--{name.replace('_', '-')}"
+        if text is None:
+            return None
+        return 0.0 if ZERO.fullmatch(text) else units.meters(text, option, lambda: scale)
+
+    pointer, angle, speed = said["max_pointer_error"] or "0", said["max_angle"], said["max_speed_error"]
     return Bounds(
-        _length(MAX_ERROR if max_error is None else max_error, "--max-error", scale),
-        _length(shell, "--shell", scale),
-        0.0 if ZERO.fullmatch(max_pointer_error) else units.share(max_pointer_error, "--max-pointer-error"),
-        None if max_angle is None else units.angle(max_angle, "--max-angle"),
-        None if max_speed_error is None else units.meters(max_speed_error, "--max-speed-error", lambda: scale),
+        length("max_error") or 0.0,
+        length("shell") or 0.0,
+        0.0 if ZERO.fullmatch(pointer) else units.share(pointer, "--max-pointer-error"),
+        None if angle is None else units.angle(angle, "--max-angle"),
+        None if speed is None else units.meters(speed, "--max-speed-error", lambda: scale),
     )
+
+
+def given(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
+    """Return the same as it was typed where that is a share of the diagonal, and the number of metres elsewhere."""
+    return tuple(_share(text) or f"{getattr(bounds, name)}" for name, text in said.items())
+
+
+def _share(text: str | None) -> str:
+    number = (text or "").strip()
+    return f"{float(number[:-1])}%" if number.endswith("%") else ""
 
 
 def kept(globs: Sequence[str], scene: Scene) -> frozenset[int]:
@@ -53,8 +66,3 @@ def count_of_bytes(text: str) -> int:
     if count <= 0:
         raise UsageError(f"--max-bytes is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
     return count
-
-
-def _length(text: str, option: str, scale: float) -> float:
-    """Metres, 0 allowed."""
-    return 0.0 if ZERO.fullmatch(text) else units.meters(text, option, lambda: scale)

@@ -165,7 +165,8 @@ def _mapped(path: Path, ending: str = ".glb") -> Bytes:
         if path.is_dir():
             raise FormatError("is a folder", help=f"name the files: {path}/*{ending}")
         with path.open("rb") as file:
-            if not path.is_file() or os.fstat(file.fileno()).st_size == 0:
+            is_plain = path.is_file() and os.fstat(file.fileno()).st_size > 0
+            if not is_plain or sys.platform == "win32":  # where a mapped file can't be replaced by its output
                 return np.frombuffer(file.read(), np.uint8)
             return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
     except OSError as error:

@@ -6,6 +6,7 @@ stays the same however long the clip is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -196,8 +197,12 @@ def check_times(*clips: Clip) -> Floats:
 
 
 def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
-    """Return what `check_times` does, a grid of `fps` frames per second over all of it from 0 s on, and the last moment
-    before each STEP key, in seconds, increasing. Frames that only rounding keeps apart from a key are that key."""
+    """Return what `check_times` does, a grid of `fps` frames per second, and the last moment before each STEP key, in
+    seconds, increasing.
+
+    The grid has 0 s on it, and begins with the last frame before the first key: that shows what all earlier ones do.
+    Frames that only rounding keeps apart from a key are that key.
+    """
     steps = {
         id(track.times): track.times
         for clip in clips
@@ -206,7 +211,8 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     }
     before = [np.nextafter(times[1:], 0) for times in steps.values()]
     end = max((clip.end for clip in clips), default=0.0)
-    keys, frames = check_times(*clips), grid(0.0, end, fps=fps)
+    keys = check_times(*clips)
+    frames = grid(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
     after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
     apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
     return sorted_unique(np.concatenate((keys, frames[apart > SAME_MOMENT], *before)))

@@ -99,11 +99,10 @@ def speed_error(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec"
 
 
 def _distances(ruler: Ruler, block: Block) -> Iterator[Floats]:
-    """Distances of all vertices at all times of the block; the points of shells are none."""
+    """Distances of all vertices at all times of the block; where there are none, of the points of shells."""
     frames = np.arange(len(block.times))
-    for part in ruler.parts:
-        if isinstance(part, Shells):
-            continue
+    surfaces = [part for part in ruler.parts if not isinstance(part, Shells)]
+    for part in surfaces or ruler.parts:
         field = part.field(block.old, block.new)
         if field is not None:
             for group in range(len(part.groups)):

@@ -67,7 +67,8 @@ class _Sorted:
         if splines:  # smaller than lines, or maybe too bent for any
             for i in splines:
                 self._keep_exactly(i)
-            found = self._searched([i for i in self._free if i not in splines])
+            others = self._searched([i for i in self._free if i not in splines])
+            found = found if others is None else others
         if found is None:
             return None
         every = {**self._done, **found}

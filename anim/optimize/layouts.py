@@ -15,7 +15,6 @@ from anim.optimize.segments import Segments, fits
 from anim.optimize.truth import Truth
 
 STILL = 0.1  # of the bound: a track that is less off its middle value gets no table
-
 ASKED = 4.0  # of the bound: larger budgets are hardly ever asked for
 
 

@@ -80,8 +80,8 @@ class Effort:
     ways to choose time axes. favoring: rounds with more room for long tracks. leeways: where rotations make up for each
     other, how much of what that shortens levers by is given to their budgets at once, as powers. finishing: factors
     tried on all budgets at the end. strays: random changes tried. descent: times that each track is tried with coarser
-    storage. cycles: times that all of this is done at most, as long as it saves bytes. besides: another effort, whose
-    result counts where it is smaller.
+    storage, where a codec makes that smaller. cycles: times that all of this is done at most, as long as it saves
+    bytes. besides: another effort, whose result counts where it is smaller.
     """
 
     rounds: int

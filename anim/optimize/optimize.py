@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from anim.gltf import read
 from anim.gltf.document import Document
+from anim.measure.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimize import seal
 from anim.optimize.clip import Task
@@ -58,9 +59,10 @@ def optimize(
     A clip for which no lossy way holds all bounds is kept without loss. Output of the same request comes back as it is.
     """
     chosen = range(len(clips)) if chosen is None else chosen
-    options = f"{request} {tuple(chosen)}"
+    options = f"{request.name} {tuple(chosen)}"
     if seal.is_sealed(document, clips, options):
         return Optimized(document, {}, {}, unchanged=True)
+    request = _in_sight(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
     site = Site(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
     tasks = _tasks(site, chosen)
@@ -78,6 +80,13 @@ def optimize(
         verdicts[number] = site.judged(number, read_back[number])
     done = seal.sealed(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
+
+
+def _in_sight(request: Request, scene: Scene) -> Request:
+    """The request, for a scene without a vertex as if nothing were invisible: nodes are all that it shows."""
+    if has_vertices(scene):
+        return request
+    return replace(request, policy=replace(request.policy, drop_invisible=False))
 
 
 def _tasks(site: Site, chosen: Sequence[int]) -> list[tuple[int, Task]]:

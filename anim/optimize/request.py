@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from anim.optimize.limits import Bounds, Objective, Packing, Policy
 from anim.optimize.verify import PLAYERS
@@ -10,7 +10,11 @@ from anim.optimize.verify import PLAYERS
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for. effort: a name in EFFORTS. players: names in PLAYERS, who must show the motion rightly."""
+    """What is asked for.
+
+    effort: a name in EFFORTS. players: names in PLAYERS, who must show the motion rightly. given: the bounds as they
+    were given, where they are shares of the diagonal: another rest pose has another, and yet it is the same request.
+    """
 
     bounds: Bounds
     policy: Policy = field(default_factory=Policy)
@@ -18,3 +22,9 @@ class Request:
     objective: Objective = Objective.FILE
     effort: str = "balanced"
     players: tuple[str, ...] = PLAYERS
+    given: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What is the same of two requests that ask for the same."""
+        return repr(replace(self, bounds=Bounds(0.0, 0.0)) if self.given else self)

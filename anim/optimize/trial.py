@@ -124,7 +124,7 @@ class Bench:
     def _chords_matter(self, axes: list[Axis], keys: dict[int, Stored]) -> bool:
         for axis in axes:
             for i in axis.members:
-                if self._paths[i] == 1:
+                if self._paths[i] == ROTATION:
                     gap = play.apart(play.steps(keys[i].values).max(initial=0.0)) / 2
                     if gap * self._meters[i] > CHORDS_NOTICED * self._bound:
                         return True
@@ -132,10 +132,10 @@ class Bench:
 
     def _chord_strain(self, axes: list[Axis], keys: dict[int, Stored], shown: list[Floats]) -> Floats:
         for axis in axes:
-            members = [i for i in axis.members if self._paths[i] == 1]
+            members = [i for i in axis.members if self._paths[i] == ROTATION]
             if members:
                 mixed = self._candidates.by_chords(axis, [keys[i] for i in members])
-                shown[1][self._nodes[members]] = np.swapaxes(mixed, 0, 1)
+                shown[ROTATION][self._nodes[members]] = np.swapaxes(mixed, 0, 1)
         return self._strains.along_chords(shown)
 
     def _size(self, fates: Ints, keys: dict[int, Stored], axes: list[Axis]) -> float:

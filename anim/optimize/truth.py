@@ -97,7 +97,7 @@ def truth(
     columns = stacked(world, points.nodes)
     by_chord = columns
     if any(each.path == "rotation" and each.meters * _gap(clip.tracks[each.number]) > noticed for each in moving):
-        by_chord = stacked(worlds(skeleton, _by_chords(skeleton, clip, at, local), levels), points.nodes)
+        by_chord = stacked(worlds(skeleton, _by_chords(clip, at, local), levels), points.nodes)
     return Truth(
         grid,
         at,
@@ -140,9 +140,7 @@ def _local(skeleton: Skeleton, clip: Clip, at: Floats) -> tuple[Floats, Floats, 
     return translation, rotation, scale
 
 
-def _by_chords(
-    skeleton: Skeleton, clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]
-) -> tuple[Floats, Floats, Floats]:
+def _by_chords(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
     """The same, as players show it that mix quaternions by components."""
     rotation = local[1].copy()
     for track in clip.tracks:

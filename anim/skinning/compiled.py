@@ -12,14 +12,15 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 
 from anim.skinning import kept
-from anim.skinning.machine_code import RESULTS, MachineCode, function, kinds, laid_out, machine
+from anim.skinning.machine_code import LAYOUT, RESULTS, MachineCode, function, kinds, laid_out, machine
 
 Kernel: TypeAlias = Callable[..., Any]
 
 ROOM = __name__.rpartition(".")[0]
 NUMBERS = (int, float, np.generic)
 HOW = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-UNLIKE = (AttributeError, ImportError, TypeError, ValueError)  # what a numba with other insides leads to
+# What a numba with other insides leads to, and an LLVM that can't load what it made.
+UNLIKE = (AttributeError, ImportError, RuntimeError, TypeError, ValueError)
 _one_at_a_time = Lock()  # numba and LLVM are asked by one thread
 
 
@@ -114,7 +115,7 @@ def _called(function: Any) -> Iterator[Any]:
 
 def _digest(kernel: Any, kind: str) -> str:
     """What tells code for one machine, kind of arguments and source, with all that it calls, from another."""
-    found, ahead = hashlib.sha256(repr((machine(), kind, HOW)).encode()), [kernel]
+    found, ahead = hashlib.sha256(repr((machine(), LAYOUT, kind, HOW)).encode()), [kernel]
     while ahead:
         function = ahead.pop()
         code, known = function.__code__, function.__globals__

@@ -11,13 +11,14 @@ from anim.skinning.machine_code import MachineCode
 
 APP = "gltf-anim"  # whose folder it is
 SEAL = 32  # bytes of SHA-256 before the rest: code that is not whole must not be run
+NO_FOLDER = (OSError, RuntimeError)  # it can't be used, or the user has no home
 
 
 def read(name: str) -> MachineCode | None:
     """Return what was written under a name, None where that is not there or not whole."""
     try:
         found = (_folder() / name).read_bytes()
-    except OSError:
+    except NO_FOLDER:
         return None
     seal, content = found[:SEAL], found[SEAL:]
     if hashlib.sha256(content).digest() != seal:
@@ -29,13 +30,16 @@ def read(name: str) -> MachineCode | None:
 def write(name: str, code: MachineCode) -> None:
     """Keep machine code under a name, whole or not at all; where that can't be, nothing happens."""
     content = code.symbol.encode() + b"\n" + code.object
-    path = _folder() / name
-    aside = path.with_name(f"{name}.{os.getpid()}")
     try:
+        path = _folder() / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        aside.write_bytes(hashlib.sha256(content).digest() + content)
-        aside.replace(path)
-    except OSError:
+        aside = path.with_name(f"{name}.{os.getpid()}")
+        try:
+            aside.write_bytes(hashlib.sha256(content).digest() + content)
+            aside.replace(path)
+        finally:
+            aside.unlink(missing_ok=True)
+    except NO_FOLDER:
         return
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 Numbers: TypeAlias = "list[int | float]"
 
+LAYOUT = 1  # of arguments; with another one kept code is made anew
 RESULTS = 2  # parameters before the arguments: where the result goes, and where an exception does
 
 

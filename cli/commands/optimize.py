@@ -133,20 +133,22 @@ def optimize(
         raise UsageError("--curve goes with neither --max-bytes nor --report")
     with streams.source(input) as source:
         work = job(source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice)
+        said = {
+            "max_error": optimize_request.MAX_ERROR if max_error is None else max_error,
+            "shell": shell,
+            "max_pointer_error": max_pointer_error,
+            "max_angle": max_angle,
+            "max_speed_error": max_speed_error,
+        }
+        bounds = optimize_request.bounds(work.scene, said)
         request = Request(
-            optimize_request.bounds(
-                work.scene,
-                max_error=max_error,
-                shell=shell,
-                max_pointer_error=max_pointer_error,
-                max_angle=max_angle,
-                max_speed_error=max_speed_error,
-            ),
+            bounds,
             Policy(drop, reference, rebase_rest, drop_invisible, optimize_request.kept(keep_node or (), work.scene)),
             Packing.CORE if meshopt is None else Packing(meshopt.value),
             objective,
             str(effort),
             PLAYERS if player is Player.ANY else ("spec",),
+            optimize_request.given(bounds, said),
         )
         if curve_file is not None:
             _draw_curve(work, request, curve_file, voice, dry_run=dry_run)

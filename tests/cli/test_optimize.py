@@ -170,6 +170,18 @@ def test_its_own_output_stays_as_it_is(
     assert "unchanged" in run.err
 
 
+def test_a_moved_rest_pose_is_the_same_request_still(tmp_path: Path, fixture: Fixture, call: Call) -> None:
+    """It has another diagonal, of which the bound is a share."""
+    once, twice = tmp_path / "once.glb", tmp_path / "twice.glb"
+    options = ("--rebase-rest", "--drop", "rest", "--max-error", "1%", *FAST)
+    first = call("optimize", fixture("biped"), once, *options)
+    assert "rest value" in first.err
+    again = call("optimize", once, twice, *options)
+    assert "optimized like this before" in again.err
+    assert twice.read_bytes() == once.read_bytes()
+    assert "optimized before" in call("optimize", once, twice, *options, "--max-error", "1.01%").err
+
+
 def test_a_file_may_be_its_own_output(fixture: Fixture, call: Call) -> None:
     path = fixture("noop")
     source = path.read_bytes()

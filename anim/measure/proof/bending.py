@@ -48,7 +48,5 @@ def _morphed(of: Morphing, first: Side, second: Side, where: Gaps) -> Floats:
 
 def _by_group(bounds: Floats, of: Reach) -> Floats:
     """Bounds of joints (J, G) as those of groups (C, G): the largest of those that carry some."""
-    if not of.groups:
-        return np.zeros((0, bounds.shape[1]))
     starts = np.cumsum([0, *map(len, of.groups[:-1])])
     return np.asarray(np.maximum.reduceat(bounds[np.concatenate(of.groups)], starts, axis=0))

@@ -208,10 +208,19 @@ def test_dense_times_hold_keys_middles_a_grid_and_the_last_moment_of_steps() -> 
     before = clip(track("translation", [0.1, 0.3], np.zeros((2, 3)), STEP))
     spline = track("scale", [0.2, 0.4], np.ones((2, 3)), CUBICSPLINE, tangents=(np.zeros((2, 3)), np.zeros((2, 3))))
     times = dense_times(before, clip(spline), fps=10)
-    for time in (0, 0.1, 0.15, 0.2, 0.25, np.nextafter(0.3, 0), 0.3, 0.35, 0.4):
+    for time in (0.1, 0.15, 0.2, 0.25, np.nextafter(0.3, 0), 0.3, 0.35, 0.4):
         assert np.abs(times - time).min() <= 1e-15
     assert np.nextafter(0.3, 0) in times.tolist()
     assert (np.diff(times) > 0).all()
+
+
+def test_dense_times_begin_a_frame_before_the_first_key_however_late_that_is() -> None:
+    """Some players hold a key otherwise than they play it; of what is held one look is enough."""
+    for first, before in ((0.0, 0.0), (0.5, 0.4), (0.5 + 1e-8, 0.4), (0.55, 0.5), (86400.0, 86399.9)):
+        times = dense_times(clip(track("translation", [first, first + 1], np.zeros((2, 3)))), fps=10)
+        assert times[0] == pytest.approx(before, abs=1e-9)
+        assert first in times.tolist()
+        assert 11 <= len(times) <= 15
 
 
 def _points(points: list[list[float]], *, targets: list[list[list[float]]] | None = None) -> Scene:
@@ -276,3 +285,14 @@ def _slerp(each: Track, time: float) -> Rotation:
     if len(each.times) == 1:
         return turns[0]
     return Slerp(each.times, turns)(np.clip(time, each.times[0], each.times[-1]))
+
+
+def test_without_vertices_the_points_of_shells_count() -> None:
+    """A lone node goes 2 mm astray at its last key: half of it on the mean, whether by shells or by cubes."""
+    scene = Scene(skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]]), ())
+    way = np.array([[0.0, 0, 0], [1, 0, 0]])
+    before, after = (clip(track("translation", [0, 1], way + [[0], [lift]] * np.eye(3)[1])) for lift in (0, 0.002))
+    times = np.linspace(0, 1, 11)
+    for ruler in (Ruler(scene, shell=0.01), Ruler(scene)):
+        found = statistics(ruler, before, after, times=times)
+        assert [found.mean, found.p99] == pytest.approx([0.001, 0.002])

@@ -230,6 +230,15 @@ def test_players_that_need_not_show_it_rightly() -> None:
     assert sizes[0] <= sizes[1]
 
 
+def test_where_nothing_has_a_vertex_nodes_are_not_invisible() -> None:
+    document = _waving()
+    nodes = [{key: node[key] for key in node if key not in ("mesh", "skin")} for node in document.json["nodes"]]
+    bare = replace(document, json={**document.json, "nodes": nodes})
+    found, written = _optimized(bare, _request(bare, 1e-3, policy=Policy(drop_invisible=True)))
+    assert all(each.holds for each in found.verdicts.values())
+    assert 0 < _error(bare, written) <= 1e-3
+
+
 def test_progress_goes_up_to_the_end() -> None:
     document = opened_fixture("noop")
     said: list[float] = []

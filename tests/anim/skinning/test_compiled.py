@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from anim.skinning import compiled as compiled_module
+from anim.skinning import kept
 from anim.skinning.compiled import compiled
 from anim.skinning.kernels import rows
 from anim.skinning.kernels.around_duals import around_duals
 from anim.skinning.kernels.lanes import LANES, Held, Shape, Target, room
 from anim.skinning.kernels.normals_of_faces import normals_of_faces
 from anim.skinning.kernels.rigid_turns import rigid_turns
-from anim.skinning.machine_code import kinds
+from anim.skinning.machine_code import MachineCode, kinds
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = """
@@ -68,9 +69,9 @@ def test_arrays_of_any_layout_and_results_are_passed_as_python_does() -> None:
 
 
 def test_code_is_kept_in_the_users_cache_and_then_needs_no_numba(tmp_path: Path) -> None:
-    made, kept = _run(tmp_path), _run(tmp_path)
-    assert (made[0], kept[0]) == ("True", "False")
-    assert made[1] == kept[1]
+    made, found = _run(tmp_path), _run(tmp_path)
+    assert (made[0], found[0]) == ("True", "False")
+    assert made[1] == found[1]
     (folder,) = tmp_path.iterdir()
     assert folder.name == "gltf-anim"
     assert {path.name.partition("-")[0] for path in folder.iterdir()} == {"worlds", "points_only"}
@@ -88,12 +89,12 @@ def test_code_that_is_not_whole_is_made_again(tmp_path: Path) -> None:
 def test_a_change_in_what_a_kernel_calls_is_other_code() -> None:
     """Numba alone would take the old code from the cache: it looks at the kernel's own file."""
     before = compiled_module._digest(around_duals, "")
-    kept = rows.turn.__code__
+    usual = rows.turn.__code__
     try:
-        rows.turn.__code__ = rows.clear.__code__.replace(co_name="turn", co_varnames=kept.co_varnames[:3])
+        rows.turn.__code__ = rows.clear.__code__.replace(co_name="turn", co_varnames=usual.co_varnames[:3])
         assert compiled_module._digest(around_duals, "") != before
     finally:
-        rows.turn.__code__ = kept
+        rows.turn.__code__ = usual
     assert compiled_module._digest(around_duals, "") == before
 
 
@@ -115,6 +116,28 @@ def test_without_a_cache_folder_it_works_all_the_same(tmp_path: Path) -> None:
     assert blocked.read_bytes() == b""
 
 
+def test_a_user_without_a_home_is_no_reason_to_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A container's user may have neither $HOME nor an entry that says where it is."""
+
+    def nowhere() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", nowhere)
+    kept.write("name", MachineCode("symbol", b"code"))
+    assert kept.read("name") is None
+
+
+def test_what_could_not_be_kept_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    (tmp_path / "name").mkdir()  # in the way
+    kept.write("name", MachineCode("symbol", b"code"))
+    assert [path.name for path in tmp_path.iterdir()] == ["name"]
+    kept.write("other", MachineCode("symbol", b"code"))
+    assert kept.read("other") == MachineCode("symbol", b"code")
+
+
 def _run(cache: Path) -> list[str]:
     """Whether numba was there in the end, and the bytes of what was baked."""
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
@@ -124,9 +147,12 @@ def _run(cache: Path) -> list[str]:
     return run.stdout.split()
 
 
-def test_a_numba_with_other_insides_runs_the_kernels_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("problem", [AttributeError("no such thing in this numba"), RuntimeError("no such format")])
+def test_a_numba_with_other_insides_runs_the_kernels_itself(
+    problem: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def foreign(*_: object) -> None:
-        raise AttributeError("no such thing in this numba")
+        raise problem
 
     monkeypatch.setattr(compiled_module, "_code", foreign)
     faces = np.array([[0, 1, 2], [2, 1, 3]])

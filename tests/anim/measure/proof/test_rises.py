@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,18 @@ def test_of_two_turns_only_the_difference_rises() -> None:
     speeds = np.radians([600, 600.04])
     least = 1e-4 / 8 * RADIUS * (speeds[1] ** 2 - speeds[0] ** 2)
     assert least <= found.rise[0, 0] <= 1.5 * least
+
+
+def test_a_matrix_above_widens_as_a_scale_does() -> None:
+    """A root that no translation, rotation and scale give: by the largest of its stretches, twice here."""
+    times = np.array([0.0, 0.01, 0.03])
+    point = scene(mesh([[RADIUS, 0, 0]], [[1]], [[1.0]]), [-1, 0])
+    matrix = np.array([[[0, 2, 0, 5], [0.5, 0, 0, 0], [0, 0, 1, 0]]], float)
+    skewed = replace(point, skeleton=replace(point.skeleton, sheared=np.array([0]), sheared_local=matrix))
+    turning = clip(track("rotation", [0, 1], about("z", [0, 30]), node=1))
+    plain, widened = (_rises(each, clip(), turning, times).rise for each in (point, skewed))
+    assert plain.max() > 0
+    assert widened == pytest.approx(2 * plain)
 
 
 def test_lines_do_not_rise() -> None:
