@@ -66,9 +66,8 @@ def edit(
         size = streams.write(result, output, source.folder, dry_run=dry_run)
     if chosen and not new:
         voice.say("note: no track was changed")
-    outside = "" if dry_run or output == streams.PIPE else streams.left_outside(result, source.folder, output)
-    if outside:
-        voice.say(f"{outside}; convert --embed takes them in")
+    if not dry_run:
+        note_images(result, source, output, voice)
     name = source.name if output == streams.PIPE else output
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
@@ -123,3 +122,10 @@ def _error(error: MotionError, diagonal: float) -> str:
 
 def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
+
+
+def note_images(document: Document, source: streams.Source, output: str, voice: report.Voice) -> None:
+    """Say which images an output in another folder than its input has lost."""
+    outside = "" if output == streams.PIPE else streams.left_outside(document, source.folder, output)
+    if outside:
+        voice.say(f"{outside}; convert --embed takes them in")

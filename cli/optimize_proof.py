@@ -14,15 +14,19 @@ NOT_PROVEN = "not proven between the times looked at"
 
 
 def summary(verdicts: Iterable[Verdict], request: Request, scale: float) -> str:
-    """Return whether the bound is proven for every time of all clips; nothing where no vertex moved or only keys count.
+    """Return what is proven for every time of all clips; nothing where no vertex moved or only keys count.
 
     scale: m, the diagonal.
     """
     moved = [each for each in verdicts if each.error.max_error > NOTHING * scale]
     if not moved or request.policy.reference is Reference.KEYS:
         return ""
-    within = all(each.certified is not None and each.certified <= request.bounds.max_error for each in moved)
-    return ", proven for every time" if within else f", {NOT_PROVEN}"
+    proven = [each.certified for each in moved if each.certified is not None]
+    if len(proven) < len(moved):
+        return f", {NOT_PROVEN}"
+    if max(proven) <= request.bounds.max_error:
+        return ", proven for every time"
+    return f", proven for every time: at most {length(_rounded_up(max(proven)))}"
 
 
 def of_clip(verdict: Verdict, request: Request) -> str:

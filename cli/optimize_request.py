@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from anim.measure.surface import diagonal
 from anim.model import Scene
@@ -43,6 +43,14 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
 def given(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
     """Return the same as it was typed where that is a share of the diagonal, and the number of metres elsewhere."""
     return tuple(_share(text) or f"{getattr(bounds, name)}" for name, text in said.items())
+
+
+def notes(said: Mapping[str, str | None]) -> Iterator[str]:
+    """Yield what may have been meant otherwise: lengths without a unit, which are metres."""
+    for name in ("max_error", "shell"):
+        text = (said[name] or "").strip()
+        if text and text[-1].isdigit() and not ZERO.fullmatch(text):
+            yield f"note: --{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
 
 
 def _share(text: str | None) -> str:

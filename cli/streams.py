@@ -15,7 +15,7 @@ import numpy as np
 
 from anim.errors import AnimError, FormatError
 from anim.gltf import container, uri
-from anim.gltf.document import Bytes, Document, items
+from anim.gltf.document import Buffer, Bytes, Document, items
 from cli.errors import UsageError
 from cli.replacing import replace_all
 
@@ -66,8 +66,9 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
 def write(document: Document, path: str, beside: Path | None, *, dry_run: bool = False) -> int:
     """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
 
-    beside: the folder of the input: external buffers and images that are still right from the output's folder keep
-    their URI. Files appear whole or not at all, and only if their bytes differ from what is there.
+    The size is that of all these files, also of those that stay as they are. beside: the folder of the input: external
+    buffers and images that are still right from the output's folder keep their URI. Files appear whole or not at all,
+    and only if their bytes differ from what is there.
     """
     if path.lower().endswith(".gltf"):
         target = Path(path)
@@ -77,7 +78,8 @@ def write(document: Document, path: str, beside: Path | None, *, dry_run: bool =
         if not dry_run:
             own = target.with_suffix(".gltf")  # x.GLTF stays that
             replace_all({target if file == own else file: content for file, content in pieces.items()})
-        return sum(len(piece) for content in pieces.values() for piece in content)
+        written = sum(len(piece) for content in pieces.values() for piece in content)
+        return written + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
     content = container.glb(document)
     if not dry_run:
         write_bytes(content, path)
@@ -200,7 +202,13 @@ def _place(folder: Path, address: str) -> Path:
 
 
 def _external_size(document: Document) -> int:
-    return sum(b.byte_length for b in document.buffers if b.uri is not None and not b.uri.startswith("data:"))
+    return sum(map(_size_outside, document.buffers))
+
+
+def _size_outside(buffer: Buffer) -> int:
+    """Bytes of a buffer that is a file of its own, 0 of others."""
+    is_file = buffer.uri is not None and not uri.is_data(buffer.uri) and not buffer.replaced
+    return buffer.byte_length if is_file else 0
 
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:

@@ -26,6 +26,7 @@ class Layouts:
 
     def __init__(self, truth: Truth, coding: Coding, bound: float) -> None:
         self.grid = truth.grid
+        self.own = truth.own
         self.coding = coding
         self.key_bytes = np.array([coding.key_bytes(each.path) for each in truth.moving])
         self._scaled = _scaled(truth)
@@ -64,16 +65,27 @@ class Layouts:
             found[~there] = needed(self.scaled(keyed[~there], budgets), self.grid)
         return found
 
+    def merged(self, keyed: Ints, keep: Bools) -> list[Axis]:
+        """Return the axes of fewest bytes for tracks that need the keys `keep` (k, K)."""
+        prices, width = self.coding.prices, self.key_bytes[keyed]
+        axes = merged(keep, width, axis_bytes=prices.axis, time_bytes=self.coding.time_bytes)
+        return [Axis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+
 
 def _merged(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
-    coding = layouts.coding
-    axes = merged(
-        layouts.needed(keyed, budgets),
-        layouts.key_bytes[keyed],
-        axis_bytes=coding.prices.axis,
-        time_bytes=coding.time_bytes,
-    )
-    return [Axis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+    return layouts.merged(keyed, layouts.needed(keyed, budgets))
+
+
+def _own(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+    """Keys that the source has too: players that mix by components cut the same corners."""
+    kinds, kind = np.unique(layouts.own[keyed], axis=0, return_inverse=True)
+    axes = []
+    for number, mask in enumerate(kinds):
+        members = keyed[kind.reshape(-1) == number]
+        keep = np.zeros((len(members), len(mask)), np.bool_)
+        keep[:, mask] = needed(layouts.scaled(members, budgets)[:, mask], layouts.grid[mask])
+        axes += layouts.merged(members, keep)
+    return axes
 
 
 def _joint(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
@@ -93,6 +105,7 @@ def _every(nth: int) -> Layout:
 Layout: TypeAlias = Callable[[Layouts, Ints, Floats], list[Axis]]
 LAYOUTS: dict[str, Layout] = {
     "merged": _merged,
+    "own": _own,
     "joint": _joint,
     "full": _every(1),
     "second": _every(2),

@@ -55,6 +55,9 @@ class _Search:
         tracks = len(self._bench.truth.moving)
         start = Plan(np.full(tracks, START * self._bound), 0.0, "merged", np.ones(tracks))
         self._adapt(start, self._effort.rounds)
+        if self._best is None and not self._bench.truth.own.all():
+            start = replace(start, axes="own")
+            self._adapt(start, self._effort.rounds)
         if self._best is None:
             for share in self._effort.thresholds:
                 self._adapt(replace(start, threshold=share * self._bound), self._effort.rounds)

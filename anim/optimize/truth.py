@@ -50,7 +50,8 @@ class Truth:
     """A clip on the times where it is measured.
 
     grid: (K,) s, where keys may lie. at: (W,) s, the grid and what lies between. on_grid: (K,) the grid within `at`.
-    moving: (G) tracks that may change. answering: (G, P) which points answer for each.
+    moving: (G) tracks that may change. own: (G, K) which keys the source has for each, or has on its spline.
+    answering: (G, P) which points answer for each.
     local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes. levels: of the nodes that count.
     columns: (4 J, 3 W) world matrices of the points' nodes; by_chord: the same where rotations run along chords.
     """
@@ -59,6 +60,7 @@ class Truth:
     at: Floats
     on_grid: Ints
     moving: tuple[Moving, ...]
+    own: Bools
     answering: Bools
     local: tuple[Floats, Floats, Floats]
     levels: tuple[Ints, ...]
@@ -103,6 +105,7 @@ def truth(
         at,
         np.searchsorted(at, grid),
         moving,
+        np.array([_own(track, grid) for track in tracks]).reshape(len(tracks), len(grid)),
         answering,
         local,
         levels,
@@ -155,6 +158,13 @@ def _gap(track: Track) -> float:
     if track.interpolation is not Interpolation.LINEAR or len(track.times) < 2:
         return 0.0
     return float(play.apart(play.steps(track.values).max())) / 2
+
+
+def _own(track: Track, grid: Floats) -> Bools:
+    """Which times of the grid (K,) are keys of the track; all of them for splines."""
+    if track.interpolation is Interpolation.CUBICSPLINE:
+        return np.ones(len(grid), np.bool_)
+    return np.asarray(np.isin(grid, times.key_times(track.times)))
 
 
 def _moving(

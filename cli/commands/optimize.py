@@ -16,6 +16,7 @@ from anim.optimize.request import Request
 from anim.optimize.tradeoff import curve
 from anim.optimize.verify import PLAYERS
 from cli import optimization, optimize_request, options, streams
+from cli.edit import note_images
 from cli.errors import UsageError
 from cli.optimize_job import Job, job
 from cli.report import Voice
@@ -141,6 +142,8 @@ def optimize(
             "max_speed_error": max_speed_error,
         }
         bounds = optimize_request.bounds(work.scene, said)
+        for note in optimize_request.notes(said):
+            voice.say(note)
         request = Request(
             bounds,
             Policy(drop, reference, rebase_rest, drop_invisible, optimize_request.kept(keep_node or (), work.scene)),
@@ -161,6 +164,8 @@ def optimize(
         optimization.check(found, work.clips, request, work.scale)
         about = _written(work, request, found, began, dry_run=dry_run)
     _say(about, voice, report, dry_run=dry_run)
+    if not dry_run:
+        note_images(about.after, source, output, voice)
 
 
 def _written(work: Job, request: Request, found: Optimized, began: float, *, dry_run: bool) -> optimization.About:

@@ -152,6 +152,33 @@ def test_a_gltf_gets_its_bin(fixture: Fixture, tmp_path: Path, call: Call) -> No
     assert apart(call, fixture("noop"), output)["max_error_percent"] <= 0.01
 
 
+def test_a_gltf_beside_its_source_is_optimized_too(tmp_path: Path, fixture: Fixture, call: Call) -> None:
+    """What counts is the .gltf with its .bin, wherever that lies."""
+    assert call("convert", fixture("biped"), tmp_path / "a.gltf").code == 0
+    source_size = sum((tmp_path / name).stat().st_size for name in ("a.gltf", "a.bin"))
+    options = ("--max-error", "2mm", *FAST, "--report", tmp_path / "report.json")
+    for output in (tmp_path / "b.gltf", tmp_path / "c" / "b.gltf", tmp_path / "a.gltf"):
+        output.parent.mkdir(exist_ok=True)
+        run = call("optimize", tmp_path / "a.gltf", output, *options)
+        assert (run.code, "unchanged" in run.err) == (0, False), run.err
+        size = output.stat().st_size + output.with_suffix(".bin").stat().st_size
+        said = json.loads((tmp_path / "report.json").read_text())["bytes"]
+        assert (said["before"]["file"], said["after"]["file"]) == (source_size, size)
+        assert size < 0.95 * source_size
+
+
+def test_images_that_stay_behind_are_named(tmp_path: Path, asset: Find, call: Call) -> None:
+    run = call("optimize", asset("CesiumMan-gltf/CesiumMan.gltf"), tmp_path / "out.gltf", *FAST)
+    assert run.code == 0
+    assert "1 image stays outside" in run.err
+
+
+def test_lengths_without_a_unit_are_said_to_be_metres(fixture: Fixture, call: Call) -> None:
+    run = call("optimize", fixture("noop"), "-", "--max-error", "0.1", *FAST)
+    assert "note: --max-error 0.1 means 0.1 m" in run.err
+    assert "note" not in call("optimize", fixture("noop"), "-", "--max-error", "0", *FAST).err
+
+
 # The same again
 
 

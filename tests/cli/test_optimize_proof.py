@@ -23,7 +23,7 @@ def _verdict(certified: float | None, error: float = 9e-4) -> Verdict:
     ("certified", "words"),
     [
         ((9.1e-4, 9.9e-4), ", proven for every time"),
-        ((9.1e-4, 1.01e-3), ", not proven between the times looked at"),
+        ((9.1e-4, 1.01e-3), ", proven for every time: at most 1.1 mm"),
         ((9.1e-4, None), ", not proven between the times looked at"),
     ],
 )

@@ -16,7 +16,7 @@ from anim.measure.proof.rises import rises
 from anim.model import Clip
 
 NEAR = 0.01  # of the largest distance: a bound this close to it is as good
-FINEST = 16  # parts that a stretch between two times is cut into at most
+FINEST = 128  # parts that a stretch between two times is cut into at most
 BLOCK = 1_000_000  # players × stretches × groups and nodes at once, each some 100 bytes
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from anim.optimize.layouts import LAYOUTS, Layouts
 from anim.optimize.limits import EFFORTS
-from tests.anim.optimize.making import CORE, every_point, scene, truth_of, waving
+from tests.anim.optimize.making import CORE, TIMES, every_point, scene, truth_of, turning, waving
+from tests.clips import clip, track
 
 
 def _layouts() -> Layouts:
@@ -56,3 +57,17 @@ def test_larger_budgets_need_fewer_keys_and_what_was_found_is_kept() -> None:
 
 def test_efforts_name_layouts() -> None:
     assert {name for effort in EFFORTS.values() for name in effort.axes} <= set(LAYOUTS)
+
+
+def test_own_keys_are_those_of_the_source() -> None:
+    """Joint 1 has keys at every third time of the grid only: none between them."""
+    of, thirds = scene(), TIMES[::3]
+    bent = track("rotation", thirds, turning(1.5, times=thirds), node=1)
+    truth = truth_of(of, clip(bent, *waving().tracks[2:3]), every_point(of))
+    layouts = Layouts(truth, CORE, 1e-3)
+    tight = np.full(2, 1e-9)
+    by_track = {i: axis.keys for axis in layouts.axes("own", np.arange(2), tight) for i in axis.members}
+    assert truth.grid[by_track[0]] == pytest.approx(thirds)
+    assert truth.grid[by_track[1]] == pytest.approx(TIMES)
+    whole = {i: axis.keys for axis in layouts.axes("merged", np.arange(2), tight) for i in axis.members}
+    assert whole[0].all()

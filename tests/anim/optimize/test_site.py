@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from anim.model import Clip
@@ -15,6 +16,7 @@ from anim.optimize.setting import Setting
 from anim.optimize.site import Site, finished
 from anim.optimize.solution import Solution
 from tests.anim.optimize.making import scene, waving
+from tests.clips import about, clip, track
 
 OF = scene()
 BOUND = 0.05
@@ -71,6 +73,19 @@ def test_below_float32_nothing_is_lost() -> None:
     found = finished(_site(1e-13), (0, _task(1e-13)))
     assert found.verdict.strain <= 1
     by_target = {track.target: track for track in found.solution.clip.tracks}
-    for track in waving().tracks:
-        if len(by_target[track.target].times) > 1:
-            assert (by_target[track.target].values == track.values).all()
+    for each in waving().tracks:
+        if len(by_target[each.target].times) > 1:
+            assert (by_target[each.target].values == each.values).all()
+
+
+def test_large_turns_on_one_of_two_axes() -> None:
+    """A joint snaps round by 150° between two keys: players that mix by components cut that corner, and any key on the
+    arc between, at times that only the other track has, would show them another way."""
+    times = np.linspace(0, 2, 21)
+    snap = track("rotation", times, about("z", [0, 150] * 10 + [0]), node=1)
+    sway = track("translation", np.linspace(0, 2, 17), np.outer(np.sin(np.arange(17)), [1.0, 0, 0]), node=0)
+    what = clip(snap, sway)
+    site = Site(Request(Bounds(0.02, 0.02), effort="fast"), OF, OF, (what,))
+    found = finished(site, (0, Task(what, ((), ()), (False, False), 0.0197)))
+    assert found.verdict.holds
+    assert not found.without_loss
