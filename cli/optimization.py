@@ -84,11 +84,9 @@ def worst(found: Optimized) -> float:
 def lines(about: About, *, dry_run: bool) -> list[str]:
     """Return what is always said."""
     dry = " (dry run: nothing written)" if dry_run else ""
-    if about.found.unchanged:
-        return [f"{about.name}  {size(about.size_after)}, unchanged: optimized like this before{dry}"]
     if about.unchanged:
-        said = f"{about.name}  {size(about.size_after)}, unchanged: no smaller file within the bound{dry}"
-        return [said, *_earlier(about)]
+        said = f"{about.name}  {size(about.size_after)}, unchanged: {_why_unchanged(about)}{dry}"
+        return [said] if about.found.unchanged else [said, *_earlier(about)]
     keys = f"{_keys(about.clips, about)} → {sum(_count(each.clip) for each in about.found.solutions.values())} keys"
     summary = [
         f"{about.name}  {change(about.size_before, about.size_after)}",
@@ -119,6 +117,13 @@ def _clip_line(about: About, number: int, solution: Solution) -> str:
     return f"  {read.label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
 
 
+def _why_unchanged(about: About) -> str | None:
+    """Why the output is the input, None where it is not."""
+    if not about.unchanged:
+        return None
+    return "optimized like this before" if about.found.unchanged else "no smaller file within the bound"
+
+
 def as_json(about: About) -> str:
     """Return the report as a JSON document, schema 1."""
     request = about.request
@@ -126,6 +131,7 @@ def as_json(about: About) -> str:
         "schema": SCHEMA,
         "output": about.name,
         "unchanged": about.unchanged,
+        "unchanged_because": _why_unchanged(about),
         "seconds": round(about.seconds, 3),
         "diagonal_m": about.scale,
         "bounds": {

@@ -6,6 +6,8 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass
 
+NEARLY_NOTHING = 1e-11  # m; what rounding leaves of nothing
+
 
 @dataclass(frozen=True, slots=True)
 class Voice:
@@ -47,6 +49,8 @@ def length(meters: float) -> str:
     """Return a length in the unit in which it is easy to read: "0.41 mm", "12 µm", "1.5 cm", "2.9 m"."""
     if meters == 0:
         return "0 mm"
+    if meters < NEARLY_NOTHING:
+        return f"<{digits(1e9 * NEARLY_NOTHING, 2)} nm"
     for unit, factor, limit in (("nm", 1e9, 1e-6), ("µm", 1e6, 1e-4), ("mm", 1e3, 1e-2), ("cm", 1e2, 1.0)):
         if float(f"{meters:.2g}") < limit:
             return f"{digits(meters * factor, 2)} {unit}"

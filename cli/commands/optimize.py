@@ -60,7 +60,7 @@ def optimize(
         typer.Option(
             "--max-bytes",
             metavar="N",
-            help="The smallest error, up to --max-error if that is given, for a file of 800kB.",
+            help="The smallest error found, up to --max-error if that is given, for a file of 800kB.",
         ),
     ] = None,
     meshopt: Annotated[

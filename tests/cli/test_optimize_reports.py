@@ -69,6 +69,17 @@ def test_the_report(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert any(each["dropped"] for each in found["clips"])
 
 
+def test_a_report_says_why_nothing_changed(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    once, report = tmp_path / "once.glb", tmp_path / "report.json"
+    reasons = []
+    for source, bound in ((fixture("noop"), "1%"), (once, "1%"), (once, "0")):
+        assert call("optimize", source, once, "--max-error", bound, "--report", report, *FAST).code == 0
+        said = json.loads(report.read_text())
+        reasons.append(said["unchanged_because"])
+        assert said["unchanged"] is (reasons[-1] is not None)
+    assert reasons == [None, "optimized like this before", "no smaller file within the bound"]
+
+
 def test_the_report_on_stdout_beside_a_file(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     run = call("optimize", fixture("noop"), tmp_path / "out.glb", "--report", "-", *FAST)
     assert run.json["unchanged"] is False

@@ -11,6 +11,7 @@ from cli.report import change, digits, length, size, speed
     ("meters", "words"),
     [
         (0, "0 mm"),
+        (4.5e-16, "<0.01 nm"),
         (2.5e-9, "2.5 nm"),
         (9.94e-7, "990 nm"),
         (9.96e-7, "1 µm"),
