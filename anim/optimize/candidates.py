@@ -13,11 +13,10 @@ from anim.optimize.axes import Axis
 from anim.optimize.coding import Form, Stored
 from anim.optimize.fit import Fit
 from anim.optimize.limits import Packing
-from anim.optimize.truth import PATHS, Truth
+from anim.optimize.truth import PATHS, ROTATION, Truth
 from anim.sampling.track import Located, locate
 
 MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
-ROTATION = PATHS.index("rotation")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +42,8 @@ class Candidates:
 
     def of(self, axis: Axis, misses: Sequence[float]) -> Iterable[tuple[int, Candidate]]:
         """Return every member of an axis with its candidate. misses: (G,) what storing may miss, in units of values."""
+        self._make_room()
         name = axis.keys.tobytes()
-        if self._kept > MOST_KEPT:
-            self._forget()
         self._fit(axis, name)
         forms = {
             i: coding.form(self._keys[name, i], PATHS[self._paths[i]], misses[i], self._packing) for i in axis.members
@@ -57,6 +55,7 @@ class Candidates:
 
     def aimed(self, axis: Axis, members: Sequence[int], aims: Floats, misses: Sequence[float]) -> list[Candidate]:
         """Return rotations for the `members` of an axis that aim at others (W, G, 4) than the tracks' own."""
+        self._make_room()
         place = self._place(axis, axis.keys.tobytes())
         keys = aims[self._truth.on_grid[axis.keys]]
         if not axis.keys.all():
@@ -93,19 +92,23 @@ class Candidates:
             for k, i in enumerate(new):
                 self._keys[name, i] = keys[:, k]
 
-    def _forget(self) -> None:
+    def _make_room(self) -> None:
+        if self._kept <= MOST_KEPT:
+            return
         for kept in (self._places, self._fits, self._keys, self._made):
             kept.clear()
         self._kept = 0
 
     def _fit_on(self, axis: Axis, name: bytes) -> Fit:
         if name not in self._fits:
-            self._fits[name] = Fit(self._place(axis, name), int(axis.keys.sum()))
+            self._fits[name] = fit = Fit(self._place(axis, name), int(axis.keys.sum()))
+            self._kept += fit.numbers
         return self._fits[name]
 
     def _place(self, axis: Axis, name: bytes) -> Located:
         if name not in self._places:
             self._places[name] = locate(self._truth.grid[axis.keys], self._truth.at)
+            self._kept += 4 * len(self._truth.at)
         return self._places[name]
 
 

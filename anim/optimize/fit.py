@@ -26,7 +26,9 @@ class Fit:
         weights = np.ones(len(place.u))
         weights[0] = weights[-1] = ENDS
         self._place = place
-        self._solved = (_dense if len(place.u) * keys <= DENSE else _banded)(place, keys, weights)
+        is_small = len(place.u) * keys <= DENSE
+        self.numbers = len(place.u) * (keys if is_small else 4)  # that are kept, about
+        self._solved = (_dense if is_small else _banded)(place, keys, weights)
 
     def vectors(self, values: Floats) -> Floats:
         """Return keys (K, G, C) whose lines are nearest to the values (W, G, C)."""

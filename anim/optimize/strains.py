@@ -11,11 +11,10 @@ from anim.maths import matrix, quaternion
 from anim.model import Skeleton
 from anim.optimize.limits import Bounds
 from anim.optimize.points import Points, stacked
-from anim.optimize.truth import PATHS, Truth
+from anim.optimize.truth import ROTATION, Truth
 from anim.optimize.worlds import local_matrices
 
 LEAST_GAP = 1e-4  # s; speeds are not taken over less
-ROTATION = PATHS.index("rotation")
 
 
 class Strains:

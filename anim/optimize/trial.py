@@ -14,12 +14,12 @@ from anim.model import Skeleton
 from anim.optimize import coding, play
 from anim.optimize.aims import Aims, leeway
 from anim.optimize.axes import Axis
-from anim.optimize.candidates import ROTATION, Candidate, Candidates
+from anim.optimize.candidates import Candidate, Candidates
 from anim.optimize.coding import Coding, Stored
 from anim.optimize.layouts import Layouts
 from anim.optimize.outcome import Aim, Fate, Outcome, Plan
 from anim.optimize.strains import Strains
-from anim.optimize.truth import PATHS, Moving, Truth
+from anim.optimize.truth import PATHS, ROTATION, Moving, Truth
 
 PATIENCE = 1.5  # budgets that a track may be off and yet go to rest, or to a single key
 OF_STORING = 0.5  # share of a budget that storing may use

@@ -23,6 +23,7 @@ CUBIC_PIECES = 8
 MAX_CUBIC_PIECES = 256
 LEVER_FRAMES = 64  # at most so many moments at which levers are measured
 PATHS = ("translation", "rotation", "scale")
+ROTATION = PATHS.index("rotation")
 
 
 @dataclass(frozen=True, slots=True)
