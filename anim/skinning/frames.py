@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import Clip, Pose, Skeleton
+from anim.model import Clip, Skeleton
 from anim.sampling.pose import Poses
 from anim.skinning.compiled import compiled
 from anim.skinning.kernels.worlds import worlds
@@ -15,10 +16,16 @@ from anim.skinning.kernels.worlds import worlds
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Local transforms of F frames, and world_from_node (N, F, 3, 4)."""
+    """F frames at `times` (F,) s: world_from_node (N, F, 3, 4), and animated morph weights (F, M) by node number."""
 
-    pose: Pose
+    times: Floats
     world: Floats
+    weights: Mapping[int, Floats]
+
+    def part(self, span: slice) -> Frames:
+        """Return some of the frames, in the same memory."""
+        weights = {node: values[span] for node, values in self.weights.items()}
+        return Frames(self.times[span], self.world[:, span], weights)
 
 
 class Playback:
@@ -42,4 +49,4 @@ class Playback:
         world = np.empty((len(self._parents), len(times), 3, 4))
         tree = (self._order, self._parents, self._fixed, self._fixed_local)
         compiled(worlds)(pose.translation, pose.rotation, pose.scale, *tree, world)
-        return Frames(pose, world)
+        return Frames(pose.times, world, pose.weights)

@@ -79,7 +79,7 @@ class Layer:
     def matrices(self, frames: Frames, block: slice) -> Floats:
         """Return world_from_mesh (n, J, 3, 4) of the joints; where there is no skin, of the node."""
         if self.in_mesh_space and self.instance.skin is None:
-            count = len(frames.pose.times[block])
+            count = len(frames.times[block])
             return np.broadcast_to(np.eye(4)[:3], (count, 1, 3, 4))
         world = frames.world[self.rig.nodes, block]
         joints, count = world.shape[:2]
@@ -99,7 +99,7 @@ class Layer:
 
     def _weights(self, frames: Frames, block: slice) -> Floats:
         """Morph weights (n, M), or (1, M) where no frame has its own."""
-        animated = frames.pose.weights.get(self.instance.node)
+        animated = frames.weights.get(self.instance.node)
         return self.instance.weights[None] if animated is None else animated[block]
 
 

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import ctypes
+import platform
+import re
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from anim.skinning.object_file import loaded
+
 Numbers: TypeAlias = "list[int | float]"
 
+CPUS, ONE_CPU = Path("/proc/cpuinfo"), 8192  # where Linux says what its processors can do; characters for one
+ABILITIES = re.compile(r"^(?:flags|Features)\s*:(.*)\n", re.MULTILINE)
 LAYOUT = 1  # of arguments; with another one kept code is made anew
 RESULTS = 2  # parameters before the arguments: where the result goes, and where an exception does
 
@@ -49,14 +57,9 @@ def function(code: MachineCode, numbers: Numbers) -> Callable[..., int]:
 
     It returns what the kernel does: an integer or a truth value, 0 for nothing.
     """
-    import llvmlite.binding as llvm
-
-    engine = _engine()
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code.object))
-    engine.finalize_object()
     types = (ctypes.c_double if isinstance(number, float) else ctypes.c_int64 for number in numbers)
     kind = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * RESULTS, *types)
-    enter = kind(engine.get_function_address(code.symbol))
+    enter = kind(_address(code))
 
     def call(*given: int | float) -> int:
         result, problem = ctypes.c_int64(), ctypes.c_void_p()
@@ -67,11 +70,35 @@ def function(code: MachineCode, numbers: Numbers) -> Callable[..., int]:
     return call
 
 
-def machine() -> tuple[str, str, str]:
+def machine() -> tuple[str, ...]:
     """Return what code is made for: the system, the processor, and what it can do."""
+    try:
+        with CPUS.open() as file:
+            first = file.read(ONE_CPU)  # a system with many takes long to list them
+    except OSError:
+        first = ""
+    abilities = ABILITIES.search(first)
+    if abilities:
+        return sys.platform, platform.machine(), abilities[1]
     import llvmlite.binding as llvm
 
     return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+def _address(code: MachineCode) -> int:
+    try:
+        return loaded(code.object, code.symbol)
+    except (OSError, ValueError):
+        return _address_by_llvm(code)
+
+
+def _address_by_llvm(code: MachineCode) -> int:
+    import llvmlite.binding as llvm
+
+    engine = _engine()
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code.object))
+    engine.finalize_object()
+    return int(engine.get_function_address(code.symbol))
 
 
 @cache

@@ -1,17 +1,17 @@
-"""Chunks of frames out of layers, made by a pool of threads that is a chunk ahead of whoever asks."""
+"""Chunks of frames out of layers, made by a crew of threads that is a chunk ahead of whoever asks."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
-from itertools import cycle, islice, pairwise
+from itertools import cycle, pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 from anim.arrays import Floats
 from anim.model import Chunk, Clip, Skeleton
 from anim.skinning.buffers import Buffers
+from anim.skinning.crew import Crew
 from anim.skinning.frames import Frames, Playback
 from anim.skinning.kernels.lanes import LANES, NOTHING, Target
 from anim.skinning.layer import Layer
@@ -21,7 +21,7 @@ Piece: TypeAlias = tuple[Layer, Any, slice, int, int]  # a layer, what it packed
 CHUNK = 1 << 23  # bytes of positions in a chunk, about; never less than LANES frames
 MOST = 32  # blocks of LANES frames in a chunk, for their poses take memory too
 PIECE = 4096  # vertices for which it is worth to wake a thread
-AHEAD = 2  # chunks that are packed before they are begun
+POSES = 1 << 21  # bytes of matrices that are sampled at a time, about; never less than for a chunk
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,57 +39,70 @@ class Stream:
     def chunks(self, clip: Clip, times: Floats, progress: Callable[[int], None]) -> Iterator[Chunk]:
         """Yield the frames at `times` (F,) s in order. progress: called with how many the caller is done with.
 
-        All threads work on one chunk, while another is used and the poses of the next ones are sampled: two lie in
-        memory, which caches hold where three would not (a fifth of the time, measured).
+        While the caller uses one chunk the next is made, and the one after it is asked for before that is done, so that
+        no thread has to wait. Three lie in memory at most: a caller may let go of a chunk only when it gets the next.
         """
         blocks = min(CHUNK // (12 * self.vertices * LANES), MOST, -(-len(times) // LANES))
         step = LANES * max(blocks, 1)
-        starts = range(0, len(times), step)
-        playback = Playback(self.skeleton, clip)
-        with ThreadPoolExecutor(self.threads) as pool:
-            packed = (pool.submit(self._packed, playback, times[first:][:step]) for first in starts)
-            ahead = deque(islice(packed, AHEAD))
-            going = pool.submit(self._begun, ahead, packed, pool)
-            for first in starts:
-                chunk = self._finished(first, going.result())
-                if ahead:
-                    going = pool.submit(self._begun, ahead, packed, pool)
+        with Crew(self.threads) as crew:
+            packed = self._ahead(Playback(self.skeleton, clip), times, step, crew)
+            making = (self._begun(each, crew) for each in packed)
+            following, first = next(making, None), 0
+            while following is not None:
+                begun = following
+                following = next(making, None)  # before a thread runs out of work
+                chunk = self._finished(first, begun, crew)
+                del begun
                 yield chunk
+                first += len(chunk.positions)
                 del chunk  # so that its memory can be used again
-                progress(min(first + step, len(times)))
+                progress(first)
 
-    def _packed(self, playback: Playback, times: Floats) -> _Packed:
-        """Sample the poses of a chunk, and pack what each layer needs for each block of frames; share that out."""
+    def _ahead(self, playback: Playback, times: Floats, step: int, crew: Crew) -> Iterator[_Packed]:
+        """Chunks of `step` frames, packed for one stretch of time while those of the stretch before are made.
+
+        The first is one chunk, so that work begins soon, and each is twice the one before: the code that packs is out
+        of the processor's caches when vertices have gone through them, and takes three times as long then (measured).
+        """
+        most = max(POSES // (96 * max(len(self.skeleton), 1)), step)
+        low, high = 0, step
+        coming = crew.submit(self._packed, playback, times[low:high], step)
+        while low < len(times):
+            packed = crew.result(coming)
+            low, high = high, high + min(2 * (high - low), most - most % step)
+            if low < len(times):
+                coming = crew.submit(self._packed, playback, times[low:high], step)
+            yield from packed
+
+    def _packed(self, playback: Playback, times: Floats, step: int) -> list[_Packed]:
+        """Sample the poses of some chunks, and pack what each layer needs for each block of frames; share that out."""
         frames = playback.at(times)
+        return [self._shared(frames.part(slice(low, low + step))) for low in range(0, len(times), step)]
+
+    def _shared(self, frames: Frames) -> _Packed:
         shares: list[list[Piece]] = [[] for _ in range(self.threads)]
         turn = cycle(shares)
         for layer in self.layers:
             vertices = len(layer.rig.points)
             pieces = min(-(-vertices // PIECE), self.threads)
             ends = [vertices * i // pieces for i in range(pieces + 1)]
-            for block in (slice(low, low + LANES) for low in range(0, len(times), LANES)):
+            for block in (slice(low, low + LANES) for low in range(0, len(frames.times), LANES)):
                 parts = layer.pack(frames, block)
                 for first, last in pairwise(ends):
                     next(turn).append((layer, parts, block, first, last))
         return _Packed(frames, [share for share in shares if share])
 
-    def _begun(self, ahead: deque[Future[_Packed]], more: Iterator[Future[_Packed]], pool: Executor) -> _Begun:
-        """Set all threads to the first chunk ahead, this one too, and then to packing one more.
-
-        Memory is asked for only here, when the caller has let go of the chunk before.
-        """
-        frames, (own, *others) = ahead.popleft().result()
-        shape = (len(frames.pose.times), self.vertices, 3)
+    def _begun(self, packed: _Packed, crew: Crew) -> _Begun:
+        """Have threads make a chunk. Memory is asked for only here, when the caller has let go of an earlier one."""
+        frames, shares = packed
+        shape = (len(frames.times), self.vertices, 3)
         wanted = (True, self.normals, self.tangents)
         whole = Target(0, *(self.buffers.array(*shape) if each else NOTHING for each in wanted))
-        jobs = [pool.submit(_place, share, whole) for share in others]
-        ahead.extend(islice(more, 1))
-        _place(own, whole)
-        return _Begun(frames, whole, jobs)
+        return _Begun(frames, whole, [crew.submit(_place, share, whole) for share in shares])
 
-    def _finished(self, first: int, begun: _Begun) -> Chunk:
+    def _finished(self, first: int, begun: _Begun, crew: Crew) -> Chunk:
         for job in begun.jobs:
-            job.result()
+            crew.result(job)
         for layer in self.layers:
             layer.finish(begun.frames, begun.whole)
         _, positions, normals, tangents = begun.whole

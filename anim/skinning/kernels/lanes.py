@@ -13,7 +13,7 @@ from anim.arrays import Ints
 Singles: TypeAlias = NDArray[np.float32]
 
 LANES = 32  # frames that a kernel takes at a time; a constant, so that the compiler sees what lies where
-TILE = 64  # vertices between two transpositions to frame-major order
+TILE = 32  # vertices between two transpositions to frame-major order
 LINE = 64  # bytes that memory hands out together: rows that start there are read a third faster
 
 

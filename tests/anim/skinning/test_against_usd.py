@@ -35,7 +35,7 @@ def test_usd_agrees(name: str, method: str, asset: Find) -> None:
         times = grid(played.start, played.end, fps=6)
         whole = made.bake(played, times=times).whole().positions
         local = pose(of.skeleton, played, times)
-        frames = Frames(local, world_by_node(of.skeleton, local))
+        frames = Frames(times, world_by_node(of.skeleton, local), local.weights)
         for layer in made.layers:
             if layer.instance.skin is None:
                 continue
