@@ -5,19 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, TypeAlias
 
 from anim.measure.facts import ClipFacts, Facts, SkinFacts, TrackFacts
 from anim.measure.findings import Finding
 from cli import tables
+from cli.inspected import Inspected, Smoothness
 from cli.report import length, plural, size, speed
 from cli.tables import Cell
 
-if TYPE_CHECKING:
-    from anim.measure.continuity import TrackContinuity
-
-Inspected: TypeAlias = tuple[str, int, Facts]
-Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 STANDING = 1e-4  # m; a root that ends this near its start goes nowhere
 MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}

@@ -10,7 +10,7 @@ from typing import Any
 from anim.measure.continuity import Grade, Largest, Seam, TrackContinuity
 from anim.measure.facts import ClipFacts
 from cli import tables
-from cli.inspection import Inspected, Smoothness
+from cli.inspected import Inspected, Smoothness
 from cli.report import digits, length, plural
 from cli.tables import Cell
 

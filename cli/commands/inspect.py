@@ -18,7 +18,7 @@ from anim.measure.inspect import inspect as facts_of
 from anim.ops.selection import Selection
 from cli import errors, inspection, options, streams, tables
 from cli.errors import CheckError
-from cli.inspection import Smoothness
+from cli.inspected import Inspected, Smoothness
 
 SCHEMA = 1
 LOST = "put it there, or mend the URI"
@@ -64,7 +64,7 @@ def inspect(
     del quiet
     selection = Selection(clip or ())
     worst = 0
-    done: list[tuple[str, int, Facts]] = []
+    done: list[Inspected] = []
     smooth: list[Smoothness] = []
     for path in inputs or [streams.PIPE]:
         try:
@@ -94,7 +94,7 @@ def inspect(
     return worst
 
 
-def _check(done: list[tuple[str, int, Facts]], limit: Severity) -> None:
+def _check(done: list[Inspected], limit: Severity) -> None:
     """Raise CheckError where a finding is as bad as `limit`, or worse."""
     order = list(Severity)  # the worst first
     bad = [
@@ -109,9 +109,7 @@ def _check(done: list[tuple[str, int, Facts]], limit: Severity) -> None:
         raise CheckError(f"{name}: {first.severity} {first.name}: {first.where}: {first.problem}{more}")
 
 
-def _inspected(
-    path: str, selection: Selection, *, tracks: bool, continuity: bool
-) -> tuple[tuple[str, int, Facts], Smoothness]:
+def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:
     with streams.source(path) as source:
         chosen = selection.chosen_clips(read.names(source.document)) if selection.clips else None
         facts = facts_of(source.document, file_bytes=source.size, chosen=chosen, tracks=tracks)
@@ -131,7 +129,7 @@ def _smooth(document: Document, facts: Facts) -> Smoothness:
     return tuple(continuity(clips[each.index], skeleton) for each in facts.clips)
 
 
-def _json(done: list[tuple[str, int, Facts]], smooth: list[Smoothness]) -> str:
+def _json(done: list[Inspected], smooth: list[Smoothness]) -> str:
     files = [{"file": name, "bytes": size, **_plain(asdict(facts))} for name, size, facts in done]
     if any(smooth):
         _add_smoothness(files, smooth)
