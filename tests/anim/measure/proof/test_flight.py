@@ -101,6 +101,43 @@ def test_a_cubic_that_dips(seed: int) -> None:
     _check(curve / np.linalg.norm(curve, axis=1, keepdims=True), found, slack=np.inf)
 
 
+def test_an_arc_that_is_longest_between_its_ends() -> None:
+    """The same quaternion at both ends, and a turn of 0.9 rad: in the middle it is 1 / cos(0.45) times as long."""
+    a, _ = _ends(0, 0.9)
+    curve, found, _ = _arc(a, a, 0.9)
+    assert _size(curve) > 1.1 * _size(curve[:1])
+    _check(curve, found, slack=1.3)
+
+
+def test_what_of_a_bend_is_sideways_is_bounded_between_ends_that_have_none_of_it() -> None:
+    """The bend points along the quaternion at both ends, outwards and inwards, and across it in the middle."""
+    a, b = (np.array([0, 0, np.sin(x), np.cos(x)]) for x in (-0.4, 0.4))
+    first, last = 3 * a, -3 * b
+    slopes = b - a - (2 * first + last) / 6, b - a + (first + 2 * last) / 6
+    found = on_cubics(_wide(a, b), _wide(*slopes) / H, _wide(first, last) / H**2, H)
+    u = U[:, None]
+    bends = first + u * (last - first)
+    curve = a + u * slopes[0] + u * u * first / 2 + u**3 * (last - first) / 6
+    assert curve[-1] == pytest.approx(b)
+    length = np.linalg.norm(curve, axis=1, keepdims=True)
+    across = (bends - curve * (curve * bends).sum(axis=1, keepdims=True) / length**2) / length / H**2
+    assert found.own is not None
+    assert np.abs(found.own).max() < 1e-12
+    assert 1 < _size(across) <= float(np.asarray(found.most_own)[0, 0, 0])
+
+
+def test_drift_of_lines_that_change_in_length_more_than_they_turn() -> None:
+    """One is the other turned in space: |d″| = 2ρ|d′| nearly, as λ is next to nothing."""
+    a = np.array([0.0, 0, 0, 1])
+    b = 1.4 * np.array([0, 0, np.sin(0.05), np.cos(0.05)])
+    cos, sin = np.cos(0.01), np.sin(0.01)
+    turn = np.array([[cos, -sin, 0, 0], [sin, cos, 0, 0], [0, 0, cos, -sin], [0, 0, sin, cos]])
+    first, second = _line(a, b), _line(turn @ a, turn @ b)
+    found = drift(first[1], second[1], (first[2], second[2], np.full((1, 1, 1), True)), H)[:, 0, 0, 0]
+    truths = [_size(y - x) for x, y in zip(_jets(first[0]), _jets(second[0]), strict=True)]
+    assert truths[2] <= found[2] <= 6 * truths[2]
+
+
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("kinds", ["ll", "la", "al", "aa", "cc", "lc", "ca"])
 def test_drift(kinds: str, width: float) -> None:
