@@ -1,0 +1,149 @@
+"""What JSON values must look like: checks that raise FormatError, with the place as a path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from anim.errors import FormatError
+
+Check: TypeAlias = Callable[[Any], None]
+LARGEST = 3.4e38  # what float32 holds
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What an object must look like: a check per property, what must be there, and a check of the whole."""
+
+    properties: Mapping[str, Check]
+    required: tuple[str, ...] = ()
+    whole: Check | None = None
+
+    def __call__(self, value: Any) -> None:
+        if type(value) is not dict:
+            raise FormatError(f"is {_name(value)} (expected an object)")
+        for key in self.required:
+            if key not in value:
+                raise FormatError(f"has no '{key}'")
+        properties = self.properties
+        for key, item in value.items():
+            check = properties.get(key)
+            if check is not None:
+                try:
+                    check(item)
+                except FormatError as error:
+                    raise error.at(key, _mark(error)) from None
+        if self.whole is not None:
+            self.whole(value)
+
+
+def named(key: str, rule: Check, value: Any) -> None:
+    """Check the value of a property; errors name it."""
+    try:
+        rule(value)
+    except FormatError as error:
+        raise error.at(key, _mark(error)) from None
+
+
+def each(values: list[Any], rule: Check, key: str) -> None:
+    """Check every value of an array; errors name its place."""
+    i = 0
+    try:
+        for i, value in enumerate(values):  # noqa: B007 (i is read after the loop broke)
+            rule(value)
+    except FormatError as error:
+        raise error.at(f"{key}[{i}]", _mark(error)) from None
+
+
+def _mark(error: FormatError) -> str:
+    return "" if error.where.startswith("[") else "." if error.where else ""
+
+
+def list_of(rule: Check) -> Check:
+    """Return the check of an array whose values pass a rule."""
+
+    def check_list(value: Any) -> None:
+        of_type(value, list, "an array")
+        each(value, rule, "")
+
+    return check_list
+
+
+def map_of(rule: Check) -> Check:
+    """Return the check of an object whose values pass a rule, whatever their names."""
+
+    def check_map(value: Any) -> None:
+        of_type(value, dict, "an object")
+        for key, item in value.items():
+            named(key, rule, item)
+
+    return check_map
+
+
+def index(of: str, count: int) -> Check:
+    """Return the check of a number of one of the file's `count` things."""
+
+    def check_index(value: Any) -> None:
+        if type(value) is not int or not 0 <= value < count:
+            of_type(value, int, "a whole number")
+            raise FormatError(f"is {value} (the file has {count} {of})")
+
+    return check_index
+
+
+def at_least(least: int) -> Check:
+    """Return the check of a whole number that is not less."""
+
+    def check_whole(value: Any) -> None:
+        if type(value) is not int or value < least:
+            of_type(value, int, "a whole number")
+            raise FormatError(f"is {value} (expected {least} or more)")
+
+    return check_whole
+
+
+def one_of(*allowed: int) -> Check:
+    """Return the check of a number out of a few."""
+
+    def check_one(value: Any) -> None:
+        if type(value) is not int or value not in allowed:
+            raise FormatError(f"is {_name(value)} (expected one of {', '.join(map(str, allowed))})")
+
+    return check_one
+
+
+def numbers(count: int | None) -> Check:
+    """Return the check of an array of finite numbers, `count` of them where that is fixed."""
+
+    def check_numbers(value: Any) -> None:
+        of_type(value, list, "an array")
+        if count is not None and len(value) != count:
+            raise FormatError(f"has {len(value)} numbers (expected {count})")
+        for item in value:
+            if (type(item) is not float and type(item) is not int) or not -LARGEST < item < LARGEST:
+                raise FormatError(f"holds {_name(item)} (expected finite numbers)")
+
+    return check_numbers
+
+
+def text(value: Any) -> None:
+    """Check a string."""
+    if type(value) is not str:
+        of_type(value, str, "a string")
+
+
+def boolean(value: Any) -> None:
+    """Check a truth value."""
+    of_type(value, bool, "true or false")
+
+
+def of_type(value: Any, kind: type, words: str, where: str = "") -> None:
+    """Check the type of a value. words: what it should be."""
+    if type(value) is not kind:
+        raise FormatError(f"is {_name(value)} (expected {words})", where=where)
+
+
+def _name(value: Any) -> str:
+    words = {dict: "an object", list: "an array", str: "a string", bool: "a boolean", type(None): "null"}
+    return words.get(type(value), repr(value)[:60])
