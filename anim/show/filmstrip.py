@@ -17,11 +17,13 @@ from anim.show.stage import Stage, draw, encoded, stage
 HEIGHT = 240  # pixels of a frame
 GAP, EDGE = 3, 12  # pixels between frames, and around all
 MAX_WIDTH = 1600  # pixels, beyond which frames go into another line
-PAPER, INK, FAINT = (0.93, 0.935, 0.94), (0.035, 0.038, 0.045), (0.19, 0.20, 0.22)  # linear
+PAPER, INK, FAINT = (247, 247, 248), (56, 58, 62), (120, 123, 128)  # sRGB
 LETTER = 2  # pixels of a dot of the font
 LOW = 8 + 7 * LETTER  # pixels from the bottom of a frame to the top of words in it
 BAR = 120, 8  # pixels of the heat's legend
 MOST_POINTS = 2_000_000  # that the camera is framed on
+CLOSED = 1e-3  # share of the way that vertices move; a loop ends this near its start
+MOST_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
 
 Image = NDArray[np.uint8]
 
@@ -63,7 +65,7 @@ def filmstrip(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: L
     lines = -(-count // max((MAX_WIDTH - 2 * EDGE) // (width + GAP), 1))
     columns = -(-count // lines)
     across = max(2 * EDGE + columns * (width + GAP) - GAP, _header_width(rows, title))
-    sheet = np.broadcast_to(PAPER, (header + lines * len(rows) * (height + footer) + EDGE - GAP, across, 3)).copy()
+    sheet = _paper(header + lines * len(rows) * (height + footer) + EDGE - GAP, across)
     _write_header(sheet, rows, title)
     for r, row in enumerate(rows):
         for f, frame in enumerate(_frames(row, scenery, _most(rows))):
@@ -75,18 +77,25 @@ def filmstrip(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: L
             glyphs.write(sheet, time, middle, top + height + GAP, size=LETTER, color=FAINT)
             if row.label and f % columns == 0:
                 glyphs.write(sheet, row.label, EDGE + 8, top + height - LOW, size=LETTER, color=INK)
-    return encoded(sheet)
+    return sheet
 
 
 def moving(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: Look = Look()) -> Iterator[Image]:
-    """Yield a picture (H, W, 3) for every time, the rows side by side in it. All rows have the same times."""
+    """Yield the pictures (H, W, 3) of an endless film, the rows side by side; the shorter ones wait for the longest.
+
+    A loop's last frame, which is its first, isn't shown twice. Raises RangeError for more pixels than memory should
+    hold.
+    """
     scenery = _scenery(around, look)
     width, height = scenery.camera.width, scenery.camera.height
     header = _header_height(rows, title)
-    frames = [_frames(row, scenery, _most(rows)) for row in rows]
+    times = max((row.times for row in rows), key=len)
+    times = times[: len(times) - _is_loop(rows)]
+    frames = [_held(_frames(row, scenery, _most(rows))) for row in rows]
     across = max(2 * EDGE + len(rows) * (width + GAP) - GAP, _header_width(rows, title))
-    for time, pictures in zip(rows[0].times, zip(*frames, strict=True), strict=True):
-        sheet = np.broadcast_to(PAPER, (header + height + EDGE, across, 3)).copy()
+    _check_size(header + height + EDGE, across, len(times))
+    for time, *pictures in zip(times, *frames, strict=False):
+        sheet = _paper(header + height + EDGE, across)
         _write_header(sheet, rows, title)
         for r, picture in enumerate(pictures):
             left = EDGE + r * (width + GAP)
@@ -96,7 +105,42 @@ def moving(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: Look
         said = f"{time:.2f} s"
         left = EDGE + width - 8 - glyphs.width(said, size=LETTER)
         glyphs.write(sheet, said, left, header + height - LOW, size=LETTER, color=FAINT)
-        yield encoded(sheet)
+        yield sheet
+
+
+def _held(frames: Iterator[Image]) -> Iterator[Image]:
+    """The frames, and the last of them for good."""
+    last = next(frames)
+    yield last
+    for last in frames:
+        yield last
+    while True:
+        yield last
+
+
+def _is_loop(rows: Sequence[Row]) -> bool:
+    """Whether all rows end together, where they began, and are elsewhere between."""
+    if len({len(row.times) for row in rows}) > 1:
+        return False
+    for row in rows:
+        moved = [float(np.abs(each - row.positions[0]).max(initial=0)) for each in row.positions]
+        if max(moved) == 0 or moved[-1] > CLOSED * max(moved):
+            return False
+    return True
+
+
+def _paper(height: int, width: int) -> Image:
+    _check_size(height, width, 1)
+    return np.full((height, width, 3), PAPER, np.uint8)
+
+
+def _check_size(height: int, width: int, frames: int) -> None:
+    if height * width * frames > MOST_PIXELS:
+        what = "the picture has" if frames == 1 else f"{frames} frames have"
+        raise RangeError(
+            f"{what} {width} × {height} pixels, too many (limit {MOST_PIXELS // 10**6} million together)",
+            help="ask for fewer or smaller frames",
+        )
 
 
 def _scenery(around: AnyArray, look: Look) -> Stage:
@@ -107,12 +151,12 @@ def _scenery(around: AnyArray, look: Look) -> Stage:
     return stage(camera, points)
 
 
-def _frames(row: Row, scenery: Stage, most: float) -> Iterator[Floats]:
+def _frames(row: Row, scenery: Stage, most: float) -> Iterator[Image]:
     for f, positions in enumerate(row.positions):
         colors = row.colors
         if row.distances is not None:
             colors = heat.of_faces(row.distances[f], row.faces, most)
-        yield draw(scenery, positions.astype(np.float64), row.faces, colors)
+        yield encoded(draw(scenery, positions.astype(np.float64), row.faces, colors))
 
 
 def _most(rows: Sequence[Row]) -> float:
@@ -134,7 +178,7 @@ def _legend(rows: Sequence[Row]) -> str:
     return _length(_most(rows)) if any(row.distances is not None for row in rows) else ""
 
 
-def _write_header(sheet: Floats, rows: Sequence[Row], title: str) -> None:
+def _write_header(sheet: Image, rows: Sequence[Row], title: str) -> None:
     top = EDGE - GAP
     glyphs.write(sheet, title, EDGE, top, size=LETTER, color=INK)
     if legend := _legend(rows):
@@ -142,7 +186,7 @@ def _write_header(sheet: Floats, rows: Sequence[Row], title: str) -> None:
         glyphs.write(sheet, legend, left, top, size=LETTER, color=FAINT)
         width, height = BAR
         left -= width + 8
-        sheet[top + 3 : top + 3 + height, left : left + width] = heat.colors(np.linspace(0, 1, width))
+        sheet[top + 3 : top + 3 + height, left : left + width] = encoded(heat.colors(np.linspace(0, 1, width)))
         glyphs.write(sheet, "0", left - 8 - glyphs.width("0", size=LETTER), top, size=LETTER, color=FAINT)
 
 

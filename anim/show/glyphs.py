@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.arrays import Bools, Floats
+from anim.arrays import AnyArray, Bools
 
 WIDTH, HEIGHT, STEP = 5, 8, 6  # dots of a glyph, and from one to the next
 # Five columns a glyph, from the space on; the lowest bit is the top dot.
@@ -38,7 +38,7 @@ def dots(text: str) -> Bools:
     return (columns.reshape(-1)[None, :] >> np.arange(HEIGHT)[:, None] & 1).astype(bool)
 
 
-def write(image: Floats, text: str, x: int, y: int, *, size: int, color: tuple[float, float, float]) -> None:
+def write(image: AnyArray, text: str, x: int, y: int, *, size: int, color: tuple[int, int, int]) -> None:
     """Draw a text into an image (H, W, 3) with its top left at x, y; what lies outside is cut off."""
     shape = np.repeat(np.repeat(dots(text), size, axis=0), size, axis=1)
     top, left = max(y, 0), max(x, 0)

@@ -46,16 +46,25 @@ class When:
             if not start - SAME <= time <= end + SAME:
                 raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
 
-    def times(self, start: float, end: float) -> Floats:
-        """Return times (F,) s of a motion from `start` to `end`. Raises RangeError where none lies in it."""
-        if self.at:
-            return np.unique(np.array(self.at, np.float64))
+    def span(self, start: float, end: float) -> tuple[float, float]:
+        """Return the first and the last time in s of a motion from `start` to `end`. Raises RangeError for none."""
         first = start if self.begin is None else max(self.begin, start)
         last = end if self.end is None else min(self.end, end)
         if first > last:
             raise RangeError(
                 f"nothing lies from {first:g} s to {last:g} s (the motion goes from {start:g} s to {end:g} s)"
             )
+        return first, last
+
+    def times(self, start: float, end: float) -> Floats:
+        """Return times (F,) s of a motion from `start` to `end`; of those in `at` none where it has none of them.
+
+        Raises RangeError where nothing of the motion is chosen otherwise, or more than a picture can hold.
+        """
+        if self.at:
+            at = np.unique(np.array(self.at, np.float64))
+            return at[(at >= start - SAME) & (at <= end + SAME)]
+        first, last = self.span(start, end)
         if self.fps is not None and self.count is None:
             found = grid(first, last, fps=self.fps)
             if len(found) > MOST_FRAMES:
@@ -95,6 +104,8 @@ def of_document(document: Document, clips: Sequence[int], methods: Sequence[str]
     for name, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
         times, path = when.times(start, end), _spread(start, end)
+        if not len(times):
+            continue
         for method in methods or ("lbs",):
             cache = bake(scene, clip, times=times, method=method, rigid=True)
             whole = bake(scene, clip, times=path, method=method, rigid=True)

@@ -12,6 +12,7 @@ from anim.show.camera import Camera
 from anim.show.raster import visible
 
 SAMPLES = 3  # across and down in each pixel
+BAND = 1 << 22  # samples that are drawn at a time, about: they take 60 bytes each
 # Linear light.
 SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
 LINE, SHADOW = np.array([0.52, 0.53, 0.55]), np.array([0.16, 0.17, 0.20])
@@ -49,16 +50,24 @@ def stage(camera: Camera, points: Floats) -> Stage:
 
 def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats) -> Floats:
     """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces."""
-    large = _larger(stage.camera, SAMPLES)
-    corners = large.project(positions)[faces]
-    seen = visible(corners, width=large.width, height=large.height)
-    shade = _shade(stage.camera, positions, faces)
-    lit = np.concatenate((colors * shade[:, None], np.zeros((1, 3))))[seen]
-    shape = (stage.camera.height, SAMPLES, stage.camera.width, SAMPLES)
-    cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
-    image = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
-    picture: Floats = image * (1 - cover) + lit.reshape(*shape, 3).mean(axis=(1, 3))
+    camera = stage.camera
+    corners = _larger(camera, SAMPLES).project(positions)[faces]
+    painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
+    picture: Floats = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
+    rows = max(BAND // (camera.width * SAMPLES**2), 1)
+    for top in range(0, camera.height, rows):
+        _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted)
     return picture
+
+
+def _paint(band: Floats, corners: Floats, painted: Floats) -> None:
+    """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
+    height, width = band.shape[:2]
+    seen = visible(corners, width=width * SAMPLES, height=height * SAMPLES)
+    shape = (height, SAMPLES, width, SAMPLES)
+    cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
+    band *= 1 - cover
+    band += painted[seen].reshape(*shape, 3).mean(axis=(1, 3))
 
 
 def encoded(image: Floats) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import PurePath
 from typing import Annotated
 
@@ -96,13 +97,15 @@ def render(
         else:
             names = read.names(seen)
             numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
+            if is_moving and count is not None and len(numbers) > 1:
+                when = _one_rate(seen, numbers, when)
             found = shots.of_document(seen, numbers, [str(each) for each in method or ()], when)
         rows, around = shots.rows(found, heated=heat)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
         look = Look(size, azimuth, elevation)
         if is_moving:
             pictures = filmstrip.moving(rows, around, title=title, look=look)
-            drawn = image_file.moving(pictures, ending, fps=fps or _rate(rows[0].times))
+            drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(rows[0].times))
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, around, title=title, look=look))
     streams.write_bytes([np.frombuffer(drawn, np.uint8)], output)
@@ -139,6 +142,14 @@ def _opened(path: str) -> Iterator[tuple[Document | VertexCache, str]]:
             else:
                 reader = reader_for(ending_of(head, len(data)))
                 yield reader(Memory(name, {name: data.tobytes()}), Reading()), name
+
+
+def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:
+    """As many frames of the longest clip, and the others at its rate: in a film all play at once."""
+    clips = read.clips(document)
+    spans = [when.span(clips[i].start, clips[i].end) for i in numbers]
+    longest = max(last - first for first, last in spans)
+    return replace(when, count=None, fps=max((when.count or 1) - 1, 1) / longest) if longest > 0 else when
 
 
 def _one_clip(found: Sequence[Shot]) -> str:

@@ -63,6 +63,27 @@ def test_moving_pictures(ending: str, form: str, fixture: Fixture, call: Call, t
     assert image.info.get("duration", 200) == 200
 
 
+@pytest.mark.parametrize(("option", "frames", "each"), [("--fps", "5", 200), ("--frames", "9", 427)])
+def test_clips_of_a_film_play_at_one_speed_until_the_longest_ends(
+    option: str, frames: str, each: float, asset: Find, call: Call, tmp_path: Path
+) -> None:
+    """Fox: Survey takes 3.42 s, Walk 0.71 s, Run 1.16 s."""
+    call("render", asset("Fox.glb"), tmp_path / "a.webp", "--clip", "*", option, frames, *SMALL).product()
+    image = opened(tmp_path / "a.webp")
+    assert image.n_frames == (9 if option == "--frames" else 19)  # the end too
+    image.load()
+    assert image.info["duration"] == pytest.approx(each, abs=1)
+
+
+def test_a_row_shows_the_times_that_its_clip_has(asset: Find, call: Call, tmp_path: Path) -> None:
+    def height(*args: object) -> int:
+        call("render", asset("Fox.glb"), tmp_path / "a.png", *args, *SMALL).product()
+        return int(opened(tmp_path / "a.png").size[1])
+
+    assert height("--clip", "*", "--at", "0.9") == height("--clip", "Survey", "--clip", "Run", "--at", "0.9")
+    assert height("--clip", "*", "--at", "0.5") > height("--clip", "*", "--at", "0.9")
+
+
 @pytest.mark.parametrize("name", ["a.npz", "a.mdd", "a.ply", "a.usdc", "a.exr", "a.glb"])
 def test_caches(name: str, call: Call, tmp_path: Path) -> None:
     for file, data in written(cache(), name)[0].files.items():

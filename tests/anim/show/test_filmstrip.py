@@ -12,7 +12,8 @@ from anim.caches.axes import turned
 from anim.errors import NotFoundError, RangeError
 from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
-from anim.show import shots
+from anim.show import filmstrip as filmstrip_module
+from anim.show import shots, stage
 from anim.show.filmstrip import Look, Row, filmstrip, moving
 from anim.show.shots import When
 from tests.clips import skeleton
@@ -123,10 +124,53 @@ def test_moving_pictures_have_their_rows_side_by_side() -> None:
     assert one.shape[1] > alone.shape[1]
 
 
+def _turning(times: list[float], *, back: bool) -> Row:
+    """A triangle that moves to the right, and back where it began or not."""
+    way = np.linspace(0, 1, len(times))
+    way = np.minimum(way, 1 - way) if back else way
+    positions = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]) + way[:, None, None] * np.array([1.0, 0, 0])
+    return Row("", np.array(times), positions, FACE, np.full((1, 3), 0.5))
+
+
+def test_the_shorter_rows_of_a_film_wait_for_the_longest() -> None:
+    short, long = _turning([0, 0.1], back=False), _turning([0, 0.1, 0.2, 0.3], back=False)
+    pictures = list(moving([short, long], long.positions[[0, -1]], look=SMALL))
+    assert len(pictures) == 4
+    half = pictures[0].shape[1] // 2
+    assert not (pictures[0][:, :half] == pictures[1][:, :half]).all()
+    assert (pictures[1][:40, :half] == pictures[3][:40, :half]).all(), "the time is below"
+    assert not (pictures[2][:, half:] == pictures[3][:, half:]).all()
+
+
+@pytest.mark.parametrize(("back", "frames"), [(True, 4), (False, 5)])
+def test_a_loop_shows_its_first_frame_once(back: bool, frames: int) -> None:
+    row = _turning([0, 0.25, 0.5, 0.75, 1], back=back)
+    assert len(list(moving([row], row.positions[[0, -1]], look=SMALL))) == frames
+    still = Row("", row.times, row.positions[[0] * 5], FACE, row.colors)
+    assert len(list(moving([still], row.positions[[0, -1]], look=SMALL))) == 5, "what doesn't move is no loop"
+
+
+def test_pictures_are_drawn_in_bands_where_they_are_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, once = strip("biped", count=2)
+    monkeypatch.setattr(stage, "BAND", 5000)
+    _, bands = strip("biped", count=2)
+    assert np.abs(once.astype(int) - bands).max() <= 1
+
+
+def test_more_pixels_than_memory_should_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = _turning([0, 0.25, 0.5], back=False)
+    monkeypatch.setattr(filmstrip_module, "MOST_PIXELS", 10_000)
+    with pytest.raises(RangeError, match=r"the picture has \d+ × \d+ pixels, too many"):
+        filmstrip([row], row.positions[0], look=SMALL)
+    with pytest.raises(RangeError, match=r"3 frames have \d+ × \d+ pixels, too many"):
+        next(moving([row], row.positions[0], look=SMALL))
+
+
 @pytest.mark.parametrize(
     ("when", "times"),
     [
         (When(at=(1.0, 0.5, 0.5)), [0.5, 1.0]),
+        (When(at=(1.0, 2.5)), [1.0]),
         (When(count=3), [0, 1, 2]),
         (When(count=1), [0]),
         (When(count=3, begin=1), [1, 1.5, 2]),

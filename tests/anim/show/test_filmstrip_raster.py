@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from anim.arrays import Floats, Ints
+from anim.errors import RangeError
 from anim.show import glyphs, heat, image_file
 from anim.show.camera import framed
 from anim.show.raster import visible
@@ -116,3 +117,28 @@ def test_heat_gets_darker_and_ends_at_the_farthest() -> None:
 @pytest.mark.parametrize(("length", "step"), [(1.0, 1.0), (0.99, 0.5), (19, 10), (5.1, 5), (0.0021, 0.002)])
 def test_steps_of_the_grid_are_round(length: float, step: float) -> None:
     assert nice(length) == pytest.approx(step)
+
+
+@pytest.mark.parametrize("band", [1, 100, 700])
+def test_a_png_in_bands_has_the_same_bytes(band: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    image = RANDOM.integers(0, 256, (40, 30, 3)).astype(np.uint8)
+    image[20:] //= 9
+    once = image_file.png(image)
+    monkeypatch.setattr(image_file, "BAND", band)
+    assert image_file.png(image) == once
+
+
+@pytest.mark.parametrize(("ending", "tick"), [(".gif", 10), (".webp", 1), (".apng", 1)])
+@pytest.mark.parametrize("fps", [7.0, 15, 24, 29.97, 50])
+def test_films_take_as_long_as_they_should(ending: str, tick: int, fps: float) -> None:
+    found = image_file.durations(31, ending, fps=fps)
+    assert abs(sum(found) - 31_000 / fps) <= tick / 2
+    assert all(each > 0 and each % tick == 0 for each in found)
+    assert max(found) - min(found) <= tick
+
+
+def test_gifs_can_t_be_as_quick_as_others() -> None:
+    picture = np.zeros((8, 8, 3), np.uint8)
+    with pytest.raises(RangeError, match=r"60 frames per second are too many for \.gif \(limit 50\)"):
+        image_file.moving([picture], ".gif", fps=60)
+    assert image_file.moving([picture, picture + 9], ".webp", fps=60)
