@@ -15,12 +15,12 @@ from anim.arrays import Floats, sorted_unique
 from anim.caches import axes, extent
 from anim.caches import order as orders
 from anim.gltf import read
-from anim.model import Clip, Instance, VertexCache
+from anim.model import Clip, VertexCache
 from anim.ops.selection import Selection
 from anim.sampling.times import grid
 from anim.skinning.bake import SPACES, baked, baker
-from anim.skinning.weights import bad_sums
-from cli import cache_files, cache_options, meshes, options, report, streams, units
+from anim.skinning.between import Missed, between
+from cli import bake_notes, cache_files, cache_options, meshes, options, report, streams, units
 from cli.cache_files import Saved
 from cli.errors import UsageError
 from cli.progress import Progress
@@ -95,7 +95,7 @@ def bake(
         numbers = Selection(clip or ()).chosen_clips(read.names(document))
         files = _files(output, [(clips[i].name, i) for i in numbers])
         nodes = meshes.nodes(scene, mesh)
-        _say_sums(baked(scene, nodes=nodes), voice)
+        bake_notes.weights(baked(scene, nodes=nodes), method.value, voice)
         made = baker(
             scene,
             method=method.value,
@@ -107,8 +107,13 @@ def bake(
             rigid=rigid,
             nodes=nodes,
         )
+        if not rigid:
+            bake_notes.left_out(scene, nodes, voice)
+        missed: dict[str, Missed] = {}
         for each, file in zip([clips[i] for i in numbers] or [Clip("", ())], files, strict=True):
             times = _times(each, fps)
+            if fps is None and not quiet:
+                missed[read.label(each.name, numbers[len(done)] if numbers else 0)] = between(made, each, times)
             progress = Progress(PurePath(file).name, len(times), shown=not quiet)
             cache = _turned(made.bake(each, times=times, progress=progress), up, order)
             try:
@@ -120,6 +125,7 @@ def bake(
             _say_notes(done, voice)
             if len(files) > 1:
                 voice.detail(f"  {_summary(done[-1:], cache.vertex_count, method.value)}")
+    bake_notes.gaps(missed, made.rest, voice)
     took = f"{time.perf_counter() - began:.1f} s" + (" (dry run: nothing written)" if dry_run else "")
     voice.say(f"{_summary(done, made.vertices, method.value)}, {took}")
 
@@ -177,7 +183,7 @@ def _summary(done: list[_Done], vertices: int, method: str) -> str:
     parts = [f"{name}  {report.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
     parts.append(f"{frames} of {vertices} vertices")
     errors = [each.saved.written.max_error for each in done if each.saved.written.max_error is not None]
-    parts += [f"max {report.length(max(errors))}"] if errors else []
+    parts += [f"max {report.length(max(errors))} at frames"] if errors else []
     count = sum(len(each.saved.files) for each in done)
     return ", ".join([*parts, *([plural(count, "file")] if count > len(done) else [])])
 
@@ -186,10 +192,3 @@ def _times(clip: Clip, fps: float | None) -> Floats:
     if fps is not None:
         return grid(clip.start, clip.end, fps=fps)
     return sorted_unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
-
-
-def _say_sums(instances: list[Instance], voice: Voice) -> None:
-    for bad in bad_sums(instances):
-        count = "1 vertex" if bad.count == 1 else f"{bad.count} vertices"
-        words = f"note: mesh '{bad.mesh}': skin weights of {count} don't add up to 1"
-        voice.say(f"{words} ({bad.least:.3g} … {bad.most:.3g}), used as they are")

@@ -49,7 +49,7 @@ def test_several_clips_need_a_place_for_their_names(call: Call, fixture: Fixture
     run = call("bake", source, tmp_path / "arm.npz")
     assert "2 clips are chosen, but" in refusal(run, 2)
     assert help_line(run) == "choose one with --clip, or put {clip} into OUT for a file per clip"
-    run = call("bake", source, tmp_path / "arm-{clip}.npz", "-v")
+    run = call("bake", source, tmp_path / "arm-{clip}.npz", "-v", "--fps", 24)
     assert run.code == 0
     assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["arm-bend.npz", "arm-twist.npz"]
     assert run.err.splitlines()[-1].startswith("2 files, ")
@@ -140,13 +140,15 @@ def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
     content = buffered(("VEC3", 5126, np.eye(3)), ("VEC4", 5121, np.zeros((3, 4))), ("VEC4", 5126, weights))
     content |= {
         "nodes": [{"mesh": 0, "skin": 0}, {}],
-        "skins": [{"joints": [1]}],
+        "skins": [{"joints": [1, 0]}],
         "meshes": [{"name": "flag", "primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}}]}],
     }
     (tmp_path / "flag.gltf").write_bytes(text(content))
     run = call("bake", tmp_path / "flag.gltf", tmp_path / "flag.npz")
     assert "note: mesh 'flag': skin weights of 1 vertex" in run.err
     assert "(0.5 … 0.5), used as they are" in run.err
+    run = call("bake", tmp_path / "flag.gltf", tmp_path / "flag.npz", "--method", "dqs")
+    assert "(0.5 … 0.5), taken as shares of their sum" in run.err
 
 
 @pytest.mark.parametrize(
@@ -258,3 +260,23 @@ def test_progress_is_for_people_and_long_jobs(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("time.monotonic", lambda: 1e9)
     Progress("walk.npz", 100)(50)
     assert sys.stderr.getvalue() == ""  # type: ignore[union-attr]
+
+
+def test_what_lies_between_keys_is_said_where_it_can_be_seen(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    out = tmp_path / "tube.npz"
+    words = "off the straight way, at "
+    run = call("bake", fixture("tube"), out, "--clip", "twist180")
+    assert words in run.err
+    assert "of clip 'twist180'; --fps" in run.err
+    assert words not in call("bake", fixture("tube"), out, "--clip", "twist180", "--fps", 30).err
+    several = call("bake", fixture("tube"), tmp_path / "{clip}.npz").err
+    assert several.count(words) == 1
+    assert "clips have such places" in several
+
+
+def test_meshes_that_are_left_out_are_counted(call: Call, asset: Find, tmp_path: Path) -> None:
+    out = tmp_path / "a.npz"
+    run = call("bake", asset("Knight.glb"), out, "--clip", "Idle")
+    assert "note: 3308 vertices that only nodes move are left out; --rigid takes them in" in run.err
+    assert "left out" not in call("bake", asset("Knight.glb"), out, "--clip", "Idle", "--rigid").err
+    assert "left out" not in call("bake", asset("Fox.glb"), out, "--clip", "Run").err
