@@ -37,6 +37,12 @@ class Layer:
     smooth: SmoothNormals | None
     still: Shape
 
+    @property
+    def packed_size(self) -> int:
+        """How many bytes a frame takes that is packed, about: its matrices, and vertices where they are morphed."""
+        morphed = len(self.rig.points) if len(self.instance.mesh.targets) else 0
+        return 96 * len(self.rig.nodes) + 36 * morphed
+
     def pack(self, frames: Frames, block: slice) -> tuple[Any, Shape]:
         """Return what `place` needs for some of the frames."""
         return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)

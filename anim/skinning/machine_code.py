@@ -19,7 +19,7 @@ from anim.skinning.object_file import loaded
 Numbers: TypeAlias = "list[int | float]"
 
 CPUS, ONE_CPU = Path("/proc/cpuinfo"), 8192  # where Linux says what its processors can do; characters for one
-ABILITIES = re.compile(r"^(?:flags|Features)\s*:(.*)\n", re.MULTILINE)
+CPU = re.compile(r"^(vendor_id|cpu family|model|flags|Features|CPU part)\s*:(.*)$", re.MULTILINE)
 LAYOUT = 1  # of arguments; with another one kept code is made anew
 RESULTS = 2  # parameters before the arguments: where the result goes, and where an exception does
 
@@ -73,13 +73,13 @@ def function(code: MachineCode, numbers: Numbers) -> Callable[..., int]:
 def machine() -> tuple[str, ...]:
     """Return what code is made for: the system, the processor, and what it can do."""
     try:
-        with CPUS.open() as file:
-            first = file.read(ONE_CPU)  # a system with many takes long to list them
+        with CPUS.open(errors="replace") as file:
+            first = file.read(ONE_CPU).partition("\n\n")[0]  # a system with many takes long to list them
     except OSError:
         first = ""
-    abilities = ABILITIES.search(first)
-    if abilities:
-        return sys.platform, platform.machine(), abilities[1]
+    found = dict(CPU.findall(first))
+    if found.keys() & {"flags", "Features"}:
+        return sys.platform, platform.machine(), *(f"{key}:{found[key]}" for key in sorted(found))
     import llvmlite.binding as llvm
 
     return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()

@@ -12,15 +12,15 @@ import mmap
 import os
 import platform
 import sys
-from struct import unpack_from
+from struct import error, unpack_from
 from typing import Any
 
 import numpy as np
 
 KIND, X86_64 = b"\x7fELF\x02\x01\x01", 62  # 64 bits, little-endian, version 1
-CONTENT, SYMBOLS, PLACES = 1, 2, 4  # types of sections
-WRITABLE, LOADED = 1, 2  # flags of sections
-ELSEWHERE = 0  # the section of a symbol that the file only names
+CONTENT, SYMBOLS, PLACES = 1, 2, 4  # types of sections: SHT_PROGBITS, SHT_SYMTAB, SHT_RELA
+WRITABLE, LOADED = 1, 2  # flags of sections: SHF_WRITE, SHF_ALLOC
+ELSEWHERE = 0  # SHN_UNDEF, the section of a symbol that the file only names
 ADDRESS = 1  # R_X86_64_64: in this place goes the address of a symbol, plus an addend
 READ, RUN = 1, 4  # what memory may be used for
 
@@ -41,7 +41,13 @@ def loaded(content: bytes, name: str) -> int:
     """
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
         raise OSError(f"this is {sys.platform} on {platform.machine()} (expected linux on x86_64)")
-    file = _File(content)
+    try:
+        return _loaded(_File(content), name)
+    except (ArithmeticError, IndexError, error) as problem:
+        raise ValueError(f"object file is not whole ({problem})") from None
+
+
+def _loaded(file: _File, name: str) -> int:
     memory = mmap.mmap(-1, file.size, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     base = np.frombuffer(memory, np.uint8).ctypes.data
     file.place(memory, base)
@@ -97,7 +103,7 @@ class _File:
                 if section["flags"] & WRITABLE:
                     raise ValueError("object file has memory to write to (expected code and constants)")
                 if section["type"] == CONTENT:  # others tell debuggers how to leave a function
-                    starts[i] = -(-end // int(section["alignment"])) * int(section["alignment"])
+                    starts[i] = -(-end // (each := max(int(section["alignment"]), 1))) * each
                     end = starts[i] + int(section["size"])
         return starts, end
 

@@ -21,7 +21,7 @@ Piece: TypeAlias = tuple[Layer, Any, slice, int, int]  # a layer, what it packed
 CHUNK = 1 << 23  # bytes of positions in a chunk, about; never less than LANES frames
 MOST = 32  # blocks of LANES frames in a chunk, for their poses take memory too
 PIECE = 4096  # vertices for which it is worth to wake a thread
-POSES = 1 << 21  # bytes of matrices that are sampled at a time, about; never less than for a chunk
+PACKED = 1 << 22  # bytes of what is packed at a time, about; never less than for a chunk
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +59,17 @@ class Stream:
                 progress(first)
 
     def _ahead(self, playback: Playback, times: Floats, step: int, crew: Crew) -> Iterator[_Packed]:
-        """Chunks of `step` frames, packed for one stretch of time while those of the stretch before are made.
-
-        The first is one chunk, so that work begins soon, and each is twice the one before: the code that packs is out
-        of the processor's caches when vertices have gone through them, and takes three times as long then (measured).
-        """
-        most = max(POSES // (96 * max(len(self.skeleton), 1)), step)
-        low, high = 0, step
-        coming = crew.submit(self._packed, playback, times[low:high], step)
-        while low < len(times):
+        """Yield chunks, packed for one stretch of time while those of the stretch before are made."""
+        size = 96 * len(self.skeleton) + sum(layer.packed_size for layer in self.layers)
+        spans = stretches(len(times), step, PACKED // max(size, 1))
+        futures = (crew.submit(self._stretch, playback, times[span], step) for span in spans)
+        coming = next(futures, None)
+        while coming is not None:
             packed = crew.result(coming)
-            low, high = high, high + min(2 * (high - low), most - most % step)
-            if low < len(times):
-                coming = crew.submit(self._packed, playback, times[low:high], step)
+            coming = next(futures, None)
             yield from packed
 
-    def _packed(self, playback: Playback, times: Floats, step: int) -> list[_Packed]:
+    def _stretch(self, playback: Playback, times: Floats, step: int) -> list[_Packed]:
         """Sample the poses of some chunks, and pack what each layer needs for each block of frames; share that out."""
         frames = playback.at(times)
         return [self._shared(frames.part(slice(low, low + step))) for low in range(0, len(times), step)]
@@ -107,6 +102,18 @@ class Stream:
             layer.finish(begun.frames, begun.whole)
         _, positions, normals, tangents = begun.whole
         return Chunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
+
+
+def stretches(frames: int, step: int, most: int) -> Iterator[slice]:
+    """Yield parts of so many frames, of whole chunks of `step`: one, and then twice as many each time up to `most`.
+
+    The first is short, so that work begins soon. The later ones are long, for the code that packs is out of the
+    processor's caches when vertices have gone through them, and takes three times as long then (measured).
+    """
+    low, size = 0, step
+    while low < frames:
+        yield slice(low, low + size)
+        low, size = low + size, min(2 * size, max(most - most % step, step))
 
 
 class _Packed(NamedTuple):

@@ -151,7 +151,6 @@ def test_same_bytes_for_any_chunk_and_number_of_threads(method: str, monkeypatch
     played = moving(of, 3)
     once = bake(of, played, times=TIMES, method=method, threads=1).whole().positions
     monkeypatch.setattr(stream, "PIECE", 7)
-    monkeypatch.setattr(stream, "POSES", 1)
     assert np.array_equal(once, bake(of, played, times=TIMES, method=method, threads=5).whole().positions)
     monkeypatch.setattr(stream, "CHUNK", 1)
     cache = bake(of, played, times=TIMES, method=method)

@@ -34,6 +34,19 @@ import numpy as np
 found = bake(random_scene(1), Clip("", ()), times=np.zeros(1)).whole().positions
 print(any(each in sys.modules for each in {heavy}), found.tobytes().hex())
 """
+ALL = """
+import sys
+import numpy as np
+from anim.model import Clip
+from anim.skinning.bake import bake
+from anim.skinning.methods import SKINNING_METHODS
+from tests.anim.skinning.scenes import random_scene
+of, still = random_scene(1, stretch=0.3), Clip("", ())
+for method in SKINNING_METHODS:
+    for normals in (False, True):
+        bake(of, still, times=np.zeros(1), method=method, normals=normals, bulge_clamp=method != "lbs").whole()
+print("llvmlite" in sys.modules)
+"""
 
 
 def test_machine_code_is_the_python_it_came_from() -> None:
@@ -78,6 +91,22 @@ def test_code_is_kept_in_the_users_cache_and_then_needs_no_numba(tmp_path: Path)
     (folder,) = tmp_path.iterdir()
     assert folder.name == "gltf-anim"
     assert {path.name.partition("-")[0] for path in folder.iterdir()} == {"worlds", "points_only"}
+
+
+@pytest.mark.skipif(not OWN_LOADER, reason="elsewhere LLVM loads all")
+def test_every_kernel_is_loaded_without_llvm() -> None:
+    """In a second process, as the first may have had to make it."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    for _ in range(2):
+        run = subprocess.run([sys.executable, "-c", ALL], cwd=ROOT, env=environment, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+    assert run.stdout.split() == ["False"]
+
+
+def test_code_is_made_for_one_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = compiled_module._digest(around_duals, "")
+    monkeypatch.setattr(compiled_module, "machine", lambda: ("linux", "x86_64", "flags: fpu"))
+    assert compiled_module._digest(around_duals, "") != usual
 
 
 def test_code_that_is_not_whole_is_made_again(tmp_path: Path) -> None:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
+import time
+from pathlib import Path
+from weakref import ref
 
 import pytest
 
 from anim.skinning.crew import Crew
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])
@@ -66,3 +73,61 @@ def test_nobody_is_left_behind() -> None:
     with pytest.raises(LookupError):
         left()
     assert threading.active_count() == before
+
+
+def test_threads_start_when_there_is_work_for_them() -> None:
+    before = threading.active_count()
+    with Crew(64) as crew:
+        one = crew.submit(pow, 2, 3)
+        assert threading.active_count() == before, "whoever waits does it"
+        crew.result(one)
+        barrier = threading.Barrier(3, timeout=20)
+        three = [crew.submit(barrier.wait) for _ in range(3)]
+        assert threading.active_count() <= before + 2
+        for each in three:
+            crew.result(each)
+
+
+def test_a_system_without_more_threads_is_no_reason_to_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", full)
+    with Crew(4) as crew:
+        futures = [crew.submit(pow, each, 2) for each in range(9)]
+        assert [crew.result(each) for each in futures] == [each**2 for each in range(9)]
+
+
+def test_what_was_done_is_forgotten() -> None:
+    """A thread that waits for the next task must not hold the arrays of the last one."""
+
+    class Large:
+        pass
+
+    with Crew(2) as crew:
+        large = Large()
+        last = ref(large)
+        futures = [crew.submit(isinstance, large, Large) for _ in range(9)]
+        del large
+        assert all(crew.result(each) for each in futures)
+        for _ in range(1000):
+            if last() is None:
+                break
+            time.sleep(0.001)
+        assert last() is None
+
+
+def test_a_process_ends_though_a_generator_is_half_used() -> None:
+    """Python 3.13 closes it when threads can't run any more, and would wait for them for good."""
+    script = """
+import threading
+from anim.skinning.crew import Crew
+def chunks():
+    with Crew(3) as crew:
+        while True:
+            yield [crew.result(each) for each in [crew.submit(pow, 2, 3) for _ in range(5)]]
+kept = chunks()
+print(next(kept), threading.active_count())
+"""
+    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (run.returncode, run.stdout.split("]")[0], run.stderr) == (0, "[8, 8, 8, 8, 8", "")

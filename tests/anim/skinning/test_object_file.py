@@ -7,7 +7,7 @@ import platform
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from struct import pack_into
+from struct import pack_into, unpack_from
 
 import llvmlite.binding as llvm
 import pytest
@@ -90,6 +90,19 @@ def test_what_is_not_foreseen_is_refused(content: bytes, message: str) -> None:
         loaded(content, "polynomial")
 
 
+def test_what_is_cut_off_or_changed_is_refused_or_is_the_same() -> None:
+    """A file is sealed where it is kept; here any error but the promised ones would show as another kind."""
+    content = _object(POLYNOMIAL)
+    for end in range(0, len(content), 7):
+        with pytest.raises(ValueError, match=r"object file|is not in|not enough values|buffer"):
+            loaded(content[:end], "polynomial")
+    flat = bytearray(content)
+    (at,) = unpack_from("<Q", content, 40)
+    for i in range(content[60]):
+        pack_into("<Q", flat, at + 64 * i + 48, 0)  # "0 and 1 mean that there is no constraint on alignment"
+    assert loaded(bytes(flat), "polynomial")
+
+
 def test_another_machines_code_is_refused() -> None:
     content = bytearray(_object(POLYNOMIAL))
     pack_into("<H", content, 18, 183)  # AArch64
@@ -111,8 +124,9 @@ def test_other_systems_are_left_to_llvm(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_what_a_machine_can_do_is_known_without_llvm_and_else_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    system, processor, abilities = machine_code.machine()
+    system, processor, *about = machine_code.machine()
     assert (system, processor) == ("linux", "x86_64")
-    assert {"fpu", "sse2"} <= set(abilities.split())
+    assert {"fpu", "sse2"} <= set(" ".join(about).split())
+    assert {each.partition(":")[0] for each in about} == {"cpu family", "flags", "model", "vendor_id"}
     monkeypatch.setattr(machine_code, "CPUS", Path("/no/such/file"))
     assert "sse2" in machine_code.machine()[2]
