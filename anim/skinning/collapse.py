@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from anim.arrays import Floats
-from anim.errors import NotFoundError
+from anim.errors import NotFoundError, RangeError
 from anim.model import Clip, Scene
 from anim.skinning.bake import baker
 from anim.skinning.fared import Fared, fared, subject
@@ -42,30 +42,46 @@ def collapse(
     *,
     times: Floats,
     methods: Sequence[str] = ("lbs", "dqs"),
+    bulge_clamp: bool = False,
     nodes: Sequence[int] | None = None,
 ) -> tuple[MeshCollapse, ...]:
     """Return what happens to each skinned mesh of a scene at `times` (F,) s while a clip plays.
 
     The collapse index of a vertex belongs to linear blending; the methods are compared by the volume that they enclose
-    and by how far they stand off the links. nodes: only meshes on these. For many clips make a `Comparison`.
+    and by how far they stand off the links. bulge_clamp: with the clamp on methods other than lbs. nodes: only meshes
+    on these. For many clips make a `Comparison`.
     collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707
     Source: notes/algorithms.md E3.
     """
-    return Comparison(scene, methods=methods, nodes=nodes).of(clip, times=times)
+    return Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=nodes).of(clip, times=times)
 
 
 class Comparison:
-    """Methods side by side on one scene, ready for any clip. Raises NotFoundError where there is no skinned mesh."""
+    """Methods side by side on one scene, ready for any clip. meshes: how many are looked at.
+
+    Raises NotFoundError where there is no skinned mesh, RangeError for a bulge clamp where lbs is the only method.
+    """
 
     def __init__(
-        self, scene: Scene, *, methods: Sequence[str] = ("lbs", "dqs"), nodes: Sequence[int] | None = None
+        self,
+        scene: Scene,
+        *,
+        methods: Sequence[str] = ("lbs", "dqs"),
+        bulge_clamp: bool = False,
+        nodes: Sequence[int] | None = None,
     ) -> None:
         skinned = [i.node for i in scene.instances if i.skin is not None and (nodes is None or i.node in nodes)]
         if not skinned:
             raise NotFoundError("there is no skinned mesh to look at")
+        if bulge_clamp and set(methods) == {"lbs"}:
+            raise RangeError("bulge clamp needs another method than lbs (expected dqs or cor)")
         self._scene = scene
-        self._bakers = {method: baker(scene, method=method, nodes=skinned) for method in methods}
+        self._bakers = {
+            method: baker(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)
+            for method in methods
+        }
         self._subjects = [subject(layer) for layer in next(iter(self._bakers.values())).layers]
+        self.meshes = len(self._subjects)
 
     def of(
         self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda methods: None

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pygltflib import GLTF2
 
 from tests.cli.conftest import Call, Fixture
-from tests.cli.running import refusal, shell
+from tests.cli.running import built, refusal, shell
 
 
 def test_a_table_with_advice(call: Call, fixture: Fixture) -> None:
@@ -26,7 +28,7 @@ def test_a_table_with_advice(call: Call, fixture: Fixture) -> None:
     assert "180° twist" in rows["twist180"]
     assert "33 %" in rows["twist180"]
     assert "90° bend" in rows["bend90"]
-    assert "  1 clip pinches; worst 0.00 in 'twist180'" in run.text
+    assert "  3 clips pinch; worst 0.00 in 'twist180'" in run.text
     assert "--method dqs" in run.text
 
 
@@ -43,7 +45,76 @@ def test_one_json_document(call: Call, fixture: Fixture) -> None:
     (method,) = mesh["methods"]
     assert method["volume_min"] == pytest.approx(1, abs=1e-3)
     assert method["bulge_max"] == pytest.approx(1, abs=1e-4)
-    assert report["advice"][0].startswith("linear blending is good enough")
+    assert report["advice"][0].startswith("no vertex falls below 0.7")
+    assert report["bulge_clamp"] is False
+    assert report["skinned_meshes"] == 1
+
+
+def test_a_quarter_twist_pinches_by_its_volume(call: Call, fixture: Fixture) -> None:
+    """It loses a third of the volume, and its index of 0.71 is above 0.7."""
+    report = call("collapse", fixture("tube"), "--format", "json", "--clip", "twist90").json
+    (mesh,) = report["clips"][0]["meshes"]
+    assert mesh["pinches"] is True
+    assert mesh["index"] > report["low_index"]
+    assert mesh["methods"][0]["volume_min"] == pytest.approx(2 / 3, abs=1e-3)
+    assert report["low_volume"] == 0.9
+    assert report["advice"][0].endswith("90° at 1.00 s; 67 % of the volume is left")
+
+
+def test_advice_follows_what_was_measured(call: Call, fixture: Fixture, asset: object) -> None:
+    man = call("collapse", asset("CesiumMan.glb"), "--method", "lbs", "--method", "dqs", "--method", "cor").text  # type: ignore[operator]
+    assert "bake it with --method cor (" in man
+    assert "dqs bulges" not in man
+    assert man.endswith("see what --bulge-clamp makes of it\n")
+    arm = call("collapse", fixture("arm")).text
+    assert "good enough" not in arm
+    assert "1 clip pinches; worst 0.71 in 'twist'" in arm
+    assert "bulges" not in arm
+
+
+def test_the_clamp(call: Call, fixture: Fixture) -> None:
+    free = call("collapse", fixture("tube"), "--clip", "bend90", "--format", "json").json
+    run = call("collapse", fixture("tube"), "--clip", "bend90", "--bulge-clamp")
+    assert run.text.splitlines()[0].endswith("tube.glb: 1 clip, 1 skinned mesh; dqs with --bulge-clamp")
+    assert "bake it with --method dqs --bulge-clamp" in run.text
+    held = call("collapse", fixture("tube"), "--clip", "bend90", "--bulge-clamp", "--format", "json").json
+    assert held["bulge_clamp"] is True
+    lbs, dqs = zip(*(each["clips"][0]["meshes"][0]["methods"] for each in (free, held)), strict=True)
+    assert lbs[0] == lbs[1]
+    assert dqs[1]["bulge_max"] < dqs[0]["bulge_max"] - 0.3
+
+
+def test_without_clips_it_says_so(call: Call, tmp_path: Path) -> None:
+    source = edited(tmp_path, lambda gltf: gltf.animations.clear())
+    run = call("collapse", source)
+    assert run.code == 0
+    assert run.text.endswith("tube.glb: 0 clips, 1 skinned mesh\n\n  there is no clip to look at\n")
+    report = call("collapse", source, "--format", "json").json
+    assert (report["clips"], report["skinned_meshes"]) == ([], 1)
+    assert report["advice"] == ["there is no clip to look at"]
+    assert "there is no clip to draw" in refusal(call("collapse", source, "--plot", tmp_path / "a.png"), 5)
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_clips_of_one_name_are_two(call: Call, tmp_path: Path) -> None:
+    def named_alike(gltf: GLTF2) -> None:
+        for each in gltf.animations:
+            each.name = "turn"
+
+    source = edited(tmp_path, named_alike)
+    text = call("collapse", source).text
+    assert "tube.glb: 3 clips, 1 skinned mesh\n" in text
+    assert len([line for line in text.splitlines() if line.startswith("  turn ")]) == 3
+    assert len(call("collapse", source, "--format", "json").json["clips"]) == 3
+
+
+def edited(folder: Path, change: Callable[[GLTF2], object]) -> Path:
+    """The tube in a folder, changed."""
+    gltf = GLTF2.load_from_bytes(built("tube"))
+    change(gltf)
+    path = folder / "tube.glb"
+    gltf.save(path)
+    return path
 
 
 @pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
@@ -79,4 +150,6 @@ def test_refusals(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     assert "--fps is 0 (expected a number above 0)" in refusal(call("collapse", source, "--fps", "0"), 2)
     assert "is no .png or .svg file" in refusal(call("collapse", source, "--plot", tmp_path / "a.gif"), 2)
     assert "no mesh matches 'x'" in refusal(call("collapse", source, "--mesh", "x"), 5)
+    clamp = call("collapse", source, "--method", "lbs", "--bulge-clamp")
+    assert "bulge clamp needs another method than lbs" in refusal(clamp, 2)
     assert "no skinned mesh" in refusal(call("collapse", fixture("morph_cube")), 5)

@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from anim.errors import NotFoundError
+from anim.errors import NotFoundError, RangeError
 from anim.gltf import read
 from anim.model import Clip, Scene
 from anim.sampling.times import grid
 from anim.skinning.advice import Found, advice, twist_joints
 from anim.skinning.bake import bake
 from anim.skinning.closed import closed_faces, volumes
-from anim.skinning.collapse import collapse
+from anim.skinning.collapse import MeshCollapse, collapse
+from anim.skinning.fared import Fared
+from anim.skinning.narrow import Narrow
+from anim.skinning.pinching import KEPT, pinches
+from anim.skinning.standings import Standing, best, standings
 from fixtures.shapes import cube
 from tests.anim.skinning.scenes import mesh, random_scene, scene, skinning_matrices
 from tests.anim.skinning.test_linear_blend import TIMES, moving
@@ -124,22 +128,149 @@ def test_without_a_skin_there_is_nothing_to_say() -> None:
         collapse(of, clip(), times=np.zeros(1))
 
 
-def test_advice() -> None:
-    def told(axis: str, *angles: float) -> list[str]:
-        return list(
-            advice([Found("turn", each) for each in collapse(tube(), turned(axis, *angles), times=np.array([1.0]))])
-        )
+def told(axis: str, angle: float, *methods: str, clamped: bool = False) -> list[str]:
+    """The advice on a tube that is turned by an angle."""
+    time, methods = np.array([1.0]), methods or ("lbs", "dqs")
+    seen = collapse(tube(), turned(axis, 0, angle), times=time, methods=methods, bulge_clamp=clamped)
+    return list(advice([Found(0, "turn", each) for each in seen], clamped=clamped))
 
-    (fine,) = told("y", 0, 40)
-    assert fine.startswith("linear blending is good enough: no vertex falls below 0.7")
-    pinched, bake_it, share = told("y", 0, 120)
-    assert pinched == "1 clip pinches; worst 0.50 in 'turn': 'lower' against 'upper', 120° at 1.00 s"
+
+def made_up(index: float, *, closed: bool = True, **methods: tuple[float | None, float]) -> Found:
+    """A mesh with an index, and of each method the volume and the bulge."""
+    worst = Narrow(index, 0, "arm", "hand", 0.0, 1.5, twist=False)
+    fared = tuple(
+        Fared(name, None if volume is None else np.full(2, volume), bulge, 0.5, 0, "arm", 0.5)
+        for name, (volume, bulge) in methods.items()
+    )
+    return Found(0, "turn", MeshCollapse("m", 0, 9, np.arange(2.0), np.ones(2), worst, 0, 0, float(closed), fared))
+
+
+def test_advice() -> None:
+    (fine,) = told("y", 0)
+    assert fine.startswith("linear blending is good enough: no vertex falls below 0.7 (least 1.000), 100 %")
+    pinched, bake_it, share = told("y", 120)
+    assert pinched.startswith("1 clip pinches; worst 0.50 in 'turn': 'lower' against 'upper', 120° at 1.00 s")
     assert "--method dqs (lbs keeps 50 %, dqs keeps 100 % of the volume)" in bake_it
     assert share.startswith("or share the twist among 4 joints between 'lower' and 'upper' (97 %")
-    bent = told("x", 0, 120)
+    bent = told("x", 120)
     assert not any("twist" in line for line in bent)
     assert bent[-1].startswith("dqs bulges up to ")
-    assert list(advice([])) == []
+    assert list(advice([])) == ["there is no clip to look at"]
+
+
+@pytest.mark.parametrize(("angle", "is_pinched"), [(44, False), (45.6, True), (90, True)])
+def test_a_tenth_of_the_volume_is_pinching_though_no_vertex_is(angle: float, is_pinched: bool) -> None:
+    """1 − ⅔ sin²(θ/2) is 0.9 at θ = 45.57°, where the index is still 0.92."""
+    least = 1 - 2 / 3 * np.sin(np.radians(angle) / 2) ** 2
+    assert (least < 0.9) == is_pinched
+    first = told("y", angle)[0]
+    assert first.startswith("1 clip pinches" if is_pinched else "linear blending is good enough")
+    assert f"{100 * least:.0f} %" in first
+
+
+def test_the_limit_of_the_volume_is_a_quarter_turn_over_three_tenths() -> None:
+    assert pytest.approx(1 - 2 / 3 * 0.3 * np.sin(np.pi / 4) ** 2) == KEPT
+
+
+def test_what_every_method_loses_is_no_pinching() -> None:
+    """A joint that shrinks takes volume from all methods: another one would be no help."""
+    sizes = np.array([[1, 1, 1], [1e-3, 1e-3, 1e-3]])
+    shrunk = clip(track("scale", [0, 1], sizes, node=1), name="shrink")
+    (found,) = collapse(tube(), shrunk, times=np.array([1.0]))
+    assert found.methods[0].volume is not None
+    assert found.methods[0].volume[0] < 0.8
+    assert not pinches(found)
+    (line,) = advice([Found(0, "shrink", found)])
+    assert "good enough" not in line
+    assert line.endswith("is left at worst, and no method that was measured keeps more")
+
+
+def test_of_what_was_measured_the_best_is_recommended() -> None:
+    """CesiumMan's figures: cor keeps more and bulges less, so nobody is told to bake dqs or to try cor."""
+    lines = list(advice([made_up(0.68, lbs=(0.94, 1.46), dqs=(0.96, 1.78), cor=(0.97, 1.57))]))
+    assert lines[1] == "bake it with --method cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume)"
+    assert (
+        lines[2] == "cor bulges up to 1.57× at 'arm' (turn, 0.50 s): look at it, and see what --bulge-clamp makes of it"
+    )
+    assert len(lines) == 3
+
+
+@pytest.mark.parametrize(
+    ("dqs", "cor", "chosen"),
+    [
+        ((0.99, 1.9), (0.9, 1.1), "dqs"),  # volume counts first
+        ((0.99, 1.9), (0.98, 1.1), "cor"),  # alike: the one that bulges less
+        ((1.2, 1.9), (0.99, 1.1), "cor"),  # more than bind pose is no gain
+        ((0.99, 1.1), (0.99, 1.1), "dqs"),  # equal: the first
+        ((None, 1.9), (None, 1.1), "cor"),  # nothing closed: bulge alone
+    ],
+)
+def test_the_best_by_volume_then_by_bulge(
+    dqs: tuple[float | None, float], cor: tuple[float | None, float], chosen: str
+) -> None:
+    meshes = [made_up(0.5, lbs=(None if dqs[0] is None else 0.5, 1.0), dqs=dqs, cor=cor).mesh]
+    found = best(standings(meshes))
+    assert found is not None
+    assert found.method == chosen
+
+
+def test_standings_are_the_worst_over_all_meshes() -> None:
+    two = [made_up(0.5, dqs=(0.9, 1.0)).mesh, made_up(0.5, dqs=(0.8, 1.2)).mesh, made_up(0.5, dqs=(None, 1.1)).mesh]
+    assert standings(two) == (Standing("dqs", 0.8, 1.2),)
+
+
+def test_only_what_was_not_measured_is_to_be_tried() -> None:
+    assert told("x", 120)[-1].endswith("see what --bulge-clamp or --method cor makes of it")
+    assert told("x", 120, "lbs", "dqs", "cor")[-1].endswith("see what --bulge-clamp makes of it")
+    assert told("y", 120, "lbs")[1] == (
+        "bake it with another method: see first what --method dqs or --method cor makes of it"
+    )
+    assert told("y", 120, "cor")[1] == "bake it with --method cor (cor keeps 100 % of the volume)"
+    clamped = told("x", 120, "lbs", "dqs", clamped=True)
+    assert clamped[1].startswith("bake it with --method dqs --bulge-clamp (")
+    assert not any("see what --bulge-clamp" in line for line in clamped)
+
+
+def test_nobody_is_warned_of_a_bulge_that_nobody_needs() -> None:
+    (line,) = advice([made_up(0.71, lbs=(0.93, 1.15), dqs=(1.0, 1.6))])
+    assert line.startswith("linear blending is good enough")
+    both = [made_up(0.71, lbs=(0.93, 1.0), dqs=(1.0, 1.9)), made_up(0.5, lbs=(0.8, 1.0), dqs=(1.0, 1.0))]
+    assert not any("bulges" in each for each in advice(both)), "it bulges where nothing pinches"
+
+
+def test_a_method_that_loses_more_than_lbs_is_not_recommended() -> None:
+    lines = list(advice([made_up(0.6, lbs=(0.97, 1.0), dqs=(0.9, 1.9))]))
+    assert lines[1:] == [
+        "no other method that was measured keeps more of the volume than lbs (lbs keeps 97 %, dqs keeps 90 %)"
+    ]
+
+
+def test_without_lbs_nothing_is_said_of_its_volume() -> None:
+    (line,) = told("y", 90, "cor")
+    assert (
+        line
+        == "no vertex falls below 0.7 (least 0.707); add --method lbs to see what linear blending leaves of the volume"
+    )
+    (line,) = advice([made_up(0.8, closed=False, dqs=(None, 1.0))])
+    assert line == "linear blending is good enough: no vertex falls below 0.7 (least 0.800)"
+
+
+def test_the_clamp_is_that_of_bake() -> None:
+    """The bent tube by the two ways: its volume by trimesh from a clamped bake; lbs is never clamped."""
+    of, bend, time = tube(), turned("x", 0, 90), np.array([1.0])
+    (free,) = collapse(of, bend, times=time)
+    (held,) = collapse(of, bend, times=time, bulge_clamp=True)
+    whole = bake(of, bend, times=time, method="dqs", bulge_clamp=True).whole()
+    faces = of.instances[0].mesh.faces
+    wanted = [
+        trimesh.Trimesh(each, faces, process=False).volume
+        for each in (whole.positions[0], of.instances[0].mesh.positions)
+    ]
+    assert held.methods[1].volume == pytest.approx([wanted[0] / wanted[1]], rel=1e-4)
+    assert held.methods[1].bulge < free.methods[1].bulge - 0.3
+    assert held.methods[0].volume == pytest.approx(free.methods[0].volume)
+    with pytest.raises(RangeError, match="bulge clamp needs another method than lbs"):
+        collapse(of, bend, times=time, methods=("lbs",), bulge_clamp=True)
 
 
 @pytest.mark.parametrize(("degrees", "joints"), [(10, 1), (36, 1), (37, 2), (90, 3), (180, 5)])
