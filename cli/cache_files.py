@@ -5,24 +5,27 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from anim.caches import formats
+from anim.caches import formats, sequence
+from anim.caches.beginnings import ending_of
 from anim.caches.files import suffix
+from anim.caches.formats import CACHE_FORMATS, Files
 from anim.caches.settings import Reading, Writing, Written
-from anim.errors import AnimError
+from anim.errors import AnimError, FormatError
 from anim.model import VertexCache
-from cli import folders, streams
+from cli import cache_notes, folders, streams
 from cli.errors import UsageError
 
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A cache that was opened: what messages call it, and its format's ending."""
+    """A cache that was opened: what messages call it, its format's ending, and what its reader said."""
 
     cache: VertexCache
     name: str
     ending: str
+    notes: tuple[str, ...]
     _folder: folders.Folder
 
     @property
@@ -33,7 +36,7 @@ class Loaded:
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """Files that were written, the main one last, their size in bytes together, and what the writer said."""
+    """Files that were written, the main one last, their size in bytes together, and what there is to say."""
 
     files: tuple[str, ...]
     size: int
@@ -47,11 +50,15 @@ def load(path: str, reading: Reading) -> Iterator[Loaded]:
     Its frames are read while it is used, so use it inside; errors raised there name the input.
     """
     name = "stdin" if path == streams.PIPE else path or "''"
+    notes: list[str] = []
     with ExitStack() as stack:
         try:
             inputs = folders.inputs(path, stack)
-            ending = suffix(inputs.main) or formats.ending_of(*inputs.beginning())
-            yield Loaded(formats.reader_for(ending)(inputs, reading), name, ending, inputs)
+            ending = _ending(inputs)
+            if path == streams.PIPE:
+                check_pipe(name, ending)
+            cache = formats.reader_for(ending)(inputs, replace(reading, note=notes.append))
+            yield Loaded(cache, name, ending, tuple(notes), inputs)
         except UsageError:
             raise
         except AnimError as error:
@@ -59,43 +66,73 @@ def load(path: str, reading: Reading) -> Iterator[Loaded]:
 
 
 def check(path: str, ending: str | None = None) -> str:
-    """Return the ending of the format that is written to `path`; `ending` instead of the name's own, ".npz" for "-".
+    """Return the ending of the format that is written to `path`: its own, or `ending`; ".npz" for "-" without one.
 
-    Raises UsageError at once, before any work, where nothing can be written or no format is called so.
+    Raises UsageError at once, before any work, where nothing can be written, no format is called so, `ending` and
+    the name's own are two formats, or a pipe is no place for it.
     """
-    if path != streams.PIPE:
+    own = "" if path == streams.PIPE else suffix(path)
+    if path == streams.PIPE:
+        check_pipe("stdout", ending or ".npz")
+    else:
         streams.check_file(path)
-    found = ending or (".npz" if path == streams.PIPE else suffix(path))
-    if found not in formats.CACHE_FORMATS:
-        known = ", ".join(formats.CACHE_FORMATS)
-        raise UsageError(f"{path}: no cache format is called '{found}' (expected {known})")
+    if ending and own in CACHE_FORMATS and own != ending:
+        raise UsageError(
+            f"{path}: the name says {own[1:]}, --format says {ending[1:]}",
+            help="leave --format out, or change the name",
+        )
+    found = ending or own or (".npz" if path == streams.PIPE else "")
+    if found not in CACHE_FORMATS:
+        raise UsageError(f"{path}: no cache format is called '{found}' (expected {', '.join(CACHE_FORMATS)})")
     return found
 
 
-def save(cache: VertexCache, path: str, writing: Writing, *, ending: str | None = None, dry_run: bool = False) -> Saved:
-    """Write a cache, "-" for stdout, in the format that the name's ending says or `ending`.
+def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_run: bool = False) -> Saved:
+    """Write a cache, "-" for stdout, in the format that `check` returned.
 
-    What lies beside the main file (a rest mesh, a JSON) is left out on stdout, and a note says so.
+    What lies beside the main file (a rest mesh) is left out on stdout, and a note says so.
     """
-    write = formats.writer_for(check(path, ending))
+    is_pipe = path == streams.PIPE
+    if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
+        raise UsageError(
+            f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
+            help="convert-cache --at takes one of them",
+        )
     with tempfile.TemporaryDirectory() as away:
         staged = folders.outputs(path, away, dry_run=dry_run)
         try:
-            written = write(cache, staged, writing)
-            size = staged.size
-            if not dry_run and path == streams.PIPE:
-                written = _told(written, staged.to_stdout())
+            written = formats.writer_for(ending)(cache, staged, writing)
+            names = staged.names[-1:] if is_pipe else staged.names
+            size = staged.size(names)
+            if not dry_run and is_pipe:
+                staged.to_stdout()
             elif not dry_run:
                 staged.publish()
         except OSError as error:
             raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
         finally:
             staged.clear()
-    return Saved(staged.names, size, written)
+    lost = cache_notes.not_held(cache, ending)
+    left = cache_notes.no_place(staged.names[:-1]) if is_pipe else cache_notes.left_behind(path, names, ending)
+    return Saved(names, size, replace(written, notes=(*written.notes, *lost, *left)))
 
 
-def _told(written: Written, left: tuple[str, ...]) -> Written:
-    """What the writer said, and which files a pipe has no place for."""
-    if not left:
-        return written
-    return Written(written.max_error, (*written.notes, f"not written, since the output is a pipe: {', '.join(left)}"))
+def _ending(inputs: folders.Folder) -> str:
+    """The format of what is read: by the name, else by the first bytes of it or of its first frame."""
+    own = suffix(inputs.main)
+    if own in CACHE_FORMATS:
+        return own
+    frames = () if inputs.main in inputs.names() else sequence.belonging(inputs.main, inputs.names())
+    head, size = inputs.beginning(frames[0] if frames else inputs.main)
+    try:
+        return ending_of(head, size)
+    except FormatError:
+        if own:
+            return own  # which is then said to be none
+        raise
+
+
+def check_pipe(name: str, ending: str) -> None:
+    """Raise UsageError for a format that one file is not enough for."""
+    if ending in CACHE_FORMATS and CACHE_FORMATS[ending].files is Files.SEVERAL:
+        raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")

@@ -49,7 +49,12 @@ OrderOption = Annotated[
     ),
 ]
 FormatOption = Annotated[
-    Format | None, typer.Option("--format", help="Of OUT; default: by its ending, npz for '-'.", show_default=False)
+    Format | None,
+    typer.Option(
+        "--format",
+        help="Of OUT; a name that ends as another of these is refused; default: by its ending, npz for '-'.",
+        show_default=False,
+    ),
 ]
 MaxError = Annotated[
     str | None,

@@ -19,6 +19,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from anim.caches.beginnings import HEAD
 from anim.caches.files import PIECE
 from anim.errors import FormatError
 from anim.gltf.document import Bytes
@@ -63,10 +64,10 @@ class Folder:
             where = "" if name == self.main else f"'{name}'"
             raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})", where=where) from None
 
-    def beginning(self) -> tuple[bytes, int]:
-        """The first bytes of the main file, and its size."""
-        with self.open(self.main) as file:
-            return file.read(64), self.sizes[self.main]
+    def beginning(self, name: str) -> tuple[bytes, int]:
+        """The first bytes of a file, and its size."""
+        with self.open(name) as file:
+            return file.read(HEAD), self.sizes[name]
 
     def names(self) -> Sequence[str]:
         """Names of all files in the folder."""
@@ -84,10 +85,9 @@ class Staged:
     main: str
     files: dict[str, Path] = field(default_factory=dict)
 
-    @property
-    def size(self) -> int:
-        """Bytes of all files together."""
-        return sum(file.stat().st_size for file in self.files.values())
+    def size(self, names: Sequence[str]) -> int:
+        """Bytes of these files together."""
+        return sum(self.files[name].stat().st_size for name in names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -116,10 +116,9 @@ class Staged:
                 os.chmod(temporary, mode_of(path))
                 os.replace(temporary, path)
 
-    def to_stdout(self) -> tuple[str, ...]:
-        """Write the main file to stdout, and return the names of the others, which are not written."""
+    def to_stdout(self) -> None:
+        """Write the main file to stdout."""
         streams.write_bytes(_pieces(self.files[self.main]), streams.PIPE)
-        return self.names[:-1]
 
     def clear(self) -> None:
         """Remove what is still temporary."""

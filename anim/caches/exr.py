@@ -18,7 +18,7 @@ def write(pixels: AnyArray, outputs: Outputs, name: str) -> None:
     """Write pixels (height, width, 3), float32 or float16, as R, G, B; losslessly packed (ZIP)."""
     package = _package()
     header = {"compression": package.ZIP_COMPRESSION, "type": package.scanlineimage}
-    with paths.written(outputs, name) as path:
+    with paths.written(outputs, name, ".exr") as path:
         package.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(path)
 
 

@@ -62,8 +62,8 @@ class Memory:
 
 
 def beside(name: str, ending: str) -> str:
-    """Return the name of a companion: beside("walk.pc2", "-rest.ply") → "walk-rest.ply"."""
-    return PurePath(name).stem + ending
+    """Return the name of a companion: beside("walk.pc2", "-rest.ply") → "walk.pc2-rest.ply"; no other cache has it."""
+    return PurePath(name).name + ending
 
 
 def suffix(name: str) -> str:

@@ -40,7 +40,13 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
     """
     with whole(inputs, inputs.main) as data:
         document = container.read(np.frombuffer(data, np.uint8))
-    return pages(document) or play.play(document, fps=reading.fps)
+    found = pages(document)
+    if found is not None:
+        return found
+    played = play.play(document, fps=reading.fps)
+    if names := play.directions(document):
+        reading.note(f"{' and '.join(names)} are not played (bake --{' or --'.join(names)} does that)")
+    return played
 
 
 def pages(document: Document) -> VertexCache | None:

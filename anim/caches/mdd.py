@@ -27,8 +27,8 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
         times = np.frombuffer(read_exactly(file, 4 * frames, "the list of times"), ">f4").astype(np.float64)
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise FormatError("times are not increasing")
-    beside = rest.read(inputs, points)
     header = HEADER.size + 4 * frames
+    beside = rest.read(inputs, header, frames, points, reading.note)
     return VertexCache(
         times - min(times[0], 0.0),
         points,
@@ -44,6 +44,6 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
         file.write(cache.times.astype(">f4").tobytes())
-        raw.write(cache, file, ">f4")
-    rest.write(cache, outputs, writing.rest)
+        mark = raw.write(cache, file, ">f4")
+    rest.write(cache, outputs, writing.rest, mark)
     return Written()

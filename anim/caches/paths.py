@@ -14,10 +14,10 @@ from anim.caches.files import PIECE, Inputs, Outputs
 
 
 @contextmanager
-def written(outputs: Outputs, name: str) -> Iterator[str]:
-    """Give a path to write to; what lies there at the end becomes the output `name`."""
+def written(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
+    """Give a path of this ending to write to; what lies there at the end becomes the output `name`."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / name
+        path = Path(folder) / f"output{ending}"
         yield str(path)
         with path.open("rb") as source, outputs.create(name) as target:
             shutil.copyfileobj(source, target, PIECE)

@@ -12,7 +12,7 @@ import struct
 import numpy as np
 
 from anim.arrays import Floats
-from anim.caches import raw, rest
+from anim.caches import pace, raw, rest
 from anim.caches.files import Inputs, Outputs, read_exactly
 from anim.caches.settings import Reading, Writing, Written
 from anim.errors import FormatError, RangeError
@@ -21,7 +21,6 @@ from anim.model import VertexCache
 MAGIC = b"POINTCACHE2\0"
 HEADER = struct.Struct("<12siiffi")
 DEFAULT_FPS = 24.0  # Blender's own default, for files of others that say nothing
-EVEN = 1e-3  # share of a step by which frames may be off their grid
 
 
 def read(inputs: Inputs, reading: Reading) -> VertexCache:
@@ -37,7 +36,7 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
         if not (np.isfinite(start) and np.isfinite(step) and step > 0):
             raise FormatError(f"header has start frame {start:g} and {step:g} frames per sample")
         raw.check_size(file, HEADER.size, samples, points)
-    beside = rest.read(inputs, points)
+    beside = rest.read(inputs, HEADER.size, samples, points, reading.note)
     fps = reading.fps or beside.fps or DEFAULT_FPS
     times = np.round((start + step * np.arange(samples)) / fps, 9)
     return VertexCache(
@@ -57,8 +56,8 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     start = round(float(cache.times[0]) * fps, 6)
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(MAGIC, 1, cache.vertex_count, start, 1.0, cache.frame_count))
-        raw.write(cache, file, "<f4")
-    rest.write(cache, outputs, writing.rest, fps=fps)
+        mark = raw.write(cache, file, "<f4")
+    rest.write(cache, outputs, writing.rest, mark, fps=fps)
     return Written(notes=notes)
 
 
@@ -66,17 +65,13 @@ def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
     """Frames per second, and what has to be said about the last frame, which may come early at a clip's end."""
     if len(times) == 1:
         return DEFAULT_FPS, ()
-    step = float(times[1] - times[0])
-    if len(times) > 2 and round(float(times[-2] - times[0]) / step) == len(times) - 2:
-        step = float(times[-2] - times[0]) / (len(times) - 2)  # rounding of the first step would add up
-    off = np.abs(times - times[0] - step * np.arange(len(times))) / step
-    if len(times) > 2 and off[:-1].max() > EVEN:
-        k = int(np.argmax(off[:-1] > EVEN))
+    step, off = pace.pace(times)
+    if off[:-1].max() > pace.EVEN:
+        k = int(np.argmax(off[:-1] > pace.EVEN))
         raise RangeError(
             f"PC2 has frames at even steps, and frame {k} at {times[k]:.4g} s is off them", help="choose --fps"
         )
     fps = float(f"{1 / step:.6g}")
-    if off[-1] > EVEN:
-        late = f"the last frame is at {times[-1]:.4g} s, {off[-1]:.2g} steps off"
-        return fps, (f"{late}; PC2 shows it one step after the one before",)
+    if off[-1] > pace.EVEN:
+        return fps, (f"{pace.late(times, off)}; PC2 shows it one step after the one before",)
     return fps, ()

@@ -30,6 +30,16 @@ def play(document: Document, *, clip: int = 0, fps: float | None = None) -> Vert
     return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
 
 
+def directions(document: Document) -> tuple[str, ...]:
+    """Return "normals" and "tangents" where a mesh has them, which `play` leaves out."""
+    primitives = [each for mesh in items(document.json, "meshes") for each in mesh.get("primitives", [])]
+    return tuple(
+        word
+        for word, name in (("normals", "NORMAL"), ("tangents", "TANGENT"))
+        if any(name in each.get("attributes", {}) for each in primitives)
+    )
+
+
 def _keys(clip: Clip) -> Floats:
     axes = clip.axes
     return np.unique(np.concatenate(axes)) if axes else np.zeros(1)

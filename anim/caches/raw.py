@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from typing import BinaryIO
 
@@ -38,10 +39,25 @@ def chunks(inputs: Inputs, header: int, frames: int, vertices: int, dtype: str) 
             yield Chunk(first, positions)
 
 
-def write(cache: VertexCache, file: BinaryIO, dtype: str) -> None:
-    """Write all positions as float32 of `dtype`."""
+def write(cache: VertexCache, file: BinaryIO, dtype: str) -> str:
+    """Write all positions as float32 of `dtype`, and return the mark of the first frame."""
+    mark = ""
     for chunk in cache.chunks():
-        file.write(np.ascontiguousarray(chunk.positions, dtype).data)
+        rows = np.ascontiguousarray(chunk.positions, dtype)
+        mark = mark or _mark(rows[0].tobytes(), cache.frame_count)
+        file.write(rows.data)
+    return mark
+
+
+def mark(inputs: Inputs, header: int, frames: int, vertices: int) -> str:
+    """Return the mark of the first of so many frames behind the header, by which a rest mesh knows its cache."""
+    with inputs.open(inputs.main) as file:
+        file.seek(header)
+        return _mark(read_exactly(file, 12 * vertices, "frame 0"), frames)
+
+
+def _mark(frame: bytes, frames: int) -> str:
+    return f"{zlib.crc32(frame, frames):08x}"
 
 
 def per_chunk(vertices: int) -> int:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePath
 
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.caches import raw, still
-from anim.caches.files import Inputs, Outputs, suffix, whole
+from anim.caches import pace, raw, still
+from anim.caches.files import Inputs, Outputs, whole
 from anim.caches.settings import Reading, Writing, Written
 from anim.errors import FormatError
 from anim.model import Chunk, VertexCache
@@ -19,31 +19,31 @@ DEFAULT_FPS = 24.0  # for files of others, which say nothing
 HEAD = 1024  # bytes in which our remark lies
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: Reading, *, ending: str) -> VertexCache:
     """Return the frames that belong together: of walk.ply if it is there, else of all walk_*.ply in order.
 
+    All have the format that `ending` names, whatever they are called.
     Frames that a longer sequence of ours left behind a shorter one are no part of it: the first file says how many are.
     Times are those that our own files say, else frames at `reading.fps` or 24 per second. The first frame gives the
     faces; every other must have as many vertices.
     """
-    names = _members(inputs)
+    names = members(inputs)
     with whole(inputs, names[0]) as data:
-        first = still.read(data, suffix(names[0]))
+        first = still.read(data, ending)
     count = first.remark.get("frames", "")
     names = names[: int(count)] if count.isdecimal() and int(count) else names
     return VertexCache(
         _times(inputs, names, reading.fps),
         len(first.positions),
         first.faces,
-        lambda: _chunks(inputs, names, len(first.positions), first.normals is not None),
+        lambda: _chunks(inputs, names, first, ending),
         has_normals=first.normals is not None,
         up=first.remark.get("up", "y"),
     )
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
-    """Write a file a frame, numbered from 1, or the main file itself where there is only one."""
-    ending = suffix(outputs.main)
+def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+    """Write a file of the format `ending` for each frame, numbered from 1; the main file itself for the only one."""
     faces: Ints = cache.faces
     for chunk in cache.chunks():
         for i, positions in enumerate(chunk.positions):
@@ -54,28 +54,35 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
             with outputs.create(name) as file:
                 file.write(still.write(still.Still(positions, faces, normals, remark), ending))
     notes = ("STL keeps no order of vertices: each triangle has three of its own",) if ending == ".stl" else ()
-    return Written(notes=notes)
+    return Written(notes=(*notes, *pace.notes(cache.times)))
 
 
 def numbered(name: str, number: int) -> str:
     """Return the name of a frame's file: numbered("walk.ply", 7) → "walk_00007.ply"."""
-    return f"{_stem(name)}_{number:05d}{suffix(name)}"
+    return f"{_stem(name)}_{number:05d}{PurePath(name).suffix}"
 
 
-def _stem(name: str) -> str:
-    return re.sub(r"_\d+$", "", PurePath(name).stem)
+def belonging(main: str, names: Iterable[str]) -> Sequence[str]:
+    """Return those of the names that are numbered frames of `main`, in order."""
+    pattern = re.compile(re.escape(_stem(main)) + r"_(\d+)" + re.escape(PurePath(main).suffix))
+    found = sorted((int(match[1]), name) for name in names if (match := pattern.fullmatch(name)))
+    return [name for _, name in found]
 
 
-def _members(inputs: Inputs) -> Sequence[str]:
+def members(inputs: Inputs) -> Sequence[str]:
+    """Return the files that are read for the main one: itself, or its frames. Raises FormatError where none is."""
     names = inputs.names()
     is_numbered = re.search(r"_\d+$", PurePath(inputs.main).stem) is not None
     if inputs.main in names and not is_numbered:
         return [inputs.main]
-    pattern = re.compile(re.escape(_stem(inputs.main)) + r"_(\d+)" + re.escape(PurePath(inputs.main).suffix))
-    found = sorted((int(match[1]), name) for name in names if (match := pattern.fullmatch(name)))
+    found = belonging(inputs.main, names)
     if not found:
         raise FormatError(f"is not there, nor is {numbered(inputs.main, 1)}")
-    return [name for _, name in found]
+    return found
+
+
+def _stem(name: str) -> str:
+    return re.sub(r"_\d+$", "", PurePath(name).stem)
 
 
 def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
@@ -93,13 +100,14 @@ def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
     return np.arange(len(names)) / (fps or DEFAULT_FPS)
 
 
-def _chunks(inputs: Inputs, names: Sequence[str], vertices: int, has_normals: bool) -> Iterator[Chunk]:
+def _chunks(inputs: Inputs, names: Sequence[str], start: still.Still, ending: str) -> Iterator[Chunk]:
+    vertices, has_normals = len(start.positions), start.normals is not None
     step = raw.per_chunk(vertices)
     for first in range(0, len(names), step):
         stills = []
         for name in names[first : first + step]:
             with whole(inputs, name) as data:
-                frame = still.read(data, suffix(name))
+                frame = still.read(data, ending)
             if len(frame.positions) != vertices:
                 raise FormatError(f"'{name}' has {len(frame.positions)} vertices (the first has {vertices})")
             if has_normals and frame.normals is None:

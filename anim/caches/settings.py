@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """fps: frames per second where a format keeps none (PC2, frame sequences, USD without a rate)."""
+    """fps: frames per second where a format keeps none (PC2, frame sequences, USD without a rate).
+
+    note: called with what the user should know about what was read, a line each.
+    """
 
     fps: float | None = None
+    note: Callable[[str], None] = lambda _: None
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,11 @@
 | file | what |
 |---|---|
 | NAME.exr or .png | positions: pixel x, y of vertex v in frame f: x = v % width, y = f · rows_per_frame + v // width |
-| NAME-normal.exr or .png | normals in the same pixels, n · ½ + ½ in a PNG; only where the cache has them |
+| NAME.exr-normal.exr | normals in the same pixels, n · ½ + ½ in a PNG; only where the cache has them |
 | NAME.exr.json | what a shader needs to know: see `texture_about` |
-| NAME-mesh.glb | the mesh at rest; its TEXCOORD_1 is the middle of each vertex's pixel in frame 0 |
+| NAME.exr-mesh.glb | the mesh at rest; its TEXCOORD_1 is the middle of each vertex's pixel in frame 0 |
+
+Beside a NAME.png they are NAME.png-normal.png, NAME.png.json and NAME.png-mesh.glb.
 
 Row 0 is at the top of the file. A pixel p means position = offset + scale · p, plus the mesh at rest where `encoding`
 is "offset"; PNG numbers count from 0 to 1. EXR of floats is lossless and absolute; half floats and PNG are offsets.
@@ -19,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
-from anim.caches import exr, png16, presets, rest, texture_about
-from anim.caches.files import Outputs, beside, suffix
+from anim.caches import exr, pace, png16, presets, rest, texture_about
+from anim.caches.files import Outputs, beside
 from anim.caches.glb_file import VERTICES, GlbFile, primitive
 from anim.caches.presets import Preset
 from anim.caches.settings import Writing, Written
@@ -65,9 +67,8 @@ class Packed:
         return self.offset + self.scale * shares
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
-    """Write textures, JSON and mesh. Raises RangeError where the frames don't fit into 4096 × 8192 pixels."""
-    ending = suffix(outputs.main)
+def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+    """Write textures as ".exr" or ".png", JSON and mesh. Raises RangeError for more than 4096 × 8192 pixels."""
     engine = presets.preset(writing.preset, ending)
     grid = _grid(cache)
     kind = "unorm16" if ending == ".png" else writing.depth
@@ -90,7 +91,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
     _write_mesh(cache, still, grid, engine, outputs, about.mesh)
     with outputs.create(f"{outputs.main}.json") as file:
         file.write(texture_about.text(about, engine))
-    return Written(worst / engine.per_meter, engine.advice)
+    return Written(worst / engine.per_meter, (*engine.advice, *pace.notes(cache.times)))
 
 
 def _grid(cache: VertexCache) -> Grid:

@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches import exr, png16, presets, texture_about
-from anim.caches.files import Inputs, suffix, whole
+from anim.caches.files import Inputs, whole
 from anim.caches.presets import Preset
 from anim.caches.settings import Reading
 from anim.caches.texture import Packed, of_directions
@@ -54,7 +54,7 @@ def _mesh(inputs: Inputs, about: About) -> Mesh:
 
 def _pixels(inputs: Inputs, name: str, about: About) -> AnyArray:
     """The pixels (F, V, 3) of all frames."""
-    if suffix(name) == ".png":
+    if about.format == "unorm16":
         with whole(inputs, name) as data:
             image: AnyArray = png16.read(data)
     else:

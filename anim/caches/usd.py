@@ -15,7 +15,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches import paths, raw, rest
-from anim.caches.files import Outputs, suffix
+from anim.caches.files import Outputs
 from anim.caches.npz import about
 from anim.caches.settings import Writing, Written
 from anim.errors import UnsupportedError
@@ -28,13 +28,16 @@ KEY = "gltf_anim"  # of the layer's custom data: the parts, as in an .npz
 PER_SECOND = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # rates that frames are tried on
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
-    """Write a stage with one mesh; nothing is lost. Raises UnsupportedError without usd-core."""
+def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+    """Write a stage with one mesh, ".usdc" binary or ".usda" text; nothing is lost.
+
+    Raises UnsupportedError without usd-core.
+    """
     usd, geom, vt = package()
     rate = _rate(cache.times)
     codes = np.round(cache.times * rate, 9).tolist()
-    with paths.written(outputs, outputs.main) as path:
-        is_text = suffix(outputs.main) == ".usda"
+    with paths.written(outputs, outputs.main, ending) as path:
+        is_text = ending == ".usda"
         stage = usd.Stage.CreateNew(f"{path}.usdc" if is_text else path)
         geom.SetStageUpAxis(stage, geom.Tokens.z if cache.up == "z" else geom.Tokens.y)
         geom.SetStageMetersPerUnit(stage, 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.caches import paths, raw, usd
-from anim.caches.files import Inputs, suffix
+from anim.caches.files import Inputs
 from anim.caches.npz import parts_of
 from anim.caches.settings import Reading
 from anim.errors import FormatError
@@ -46,7 +46,7 @@ def _opened(inputs: Inputs) -> Iterator[_Stage]:
     usd.package()
     from pxr import Tf
 
-    with paths.readable(inputs, inputs.main, suffix(inputs.main) or ".usd") as path:
+    with paths.readable(inputs, inputs.main, ".usd") as path:
         try:
             with paths.hushed():
                 stage = _Stage(path)

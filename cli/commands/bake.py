@@ -177,7 +177,7 @@ def _say_notes(done: list[_Done], voice: Voice) -> None:
 
 def _summary(done: list[_Done], vertices: int, method: str) -> str:
     file = "stdout" if done[0].file == streams.PIPE else done[0].file
-    name = file if len(done) == 1 else f"{plural(len(done), 'file')}, {file} …"
+    name = file if len(done) == 1 else f"{plural(len(done), 'clip')}, {file} …"
     frames = plural(sum(each.frames for each in done), "frame")
     of = f" of '{done[0].clip}'" if len(done) == 1 and done[0].clip else ""
     parts = [f"{name}  {report.size(sum(each.saved.size for each in done))}", f"{method}{of}"]

@@ -52,9 +52,10 @@ def convert_cache(
 
     Any length goes in little memory, but for .glb morph targets (1 GB of positions) and textures (4096 × 8192 pixels).
 
-    Formats go by the name's ending. PC2 and MDD get a rest mesh beside them with the same order of vertices; for
-    Blender's Mesh Cache modifier use --up z --order blender. Frame sequences (.ply, .obj, .stl) are numbered:
-    walk_00001.ply. Textures (.exr, .png) get a JSON and a mesh beside them.
+    Formats go by the name's ending, else IN's by its first bytes and OUT's by --format. PC2 and MDD get a rest mesh
+    beside them (walk.pc2-rest.ply) with the same order of vertices; for Blender's Mesh Cache modifier use --up z
+    --order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply. Textures (.exr, .png) get a JSON
+    and a mesh beside them. A pipe takes one file: textures don't go through it, of sequences a single frame does.
     """
     voice = report.Voice(quiet)
     began = time.perf_counter()
@@ -81,7 +82,7 @@ def convert_cache(
         size = loaded.size
     if cache.chosen:
         voice.say(f"note: {cache.chosen}; bake takes others by --clip")
-    for note in saved.written.notes:
+    for note in (*loaded.notes, *saved.written.notes):
         voice.say(f"note: {note}")
     name = loaded.name if output == streams.PIPE else output
     parts = [

@@ -14,8 +14,9 @@ import typer
 
 from anim.arrays import Floats
 from anim.caches import glb
+from anim.caches.beginnings import HEAD, ending_of
 from anim.caches.files import Memory, suffix
-from anim.caches.formats import CACHE_FORMATS, ending_of, reader_for
+from anim.caches.formats import CACHE_FORMATS, reader_for
 from anim.caches.settings import Reading
 from anim.gltf import container, read
 from anim.gltf.document import Document
@@ -89,7 +90,8 @@ def render(
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
     when = When(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
-    with _opened(input) as (seen, name):
+    notes: list[str] = []
+    with _opened(input, notes) as (seen, name):
         if isinstance(seen, VertexCache):
             if clip or method:
                 raise UsageError(f"--{'clip' if clip else 'method'} means nothing to a vertex cache")
@@ -109,6 +111,8 @@ def render(
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, around, title=title, look=look))
     streams.write_bytes([np.frombuffer(drawn, np.uint8)], output)
+    for note in notes:
+        voice.say(f"note: {note}")
     frames = report.plural(sum(len(row.times) for row in rows), "frame")
     called = name if output == streams.PIPE else output
     voice.say(f"{called}  {report.size(len(drawn))}, {frames}, {time.perf_counter() - began:.1f} s")
@@ -125,23 +129,29 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str) -> Iterator[tuple[Document | VertexCache, str]]:
-    """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes."""
+def _opened(path: str, notes: list[str]) -> Iterator[tuple[Document | VertexCache, str]]:
+    """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes.
+
+    notes: gets what readers say.
+    """
     if path != streams.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
         with cache_files.load(path, Reading()) as loaded:
+            notes += loaded.notes
             yield loaded.cache, loaded.name
     elif path != streams.PIPE:
         with streams.source(path) as source:
             yield glb.pages(source.document) or source.document, source.name
     else:
         with streams.content(path) as (data, name):
-            head = data[:64].tobytes()
+            head = data[:HEAD].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data)
                 yield glb.pages(document) or document, name
             else:
-                reader = reader_for(ending_of(head, len(data)))
-                yield reader(Memory(name, {name: data.tobytes()}), Reading()), name
+                ending = ending_of(head, len(data))
+                cache_files.check_pipe(name, ending)
+                reader = reader_for(ending)
+                yield reader(Memory(name, {name: data.tobytes()}), Reading(note=notes.append)), name
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:

@@ -52,7 +52,7 @@ def test_several_clips_need_a_place_for_their_names(call: Call, fixture: Fixture
     run = call("bake", source, tmp_path / "arm-{clip}.npz", "-v", "--fps", 24)
     assert run.code == 0
     assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["arm-bend.npz", "arm-twist.npz"]
-    assert run.err.splitlines()[-1].startswith("2 files, ")
+    assert run.err.splitlines()[-1].startswith("2 clips, ")
     assert len(run.err.splitlines()) == 3
 
 

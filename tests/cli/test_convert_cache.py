@@ -47,7 +47,8 @@ def test_every_format_becomes_every_other(first: str, second: str, walk: Path, c
 def test_one_line_says_what_came_of_it(walk: Path, call: Call) -> None:
     run = call("convert-cache", walk, walk.with_name("a.mdd"))
     assert run.out == b""
-    (line,) = run.err.splitlines()
+    note, line = run.err.splitlines()
+    assert note == "note: normals are left out: mdd has no place for them"
     assert line.endswith("s")
     for words in ("a.mdd  ", "kB", "7 frames of 9 vertices", "2 files"):
         assert words in line

@@ -134,3 +134,25 @@ def test_a_cache_has_no_clips(call: Call, tmp_path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"hello", b"glTF"])
 def test_bad_input(data: bytes, call: Call) -> None:
     refusal(call("render", stdin=data), 3)
+
+
+def test_one_frame_of_any_format_comes_through_a_pipe(call: Call) -> None:
+    for name in ("a.ply", "a.stl", "a.obj"):
+        data = call("convert-cache", "-", "-", "--at", "0", "--format", name[2:], stdin=_npz()).product()
+        assert call("render", *SMALL, stdin=data).product().startswith(b"\x89PNG")
+    line = refusal(call("render", *SMALL, stdin=b"\x76\x2f\x31\x01" + bytes(100)), 2)
+    assert "several files" in line
+
+
+def test_what_a_reader_says_is_said(call: Call, tmp_path: Path) -> None:
+    for file, data in written(cache(), "a.pc2")[0].files.items():
+        (tmp_path / file).write_bytes(data)
+    rest = (tmp_path / "a.pc2-rest.ply").read_bytes()
+    (tmp_path / "a.pc2-rest.ply").unlink()
+    (tmp_path / "a-rest.ply").write_bytes(rest.replace(b" of=", b" by="))  # as earlier versions wrote it
+    run = call("render", tmp_path / "a.pc2", tmp_path / "a.png", *SMALL)
+    assert "note: faces and axes are those of 'a-rest.ply'" in run.err
+
+
+def _npz() -> bytes:
+    return written(cache(), "a.npz")[0].files["a.npz"]

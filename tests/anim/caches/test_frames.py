@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from anim.caches import extent
-from anim.caches.formats import CACHE_FORMATS, ending_of, reader_for
+from anim.caches.beginnings import ending_of
+from anim.caches.formats import CACHE_FORMATS, reader_for
 from anim.caches.frames import at_rate, at_time, at_times
 from anim.caches.order import ordered
 from anim.errors import FormatError, RangeError, UnsupportedError

@@ -56,8 +56,8 @@ def test_mdd_by_numpy() -> None:
 def test_the_rest_mesh_has_the_same_order(name: str, ending: str) -> None:
     source = cache()
     files, _ = written(source, name, Writing(rest=ending))
-    assert sorted(files.files) == sorted([name, f"walk-rest{ending}"])
-    mesh = by_trimesh(files.files[f"walk-rest{ending}"], ending)
+    assert sorted(files.files) == sorted([name, f"{name}-rest{ending}"])
+    mesh = by_trimesh(files.files[f"{name}-rest{ending}"], ending)
     assert mesh.vertices == pytest.approx(source.rest, abs=1e-6)
     assert mesh.faces.tolist() == FACES.tolist()
     back = opened(files)

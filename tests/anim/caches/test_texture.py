@@ -126,7 +126,7 @@ def test_the_mesh_beside_finds_its_pixels() -> None:
     every = []
     for preset in ("godot", "three"):
         files, _ = written(wide(), "a.exr", Writing(preset=preset))
-        every.append(files.files["a-mesh.glb"])
+        every.append(files.files["a.exr-mesh.glb"])
         gltf: Any = GLTF2().load_from_bytes(every[-1])
         accessor = gltf.accessors[gltf.meshes[0].primitives[0].attributes.TEXCOORD_1]
         view = gltf.bufferViews[accessor.bufferView]
@@ -156,7 +156,7 @@ def test_too_many_frames_are_refused() -> None:
         written(many, "a.png")
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.png.json", "a-mesh.glb", "a-normal.png"])
+@pytest.mark.parametrize("name", ["a.png", "a.png.json", "a.png-mesh.glb", "a.png-normal.png"])
 @pytest.mark.parametrize("cut", [0, 30, -2, None])
 def test_damaged_or_missing_files_are_refused(name: str, cut: int | None) -> None:
     files, _ = written(cache(), "a.png")
@@ -166,6 +166,19 @@ def test_damaged_or_missing_files_are_refused(name: str, cut: int | None) -> Non
         files.files[name] = files.files[name][: cut if name != "a.png.json" or cut != -2 else -4]
     with pytest.raises(FormatError):
         opened(files).whole()
+
+
+def test_companions_are_those_that_the_json_names() -> None:
+    """Earlier versions called them a-mesh.glb and a-normal.png."""
+    files, _ = written(cache(), "a.png")
+    for ending in ("mesh.glb", "normal.png"):
+        files.files[f"a-{ending}"] = files.files.pop(f"a.png-{ending}")
+        files.files["a.png.json"] = files.files["a.png.json"].replace(
+            f"a.png-{ending}".encode(), f"a-{ending}".encode()
+        )
+    back = opened(files)
+    assert (back.faces == FACES).all()
+    assert normals_of(back) == pytest.approx(normals_of(cache()), abs=1e-3)
 
 
 def test_other_pngs_are_refused() -> None:
