@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -31,16 +31,49 @@ class Batch(Alike):
         return interpolate(place, self.values, self.tangents, self.interpolation, self.kind)
 
 
-def batches(tracks: Iterable[Track]) -> list[Batch]:
-    """Return `tracks` stacked by time axis and `alike.rule`, in the order of their first members.
+class Stack:
+    """Tracks of one rule and with the same times, whose keys are stacked when they are needed.
+
+    That is all keys at once where half of them are, or where parts have been asked for that are twice as many together;
+    else only those: a clip that is played from start to end is never in memory twice, and begins sooner.
+    """
+
+    def __init__(self, tracks: tuple[Track, ...]) -> None:
+        self.tracks = tracks
+        self.times = tracks[0].times
+        self._stacked = 0
+        self._whole: Batch | None = None
+
+    @property
+    def whole(self) -> Batch:
+        """All keys."""
+        if self._whole is None:
+            self._whole = Batch(self.tracks, self.times, *put_together(self.tracks, partial(np.stack, axis=1)))
+        return self._whole
+
+    def at(self, place: Located) -> tuple[Batch, Located]:
+        """Return a batch of keys among which are those of `place`, and where in it they are."""
+        low, high = (int(place.left.min()), int(place.right.max()) + 1) if len(place.left) else (0, 0)
+        self._stacked += high - low
+        keys = len(self.times)
+        if self._whole is not None or 2 * (high - low) >= keys or self._stacked > 2 * keys:
+            return self.whole, place
+        joined = put_together(self.tracks, lambda each: np.stack([values[low:high] for values in each], axis=1))
+        moved = replace(place, left=place.left - low, right=place.right - low)
+        return Batch(self.tracks, self.times[low:high], *joined), moved
+
+
+def stacks(tracks: Iterable[Track]) -> list[Stack]:
+    """Return `tracks` by time axis and `alike.rule`, in the order of their first members.
 
     Time axes are the same where they are one array: tracks read from one input accessor share it.
     """
     groups: dict[tuple[int, Rule], list[Track]] = {}
     for track in tracks:
         groups.setdefault((id(track.times), rule(track)), []).append(track)
-    return [_stacked(tuple(group)) for group in groups.values()]
+    return [Stack(tuple(group)) for group in groups.values()]
 
 
-def _stacked(tracks: tuple[Track, ...]) -> Batch:
-    return Batch(tracks, tracks[0].times, *put_together(tracks, partial(np.stack, axis=1)))
+def batches(tracks: Iterable[Track]) -> list[Batch]:
+    """Return `tracks` stacked as `stacks` sorts them."""
+    return [each.whole for each in stacks(tracks)]

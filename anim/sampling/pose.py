@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import matrix
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling.batch import Batch, batches
+from anim.sampling.batch import Batch, stacks
 from anim.sampling.track import Located, locate
 
 Sampler: TypeAlias = Callable[[Batch, Floats, Located], Floats]
@@ -23,7 +23,7 @@ def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
 
 
 class Poses:
-    """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked once.
+    """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked where they are needed.
 
     sample: gives the values of tracks at times, by default as glTF says.
     """
@@ -32,7 +32,7 @@ class Poses:
         self._skeleton = skeleton
         self._sample = sample
         nodes = len(skeleton)
-        self._batches = batches(track for track in clip.tracks if track.node is not None and track.node < nodes)
+        self._stacks = stacks(track for track in clip.tracks if track.node is not None and track.node < nodes)
 
     def sampled(self, sample: Sampler) -> Poses:
         """Return the same clip on the same skeleton, with the values of its tracks given by another sampler."""
@@ -50,10 +50,11 @@ class Poses:
         }
         weights: dict[int, Floats] = {}
         places: dict[int, Located] = {}
-        for batch in self._batches:
-            place = places.get(id(batch.times))
-            if place is None:
-                place = places[id(batch.times)] = locate(batch.times, at)
+        for stack in self._stacks:
+            found = places.get(id(stack.times))
+            if found is None:
+                found = places[id(stack.times)] = locate(stack.times, at)
+            batch, place = stack.at(found)
             values = self._sample(batch, at, place)
             numbers = [track.node for track in batch.tracks if track.node is not None]
             if batch.tracks[0].path == "weights":

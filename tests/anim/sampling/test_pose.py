@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from anim import arrays
 from anim.arrays import Floats
 from anim.gltf import read
+from anim.measure.players import PLAYERS, sampler
 from anim.model import Clip, Skeleton
 from anim.sampling import pose, rest, world_matrices
-from anim.sampling.track import sample
+from anim.sampling.batch import stacks
+from anim.sampling.pose import Poses
+from anim.sampling.track import locate, sample
 from fixtures.broken.pieces import text
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened, opened_fixture
@@ -128,3 +132,37 @@ def _world(nodes: Skeleton, moved: Clip, node: int, t: float) -> Floats:
 def _quaternions(n: int) -> Floats:
     q = RNG.normal(size=(n, 4))
     return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
+
+
+@pytest.mark.parametrize("name", ["interpolations", "biped", "morph_cube", "accessors"])
+def test_stretches_of_time_are_the_whole(name: str) -> None:
+    """Few keys are stacked for themselves, then all: the same bits, outside the keys too."""
+    document = opened_fixture(name)
+    skeleton = read.skeleton(document)
+    for played in read.clips(document):
+        times = np.linspace(played.start - 0.1, played.end + 0.1, 301)
+        for player in PLAYERS:
+            wanted = Poses(skeleton, played, sampler(player)).at(times)
+            stretch = Poses(skeleton, played, sampler(player))
+            for _ in range(2):
+                for low in range(0, len(times), 7):
+                    part = stretch.at(times[low : low + 7])
+                    for field in ("translation", "rotation", "scale"):
+                        assert np.array_equal(getattr(part, field), getattr(wanted, field)[low : low + 7])
+                    for node, weights in wanted.weights.items():
+                        assert np.array_equal(part.weights[node], weights[low : low + 7])
+
+
+def test_keys_are_stacked_where_they_are_needed_and_all_in_the_end() -> None:
+    times = arrays.times(np.arange(100))
+    moving = [track("translation", times, np.tile(times[:, None], 3), node=node) for node in (0, 1)]
+    (stack,) = stacks(moving)
+    for low in range(0, 200, 10):
+        at = np.linspace(low % 100 + 0.5, low % 100 + 3.5, 5)
+        batch, place = stack.at(locate(stack.times, at))
+        assert len(batch.times) == 5
+        assert batch.sample(at, place)[:, 1, 2].tolist() == at.tolist()
+    seen = [len(stack.at(locate(stack.times, np.array([low + 0.5])))[0].times) for low in range(60)]
+    assert (seen[0], seen[-1]) == (2, 100)
+    (fresh,) = stacks(moving)
+    assert len(fresh.at(locate(times, times[:60]))[0].times) == 100, "half of them at once"
