@@ -91,6 +91,8 @@ def writing(ending: str, given: Mapping[str, Any]) -> Writing:
     for name in said:
         if name not in takes:
             raise UsageError(f"--{name.replace('_', '-')} means nothing to {ending}")
+    if "max_error" in said and str(said.get("layout", "")).startswith("flip"):
+        raise UsageError("--max-error means nothing to a flip-book, which has every frame as it is")
     if "rest" in said:
         said["rest"] = "" if said["rest"] == "none" else f".{said['rest']}"
     plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}

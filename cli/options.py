@@ -12,7 +12,8 @@ Output = Annotated[
     str, typer.Argument(metavar="OUT", help="A .glb or .gltf file, '-' for stdout (GLB).", show_default=False)
 ]
 Clips = Annotated[
-    list[str] | None, typer.Option("--clip", metavar="GLOB", help="Only clips of this name; may be repeated.")
+    list[str] | None,
+    typer.Option("--clip", metavar="GLOB", help="Only clips of this name, or '#0', '#1', …; may be repeated."),
 ]
 Nodes = Annotated[
     list[str] | None, typer.Option("--node", metavar="GLOB", help="Only nodes of this name; may be repeated.")

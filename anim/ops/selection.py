@@ -44,14 +44,19 @@ class Selection:
 def matching(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
     """Return the numbers of the names that match any of the globs; of all without a glob. what: "clip", for messages.
 
+    "#3" is number 3, whatever it is called.
     Raises NotFoundError for a glob that matches none, and says which name is near.
     """
     if not globs:
         return list(range(len(names)))
     for glob in globs:
-        if not any(fnmatchcase(name, glob) for name in names):
+        if not any(_is_meant(i, name, glob) for i, name in enumerate(names)):
             raise NotFoundError(f"no {what} matches '{glob}'", help=_suggestion(glob, names, what))
-    return [i for i, name in enumerate(names) if any(fnmatchcase(name, glob) for glob in globs)]
+    return [i for i, name in enumerate(names) if any(_is_meant(i, name, glob) for glob in globs)]
+
+
+def _is_meant(number: int, name: str, glob: str) -> bool:
+    return glob == f"#{number}" or fnmatchcase(name, glob)
 
 
 def _suggestion(glob: str, names: Iterable[str], what: str) -> str:

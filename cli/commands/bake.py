@@ -41,7 +41,8 @@ def bake(
     *,
     method: Annotated[Method, typer.Option("--method", help=ABOUT)] = LBS,
     blend: Annotated[
-        float | None, typer.Option("--blend", metavar="0..1", help="Share of the method; the rest is lbs.")
+        float | None,
+        typer.Option("--blend", metavar="0..1", help="Share of the method; the rest is lbs.", min=0, max=1),
     ] = None,
     bulge_clamp: Annotated[
         bool, typer.Option("--bulge-clamp", help="Keep skin no farther from the links between joints than at rest.")
@@ -153,7 +154,8 @@ def _files(output: str, clips: list[tuple[str, int]]) -> list[str]:
     for name, number in clips or [("", 0)]:
         plain = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ") or str(number)
         file = output.replace(PLACE, plain)
-        names.append(output.replace(PLACE, f"{plain}-{number}") if file in names else file)
+        taken = file.casefold() in {each.casefold() for each in names}  # to some file systems these are one name
+        names.append(output.replace(PLACE, f"{plain}-{number}") if taken else file)
     return names
 
 

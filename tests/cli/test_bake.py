@@ -63,6 +63,10 @@ def test_names_that_no_file_can_have(call: Call, tmp_path: Path) -> None:
     (tmp_path / "odd.glb").write_bytes(glb_of(Document({**document.json, "animations": animations}, document.buffers)))
     assert call("bake", tmp_path / "odd.glb", tmp_path / "{clip}.npz", "-q").code == 0
     assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["a_b_c-1.npz", "a_b_c.npz"]
+    animations = [{**each, "name": name} for each, name in zip(animations, ("Walk", "walk"), strict=True)]
+    (tmp_path / "odd.glb").write_bytes(glb_of(Document({**document.json, "animations": animations}, document.buffers)))
+    assert call("bake", tmp_path / "odd.glb", tmp_path / "{clip}.pc2", "--fps", 9, "-q").code == 0
+    assert sorted(path.name for path in tmp_path.glob("*.pc2")) == ["Walk.pc2", "walk-1.pc2"]
 
 
 def test_every_format_is_written(call: Call, fixture: Fixture, tmp_path: Path) -> None:
@@ -157,7 +161,7 @@ def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
         (("--fps", "0"), 2, "--fps is 0 (expected a number above 0)"),
         (("--method", "lsb"), 2, "'lsb' is none of lbs, dqs, cor"),
         (("--blend", "0.5"), 2, "blend needs another method than lbs"),
-        (("--method", "dqs", "--blend", "2"), 2, "blend is 2 (expected 0 … 1)"),
+        (("--method", "dqs", "--blend", "2"), 2, "2 is too large (expected at most 1)"),
         (("--mesh", "hand"), 5, "no mesh matches 'hand'"),
         (("--clip", "twits"), 5, "no clip matches 'twits'"),
         (("--quantize",), 2, "--quantize means nothing to .npz"),

@@ -167,3 +167,9 @@ def test_one_frame_of_any_format_reads_the_same_by_name_and_pipe(tmp_path: Path,
         call("convert-cache", tmp_path / f"a{ending}", tmp_path / "one.npz").product()
         call("convert-cache", "-", tmp_path / "two.npz", stdin=files[f"a{ending}"]).product()
         assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+
+
+def test_a_flip_book_has_no_error_to_bound(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    args = ("--clip", "bend", "--layout", "flip-scale", "--max-error", "1mm")
+    line = refusal(call("bake", fixture("arm"), tmp_path / "a.glb", *args), 2)
+    assert "--max-error means nothing to a flip-book" in line
