@@ -14,8 +14,14 @@ from anim.caches.formats import CACHE_FORMATS, Files
 from anim.caches.settings import Reading, Writing, Written
 from anim.errors import AnimError, FormatError
 from anim.model import VertexCache
-from cli import cache_notes, folders, streams
+from cli import cache_notes, folders, loading, streams
 from cli.errors import UsageError
+
+LIBRARIES = {
+    **dict.fromkeys((".ply", ".obj", ".stl", ".pc2", ".mdd"), ("trimesh",)),
+    **dict.fromkeys((".usdc", ".usda"), ("pxr.UsdGeom",)),
+    ".exr": ("OpenEXR",),
+}  # that formats need
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +63,7 @@ def load(path: str, reading: Reading) -> Iterator[Loaded]:
             ending = _ending(inputs)
             if path == streams.PIPE:
                 check_pipe(name, ending)
+            loading.load(*LIBRARIES.get(ending, ()))
             cache = formats.reader_for(ending)(inputs, replace(reading, note=notes.append))
             yield Loaded(cache, name, ending, tuple(notes), inputs)
         except UsageError:
@@ -98,6 +105,7 @@ def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_ru
             f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
             help="convert-cache --at takes one of them",
         )
+    loading.load(*LIBRARIES.get(ending, ()))
     with tempfile.TemporaryDirectory() as away:
         staged = folders.outputs(path, away, dry_run=dry_run)
         try:
