@@ -63,12 +63,11 @@ class Mesh:
 
     def __post_init__(self) -> None:
         arrays.check_shape(self.positions, "V 3", name="positions")
+        where = f"mesh '{self.name}'" if self.name else ""
         if len(self.weights) and self.weights.size and self.weights.min() < 0:
-            raise FormatError(f"a skin weight is negative ({self.weights.min():g})", where=f"mesh '{self.name}'")
+            raise FormatError(f"a skin weight is negative ({self.weights.min():g})", where=where)
         if self.faces.size and int(self.faces.max()) >= len(self.positions):
-            raise FormatError(
-                f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=f"mesh '{self.name}'"
-            )
+            raise FormatError(f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=where)
 
 
 @dataclass(frozen=True, slots=True)
