@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -38,17 +38,17 @@ def left_out(scene: Scene, nodes: Sequence[int] | None, voice: Voice) -> None:
         voice.say(f"note: {count} vertices that only nodes move are left out; --rigid takes them in")
 
 
-def gaps(found: Mapping[str, Missed], rest: Floats, voice: Voice) -> None:
+def gaps(found: Sequence[tuple[str, Missed]], rest: Floats, voice: Voice) -> None:
     """Say how far vertices are off the straight way between frames, of the clip where that can be seen best.
 
-    found: by the names of clips. rest: (V, 3) m, for their size.
+    found: what clips of these names miss. rest: (V, 3) m, for their size.
     """
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) if len(rest) else 0.0
-    seen = {name: missed for name, missed in found.items() if missed.distance > SHOWN * diagonal}
+    seen = [(missed, name) for name, missed in found if missed.distance > SHOWN * diagonal]
     if seen:
-        name = max(seen, key=lambda each: seen[each].distance)
+        missed, name = max(seen)
         others = f" ({len(seen)} clips have such places)" if len(seen) > 1 else ""
         voice.say(
-            f"note: between frames a vertex is up to {report.length(seen[name].distance)} off the straight way, at "
-            f"{seen[name].time:.3g} s of {name}{others}; --fps puts more frames there"
+            f"note: between frames a vertex is up to {report.length(missed.distance)} off the straight way, at "
+            f"{missed.time:.3g} s of {name}{others}; --fps puts more frames there"
         )

@@ -17,12 +17,6 @@ from anim.model import VertexCache
 from cli import cache_notes, folders, loading, streams
 from cli.errors import UsageError
 
-LIBRARIES = {
-    **dict.fromkeys((".ply", ".obj", ".stl", ".pc2", ".mdd"), ("trimesh",)),
-    **dict.fromkeys((".usdc", ".usda"), ("pxr.UsdGeom",)),
-    ".exr": ("OpenEXR",),
-}  # that formats need
-
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
@@ -63,8 +57,9 @@ def load(path: str, reading: Reading) -> Iterator[Loaded]:
             ending = _ending(inputs)
             if path == streams.PIPE:
                 check_pipe(name, ending)
-            loading.load(*LIBRARIES.get(ending, ()))
-            cache = formats.reader_for(ending)(inputs, replace(reading, note=notes.append))
+            read = formats.reader_for(ending)
+            loading.load(CACHE_FORMATS[ending].library)
+            cache = read(inputs, replace(reading, note=notes.append))
             yield Loaded(cache, name, ending, tuple(notes), inputs)
         except UsageError:
             raise
@@ -94,6 +89,12 @@ def check(path: str, ending: str | None = None) -> str:
     return found
 
 
+def check_pipe(name: str, ending: str) -> None:
+    """Raise UsageError for a format that one file is not enough for."""
+    if ending in CACHE_FORMATS and CACHE_FORMATS[ending].files is Files.SEVERAL:
+        raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")
+
+
 def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_run: bool = False) -> Saved:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
@@ -105,7 +106,8 @@ def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_ru
             f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
             help="convert-cache --at takes one of them",
         )
-    loading.load(*LIBRARIES.get(ending, ()))
+    has_rest = writing.rest and "rest" in CACHE_FORMATS[ending].takes
+    loading.load("trimesh" if has_rest else CACHE_FORMATS[ending].library)
     with tempfile.TemporaryDirectory() as away:
         staged = folders.outputs(path, away, dry_run=dry_run)
         try:
@@ -138,9 +140,3 @@ def _ending(inputs: folders.Folder) -> str:
         if own:
             return own  # which is then said to be none
         raise
-
-
-def check_pipe(name: str, ending: str) -> None:
-    """Raise UsageError for a format that one file is not enough for."""
-    if ending in CACHE_FORMATS and CACHE_FORMATS[ending].files is Files.SEVERAL:
-        raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")

@@ -79,16 +79,13 @@ def as_json(seen: Seen) -> str:
 
 
 def _head(seen: Seen, *, every: bool) -> str:
-    about = (
-        f"{seen.name}: {plural(seen.clips, 'clip')}, {seen.meshes} skinned {'mesh' if seen.meshes == 1 else 'meshes'}"
-    )
-    clamped = ", ".join(each for each in seen.methods if each != "lbs")
-    clamp = f"; {clamped} with --bulge-clamp" if seen.clamped else ""
-    return (
-        about
-        + clamp
-        + ("" if every or seen.meshes < 2 or not seen.clips else "; the worst mesh of each clip (-v: all)")
-    )
+    meshes = f"{seen.meshes} skinned {'mesh' if seen.meshes == 1 else 'meshes'}"
+    parts = [f"{seen.name}: {plural(seen.clips, 'clip')}, {meshes}"]
+    if seen.clamped:
+        parts.append(f"{', '.join(each for each in seen.methods if each != 'lbs')} with --bulge-clamp")
+    if not every and seen.meshes > 1 and seen.clips:
+        parts.append("the worst mesh of each clip (-v: all)")
+    return "; ".join(parts)
 
 
 def _row(found: Found) -> list[tables.Cell]:

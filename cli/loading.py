@@ -11,12 +11,11 @@ from contextlib import contextmanager, suppress
 STOPS = (signal.SIGINT, signal.SIGTERM)
 
 
-def load(*names: str) -> None:
-    """Import modules where they are installed; an interrupt takes effect when they are there."""
-    with _held():
-        for name in names:
-            with suppress(ImportError):
-                importlib.import_module(name)
+def load(name: str) -> None:
+    """Import a module if it is installed, "" for none; an interrupt takes effect when it is there."""
+    if name:
+        with _held(), suppress(ImportError):
+            importlib.import_module(name)
 
 
 @contextmanager

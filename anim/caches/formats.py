@@ -31,6 +31,7 @@ class CacheFormat:
     """One format. about: for --help. takes: the fields of Reading and Writing that mean something to it.
 
     holds: "normals" and "tangents", where there is a place for them beside positions. files: which ones a cache is.
+    library: the module of others that reads and writes it, "" for none.
     """
 
     about: str
@@ -39,18 +40,34 @@ class CacheFormat:
     takes: frozenset[str] = frozenset()
     holds: frozenset[str] = frozenset()
     files: Files = Files.ONE
+    library: str = ""
 
 
 NORMALS = frozenset(("normals",))
 BOTH = frozenset(("normals", "tangents"))
 RATE = frozenset(("read_fps",))
 
+
+def _frames(ending: str, about: str, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
+    read, write = partial(sequence.read, ending=ending), partial(sequence.write, ending=ending)
+    return CacheFormat(about, read, write, RATE, holds, Files.FRAMES, "trimesh")
+
+
+def _usd(ending: str, about: str) -> CacheFormat:
+    return CacheFormat(about, usd_read.read, partial(usd.write, ending=ending), RATE, BOTH, library="pxr.UsdGeom")
+
+
+def _texture(ending: str, about: str, *takes: str, library: str = "") -> CacheFormat:
+    write = partial(texture.write, ending=ending)
+    return CacheFormat(about, texture_read.read, write, frozenset(takes), NORMALS, Files.SEVERAL, library)
+
+
 CACHE_FORMATS: dict[str, CacheFormat] = {
     ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write, holds=BOTH),
     ".pc2": CacheFormat("point cache of 3ds Max and Blender", pc2.read, pc2.write, frozenset(("read_fps", "rest"))),
     ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, frozenset(("rest",))),
-    ".usdc": CacheFormat("USD, binary (extra usd)", usd_read.read, partial(usd.write, ending=".usdc"), RATE, BOTH),
-    ".usda": CacheFormat("USD, text (extra usd)", usd_read.read, partial(usd.write, ending=".usda"), RATE, BOTH),
+    ".usdc": _usd(".usdc", "USD, binary (extra usd)"),
+    ".usda": _usd(".usda", "USD, text (extra usd)"),
     ".glb": CacheFormat(
         "glTF: morph targets or a flip-book",
         glb.read,
@@ -58,45 +75,11 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         frozenset(("read_fps", "max_error", "quantize", "layout")),
         BOTH,
     ),
-    ".exr": CacheFormat(
-        "vertex animation texture, float (extra exr)",
-        texture_read.read,
-        partial(texture.write, ending=".exr"),
-        frozenset(("preset", "depth")),
-        NORMALS,
-        Files.SEVERAL,
-    ),
-    ".png": CacheFormat(
-        "vertex animation texture, 16 bit",
-        texture_read.read,
-        partial(texture.write, ending=".png"),
-        frozenset(("preset",)),
-        NORMALS,
-        Files.SEVERAL,
-    ),
-    ".ply": CacheFormat(
-        "a mesh a frame",
-        partial(sequence.read, ending=".ply"),
-        partial(sequence.write, ending=".ply"),
-        RATE,
-        NORMALS,
-        Files.FRAMES,
-    ),
-    ".obj": CacheFormat(
-        "a mesh a frame, as text",
-        partial(sequence.read, ending=".obj"),
-        partial(sequence.write, ending=".obj"),
-        RATE,
-        NORMALS,
-        Files.FRAMES,
-    ),
-    ".stl": CacheFormat(
-        "a mesh a frame, without order",
-        partial(sequence.read, ending=".stl"),
-        partial(sequence.write, ending=".stl"),
-        RATE,
-        files=Files.FRAMES,
-    ),
+    ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", "preset", "depth", library="OpenEXR"),
+    ".png": _texture(".png", "vertex animation texture, 16 bit", "preset"),
+    ".ply": _frames(".ply", "a mesh a frame"),
+    ".obj": _frames(".obj", "a mesh a frame, as text"),
+    ".stl": _frames(".stl", "a mesh a frame, without order", holds=frozenset()),
 }
 
 

@@ -35,7 +35,7 @@ class Stack:
     """Tracks of one rule and with the same times, whose keys are stacked when they are needed.
 
     That is all keys at once where half of them are, or where parts have been asked for that are twice as many together;
-    else only those: a clip that is played from start to end is never in memory twice, and begins sooner.
+    else only those: a long clip that is played from start to end isn't in memory twice, and begins sooner.
     """
 
     def __init__(self, tracks: tuple[Track, ...]) -> None:

@@ -83,14 +83,12 @@ def filmstrip(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: L
 def moving(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: Look = Look()) -> Iterator[Image]:
     """Yield the pictures (H, W, 3) of an endless film, the rows side by side; the shorter ones wait for the longest.
 
-    A loop's last frame, which is its first, isn't shown twice. Raises RangeError for more pixels than memory should
-    hold.
+    Raises RangeError for more pixels than memory should hold.
     """
     scenery = _scenery(around, look)
     width, height = scenery.camera.width, scenery.camera.height
     header = _header_height(rows, title)
-    times = max((row.times for row in rows), key=len)
-    times = times[: len(times) - _is_loop(rows)]
+    times = film_times(rows)
     frames = [_held(_frames(row, scenery, _most(rows))) for row in rows]
     across = max(2 * EDGE + len(rows) * (width + GAP) - GAP, _header_width(rows, title))
     _check_size(header + height + EDGE, across, len(times))
@@ -106,6 +104,15 @@ def moving(rows: Sequence[Row], around: AnyArray, *, title: str = "", look: Look
         left = EDGE + width - 8 - glyphs.width(said, size=LETTER)
         glyphs.write(sheet, said, left, header + height - LOW, size=LETTER, color=FAINT)
         yield sheet
+
+
+def film_times(rows: Sequence[Row]) -> Floats:
+    """Return the times (F,) s of a film of the rows: of the longest; a loop's last frame, which is its first, is none.
+
+    At least one row.
+    """
+    times = max((row.times for row in rows), key=len)
+    return times[:-1] if _is_loop(rows) else times
 
 
 def _held(frames: Iterator[Image]) -> Iterator[Image]:

@@ -111,6 +111,8 @@ def of_document(document: Document, clips: Sequence[int], methods: Sequence[str]
             whole = bake(scene, clip, times=path, method=method, rigid=True)
             colors = palette.of_faces(cache, _materials(document))
             found.append(Shot(name, method if methods else "", cache, whole, colors))
+    if not found:
+        raise RangeError(f"no clip has a frame at {', '.join(f'{time:g} s' for time in when.at)}")
     return found
 
 

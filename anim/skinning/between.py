@@ -13,7 +13,7 @@ from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
 
-WIDE = 0.05  # s; frames closer than this show all that a clip does
+WIDE = 0.05  # s; frames closer than this are as close as most clips are made
 MOST = 16  # gaps that are looked into, the widest
 
 

@@ -110,11 +110,12 @@ def bake(
         )
         if not rigid:
             bake_notes.left_out(scene, nodes, voice)
-        missed: dict[str, Missed] = {}
+        missed: list[tuple[str, Missed]] = []
         for each, file in zip([clips[i] for i in numbers] or [Clip("", ())], files, strict=True):
             times = _times(each, fps)
             if fps is None and not quiet:
-                missed[read.label(each.name, numbers[len(done)] if numbers else 0)] = between(made, each, times)
+                label = read.label(each.name, numbers[len(done)] if numbers else 0)
+                missed.append((label, between(made, each, times)))
             progress = Progress(PurePath(file).name, len(times), shown=not quiet)
             cache = _turned(made.bake(each, times=times, progress=progress), up, order)
             try:
@@ -153,9 +154,10 @@ def _files(output: str, clips: list[tuple[str, int]]) -> list[str]:
     names: list[str] = []
     for name, number in clips or [("", 0)]:
         plain = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ") or str(number)
-        file = output.replace(PLACE, plain)
-        taken = file.casefold() in {each.casefold() for each in names}  # to some file systems these are one name
-        names.append(output.replace(PLACE, f"{plain}-{number}") if taken else file)
+        taken = {each.casefold() for each in names}  # to some file systems "Walk" and "walk" are one name
+        while (file := output.replace(PLACE, plain)).casefold() in taken:
+            plain += f"-{number}"
+        names.append(file)
     return names
 
 

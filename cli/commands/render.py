@@ -99,21 +99,22 @@ def render(
         else:
             names = read.names(seen)
             numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
-            if is_moving and count is not None and len(numbers) > 1:
+            if is_moving and count is not None and count > 1 and len(numbers) > 1:
                 when = _one_rate(seen, numbers, when)
             found = shots.of_document(seen, numbers, [str(each) for each in method or ()], when)
         rows, around = shots.rows(found, heated=heat)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
         look = Look(size, azimuth, elevation)
         if is_moving:
+            times = filmstrip.film_times(rows)
             pictures = filmstrip.moving(rows, around, title=title, look=look)
-            drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(rows[0].times))
+            drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(times))
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, around, title=title, look=look))
     streams.write_bytes([np.frombuffer(drawn, np.uint8)], output)
     for note in notes:
         voice.say(f"note: {note}")
-    frames = report.plural(sum(len(row.times) for row in rows), "frame")
+    frames = report.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == streams.PIPE else output
     voice.say(f"{called}  {report.size(len(drawn))}, {frames}, {time.perf_counter() - began:.1f} s")
 
@@ -159,7 +160,7 @@ def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:
     clips = read.clips(document)
     spans = [when.span(clips[i].start, clips[i].end) for i in numbers]
     longest = max(last - first for first, last in spans)
-    return replace(when, count=None, fps=max((when.count or 1) - 1, 1) / longest) if longest > 0 else when
+    return replace(when, count=None, fps=((when.count or 0) - 1) / longest) if longest > 0 else when
 
 
 def _one_clip(found: Sequence[Shot]) -> str:

@@ -67,6 +67,10 @@ def test_names_that_no_file_can_have(call: Call, tmp_path: Path) -> None:
     (tmp_path / "odd.glb").write_bytes(glb_of(Document({**document.json, "animations": animations}, document.buffers)))
     assert call("bake", tmp_path / "odd.glb", tmp_path / "{clip}.pc2", "--fps", 9, "-q").code == 0
     assert sorted(path.name for path in tmp_path.glob("*.pc2")) == ["Walk.pc2", "walk-1.pc2"]
+    three = [{**animations[0], "name": name} for name in ("a-2", "a", "a")]
+    (tmp_path / "odd.glb").write_bytes(glb_of(Document({**document.json, "animations": three}, document.buffers)))
+    assert call("bake", tmp_path / "odd.glb", tmp_path / "{clip}.mdd", "--fps", 9, "-q").code == 0
+    assert sorted(path.name for path in tmp_path.glob("*.mdd")) == ["a-2-2.mdd", "a-2.mdd", "a.mdd"]
 
 
 def test_every_format_is_written(call: Call, fixture: Fixture, tmp_path: Path) -> None:

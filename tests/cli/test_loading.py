@@ -39,7 +39,8 @@ def test_an_interrupt_takes_effect_when_the_library_is_there(greedy: str) -> Non
 
 
 def test_what_is_not_installed_is_left_to_whoever_needs_it() -> None:
-    loading.load("no_such_library", "json")
+    loading.load("no_such_library")
+    loading.load("")
 
 
 def test_other_threads_load_as_usual() -> None:

@@ -136,6 +136,25 @@ def test_bad_input(data: bytes, call: Call) -> None:
     refusal(call("render", stdin=data), 3)
 
 
+def test_a_film_says_how_many_frames_it_has(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    """Walking is a loop of 1 s: the frame at its end is the one at its start."""
+    run = call("render", fixture("biped"), tmp_path / "a.webp", "--clip", "walk", "--fps", "10", *SMALL)
+    assert opened(tmp_path / "a.webp").n_frames == 10
+    assert ", 10 frames, " in run.err
+
+
+def test_one_frame_is_one_for_several_clips_too(asset: Find, call: Call, tmp_path: Path) -> None:
+    call("render", asset("Fox.glb"), tmp_path / "a.webp", "--clip", "*", "--frames", "1", *SMALL).product()
+    assert opened(tmp_path / "a.webp").n_frames == 1
+
+
+def test_a_time_between_all_clips_is_refused(call: Call, tmp_path: Path) -> None:
+    trimmed = call("trim", "-", "--clip", "bend", "--from", "0.6", stdin=built("arm")).product()
+    trimmed = call("trim", "-", "--clip", "twist", "--to", "0.4", stdin=trimmed).product()
+    line = refusal(call("render", "-", tmp_path / "a.png", "--clip", "*", "--at", "0.5", *SMALL, stdin=trimmed), 2)
+    assert "no clip has a frame at 0.5 s" in line
+
+
 def test_one_frame_of_any_format_comes_through_a_pipe(call: Call) -> None:
     for name in ("a.ply", "a.stl", "a.obj"):
         data = call("convert-cache", "-", "-", "--at", "0", "--format", name[2:], stdin=_npz()).product()

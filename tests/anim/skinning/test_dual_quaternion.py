@@ -178,6 +178,26 @@ def test_the_volume_of_the_tube(name: str, fraction: float, axis: str, loss: flo
         assert left["cor"] == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.parametrize(("name", "fraction"), [("tube", 1.0), ("tube_f03", 0.3)])
+@pytest.mark.parametrize("angle", [45.0, 90.0, 135.0, 180.0])
+def test_a_twist_turns_every_vertex_as_its_blended_quaternion(name: str, fraction: float, angle: float) -> None:
+    """By 2 atan2(w sin(θ/2), 1 − w + w cos(θ/2)) about the axis: nothing of a radius is lost, up to a half turn.
+
+    What the enclosed volume lacks of 1 then (0.0013 at most, by a half turn over 30 %) is the facets', not the skin's.
+    """
+    of = read.scene(opened_fixture(name))
+    body, half = of.instances[0].mesh, np.radians(angle) / 2
+    share = (body.weights * (body.joints == 1)).sum(axis=1)
+    turn = 2 * np.arctan2(share * np.sin(half), 1 - share + share * np.cos(half))
+    x, y, z = body.positions.T
+    wanted = np.stack((x * np.cos(turn) + z * np.sin(turn), y, z * np.cos(turn) - x * np.sin(turn)), axis=1)
+    played = clip(track("rotation", [0], about("y", [angle]), node=1))
+    assert np.abs(baked(of, played, np.zeros(1), method="dqs")[0] - wanted).max() < 1e-7
+    linear = bake(of, played, times=np.zeros(1)).whole().positions[0]
+    rest, posed = volumes(np.stack((body.positions.astype(np.float32), linear)), body.faces)
+    assert posed / rest == pytest.approx(1 - 2 / 3 * fraction * np.sin(half) ** 2, abs=1e-3)
+
+
 def test_opposite_rotations_stay_finite() -> None:
     """Half turns and equal weights: the pivot's weight is left in the blend, whatever the others do."""
     body = mesh([[1, 0, 0]] * 2, [[0, 1]] * 2, [[0.5, 0.5], [0.3, 0.7]])
