@@ -1,10 +1,11 @@
 # `make demo` and `make test` set up everything themselves from a bare Python 3.11+.
 PYTHON ?= python3
+BPY_PYTHON ?= python3.11
 BIN := .venv/bin
 OUT := demo-out
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test slow format clean
+.PHONY: demo test slow blender format clean
 
 demo: $(BIN)/.installed
 	@$(BIN)/python -m fixtures $(OUT)/fixtures 2>/dev/null
@@ -20,6 +21,9 @@ test: $(BIN)/.installed
 slow: $(BIN)/.installed
 	$(BIN)/python -m pytest -n auto -m slow
 
+# Blender's module, which plays what we write in some slow tests: 370 MB, for one version of Python, so in its own venv.
+blender: .venv-blender/.installed
+
 format: $(BIN)/.installed
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
@@ -29,5 +33,11 @@ $(BIN)/.installed: pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	@touch $@
 
+.venv-blender/.installed: Makefile
+	$(BPY_PYTHON) -m venv .venv-blender
+	.venv-blender/bin/python -m pip install --quiet --disable-pip-version-check 'bpy==5.0.*'
+	.venv-blender/bin/python -c 'import bpy'
+	@touch $@
+
 clean:
-	rm -rf .venv $(OUT) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-blender $(OUT) .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -24,6 +24,7 @@ def floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     """Return `values` as a read-only float64 array of the named shape, every number finite.
 
     shape: one word per axis, a number for a fixed length and a letter for any: "K 3", "F N 4", "K C".
+    An array that its owner can write to is copied; one that is read-only already is shared.
     Raises ShapeError for a wrong shape or type, RangeError for NaN or infinity.
     floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
     """
@@ -35,7 +36,8 @@ def floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     if not _is_finite(array):
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise RangeError(f"{name} holds {array[at]} at {list(at)} (expected finite numbers)")
-    return read_only(array)
+    fresh = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.dtype != array.dtype)
+    return read_only(array) if fresh else own(array)
 
 
 def times(values: ArrayLike, *, name: str = "times") -> Floats:
@@ -80,6 +82,11 @@ def _is_finite(array: AnyArray) -> bool:
     """Whether every number is finite; the sum of squares is a quick yes for all but huge numbers."""
     flat = array.reshape(-1)
     return math.isfinite(flat.dot(flat)) or bool(np.isfinite(array).all())
+
+
+def own(array: NDArray[Any]) -> NDArray[Any]:
+    """Return `array` itself if it is read-only, else a read-only copy, which later writes by its owner don't reach."""
+    return read_only(array.copy(order="K") if array.flags.writeable else array)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -18,17 +18,25 @@ class AnimError(Exception):
 
     problem: what is wrong, with what was got and what was expected. One line.
     where: the place from the outside in, "clip 'walk', track 3"; empty if the message says all.
-    help: one line that says what to do, or empty.
+    help: one line that says what to do, or empty; tracebacks show it too.
     """
 
     def __init__(self, problem: str, *, where: str = "", help: str = "") -> None:
         super().__init__(problem)
         self.problem = problem
         self.where = where
-        self.help = help
+        self.help = ""
+        self.advise(help)
 
     def __str__(self) -> str:
         return f"{self.where}: {self.problem}" if self.where else self.problem
+
+    def advise(self, help: str) -> Self:
+        """Return this error with `help`, unless it has some already; tracebacks show it as a note."""
+        if help and not self.help:
+            self.help = help
+            self.add_note(f"help: {help}")
+        return self
 
     def at(self, where: str, separator: str = ", ") -> Self:
         """Return this error with `where` put in front of its place: the caller knows more of the way."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,7 @@ from anim.caches.settings import Reading, Writing, Written
 from anim.errors import AnimError, FormatError
 from anim.model import VertexCache
 from cli import cache_notes, folders, loading, streams
-from cli.errors import UsageError
+from cli.errors import OutputError, UsageError, not_written
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,23 +61,23 @@ def load(path: str, reading: Reading) -> Iterator[Loaded]:
             loading.load(CACHE_FORMATS[ending].library)
             cache = read(inputs, replace(reading, note=notes.append))
             yield Loaded(cache, name, ending, tuple(notes), inputs)
-        except UsageError:
+        except (UsageError, OutputError):
             raise
         except AnimError as error:
             raise error.at(name, ": ") from None
 
 
-def check(path: str, ending: str | None = None) -> str:
+def check(path: str, ending: str | None = None, placeholders: Sequence[str] = ()) -> str:
     """Return the ending of the format that is written to `path`: its own, or `ending`; ".npz" for "-" without one.
 
     Raises UsageError at once, before any work, where nothing can be written, no format is called so, `ending` and
-    the name's own are two formats, or a pipe is no place for it.
+    the name's own are two formats, or a pipe is no place for it. placeholders: what may stand in the name as {this}.
     """
     own = "" if path == streams.PIPE else suffix(path)
     if path == streams.PIPE:
         check_pipe("stdout", ending or ".npz")
     else:
-        streams.check_file(path)
+        streams.check_file(path, placeholders)
     if ending and own in CACHE_FORMATS and own != ending:
         raise UsageError(
             f"{path}: the name says {own[1:]}, --format says {ending[1:]}",
@@ -115,11 +115,11 @@ def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_ru
             names = staged.names[-1:] if is_pipe else staged.names
             size = staged.size(names)
             if not dry_run and is_pipe:
-                staged.to_stdout()
+                folders.to_stdout(staged)
             elif not dry_run:
-                staged.publish()
+                staged.commit()
         except OSError as error:
-            raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
+            raise not_written(path, error) from None
         finally:
             staged.clear()
     lost = cache_notes.not_held(cache, ending)

@@ -10,7 +10,7 @@ from pathlib import Path
 from anim.caches import sequence
 from anim.caches.formats import CACHE_FORMATS, Files
 from anim.model import VertexCache
-from cli import report
+from cli import links, report
 
 
 def not_held(cache: VertexCache, ending: str) -> tuple[str, ...]:
@@ -29,7 +29,7 @@ def left_behind(path: str, written: Sequence[str], ending: str) -> tuple[str, ..
     """Return which frames of an earlier sequence are still beside those that were written to `path`."""
     if CACHE_FORMATS[ending].files is not Files.FRAMES:
         return ()
-    target, there = Path(path), []
+    target, there = links.followed(Path(path)), []
     with suppress(OSError):
         there = os.listdir(target.parent)
     notes = []

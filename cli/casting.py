@@ -5,37 +5,48 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, replace
 
+from anim.errors import NotFoundError
 from anim.exchange import aliases
+from anim.exchange.humanoid import stated_roles
+from anim.exchange.left_over import left_over, with_left_over
 from anim.exchange.onto import onto
 from anim.exchange.retarget import Floor
-from anim.gltf import author, read
-from anim.gltf.document import Document, items
-from cli import conversion, streams
+from anim.gltf import author, read, write
+from anim.gltf.document import Document
+from anim.ops.selection import Selection
+from cli import conversion, report, scenes, streams
 from cli.conversion import Conversion
 from cli.errors import CheckError
+from cli.report import Voice
 
 
 @dataclass(frozen=True, slots=True)
 class Casting:
-    """What --onto is told: pairs of names, what heights the hips get, the time of the rest pose, and the limit."""
+    """What --onto is told: pairs of names, what heights the hips get, the time of the rest pose, and the limit.
+
+    replaced: index of the clip that gives way to the new one; None where it is added.
+    """
 
     names: dict[str, str]
     floor: Floor
     rest_at: float | None
     fail_unmatched: int | None
+    replaced: int | None = None
 
 
-def cast(made: Conversion, document: Document, casting: Casting) -> tuple[Conversion, Document]:
-    """Return the conversion with what became of it on the character, and the document with the clip.
+def cast(made: Conversion, character: streams.Source, casting: Casting, voice: Voice) -> tuple[Conversion, Document]:
+    """Return the conversion with what became of it on the character, and its document with the clip.
 
     Raises CheckError where more joints are without a partner than may be.
     """
-    scene = read.scene(document)
+    document = character.document
+    scene = scenes.scene(document, character.name, voice)
     done = onto(
         made.converted,
         scene,
         aliases=casting.names,
         nested=made.motion.nested,
+        stated=stated_roles(document.json),
         floor=casting.floor,
         rest_at=casting.rest_at,
     )
@@ -45,7 +56,18 @@ def cast(made: Conversion, document: Document, casting: Casting) -> tuple[Conver
             f"{len(left)} joints without a partner (limit {casting.fail_unmatched}): {conversion.listed(left)}",
             help="name partners in an --alias file; an empty target leaves a joint out",
         )
-    return replace(made, onto=done, character=scene.skeleton), author.add_clips(document, [done.clip])
+    made = replace(made, onto=done, character=scene.skeleton)
+    if casting.replaced is not None:
+        old = read.clips(document)[casting.replaced]
+        stay, num_gone = left_over(old, done)
+        if stay:
+            voice.say(f"note: {report.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
+        if num_gone:
+            what = f"{report.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
+            voice.warn(f"{what} go with it: it is another figure's motion")
+        clip = with_left_over(done, stay, scene.skeleton)
+        return made, write.replace_clips(document, {casting.replaced: clip})
+    return made, author.add_clips(document, [done.clip])
 
 
 def pairs(path: str | None) -> dict[str, str]:
@@ -56,14 +78,40 @@ def pairs(path: str | None) -> dict[str, str]:
         return aliases.read(data.tobytes())
 
 
-def renamed(made: Conversion, document: Document) -> Conversion:
-    """Return the conversion with another name of its clip where the character has one so called."""
-    taken = {clip.get("name") for clip in items(document.json, "animations")}
-    name = made.converted.clip.name
-    if name not in taken:
+def named(made: Conversion, document: Document, *, name: str | None, replaced: int | None) -> Conversion:
+    """Return the conversion with the name that its clip gets in the character's file, and a note where it is taken.
+
+    name: as asked for, which stays; None for the motion's own, which gets a number where a clip has it. replaced:
+    index of the clip whose place it takes, and whose name.
+    """
+    names = read.names(document)
+    if replaced is not None:
+        return _called(made, names[replaced])
+    own = made.converted.clip.name
+    if own not in names:
         return made
-    new = next(f"{name} {number}" for number in itertools.count(2) if f"{name} {number}" not in taken)
-    note = f"the character has a clip '{name}': this one is called '{new}' (--name says otherwise)"
-    motion = replace(made.motion, notes=(*made.motion.notes, note))
-    clip = replace(made.converted.clip, name=new)
+    if name is not None:
+        index = names.index(own)
+        note = f"a second clip '{own}': #{len(names)} beside #{index}, which players and diff find first"
+        return _called(made, own, f"{note} (--replace '#{index}' takes its place)")
+    new = next(f"{own} {number}" for number in itertools.count(2) if f"{own} {number}" not in names)
+    note = f"the character has a clip '{own}': this one is called '{new}'"
+    return _called(made, new, f"{note} (--name says otherwise; --replace '{own}' takes its place)")
+
+
+def index_of(replaced: str | None, document: Document) -> int | None:
+    """Return the index of the one clip that a name or '#number' means. Raises NotFoundError for none or several."""
+    if replaced is None:
+        return None
+    names = read.names(document)
+    found = Selection((replaced,)).chosen_clips(names)
+    if len(found) > 1:
+        listed = ", ".join(f"#{i} '{names[i]}'" for i in found[: conversion.LISTED])
+        raise NotFoundError(f"--replace '{replaced}' means {len(found)} clips (expected one)", help=f"one of {listed}")
+    return found[0]
+
+
+def _called(made: Conversion, name: str, *notes: str) -> Conversion:
+    motion = replace(made.motion, notes=(*made.motion.notes, *notes))
+    clip = replace(made.converted.clip, name=name)
     return replace(made, motion=motion, converted=replace(made.converted, clip=clip))

@@ -23,6 +23,7 @@ class Seen:
     """What was looked at, and what was found.
 
     name: of the file. meshes: how many skinned ones. clamped: whether methods other than lbs had the bulge clamp.
+    warnings: said of the file, for the report.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Seen:
     clamped: bool
     fps: float
     found: Sequence[Found]
+    warnings: Sequence[str] = ()
 
     @property
     def clips(self) -> int:
@@ -74,6 +76,7 @@ def as_json(seen: Seen) -> str:
         "skinned_meshes": seen.meshes,
         "clips": list(clips.values()),
         "advice": list(advice(seen.found, clamped=seen.clamped)),
+        "warnings": list(seen.warnings),
     }
     return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
@@ -91,15 +94,15 @@ def _head(seen: Seen, *, every: bool) -> str:
 def _row(found: Found) -> list[tables.Cell]:
     mesh = found.mesh
     worst = mesh.worst
-    two = worst.angle > 0
+    two = worst.joint != worst.other
     cells: list[tables.Cell] = [
         found.clip,
         mesh.mesh,
         f"{worst.index:.2f}",
         _percent(mesh.low),
         _percent(mesh.inverted),
-        f"{worst.time:.2f} s" if two else None,
-        f"{worst.joint} ~ {worst.other}" if two else None,
+        f"{worst.time:.2f} s" if worst.joint else None,
+        f"{worst.joint} ~ {worst.other}" if two else worst.joint or None,
         f"{math.degrees(worst.angle):.0f}° {'twist' if worst.twist else 'bend'}" if two else None,
     ]
     cells += [None if each.volume is None else f"{100 * each.volume.min():.0f} %" for each in mesh.methods]
@@ -107,7 +110,7 @@ def _row(found: Found) -> list[tables.Cell]:
 
 
 def _percent(share: float) -> str | None:
-    return f"{100 * share:.2g} %" if share else None
+    return f"{100 * share:{'.0f' if share > 0.1 else '.2g'}} %" if share else None
 
 
 def _mesh(mesh: MeshCollapse) -> dict[str, Any]:
@@ -145,4 +148,7 @@ def _fared(fared: Fared, mesh: MeshCollapse) -> dict[str, Any]:
         "bulge_joint": fared.joint,
         "bulge_time_s": fared.time,
         "share_bulging": fared.bulging,
+        "max_off_lbs_m": fared.off,
+        "max_off_lbs_time_s": fared.off_time,
+        "unusable": fared.unusable,
     }

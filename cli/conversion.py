@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
 
+from anim.exchange.alignment import Measure
 from anim.exchange.from_euler import Converted
 from anim.exchange.gimbal import NEAR, GimbalRow
 from anim.exchange.motion import EulerMotion
@@ -17,12 +18,19 @@ from cli import report, tables
 
 SCHEMA = 1
 LISTED = 8  # names in a line
+WORDS = {
+    Measure.JOINTS: "the path is scaled by the distances of the matched joints at rest",
+    Measure.EXTENT: "the path is scaled by the sizes of both figures at rest",
+}
 NEAR_DEG = round(degrees(NEAR))
 
 
 @dataclass(frozen=True, slots=True)
 class Conversion:
-    """A motion, what became of it, and on whom. scale_words: where meters_per_unit comes from."""
+    """A motion, what became of it, and on whom.
+
+    scale_words: where meters_per_unit comes from; is_guess: whether that is not certain.
+    """
 
     format: str
     motion: EulerMotion
@@ -32,12 +40,24 @@ class Conversion:
     gimbal: tuple[GimbalRow, ...]
     onto: Onto | None = None
     character: Skeleton | None = None
+    is_guess: bool = False
+
+
+def warnings(made: Conversion) -> Iterator[str]:
+    """Yield what was guessed or put right, a line each: it changes the meaning of times, lengths and poses."""
+    yield from made.motion.notes
+    if made.is_guess:
+        yield f"scale: {made.scale_words}"
+    if made.onto is not None and made.onto.num_bound:
+        moved = f"{report.plural(made.onto.num_bound, 'joint')} of the character rest elsewhere than its skin was bound"
+        yield f"{moved}: that pose is taken for the rest"
+    if made.onto is not None:
+        yield from _guesses(made.onto)
 
 
 def lines(made: Conversion, *, verbose: bool) -> Iterator[str]:
     """Yield what a person wants to know, one line each; tables where verbose."""
-    yield from (f"note: {note}" for note in made.motion.notes)
-    if made.scale_words:
+    if made.scale_words and not made.is_guess:
         yield f"scale: {made.scale_words}"
     if made.format != "bvh":
         yield from _angles_line(made.motion)
@@ -59,8 +79,8 @@ def counts(made: Conversion) -> str:
     )
 
 
-def as_json(made: Conversion) -> str:
-    """Return the report as one JSON document: schema, units in the keys."""
+def as_json(made: Conversion, *, warnings: Sequence[str]) -> str:
+    """Return the report as one JSON document: schema, units in the keys. warnings: said so far."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "format": made.format,
@@ -69,7 +89,7 @@ def as_json(made: Conversion) -> str:
         "joints": len(made.converted.skeleton) - len(made.converted.ends),
         "keys": sum(len(track.times) for track in made.converted.clip.tracks),
         "meters_per_unit": made.meters_per_unit,
-        "notes": list(made.motion.notes),
+        "warnings": list(warnings),
         "gimbal": [asdict(row) for row in made.gimbal],
     }
     if made.onto is not None and made.character is not None:
@@ -79,6 +99,7 @@ def as_json(made: Conversion) -> str:
             "unmatched": [names[a] for a in made.onto.matching.unmatched],
             "path_scale": made.onto.scale,
             "lowered_m": list(made.onto.lowered),
+            "joints_at_bind_pose": made.onto.num_bound,
         }
     return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
@@ -139,3 +160,12 @@ def _onto_lines(made: Conversion, onto: Onto, character: Skeleton, *, verbose: b
         yield f"onto: path × {onto.scale:.3g}{moved}"
     if verbose:
         yield from (f"  {names[a]} → {character.names[b]}" for a, b in onto.matching.pairs.items())
+
+
+def _guesses(onto: Onto) -> Iterator[str]:
+    """What the path and the floor had to do without, where the builds differ."""
+    if onto.without and onto.measure not in (None, Measure.BUILD):
+        made = [WORDS[onto.measure]] if onto.measure in WORDS else []
+        made += ["soles are not put on the floor (as with --floor keep)"] if "feet" in onto.without else []
+        made = made or ["the topmost matched joint carries the path"]
+        yield f"not matched: {', '.join(onto.without)}; {', and '.join(made)}"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from anim.gltf.read import clip_name
 from anim.measure.diff import ClipDiff, Diff
 from anim.measure.footprint import Footprint
 from anim.measure.statistics import Peak
@@ -36,7 +37,8 @@ class Found:
     """What was found about two files, and how it was measured.
 
     nodes_by_name: how many nodes of the old file have a namesake in the new one. are_named: whether both files call
-    anything by a name. player: who plays both. fps: frames per second of the grid. shell: m.
+    anything by a name. player: who plays both, or two, "spec,nlerp". fps: frames per second of the grid. shell: m.
+    measured_at: "surface" or, where the old file has no vertices, "nodes".
     """
 
     old: File
@@ -47,6 +49,7 @@ class Found:
     player: str
     fps: float
     shell: float
+    measured_at: str
 
     @property
     def clips_by_name(self) -> int:
@@ -71,8 +74,8 @@ def text(found: Found) -> str:
     return head + table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
 
 
-def as_json(found: Found) -> str:
-    """Return the same as one JSON document, units in the keys."""
+def as_json(found: Found, *, warnings: Sequence[str] = ()) -> str:
+    """Return the same as one JSON document, units in the keys. warnings: said of the files."""
     diff = found.diff
     content = {
         "schema": SCHEMA,
@@ -81,16 +84,18 @@ def as_json(found: Found) -> str:
         "grid_fps": found.fps,
         "shell_m": found.shell,
         "diagonal_m": diff.diagonal,
+        "measured_at": found.measured_at,
         "meshes_agree_by_vertex": diff.by_vertex,
         "clips_matched_by_name": found.clips_by_name,
         "nodes_matched_by_name": found.nodes_by_name,
         "max_error_m": diff.clips[0].error.max_error if diff.clips else 0.0,
         "max_error_percent": _percent(diff.clips[0].error.max_error, diff.diagonal) if diff.clips else 0.0,
         "clips": [_clip(each, diff.diagonal) for each in diff.clips],
-        "missing_clips": [_name(found.old.clips[i], i) for i in diff.missing_clips],
-        "added_clips": [_name(found.new.clips[i], i) for i in diff.added_clips],
+        "missing_clips": [clip_name(found.old.clips[i], i) for i in diff.missing_clips],
+        "added_clips": [clip_name(found.new.clips[i], i) for i in diff.added_clips],
         "missing_nodes": list(diff.missing_nodes),
         "added_nodes": list(diff.added_nodes),
+        "warnings": list(warnings),
     }
     return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
@@ -103,7 +108,7 @@ def worst(found: Found) -> str:
         return "0 mm"
     vertex = f", vertex {error.vertex}" if error.vertex >= 0 else ""
     percent = f" ({_share(_percent(error.max_error, found.diff.diagonal))} %)" if found.diff.diagonal else ""
-    clip = _name(each.name, each.old)
+    clip = clip_name(each.name, each.old)
     return f"{length(error.max_error)}{percent} in '{clip}' at '{error.joint}'{vertex}, {error.time:.3f} s"
 
 
@@ -113,7 +118,8 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
     ends = f"{each.end_old:.4g} → {each.end_new:.4g}" if abs(each.end_old - each.end_new) > SAME_END else ""
     changed = [f"−{len(each.missing)}"] * bool(each.missing) + [f"+{len(each.added)}"] * bool(each.added)
     return [
-        _name(each.name, each.old) + (f" → {_name(each.new_name, each.new)}" if each.new_name != each.name else ""),
+        clip_name(each.name, each.old)
+        + (f" → {clip_name(each.new_name, each.new)}" if each.new_name != each.name else ""),
         error.joint,
         str(error.vertex) if error.vertex >= 0 else "",
         f"{error.time:.3f}" if moved else "",
@@ -134,8 +140,8 @@ def _alone(found: Found) -> list[str]:
     """Lines about what only one of the files has."""
     diff, lines = found.diff, []
     for names, which in (
-        ([_name(found.old.clips[i], i) for i in diff.missing_clips], f"clip only in {found.old.name}"),
-        ([_name(found.new.clips[i], i) for i in diff.added_clips], f"clip only in {found.new.name}"),
+        ([clip_name(found.old.clips[i], i) for i in diff.missing_clips], f"clip only in {found.old.name}"),
+        ([clip_name(found.new.clips[i], i) for i in diff.added_clips], f"clip only in {found.new.name}"),
         (diff.missing_nodes, f"node only in {found.old.name}"),
         (diff.added_nodes, f"node only in {found.new.name}"),
     ):
@@ -153,6 +159,8 @@ def _summary(found: Found) -> list[str]:
     old, new = found.old, found.new
     count = plural(len(found.diff.clips), "clip")
     motion = f"{count} compared, max {worst(found)}" if found.diff.clips else "no clips to compare"
+    if "," in found.player:
+        return [motion, f"{old.name}, as {found.player.replace(',', ' and as ')} show it"]
     cost = f"animation {change(old.cost.total, new.cost.total)}"
     return [motion, f"{old.name} → {new.name}: {change(old.size, new.size)}, {cost}, of it JSON {_json_part(found)}"]
 
@@ -169,8 +177,8 @@ def _file(file: File) -> dict[str, Any]:
 def _clip(each: ClipDiff, diagonal: float) -> dict[str, Any]:
     error, found = each.error, each.statistics
     return {
-        "clip": _name(each.name, each.old),
-        "other_clip": _name(each.new_name, each.new),
+        "clip": clip_name(each.name, each.old),
+        "other_clip": clip_name(each.new_name, each.new),
         "max_error_m": error.max_error,
         "max_error_percent": _percent(error.max_error, diagonal),
         "certified_error_m": each.certified,
@@ -217,7 +225,3 @@ def _share(value: float) -> str:
     if 0 < value < 1e-4:
         return "<0.0001"
     return digits(value, 3 if value >= 100 else 2)
-
-
-def _name(name: str, number: int) -> str:
-    return name or f"#{number}"

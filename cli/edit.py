@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from anim.errors import AnimError
 from anim.gltf import read, write
 from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document
 from anim.measure.error import MotionError, Ruler
+from anim.measure.findings import badly_stored
 from anim.model import Clip, Scene, Skeleton
 from anim.ops.selection import Selection
-from cli import report, streams
+from cli import images, report, scenes, streams
+from cli.lengths import lengths
 
-Change = Callable[[Clip, frozenset[int], Skeleton], Clip]
+Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
+Clips = Mapping[int, Clip]  # by their number in the file
 
 
 @dataclass(frozen=True, slots=True)
 class Edited:
-    """Clips of a file before and after, by number, and the worst that happened to the surface."""
+    """Clips of a file before and after, by number, and the worst that happened to the surface.
+
+    at_nodes: whether the surface could not be read, so that only nodes were measured.
+    """
 
     before: dict[int, Clip]
     after: dict[int, Clip]
     worst: MotionError | None
     diagonal: float
+    at_nodes: bool = False
 
 
 def edit(
@@ -38,32 +46,38 @@ def edit(
     *,
     dry_run: bool,
     measure: bool = True,
+    notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
 ) -> None:
     """Change the selected clips of one file and write it; one line on stderr says what came of it.
 
-    change: gets a clip, the numbers of its selected tracks and the skeleton, returns the new clip.
+    change: gets a clip, the numbers of its selected tracks, and what reads the scene; returns the new clip.
     measure: compare the motion of the written file with that of the input, on the surface.
+    notes: gets the clips that are changed, before and after, and returns what a user should know, a line each.
     """
     began = time.perf_counter()
     if not dry_run:
         streams.check_output(output)
-    with streams.source(path) as source:
+    with streams.source(path, voice) as source:
         document = source.document
         accessors = Accessors(document)
         clips = read.clips(document, accessors)
         skeleton = read.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
-        new = {i: _changed(clips[i], i, skeleton, selection, change) for i in chosen}
-        new = {i: clip for i, clip in new.items() if not _is_same(clip, clips[i])}
+        scene = cache(lambda: _scene(document, accessors, skeleton))
+        new = {i: _changed(clips[i], i, selection.chosen_tracks(clips[i], skeleton), scene, change) for i in chosen}
+        stale = badly_stored(document.json)
+        new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
+        for note in notes({i: clips[i] for i in new}, new):
+            voice.say(f"note: {note}")
         result = write.replace_clips(document, new)
         written = read.clips(result)
         edited = Edited({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
         if measure:
-            edited = _measured(edited, document, accessors, skeleton, voice)
+            edited = _measured(edited, source, accessors, skeleton, voice)
         else:
             for i, clip in edited.before.items():
                 voice.detail(f"  {read.label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
-        size = streams.write(result, output, source.folder, dry_run=dry_run)
+        size = streams.write(result, output, source, dry_run=dry_run)
     if chosen and not new:
         voice.say("note: no track was changed")
     if not dry_run:
@@ -72,11 +86,19 @@ def edit(
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
-def _changed(clip: Clip, number: int, skeleton: Skeleton, selection: Selection, change: Change) -> Clip:
+def _changed(clip: Clip, number: int, tracks: frozenset[int], scene: Callable[[], Scene], change: Change) -> Clip:
     try:
-        return change(clip, selection.chosen_tracks(clip, skeleton), skeleton)
+        return change(clip, tracks, scene)
     except AnimError as error:
         raise error.at(read.label(clip.name, number)) from None
+
+
+def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
+    """The scene, without its meshes where their vertices can't be read."""
+    try:
+        return read.scene(document, accessors)
+    except AnimError:  # `_measured` says so
+        return Scene(skeleton, ())
 
 
 def _is_same(new: Clip, old: Clip) -> bool:
@@ -84,13 +106,15 @@ def _is_same(new: Clip, old: Clip) -> bool:
 
 
 def _measured(
-    edited: Edited, document: Document, accessors: Accessors, skeleton: Skeleton, voice: report.Voice
+    edited: Edited, source: streams.Source, accessors: Accessors, skeleton: Skeleton, voice: report.Voice
 ) -> Edited:
+    at_nodes = False
     try:
-        scene = read.scene(document, accessors)
+        scene = scenes.scene(source.document, source.name, voice, accessors=accessors)
     except AnimError as error:  # vertices that can't be read don't stop a change of keys
-        voice.say(f"note: measured at nodes, not on the surface: {error}")
-        scene = Scene(skeleton, ())
+        hint = f" ({error.help})" if error.help else ""
+        voice.warn(f"measured at nodes, not on the surface: {error}{hint}")
+        scene, at_nodes = Scene(skeleton, ()), True
     ruler = Ruler(scene)
     worst: MotionError | None = None
     for i, before in edited.before.items():
@@ -99,22 +123,22 @@ def _measured(
         voice.detail(f"  {read.label(before.name, i)}: {counts}, {_error(found, ruler.diagonal)}")
         if worst is None or found.max_error > worst.max_error:
             worst = found
-    return Edited(edited.before, edited.after, worst, ruler.diagonal)
+    return Edited(edited.before, edited.after, worst, ruler.diagonal, at_nodes)
 
 
 def _summary(name: str, before: int, after: int, edited: Edited, seconds: float, *, dry_run: bool) -> str:
     keys = [sum(_keys(clip) for clip in clips.values()) for clips in (edited.before, edited.after)]
     parts = [f"{name}  {report.change(before, after)}", f"{keys[0]} → {keys[1]} keys"]
+    parts += filter(None, [lengths(edited.before, edited.after)])
     if edited.worst is not None:
-        parts.append(_error(edited.worst, edited.diagonal))
-    parts.append(f"{seconds:.1f} s")
+        parts.append(_error(edited.worst, edited.diagonal) + (" (nodes only)" if edited.at_nodes else ""))
+    parts.append(report.took(seconds))
     return ", ".join(parts) + (" (dry run: nothing written)" if dry_run else "")
 
 
 def _error(error: MotionError, diagonal: float) -> str:
-    percent = f" ({100 * error.max_error / diagonal:.2g} %)" if diagonal and error.max_error else ""
     where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = f"max {report.length(error.max_error)}{percent}{where}"
+    words = f"max {report.length(error.max_error)}{report.share(error.max_error, diagonal)}{where}"
     if error.max_pointer_error > 0:
         words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
     return words
@@ -125,7 +149,7 @@ def _keys(clip: Clip) -> int:
 
 
 def note_images(document: Document, source: streams.Source, output: str, voice: report.Voice) -> None:
-    """Say which images an output in another folder than its input has lost."""
-    outside = "" if output == streams.PIPE else streams.left_outside(document, source.folder, output)
-    if outside:
-        voice.say(f"{outside}; convert --embed takes them in")
+    """Say which images went along to an output in another folder than its input, and which are missing there."""
+    if output != streams.PIPE and not source.is_beside(output):
+        for note in images.notes(document, source.folder, copied=True):
+            voice.say(note)

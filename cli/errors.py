@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import sys
+import re
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from typer import TyperException
 
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
+from cli.report import Voice
 from cli.tables import one_line
 
 PROGRAM = "gltf-anim"
@@ -27,23 +29,37 @@ class UsageError(AnimError):
     """The command line asks for something that can't be done: exit 2."""
 
 
+class OutputError(AnimError):
+    """What was asked for is right, but can't be written: a full or read-only disk, no permission. Exit 3."""
+
+
 class CheckError(AnimError):
     """A check that the user asked for said no: exit 6."""
 
 
 CODES[UsageError] = USAGE
+CODES[OutputError] = FORMAT
 CODES[CheckError] = CHECK
 
 
-def guarded(job: Callable[[], Any]) -> int:
-    """Run a job and return the exit code; one line on stderr for what went wrong, a traceback only for our own bugs."""
+def not_written(name: str | Path, error: OSError) -> OutputError:
+    """Return the error for an output, `name`, that the system does not let us write."""
+    return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")
+
+
+def guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
+    """Run a job and return the exit code; one line on stderr for what went wrong, a traceback only for our own bugs.
+
+    args: of the command line, for the hint where one of them is a file that looks like an option.
+    """
     try:
         code = job()
         return code if isinstance(code, int) and not isinstance(code, bool) else DONE
     except AnimError as error:
         return reported(error)
     except TyperException as error:
-        _say(*_usage(error))
+        problem, hint = _usage(error)
+        _say(problem, _file_hint(error, args) or hint)
         return USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -54,7 +70,7 @@ def guarded(job: Callable[[], Any]) -> int:
         _say("out of memory", "")
         return UNSUPPORTED
     except Exception:
-        traceback.print_exc()
+        _say_trace()
         _say("this is a bug of ours; please report the lines above", "")
         return BUG
 
@@ -63,9 +79,17 @@ def reported(error: AnimError) -> int:
     """Say what was refused, in one line and maybe a hint, and return its exit code."""
     code = CODES.get(type(error), BUG)
     if code == BUG:
-        traceback.print_exc()
+        vars(error).pop("__notes__", None)  # the help, which stands below
+        _say_trace()
     _say(str(error), error.help)
     return code
+
+
+def _file_hint(error: TyperException, args: Sequence[str]) -> str:
+    """What to do where an unknown option is the name of a file: -x.glb."""
+    unknown = "no such option" in str(error.format_message()).lower()
+    files = [each for each in args if re.fullmatch(r"-[^-].*\.[A-Za-z]\w{1,4}", each)]
+    return f"if it is a file, write ./{files[0]}" if unknown and files else ""
 
 
 def _usage(error: TyperException) -> tuple[str, str]:
@@ -91,6 +115,11 @@ def _has_output(context: Any) -> bool:
 
 
 def _say(problem: str, hint: str) -> None:
-    sys.stderr.write(f"{PROGRAM}: {one_line(problem)}\n")
+    voice = Voice()  # the exit code is the same where nobody listens
+    voice.say(f"{PROGRAM}: {one_line(problem)}")
     if hint:
-        sys.stderr.write(f"help: {one_line(hint)}\n")
+        voice.say(f"help: {one_line(hint)}")
+
+
+def _say_trace() -> None:
+    Voice().say(traceback.format_exc().rstrip("\n"))

@@ -6,11 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from anim.gltf.read import clip_name
 from anim.measure.facts import ClipFacts, Facts, SkinFacts, TrackFacts
 from anim.measure.findings import Finding
 from cli import tables
 from cli.inspected import Inspected, Smoothness
-from cli.report import length, plural, size, speed
+from cli.report import length, plural, size, span, speed
 from cli.tables import Cell
 
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
@@ -20,6 +21,8 @@ MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
 
 def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, tracks: bool) -> str:
     """Return the whole page for one file: headline, clips, skins, findings; smooth: tracks of each clip, or nothing."""
+    if facts.faults and not file_bytes:
+        return tables.one_line(f"{name}: nothing can be read") + "\n" + _findings(facts.findings)
     parts = [_headline(name, file_bytes, facts)]
     if facts.clips:
         parts.append(_clips(facts.clips))
@@ -56,7 +59,7 @@ def track_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]
     """Return header and rows of one table: a row per track of every clip of every file."""
     header = ["file", "clip", *_fields(TrackFacts)]
     rows: list[list[Cell]] = [
-        [name, clip.name or str(clip.index), *asdict(track).values()]
+        [name, clip_name(clip.name, clip.index), *asdict(track).values()]
         for name, _, facts in files
         for clip in facts.clips
         for track in clip.track_list
@@ -69,13 +72,15 @@ def _fields(kind: type[ClipFacts] | type[TrackFacts]) -> list[str]:
 
 
 def _headline(name: str, file_bytes: int, facts: Facts) -> str:
-    cost = facts.animation_data_bytes + facts.animation_json_bytes
+    cost = facts.animation_stored_bytes + facts.animation_json_bytes
     counts = [plural(facts.nodes, "node"), plural(facts.meshes, "mesh").replace("meshs", "meshes")]
     if facts.vertices:
         counts.append(f"{facts.vertices} vertices")
     counts += [plural(len(facts.skins), "skin"), plural(len(facts.clips), "clip")]
     share = f" ({100 * cost / file_bytes:.0f} % of the file)" if file_bytes else ""
-    parts = f"{size(facts.animation_data_bytes)} of keys + {size(facts.animation_json_bytes)} of JSON"
+    decoded = facts.animation_data_bytes
+    unpacked = f" ({size(decoded)} decoded)" if any("meshopt" in each for each in facts.extensions_used) else ""
+    parts = f"{size(facts.animation_stored_bytes)} of keys{unpacked} + {size(facts.animation_json_bytes)} of JSON"
     lines = [f"{name}  {size(file_bytes)}: {', '.join(counts)}"]
     if cost:
         lines.append(f"  animation: {parts}{share}")
@@ -87,21 +92,22 @@ def _headline(name: str, file_bytes: int, facts: Facts) -> str:
 
 
 def _clips(clips: Sequence[ClipFacts]) -> str:
+    on_skin = all(clip.seam_measured_on == "skin" for clip in clips)
     header = ["clip", "seconds", "fps", "T/R/S/W/P", "keys", "how", "bytes", "share"]
-    header += ["still", "at rest", "spare keys", "loop seam", "root speed"]
+    header += ["still", "at rest", "spare keys", "loop seam" if on_skin else "loop seam (nodes)", "root speed"]
     rows: list[list[Cell]] = []
     for clip in clips:
         seam = f"{length(clip.seam_m)} {speed(clip.seam_speed_m_per_s)}"
         root_speed = speed(clip.root_speed_m_per_s) if clip.root_distance_m > STANDING else ""
         rows.append(
             [
-                clip.name or f"#{clip.index}",
-                f"{clip.start_s:.4g}–{clip.end_s:.4g}" if clip.start_s else f"{clip.end_s:.4g}",
+                clip_name(clip.name, clip.index),
+                span(clip.start_s, clip.end_s).removesuffix(" s"),
                 _rate(clip),
                 "/".join(str(clip.tracks.get(path, 0)) for path in PATHS),
                 clip.keys,
                 "+".join(name[0] for name in sorted(clip.interpolations)),
-                size(clip.data_bytes + clip.json_bytes),
+                size(clip.stored_bytes + clip.json_bytes),
                 f"{100 * clip.share:.1f} %",
                 str(clip.constant_tracks or ""),
                 str(clip.no_effect_tracks or ""),
@@ -121,7 +127,7 @@ def _rate(clip: ClipFacts) -> str:
 
 
 def _tracks(clip: ClipFacts) -> str:
-    header = [tables.one_line(f"tracks of {clip.name or f'#{clip.index}'}"), "path", "how", "keys", "seconds"]
+    header = [tables.one_line(f"tracks of {clip_name(clip.name, clip.index)}"), "path", "how", "keys", "seconds"]
     header += ["still", "at rest", "spare keys", "off unit", "sign flips", "widest step"]
     rows: list[list[Cell]] = [
         [

@@ -8,18 +8,18 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-STOPS = (signal.SIGINT, signal.SIGTERM)
+STOPS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 def load(name: str) -> None:
     """Import a module if it is installed, "" for none; an interrupt takes effect when it is there."""
     if name:
-        with _held(), suppress(ImportError):
+        with signals_held(), suppress(ImportError):
             importlib.import_module(name)
 
 
 @contextmanager
-def _held() -> Iterator[None]:
+def signals_held() -> Iterator[None]:
     """Keep signals that stop us until the end. Only the main thread can, and only it gets them."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -213,8 +213,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="IN and OUT may be '-' for a pipe (GLB). Exit codes: 0 done, 2 usage, 3 bad input, 4 not handled, "
-    "5 no such clip or node, 6 a check said no.",
+    epilog="IN and OUT may be '-' for a pipe (GLB). Exit codes: 0 done, 2 usage, 3 bad input, or a file that can't be "
+    "read or written, 4 not handled, 5 no such clip or node, 6 a check said no.",
 )
 
 
@@ -237,7 +237,9 @@ def main() -> None:
     """Run the command line of this process and exit with the code that says how it went."""
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends us quietly, as it ends any other tool
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that temporary files are cleared away
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, lambda number, _: sys.exit(128 + number))  # so that temporary files are cleared away
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # our products are small: a second thread would only spin
     gc.disable()  # one short job over many long-lived objects: collecting only costs time
     code = run(sys.argv[1:])
@@ -252,7 +254,7 @@ def run(args: list[str]) -> int:
     from cli import errors
 
     command = quicken(typer.main.get_command(app))
-    return errors.guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False))
+    return errors.guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False), args)
 
 
 if __name__ == "__main__":

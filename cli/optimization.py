@@ -25,7 +25,7 @@ from anim.optimize.tradeoff import Sized
 from anim.optimize.verify import NOTHING, Verdict
 from cli import optimize_proof
 from cli.errors import CheckError
-from cli.report import change, length, plural, size
+from cli.report import change, length, plural, share, size, took
 
 SCHEMA = 1
 LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
@@ -33,7 +33,10 @@ LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Everything there is to say. size_before, size_after: bytes of the files; scale: m, the diagonal."""
+    """Everything there is to say. size_before, size_after: bytes of the files; scale: m, the diagonal.
+
+    measured_at: "surface" or, in a file without vertices, "nodes".
+    """
 
     name: str
     before: Document
@@ -45,6 +48,7 @@ class About:
     size_before: int
     size_after: int
     seconds: float
+    measured_at: str
 
     @property
     def unchanged(self) -> bool:
@@ -86,16 +90,21 @@ def lines(about: About, *, dry_run: bool) -> list[str]:
     dry = " (dry run: nothing written)" if dry_run else ""
     if about.unchanged:
         said = f"{about.name}  {size(about.size_after)}, unchanged: {_why_unchanged(about)}{dry}"
-        return [said] if about.found.unchanged else [said, *_earlier(about)]
+        return [said]
     keys = f"{_keys(about.clips, about)} → {sum(_count(each.clip) for each in about.found.solutions.values())} keys"
     summary = [
         f"{about.name}  {change(about.size_before, about.size_after)}",
-        f"animation {change(_cost(about.before), _cost(about.after))}",
+        f"animation {change(cost(about.before), cost(about.after))}",
         keys,
         _worst_words(about),
-        f"{about.seconds:.1f} s",
+        took(about.seconds),
     ]
-    return [", ".join(summary) + dry, *_policy(about), *_earlier(about)]
+    return [", ".join(summary) + dry, *_policy(about)]
+
+
+def warnings(about: About) -> list[str]:
+    """Return what is said even when quiet, since it changes what the numbers mean."""
+    return [] if about.found.unchanged else _earlier(about)
 
 
 def details(about: About) -> list[str]:
@@ -124,8 +133,8 @@ def _why_unchanged(about: About) -> str | None:
     return "optimized like this before" if about.found.unchanged else "no smaller file within the bound"
 
 
-def as_json(about: About) -> str:
-    """Return the report as a JSON document, schema 1."""
+def as_json(about: About, *, warnings: Sequence[str] = ()) -> str:
+    """Return the report as a JSON document, schema 1. warnings: said so far."""
     request = about.request
     content = {
         "schema": SCHEMA,
@@ -134,6 +143,8 @@ def as_json(about: About) -> str:
         "unchanged_because": _why_unchanged(about),
         "seconds": round(about.seconds, 3),
         "diagonal_m": about.scale,
+        "measured_at": about.measured_at,
+        "optimized_before": _is_marked(about.before),
         "bounds": {
             "max_error_m": request.bounds.max_error,
             "shell_m": request.bounds.shell,
@@ -158,6 +169,7 @@ def as_json(about: About) -> str:
         },
         "moved_rest": [_target(about, node, path) for node, path in about.found.moved],
         "clips": [] if about.unchanged else [_clip(about, i, each) for i, each in about.found.solutions.items()],
+        "warnings": list(warnings),
     }
     return jsonlib.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -165,20 +177,24 @@ def as_json(about: About) -> str:
 def curve_line(sized: Sized, scale: float) -> str:
     """Return one point of the curve for a person."""
     percent = 100 * sized.max_error / scale if scale else 0.0
-    return f"  {length(sized.max_error)} ({percent:.2g} %): {size(sized.size)}, max {length(sized.error)}"
+    bound = f"{length(sized.max_error)} ({percent:.2g} %)" if sized.max_error else "without loss"
+    return f"  {bound}: animation {size(sized.animation)}, file {size(sized.size)}, max {length(sized.error)}"
 
 
 def curve_csv(sizes: Sequence[Sized], scale: float) -> str:
-    """Return the curve as CSV: bound in metres and as a share of the diagonal, bytes, largest error found."""
+    """Return the curve as CSV: bound in metres and as a share of the diagonal, bytes of the file, largest error found,
+    and bytes of the animation alone."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m"])
+    writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m", "animation_bytes"])
     for each in sizes:
-        writer.writerow([each.max_error, each.max_error / scale if scale else 0.0, each.size, each.error])
+        share = each.max_error / scale if scale else 0.0
+        writer.writerow([each.max_error, share, each.size, each.error, each.animation])
     return text.getvalue()
 
 
-def _cost(document: Document) -> int:
+def cost(document: Document) -> int:
+    """Return the bytes of all animations: keys as stored, and JSON."""
     return stored(document) + footprints(document)[1].json
 
 
@@ -191,8 +207,7 @@ def _count(clip: Clip) -> int:
 
 
 def _length(meters: float, scale: float) -> str:
-    percent = f" ({100 * meters / scale:.2g} %)" if scale and meters else ""
-    return f"max {length(meters)}{percent}"
+    return f"max {length(meters)}{share(meters, scale)}"
 
 
 def _worst_words(about: About) -> str:
@@ -219,7 +234,7 @@ def _earlier(about: About) -> list[str]:
     """What to know where the input was lossy before: nothing in a file tells its motion from its own source's."""
     if not _is_marked(about.before):
         return []
-    return ["  note: the input was optimized before; errors are measured from it, not from its source"]
+    return ["the input was optimized before; errors are measured from it, not from its source"]
 
 
 def _is_marked(document: Document) -> bool:
@@ -239,7 +254,7 @@ def _policy(about: About) -> list[str]:
     if about.found.moved:
         words.append(f"moved {plural(len(about.found.moved), 'rest value')}")
     if about.found.without_loss:
-        names = [about.clips[i].name or str(i) for i in about.found.without_loss]
+        names = [read.clip_name(about.clips[i].name, i) for i in about.found.without_loss]
         words.append(f"kept without loss, as no smaller way held all bounds: {', '.join(names)}")
     return [f"  {'; '.join(words)}"] if words else []
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from anim.errors import AnimError
 from anim.gltf import read
 from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document
@@ -17,7 +18,7 @@ from anim.ops.selection import Selection
 from anim.optimize.optimize import Optimized, optimize
 from anim.optimize.request import Request
 from anim.optimize.tradeoff import MOST, Sized, fitting
-from cli import optimization, streams
+from cli import optimization, scenes, streams
 from cli.errors import CheckError
 from cli.progress import Progress
 from cli.report import Voice, length, plural
@@ -42,17 +43,18 @@ class Job:
 
     def run(self, request: Request) -> Optimized:
         """Return what the search makes of it."""
-        found = optimize(
-            self.source.document,
-            self.scene,
-            self.clips,
-            request,
-            chosen=self.chosen,
-            workers=self.workers if optimization.is_long(self.clips, self.chosen) else 1,
-            detailed=self.detailed,
-            start="fork" if sys.platform == "linux" else "spawn",
-            progress=lambda share: self.progress(round(1000 * share)),
-        )
+        with _errors_for_broken_pipes():
+            found = optimize(
+                self.source.document,
+                self.scene,
+                self.clips,
+                request,
+                chosen=self.chosen,
+                workers=self.workers if optimization.is_long(self.clips, self.chosen) else 1,
+                detailed=self.detailed,
+                start="fork" if sys.platform == "linux" else "spawn",
+                progress=lambda share: self.progress(round(1000 * share)),
+            )
         self.progress.close()
         return found
 
@@ -62,12 +64,13 @@ class Job:
 
     def size(self, document: Document) -> int:
         """Return the bytes of a document as it would be written."""
-        return streams.write(document, self.output, self.source.folder, dry_run=True)
+        return streams.write(document, self.output, self.source, dry_run=True)
 
     def sized(self, request: Request, max_error: float) -> Sized:
         """Return what a bound, in m, leads to, searched fast."""
         found = self.run(replace(_bounded(request, max_error), effort="fast"))
-        return Sized(max_error, self.size(self.smaller(found)), optimization.worst(found))
+        smaller = self.smaller(found)
+        return Sized(max_error, self.size(smaller), optimization.worst(found), optimization.cost(smaller))
 
     def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
         """Return what fits with the smallest error, and the request that led there.
@@ -93,8 +96,24 @@ class Job:
             percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
             raise CheckError(
                 f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {length(sized.max_error)}{percent} "
-                f"it still takes {plural(sized.size, 'byte')}; nothing was written"
+                f"it still takes {plural(sized.size, 'byte')}, {sized.animation} of them animation; "
+                "nothing was written",
+                help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {sized.size}",
             )
+
+
+@contextmanager
+def _errors_for_broken_pipes() -> Iterator[None]:
+    """Keep SIGPIPE from ending this process: `concurrent.futures` writes to workers that may be gone, and handles it.
+
+    After an error its thread still may, so that the signal stays off then.
+    """
+    if not hasattr(signal, "SIGPIPE"):
+        yield
+        return
+    usual = signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGPIPE, usual)
 
 
 def _bounded(request: Request, max_error: float) -> Request:
@@ -103,10 +122,14 @@ def _bounded(request: Request, max_error: float) -> Request:
 
 
 def job(source: streams.Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:
-    """Return the job for a source. clip: globs. jobs: processes, 0 for one per core. Raises NotFoundError."""
+    """Return the job for a source. clip: globs. jobs: processes, 0 for one per core.
+
+    Raises NotFoundError; FormatError or UnsupportedError where vertices can't be read: no bound holds on those.
+    """
     document = source.document
     accessors = Accessors(document)
-    clips, scene = tuple(read.clips(document, accessors)), _scene(document, accessors, voice)
+    clips = tuple(read.clips(document, accessors))
+    scene = scenes.scene(document, source.name, voice, accessors=accessors)
     return Job(
         source,
         clips,
@@ -118,11 +141,3 @@ def job(source: streams.Source, output: str, *, clip: Sequence[str], jobs: int, 
         detailed,
         Progress("optimize", 1000, shown=not voice.quiet),
     )
-
-
-def _scene(document: Document, accessors: Accessors, voice: Voice) -> Scene:
-    try:
-        return read.scene(document, accessors)
-    except AnimError as error:  # vertices that can't be read leave the nodes to be measured
-        voice.say(f"note: measured at nodes, not on the surface: {error}")
-        return Scene(read.skeleton(document), ())

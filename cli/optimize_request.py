@@ -50,7 +50,7 @@ def notes(said: Mapping[str, str | None]) -> Iterator[str]:
     for name in ("max_error", "shell"):
         text = (said[name] or "").strip()
         if text and text[-1].isdigit() and not ZERO.fullmatch(text):
-            yield f"note: --{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
+            yield f"--{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
 
 
 def _share(text: str | None) -> str:

@@ -43,5 +43,8 @@ Report = Annotated[Format, typer.Option("--format", help="Text to read, or one J
 From = Annotated[float | None, typer.Option("--from", metavar="S", help="From so many seconds of the clip on.")]
 To = Annotated[float | None, typer.Option("--to", metavar="S", help="Up to so many seconds of the clip.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do everything but write.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="No words, no tables: only errors, warnings, products."),
+]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more: one line per clip.")]

@@ -4,23 +4,34 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+LEAST_PERCENT = 1e-4
 NEARLY_NOTHING = 1e-11  # m; what rounding leaves of nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Voice:
-    """How much is said: nothing but errors, one line, or every detail."""
+    """How much is said: nothing but errors and warnings, one line, or every detail.
+
+    warnings: what was warned of so far, for the list of this name in a JSON report.
+    """
 
     quiet: bool = False
     verbose: bool = False
+    warnings: list[str] = field(default_factory=list, compare=False)
 
     def say(self, line: str) -> None:
         """Write a line to stderr, unless quiet."""
         if not self.quiet:
             with suppress(OSError, AttributeError):  # nobody listens
                 sys.stderr.write(line + "\n")
+
+    def warn(self, words: str) -> None:
+        """Write "warning: words" to stderr, even when quiet, and once: for what changes the meaning of a number."""
+        if words not in self.warnings:
+            self.warnings.append(words)
+            Voice().say(f"warning: {words}")
 
     def detail(self, line: str) -> None:
         """Write a line to stderr only where details are wanted."""
@@ -57,9 +68,35 @@ def length(meters: float) -> str:
     return f"{digits(meters, 3)} m"
 
 
+def share(part: float, whole: float) -> str:
+    """Return " (0.41 %)", or nothing where there is no whole or what is left is far below what anybody sees."""
+    percent = 100 * part / whole if whole else 0.0
+    return f" ({digits(percent, 2)} %)" if percent >= LEAST_PERCENT else ""
+
+
 def speed(meters_per_second: float) -> str:
     """Return a speed with two digits: "0.46 m/s", "280 m/s"."""
     return f"{digits(meters_per_second, 2)} m/s"
+
+
+def moment(seconds: float) -> str:
+    """Return a time or a length of time to a tenth of a millisecond: "0.0417 s", "12 s"."""
+    return f"{_rounded(seconds)} s"
+
+
+def span(start: float, end: float) -> str:
+    """Return the seconds of a clip: "1.5 s", or "0.0417–2 s" where it starts late."""
+    begins = _rounded(start)
+    return moment(end) if begins == "0" else f"{begins}–{moment(end)}"
+
+
+def _rounded(seconds: float) -> str:
+    return f"{seconds:.4f}".rstrip("0").rstrip(".")
+
+
+def took(seconds: float) -> str:
+    """Return how long the command worked, so that nobody takes it for the length of a clip: "took 0.8 s"."""
+    return f"took {digits(seconds, 2 if seconds < 10 else 3)} s"
 
 
 def digits(value: float, count: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from anim.gltf.read import clip_name
 from anim.measure.continuity import Grade, Largest, Seam, TrackContinuity
 from anim.measure.facts import ClipFacts
 from cli import tables
@@ -17,7 +18,7 @@ from cli.tables import Cell
 
 def table(clip: ClipFacts, tracks: Sequence[TrackContinuity]) -> str:
     """Return the table of a clip's tracks that move at all, and a note on the others."""
-    header = [tables.one_line(f"smoothness of {clip.name or f'#{clip.index}'}"), "path", "how", "inner keys", "jump"]
+    header = [tables.one_line(f"smoothness of {clip_name(clip.name, clip.index)}"), "path", "how", "inner keys", "jump"]
     header += ["C0", "G1", "C1", "C2", "value jump", "speed jump", "acceleration jump", "loop seam"]
     moving = [track for track in tracks if not track.still]
     rows: list[list[Cell]] = [
@@ -48,7 +49,7 @@ def rows(files: Sequence[Inspected], smooth: Sequence[Smoothness]) -> tuple[list
     """Return header and rows of one table: a row per track of every clip of every file, with its keys by smoothness."""
     header = ["file", "clip", *cells(None)]
     lines: list[list[Cell]] = [
-        [name, clip.name or str(clip.index), *cells(track).values()]
+        [name, clip_name(clip.name, clip.index), *cells(track).values()]
         for (name, _, facts), of_clips in zip(files, smooth, strict=True)
         for clip, tracks in zip(facts.clips, of_clips, strict=True)
         for track in tracks
@@ -87,12 +88,12 @@ def json(track: TrackContinuity) -> dict[str, Any]:
 
 
 def _seam(track: TrackContinuity) -> str:
-    """The loop's seam in words: "C2", "C0, 0.3 m/s", "open, 2 cm"."""
+    """The loop's seam in words: "C2", "C0, 0.3 m/s", "jump, 2 cm"."""
     seam = track.seam
     if seam is None or seam.grade is Grade.C2:
         return "C2" if seam else ""
     if seam.grade is Grade.JUMP:
-        return f"open, {_amount(seam.value_jump, track.unit, '')}"
+        return f"jump, {_amount(seam.value_jump, track.unit, '')}"
     if seam.grade is Grade.C1:
         return f"C1, {_amount(seam.acceleration_jump, track.unit, '/s²')}"
     return f"{seam.grade}, {_amount(seam.speed_jump, track.unit, '/s')}"

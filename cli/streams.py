@@ -1,48 +1,66 @@
 """Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path, but
-`cli.folders` for what is streamed, and `cli.replacing` to write."""
+`cli.folders` for what is streamed, `cli.atomic` and `cli.gltf_files` to write."""
 
 from __future__ import annotations
 
-import mmap
 import os
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
 from anim.errors import AnimError, FormatError
 from anim.gltf import container, uri
-from anim.gltf.document import Buffer, Bytes, Document, items
-from cli.errors import UsageError
-from cli.replacing import replace_all
+from anim.gltf.document import Buffer, Bytes, Document, items, node_label
+from cli import atomic, beside, gltf_files, images, links, output_names
+from cli.errors import OutputError, UsageError, not_written
+from cli.report import Voice
 
 PIPE = "-"
+MAX_TRIES = 20  # of opening a .gltf with its buffers, while others replace it
 OTHERS = frozenset((".bin", ".bvh", ".csv", ".dae", ".fbx", ".json", ".npz", ".obj", ".usd", ".usda", ".usdc", ".usdz"))
+
+AUDIBLE = Voice()
+Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An input: its document, what messages call it, its size in bytes with its .bin files, and its folder."""
+    """An input: its document, what messages call it, its size in bytes with its .bin files, and its real folder."""
 
     document: Document
     name: str
     size: int
     folder: Path | None
 
+    def is_beside(self, output: str) -> bool:
+        """Return whether `output` lies in the same folder, so that relative URIs stay right."""
+        if self.folder is None or output == PIPE:
+            return False
+        return links.followed(Path(output)).parent.resolve() == self.folder.resolve()
+
+    def is_at(self, path: str) -> bool:
+        """Return whether this is the file at `path`."""
+        return self.folder is not None and os.path.realpath(self.name) == os.path.realpath(path)
+
 
 @contextmanager
-def source(path: str) -> Iterator[Source]:
-    """Give the document at `path`, "-" for stdin; errors raised inside name the input."""
-    name = _called(path)
+def source(path: str, voice: Voice = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
+    """Give the document at `path`, "-" for stdin; errors raised inside name the input.
+
+    voice: says what had to be mended to read it. opener: makes a document of bytes.
+    """
+    name = called(path)
     try:
-        data = _stdin() if path == PIPE else _mapped(Path(path))
-        folder = None if path == PIPE else Path(path).parent
-        document = container.read(data, None if folder is None else lambda address: _beside(folder, address))
+        data, document = _received(opener) if path == PIPE else _opened(links.followed(Path(path)), opener)
+        folder = None if path == PIPE else links.followed(Path(path)).parent
+        note_mended(document, name, voice)
         yield Source(document, name, len(data) + _external_size(document), folder)
-    except UsageError:
+    except (UsageError, OutputError):
         raise
     except AnimError as error:
         raise error.at(name, ": ") from None
@@ -54,32 +72,44 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
 
     ending: of the files that are meant, for the hint where `path` is a folder.
     """
-    name = _called(path)
+    name = called(path)
     try:
-        yield _stdin() if path == PIPE else _mapped(Path(path), ending), name
-    except UsageError:
+        yield _stdin() if path == PIPE else beside.mapped(Path(path), ending), name
+    except (UsageError, OutputError):
         raise
     except AnimError as error:
         raise error.at(name, ": ") from None
 
 
-def write(document: Document, path: str, beside: Path | None, *, dry_run: bool = False) -> int:
+def note_mended(document: Document, name: str, voice: Voice) -> None:
+    """Say what had to be mended to read a document, nothing of most. name: of the input."""
+    if not document.expanded:
+        return
+    first, more = document.expanded[0], len(document.expanded) - 1
+    words = (f" and {more} more have", "them") if more else (" has", "it")
+    problem = f"{node_label(document.json, first)}{words[0]} a matrix although a clip animates {words[1]}"
+    voice.say(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
+
+
+def write(document: Document, path: str, source: Source | None, *, dry_run: bool = False) -> int:
     """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
 
-    The size is that of all these files, also of those that stay as they are. beside: the folder of the input: external
-    buffers and images that are still right from the output's folder keep their URI. Files appear whole or not at all,
-    and only if their bytes differ from what is there.
+    The size is that of all these files, also of those that stay as they are. source: the input that the document comes
+    from: external buffers and images that are still right from the output's folder keep their URI, and none of its
+    files is ever removed. In another folder images are copied beside the output, and no file is overwritten. Files
+    appear whole or not at all, and only if their bytes differ from what is there; else the
+    time of the file at `path` is updated.
     """
+    copies: dict[Path, Bytes] = {}
+    if source is not None and source.folder is not None and path != PIPE and not source.is_beside(path):
+        document, copies = images.along(document, source.folder, links.followed(Path(path)).parent)
+    if not dry_run:
+        images.write_copies(copies)
     if path.lower().endswith(".gltf"):
-        target = Path(path)
-        same_folder = beside is not None and target.parent.resolve() == beside.resolve()
-        files = container.gltf(document, target.stem, keep_external=same_folder)
-        pieces = {target.parent / name: content for name, content in files.items()}
-        if not dry_run:
-            own = target.with_suffix(".gltf")  # x.GLTF stays that
-            replace_all({target if file == own else file: content for file, content in pieces.items()})
-        written = sum(len(piece) for content in pieces.values() for piece in content)
-        return written + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
+        same_folder = source is not None and source.is_beside(path)
+        spared = [] if source is None or source.is_at(path) else list(_files_beside(source))
+        size = gltf_files.write(document, Path(path), same_folder=same_folder, spared=spared, dry_run=dry_run)
+        return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
     content = container.glb(document)
     if not dry_run:
         write_bytes(content, path)
@@ -92,7 +122,7 @@ def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
         _no_terminal()
         _to_stdout(pieces)
     else:
-        replace_all({Path(path): list(pieces)})
+        atomic.write_file(Path(path), list(pieces))
 
 
 def write_text(text: str, path: str = PIPE) -> None:
@@ -104,7 +134,7 @@ def write_text(text: str, path: str = PIPE) -> None:
     if path == PIPE:
         _to_stdout([content])
     else:
-        replace_all({Path(path): [content]})
+        atomic.write_file(Path(path), [content])
 
 
 def check_output(path: str) -> None:
@@ -117,22 +147,28 @@ def check_output(path: str) -> None:
             raise UsageError(f"{path}: glTF is no {ending} (expected .glb or .gltf)")
 
 
-def check_file(path: str) -> None:
-    """Raise UsageError at once, before any work, where no file can be written at `path`."""
+def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
+    """Raise UsageError at once, before any work, where no file can be written at `path`.
+
+    placeholders: what may stand in its name as {this}.
+    """
     if not path:
         raise UsageError("the output has an empty name")
-    target = Path(path)
+    output_names.check_placeholders(path, placeholders)
     try:
+        target = links.followed(Path(path))
         if target.is_dir():
             raise UsageError(f"{path}: is a folder (expected a file name)")
         if not target.parent.is_dir():
             raise UsageError(f"{path}: there is no folder '{target.parent}'")
+    except PermissionError:
+        raise OutputError(f"{path}: can't be written (permission denied)") from None
     except OSError as error:  # a name that no file can have
         raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
 
 
-def _called(path: str) -> str:
-    """What messages call an input."""
+def called(path: str) -> str:
+    """Return what messages call an input."""
     return "stdin" if path == PIPE else path or "''"
 
 
@@ -151,7 +187,7 @@ def _to_stdout(pieces: Iterable[Bytes]) -> None:
         out.flush()
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or what is left fails once more at exit
-        raise UsageError(f"stdout: can't be written ({(error.strerror or str(error)).lower()})") from None
+        raise not_written("stdout", error) from None
 
 
 def _stdin() -> Bytes:
@@ -162,43 +198,42 @@ def _stdin() -> Bytes:
     return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
 
 
-def _mapped(path: Path, ending: str = ".glb") -> Bytes:
+def _received(opener: Opener) -> tuple[Bytes, Document]:
+    data = _stdin()
+    return data, opener(data, beside.missing)
+
+
+def _opened(path: Path, opener: Opener) -> tuple[Bytes, Document]:
+    """Bytes and document of a file, and its buffers opened while it was there: if it is replaced meanwhile, again."""
+    for _ in range(MAX_TRIES):
+        before = _stamp(path)
+        data, buffers = beside.mapped(path), beside.Beside(path.parent)
+        document = opener(data, buffers.open)
+        outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
+        for address in outside:
+            with suppress(FormatError):  # raised again where its bytes are asked for
+                buffers.open(uri.relative_path(address))
+        if not outside or _stamp(path) == before:
+            break
+    return data, document
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    """What changes when a file is replaced."""
     try:
-        if path.is_dir():
-            raise FormatError("is a folder", help=f"name the files: {path}/*{ending}")
-        with path.open("rb") as file:
-            is_plain = path.is_file() and os.fstat(file.fileno()).st_size > 0
-            if not is_plain or sys.platform == "win32":  # where a mapped file can't be replaced by its output
-                return np.frombuffer(file.read(), np.uint8)
-            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
-    except OSError as error:
-        raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
+        found = path.stat()
+    except (OSError, ValueError):
+        return ()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
-def _beside(folder: Path, address: str) -> Bytes:
-    """Bytes of a file in or below the folder."""
-    path = _place(folder, address)
-    try:
-        return _mapped(path)
-    except FormatError as error:
-        raise error.at(f"'{address}'", " ") from None
-
-
-def _place(folder: Path, address: str) -> Path:
-    """Where a file in or below the folder lies; links that lead out of it are refused."""
-    path = folder / address
-    try:
-        outside = folder.resolve() not in path.resolve().parents
-        there, regular = path.exists(), path.is_file()
-    except (OSError, RuntimeError, ValueError) as error:  # a name too long, a loop of links, half a character
-        raise FormatError(f"'{address[:60]}' can't be looked up ({str(error).lower()[:60]})") from None
-    if outside:
-        raise FormatError(f"'{address}' leads out of the file's folder (only files beside it are read)")
-    if not there:
-        raise FormatError(f"'{address}' is not beside the file", help=f"put it into '{folder}'")
-    if not regular:
-        raise FormatError(f"'{address}' is no file")
-    return path
+def _files_beside(source: Source) -> Iterator[Path]:
+    """Yield where the buffers and images of an input lie."""
+    for about in (*items(source.document.json, "buffers"), *items(source.document.json, "images")):
+        address = about.get("uri")
+        if source.folder is not None and address is not None and not uri.is_data(address):
+            with suppress(FormatError):
+                yield source.folder / uri.relative_path(address)
 
 
 def _external_size(document: Document) -> int:
@@ -212,51 +247,12 @@ def _size_outside(buffer: Buffer) -> int:
 
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:
-    """Yield place and problem of every buffer and image that can't be found from the input's folder."""
-    for kind in ("buffer", "image"):
-        for i, about in enumerate(items(document.json, f"{kind}s")):
-            address = about.get("uri")
-            if folder is None or address is None or uri.is_data(address):
-                continue
-            try:
-                _place(folder, uri.relative_path(address))
-            except FormatError as error:
-                yield f"{kind} {i}", error.problem
-
-
-def stays_in(folder: Path | None, output: str) -> bool:
-    """Return whether `output` lies in `folder`, so that relative URIs stay right."""
-    return folder is not None and output != PIPE and Path(output).parent.resolve() == folder.resolve()
-
-
-def left_outside(document: Document, folder: Path | None, output: str) -> str:
-    """Return a note where images that the output refers to lie in another folder than it, else nothing."""
-    images = [image["uri"] for image in items(document.json, "images") if not uri.is_data(image.get("uri", "data:"))]
-    if not images or stays_in(folder, output):
-        return ""
-    return f"note: {len(images)} image{'s stay' if len(images) > 1 else ' stays'} outside ({images[0]}, …)"
-
-
-def with_images(document: Document, folder: Path | None) -> Document:
-    """Return the document with its external images as data URIs. Raises FormatError for one that can't be read."""
-    images = []
-    for i, image in enumerate(items(document.json, "images")):
-        address = image.get("uri")
-        if address is not None and not uri.is_data(address):
-            if folder is None:
-                raise FormatError("lies beside the file, but the input is a pipe", where=f"image {i}")
-            data = _beside(folder, uri.relative_path(address))
-            image = {**image, "uri": uri.encode_data(data.tobytes(), _media_type(data))}
-        images.append(image)
-    return replace(document, json={**document.json, "images": images}) if images else document
-
-
-def _media_type(data: Bytes) -> str:
-    head = data[:12].tobytes()
-    if head.startswith(b"\x89PNG"):
-        return "image/png"
-    if head.startswith(b"\xff\xd8"):
-        return "image/jpeg"
-    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
-        return "image/webp"
-    return "image/ktx2" if head.startswith(b"\xabKTX 20") else "application/octet-stream"
+    """Yield place and problem of every image that can't be found from the input's folder."""
+    for i, about in enumerate(items(document.json, "images")):
+        address = about.get("uri")
+        if folder is None or address is None or uri.is_data(address):
+            continue
+        try:
+            beside.place(folder, uri.relative_path(address))
+        except FormatError as error:
+            yield f"image {i}", error.problem

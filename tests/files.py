@@ -18,7 +18,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 ASSETS = SHARED / "assets"
 BAD_INPUTS = SHARED / "bad-inputs"
 
-# Every glTF file in shared/assets, by its path there.
+# Every glTF file with clips in shared/assets, by its path there.
 REAL = (
     "AnimationPointer/24_animation_pointer.gltf",
     "BitmojiRun.glb",

@@ -27,7 +27,8 @@ PYTHON = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One folder for all commands: some read what an earlier one wrote, as a reader would."""
     folder = tmp_path_factory.mktemp("readme")
-    (folder / "biped.glb").write_bytes(fixtures.build("biped"))
+    for name in ("biped", "tube"):
+        (folder / f"{name}.glb").write_bytes(fixtures.build(name))
     return folder
 
 

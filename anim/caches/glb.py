@@ -43,7 +43,7 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
     found = pages(document)
     if found is not None:
         return found
-    played = play.play(document, fps=reading.fps)
+    played = play.play(document, fps=reading.fps, note=reading.note)
     if names := play.directions(document):
         reading.note(f"{' and '.join(names)} are not played (bake --{' or --'.join(names)} does that)")
     return played

@@ -3,13 +3,12 @@
 Three forms are tried, and the smallest that keeps every vertex of every frame within the limit is written:
 `keyframes`, one target for each frame that straight lines between others don't give; `basis`, few shapes (principal
 components) with a weight each per frame; `both`, the shapes of the kept frames. Between frames weights go in straight
-lines, and so do vertices, so the worst over the frames is the worst over all times.
+lines, and so do vertices, so the worst over the frames is the worst over all times. All weights are within 0…1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from anim.caches import extent
 from anim.caches.basis import basis
 from anim.caches.files import Outputs
 from anim.caches.glb_file import VERTICES, GlbFile, primitive, signed
+from anim.caches.morph_form import SHORT, Form, stored
 from anim.caches.reduce import kept_frames
 from anim.caches.settings import Writing, Written
 from anim.errors import RangeError, UnsupportedError
@@ -27,25 +27,9 @@ DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given
 MOST_BYTES = 1 << 30  # of positions, which are in memory here, three times over
 MOST_TARGETS = 1024
 SURE_TARGETS = 8  # what glTF promises; engines take more
-SHORT = 32767
 BATCH = 16  # frames compared at a time
-MARGIN = 0.98  # of the limit, what rounding to float32 may not eat
+MARGINS = 0.98, 0.5  # of the limit, what rounding to float32 may not eat; the second where it did
 NAME, EXTRAS = "cache", "gltf_anim"
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """A way to say all frames. frames: (K,) which have a key. weights: (K, M). targets: (M, V, 3) float32."""
-
-    kind: str
-    base: AnyArray
-    targets: AnyArray
-    frames: Ints
-    weights: Floats
-
-    def size(self, *, quantize: bool) -> int:
-        """Bytes of the numbers in a file."""
-        return self.targets.size // 3 * (8 if quantize else 12) + 4 * self.weights.size + 4 * len(self.frames)
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
@@ -61,52 +45,50 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         )
     whole = cache.whole()
     limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * extent.diagonal(cache)
-    best: tuple[Form, float] | None = None
-    for form in _forms(whole.positions, cache.times, limit):
-        form = _stored(form, quantize=writing.quantize)
-        worst = _worst(whole.positions, cache.times, form)
-        is_smaller = best is None or form.size(quantize=writing.quantize) < best[0].size(quantize=writing.quantize)
-        if worst <= limit and is_smaller:
-            best = form, worst
+    best = _smallest(whole.positions, cache.times, limit, quantize=writing.quantize)
     if best is None:
-        raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help="allow more --max-error")
+        advice = "allow more --max-error" + (", or leave out --quantize" if writing.quantize else "")
+        raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help=advice)
     form, worst = best
     _write(cache, whole, form, outputs, quantize=writing.quantize)
     return Written(worst, _notes(form, cache.frame_count))
 
 
-def _forms(positions: AnyArray, times: Floats, limit: float) -> Iterator[Form]:
-    """Forms that may be the smallest; the number of targets decides, nearly."""
-    limit *= MARGIN
-    kept = kept_frames(positions, times, limit)
-    fewest = len(kept) - 1
+def _smallest(positions: AnyArray, times: Floats, limit: float, *, quantize: bool) -> tuple[Form, float] | None:
+    """The form of fewest bytes that keeps the limit as it is stored, and its error; None where none does."""
+
+    def within(forms: Iterable[Form]) -> list[tuple[Form, float]]:
+        changed = (stored(form, quantize=quantize) for form in forms)
+        errors = ((form, _worst(positions, times, form)) for form in changed)
+        return [(form, error) for form, error in errors if error <= limit]
+
+    kept = kept_frames(positions, times, limit * MARGINS[0])
+    most = len(kept) - 1
+    found: list[tuple[Form, float]] = []
+    for margin in MARGINS:
+        found = found or within(_combined(positions, times, limit * margin, most=most))
+    fewest = min((len(form.targets) for form, _ in found), default=most)
+    if most <= min(fewest + 1, MOST_TARGETS):
+        found += within([_one_hot(positions, kept)])
+    return min(found, key=lambda each: each[0].size(quantize=quantize), default=None)
+
+
+def _combined(positions: AnyArray, times: Floats, limit: float, *, most: int) -> Iterator[Form]:
+    """Forms of few shapes that may be the smallest; the number of targets decides, nearly."""
     for name, share in (("basis", 0.0), ("both", 0.5)):
         frames = kept_frames(positions, times, limit * share) if share else np.arange(len(positions))
         if share and len(frames) == len(positions):
             continue
-        found = basis(positions[frames], limit * (1 - share), most=min(fewest, MOST_TARGETS))
+        found = basis(positions[frames], limit * (1 - share), most=min(most, MOST_TARGETS))
         if found is not None:
-            fewest = len(found.shapes)
+            most = len(found.shapes)
             yield Form(name, found.base, found.shapes, frames, found.weights)
-    if len(kept) - 1 <= min(fewest + 1, MOST_TARGETS):
-        yield _one_hot(positions, kept)
 
 
 def _one_hot(positions: AnyArray, kept: Ints) -> Form:
     base = positions[kept[0]]
     weights = np.concatenate((np.zeros((1, len(kept) - 1)), np.eye(len(kept) - 1)))
     return Form("keyframes", base, positions[kept[1:]] - base, kept, weights)
-
-
-def _stored(form: Form, *, quantize: bool) -> Form:
-    """The form as a file keeps it: targets rounded to shorts of ±1 m by their own factor, weights to float32."""
-    targets, weights = form.targets, form.weights
-    if quantize:
-        size = np.abs(targets).max(axis=(1, 2), initial=0.0)
-        size = np.where(size > 0, size, 1.0).astype(np.float64)
-        targets = (np.rint(targets / size[:, None, None] * SHORT) / SHORT).astype(np.float32)
-        weights = weights * size
-    return Form(form.kind, form.base, targets, form.frames, weights.astype(np.float32).astype(np.float64))
 
 
 def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
@@ -120,7 +102,7 @@ def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
         for i, column in enumerate(form.weights.T):
             weights[:, i] = np.interp(times[rows], keys, column)
         placed = form.base + (weights @ flat).reshape(-1, *form.base.shape)
-        off = (placed - positions[rows]).astype(np.float64)
+        off = (np.float32(form.scale) * placed - positions[rows]).astype(np.float64)
         worst = max(worst, float(np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0))))
     return worst
 
@@ -148,7 +130,8 @@ def _write(cache: VertexCache, whole: Chunk, form: Form, outputs: Outputs, *, qu
         targets.append(entry)
     first = [float(weight) for weight in form.weights[0]]
     gltf.meshes.append(Mesh(primitives=[primitive(attributes, indices, targets)], weights=first or None))
-    gltf.nodes.append(Node(name=NAME, mesh=0, extras={EXTRAS: {"cache": form.kind, "up": cache.up}}))
+    scale = [form.scale] * 3 if form.scale != 1 else None
+    gltf.nodes.append(Node(name=NAME, mesh=0, scale=scale, extras={EXTRAS: {"cache": form.kind, "up": cache.up}}))
     gltf.scenes[0].nodes.append(0)
     if targets and len(form.frames) > 1:
         sampler = AnimationSampler(

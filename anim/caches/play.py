@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,20 +14,27 @@ from anim.gltf.document import Document, items
 from anim.model import Clip, VertexCache
 from anim.sampling import grid
 from anim.skinning.bake import bake
+from anim.skinning.weights import bad_sums
 
 
-def play(document: Document, *, clip: int = 0, fps: float | None = None) -> VertexCache:
+def play(
+    document: Document, *, clip: int = 0, fps: float | None = None, note: Callable[[str], None] = lambda _: None
+) -> VertexCache:
     """Return every vertex of the file while a clip plays, in world space, nodes depth-first, primitives in order.
 
     At `fps` frames per second, else at the clip's own keys; without clips the rest pose. The cache's `chosen` says
-    which clip it is. A file that we wrote says which axis is up. Raises NotFoundError where the file has no vertices.
+    which clip it is. A file that we wrote says which axis is up. note: is told of skin weights that don't add up to 1.
+    Raises NotFoundError where the file has no vertices.
     """
     scene, clips = read.scene(document), read.clips(document)
+    for bad in bad_sums(scene.instances):
+        for words in bad.in_words():
+            note(words)
     chosen = clips[clip] if clips else Clip("", ())
     if not scene.vertex_count:
         raise NotFoundError("has no mesh with vertices")
     times = grid(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
-    said = f"clip '{chosen.name or clip}', one of {len(clips)}" if len(clips) > 1 else ""
+    said = f"{read.label(chosen.name, clip)}, one of {len(clips)}" if len(clips) > 1 else ""
     return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
 
 

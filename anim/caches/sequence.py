@@ -24,14 +24,14 @@ def read(inputs: Inputs, reading: Reading, *, ending: str) -> VertexCache:
 
     All have the format that `ending` names, whatever they are called.
     Frames that a longer sequence of ours left behind a shorter one are no part of it: the first file says how many are.
+    Raises FormatError where one of these is missing, as after a write that was killed.
     Times are those that our own files say, else frames at `reading.fps` or 24 per second. The first frame gives the
     faces; every other must have as many vertices.
     """
     names = members(inputs)
     with whole(inputs, names[0]) as data:
         first = still.read(data, ending)
-    count = first.remark.get("frames", "")
-    names = names[: int(count)] if count.isdecimal() and int(count) else names
+    names = _of_one_sequence(inputs.main, names, first.remark.get("frames", ""))
     return VertexCache(
         _times(inputs, names, reading.fps),
         len(first.positions),
@@ -79,6 +79,19 @@ def members(inputs: Inputs) -> Sequence[str]:
     if not found:
         raise FormatError(f"is not there, nor is {numbered(inputs.main, 1)}")
     return found
+
+
+def _of_one_sequence(main: str, names: Sequence[str], count: str) -> Sequence[str]:
+    """The frames that belong to the first of these files, of a sequence of ours; all, of others' (count is "")."""
+    if not count.isdecimal() or not int(count):
+        return names
+    if int(count) == 1:
+        return names[:1]
+    there = set(names)
+    wanted = [numbered(main, number) for number in range(1, min(int(count), len(names) + 1) + 1)]
+    if missing := next((name for name in wanted if name not in there), None):
+        raise FormatError(f"'{missing}' is not there (the sequence has {count} frames)", help="write all of it again")
+    return wanted
 
 
 def _stem(name: str) -> str:

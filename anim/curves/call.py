@@ -48,8 +48,7 @@ def resolve(text: str, ready: Mapping[str, T], makers: Mapping[str, Maker[T]], *
     try:
         return maker.make(tuple(part.strip() for part in inside.split(",")) if inside.strip() else ())
     except RangeError as error:
-        error.help = error.help or f"write {maker.usage}"
-        raise error.at(f"{kind} {text!r}", separator="") from None
+        raise error.advise(f"write {maker.usage}").at(f"{kind} {text!r}", separator="") from None
 
 
 def numbers(arguments: tuple[str, ...], count: int) -> tuple[float, ...]:

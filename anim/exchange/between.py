@@ -20,8 +20,8 @@ Motion: TypeAlias = Callable[[Floats], tuple[dict[int, Floats], Floats]]
 def refined(times: Floats, motion: Motion, *, tolerance: float, size: float) -> Floats:
     """Return key times, `times` among them, between which slerp and lerp stay within the tolerance of the motion.
 
-    times: (K,) s, float32-exact. motion: at times (F,) → unit quaternions (F, 4) by node, and a path (F, 3) in metres.
-    tolerance: rad for each rotation; the path is held within tolerance × size. No joint turns by over 120° in a piece.
+    times: (K,) s, float32-exact. motion: at times (F,) → unit quaternions (F, 4) by node, and paths (F, P, 3), m.
+    tolerance: rad for each rotation; paths are held within tolerance × size. No joint turns by over 120° in a piece.
     Raises RangeError for over two million keys.
     """
     return keys.refined(times, lambda a, b: _wanted(motion, a, b, tolerance, size))
@@ -32,10 +32,10 @@ def _wanted(motion: Motion, a: Floats, b: Floats, tolerance: float, size: float)
     shares = np.concatenate(([0.0], SAMPLES, [1.0]))
     at = a[:, None] + (b - a)[:, None] * shares
     at[:, -1] = b
-    rotations, path = motion(at.ravel())
-    places = path.reshape(*at.shape, 3)
-    chord = places[:, :1] + (places[:, -1:] - places[:, :1]) * SAMPLES[None, :, None]
-    error = np.linalg.norm(chord - places[:, 1:-1], axis=-1).max(axis=1) / size
+    rotations, paths = motion(at.ravel())
+    places = paths.reshape(*at.shape, *paths.shape[1:])
+    chord = places[:, :1] + (places[:, -1:] - places[:, :1]) * SAMPLES[None, :, None, None]
+    error = np.linalg.norm(chord - places[:, 1:-1], axis=-1).max(axis=(1, 2), initial=0.0) / size
     turns = np.ones(len(a))
     for flat in rotations.values():
         q = flat.reshape(*at.shape, 4)

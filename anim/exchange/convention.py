@@ -60,7 +60,7 @@ def complete(said: Stated) -> Convention:
     missing = next(name for name in ("order", "frame", "unit") if getattr(said, name) is None)
     raise RangeError(
         f"nobody says the {missing} of the angles",
-        help="give --order, --frame and --unit; FBX and Maya call --order XYZ --frame extrinsic 'XYZ'",
+        help="give order, frame and unit; what FBX and Maya call XYZ is the order XYZ in the frame extrinsic",
     )
 
 

@@ -82,7 +82,7 @@ def checked(draft: Draft, slot: tuple[str, int], build: Callable[[], Curve]) -> 
     except FormatError:
         raise
     except AnimError as error:
-        raise FormatError(error.problem, where=error.where) from None
+        raise FormatError(error.problem, where=error.where, help=error.help) from None
 
 
 def _node(draft: Draft, parent: int, meters_per_unit: float) -> EulerNode:

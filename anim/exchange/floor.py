@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -18,6 +18,7 @@ DOWN = 0.03  # share of the height that the lowest foot may be above its ground 
 STANDS, LEAVES = 0.015, 0.04  # shares of the height: up to the first clearance is noise, from the second on none of it
 UNEVEN = 0.04  # share of the height that a foot's ground may be above that of all: markers and floors are never level
 WINDOW, STEP = 0.1, 1 / 120  # s
+FEET = ("foot", "toe")  # endings of roles
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
@@ -35,15 +36,19 @@ class Soles:
         return np.asarray((mine[:, :, 1, :3] * self.points).sum(axis=-1) + mine[:, :, 1, 3])
 
 
+def has_feet(roles: Iterable[str]) -> bool:
+    """Return whether a foot or toe is among roles such as "left_foot"."""
+    return any(role.endswith(FEET) for role in roles)
+
+
 def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> Soles:
     """Return the outermost points of the skin on feet and toes, and where the floor is: the lowest of all at rest.
 
-    positions: (N, 3) of all nodes at rest. roles: (role, node). Without skin there, the joints themselves; without
-    feet, all nodes.
+    positions: (N, 3) of all nodes at rest. roles: (role, node), with a foot or toe among them (`has_feet`). Without
+    skin there, the joints themselves.
     """
     world = world_matrices(scene.skeleton, rest(scene.skeleton))[0]
-    feet = {node for role, node in roles if role.endswith(("foot", "toe"))}
-    below = {int(node) for node in at_or_below(scene.skeleton, feet)} or set(range(len(world)))
+    below = {int(node) for node in at_or_below(scene.skeleton, {node for role, node in roles if role.endswith(FEET)})}
     nodes, points, lowest = list[int](), list[Floats](), [float(positions[sorted(below), 1].min())]
     for instance in scene.instances:
         if instance.skin is None or not instance.mesh.joints.shape[1]:

@@ -46,11 +46,11 @@ def from_euler(motion: EulerMotion, *, tolerance: float, keys: Keys = Keys.AUTO,
     tolerance: rad; translations are held within tolerance × the skeleton's size, scales within tolerance × 1.
     keys: ADAPTIVE as above; GRID adds no key, and takes angles that jump by whole turns for the same; AUTO takes GRID
     for recordings: BVH, or straight curves on one even grid of 10 keys a second or more.
-    Raises RangeError for a tolerance below 1e-6.
+    Raises RangeError for a tolerance below 1e-6 or above pi.
     XYZ (0, 0, 0) at 0 s → (90°, 90°, 0) at 1 s, tolerance 0.1° → a rotation track of 15 keys
     """
-    if not MIN_TOLERANCE <= tolerance < np.inf:
-        raise RangeError(f"tolerance is {tolerance:g} rad (expected {MIN_TOLERANCE:g} or more)")
+    if not MIN_TOLERANCE <= tolerance <= np.pi:
+        raise RangeError(f"tolerance is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
     bones = skeleton(motion)
     size = extent(bones) or 1.0
     stored, axes = StoredTimes(), _Axes()

@@ -5,10 +5,14 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TypeAlias
 
 from anim.errors import NotFoundError
 from anim.exchange.names import plain
 from anim.exchange.roles import roles
+
+Way: TypeAlias = Callable[[int], int | None]  # from a source node to the target node, where there is one
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,25 +35,47 @@ def match(
     aliases: Mapping[str, str],
     of_source: Sequence[int],
     of_target: Sequence[int],
+    others: Sequence[int] = (),
+    same: Mapping[int, int] = MappingProxyType({}),
+    stated: Mapping[str, int] = MappingProxyType({}),
 ) -> Matching:
     """Return the pairs of nodes whose names mean the same, each node in one pair at most.
 
-    In this order: aliases (source name → target name; "" for none), the same name, the same name without namespace,
-    prefix, case, separators and spelling of sides, then the same joint of a person (`roles`).
-    of_source, of_target: nodes that take part, the surest first. Raises NotFoundError for an alias of a missing name.
+    In this order: aliases (source name → target name; "" for none), `same` (source → target node, see `same_tree`), the
+    joint that the target's file states (`stated`, target node by role), the same name, the same name without namespace,
+    prefix, ending, case, separators and spelling of sides, then the same joint of a person (`roles`).
+    of_source, of_target: nodes that take part, the surest first. others: nodes of the target for what finds no partner
+    among those. Raises NotFoundError for an alias of a missing name.
     """
     left = {source[node]: node for node in reversed(of_source)}
-    right = {target[node]: node for node in reversed(of_target)}
-    everywhere = {name: node for node, name in reversed([*enumerate(target)])} | right
+    everywhere = {target[node]: node for node in (*range(len(target))[::-1], *reversed(of_target))}
     pairs, excluded = _named(aliases, left, everywhere)
     plain_source, plain_target = plain(source), plain(target)
-    by_plain = {plain_target[node]: node for node in reversed(of_target)}
-    source_roles, target_roles = roles(plain_source, of_source), roles(plain_target, of_target)
+    source_roles = roles(plain_source, of_source)
     by_role = {node: role for role, node in source_roles.items()}
-    ways: tuple[Callable[[int], int | None], ...] = (
-        lambda node: right.get(source[node]),
-        lambda node: by_plain.get(plain_source[node]),
-        lambda node: target_roles.get(by_role.get(node, "")),
+
+    def by_names(nodes: Sequence[int]) -> tuple[Way, ...]:
+        """Partners among these nodes: of the same name, of the same one taken apart, of the same role.
+
+        Numbers mean other joints in other rigs ("spine1"): roles win over names that were taken apart.
+        """
+        right = {target[node]: node for node in reversed(nodes)}
+        by_own_role = roles(plain_target, [node for node in nodes if node not in stated.values()])
+        shared = source_roles.keys() & by_own_role.keys()
+        in_role = {source_roles[role] for role in shared}
+        of_role = {by_own_role[role] for role in shared}
+        free = {plain_target[node]: node for node in reversed(nodes) if node not in of_role}
+        return (
+            lambda node: right.get(source[node]),
+            lambda node: None if node in in_role else free.get(plain_source[node]),
+            lambda node: by_own_role.get(by_role.get(node, "")),
+        )
+
+    ways = (
+        same.get,
+        lambda node: stated.get(by_role.get(node, "")),
+        *by_names(of_target),
+        *by_names(others),
     )
     for way in ways:
         taken = set(pairs.values())

@@ -8,7 +8,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-SHARED = 0.6  # share of names that must begin alike for that to be a prefix
+TOOL = re.compile(r"^(?:DEF-|mixamorig\d*_?)(?=\w)")  # what Rigify's joints begin with, and Mixamo's without colon
+ROUNDS = 3  # of what is taken off at both ends
+CENTER = "c"  # VRoid's joints in the middle: "J_Bip_C_Hips"
+DISTINCT = 0.9  # share of names that must stay different
+SHARED = 0.6  # share of names that must begin or end alike for that to tell nothing
 
 
 class Name(NamedTuple):
@@ -19,20 +23,52 @@ class Name(NamedTuple):
 
 
 def plain(names: Sequence[str]) -> list[Name]:
-    """Return the names of one skeleton taken apart, without namespaces and without a prefix that most of them share.
+    """Return the names of one skeleton taken apart, without namespaces and what most of them begin or end with.
 
+    That is a prefix ("Bip01 "), an ending ("_Armature"), or a number that counts them ("_023").
     plain(["Bip01 L Thigh", "Bip01 Head"]) → ("left", "thigh"), ("", "head")
     """
-    bare = [re.split(r"[:|]", name)[-1] for name in names]
-    prefix = _prefix(bare)
-    return [_taken_apart(name[len(prefix) :] if prefix and _begins(name) == prefix else name) for name in bare]
+    bare = [TOOL.sub("", re.split(r"[:|]", name)[-1]) for name in names]
+    for _ in range(ROUNDS):
+        bare = _without_prefix(_without_ending(_without_numbers(bare)))
+    return [_taken_apart(name) for name in bare]
 
 
-def _prefix(names: Sequence[str]) -> str:
-    starts = Counter(start for name in names if (start := _begins(name)))
-    start, count = starts.most_common(1)[0] if starts else ("", 0)
-    word = start.strip(" _.-").casefold()
-    return start if count > 1 and count >= SHARED * len(names) and word not in SIDES else ""
+def _without_prefix(names: list[str]) -> list[str]:
+    prefix = _shared([_begins(name) for name in names])
+    return [name[len(prefix) :] if prefix and _begins(name) == prefix else name for name in names]
+
+
+def _without_ending(names: list[str]) -> list[str]:
+    ending = _shared([_ends(name) for name in names])
+    shorter = [name.removesuffix(ending) for name in names]
+    return shorter if _differ(shorter) else names
+
+
+def _without_numbers(names: list[str]) -> list[str]:
+    """Names without the numbers that an exporter gave to all of them, which tell nothing."""
+    numbers = [match[0] for name in names if (match := re.search(r"_\d+$", name))]
+    shorter = [re.sub(r"_\d+$", "", name) for name in names]
+    counted = len(numbers) > 1 and len(numbers) >= SHARED * len(names) and len(set(numbers)) == len(numbers)
+    return shorter if counted and _differ(shorter) else names
+
+
+def _differ(names: list[str]) -> bool:
+    return len(set(names)) >= DISTINCT * len(names)
+
+
+def _shared(parts: list[str]) -> str:
+    """The part that most names have; none where it is a side."""
+    counts = Counter(part for part in parts if part)
+    part, count = counts.most_common(1)[0] if counts else ("", 0)
+    is_side = part.strip(" _.-").casefold() in SIDES
+    return part if count > 1 and count >= SHARED * len(parts) and not is_side else ""
+
+
+def _ends(name: str) -> str:
+    """The last word of a name with the separator, where a word comes before: "_Armature" of "hips_Armature"."""
+    match = re.search(r"(?<=\w)[\s_.-]+[^\W\d_]{2,}$", name)
+    return match[0] if match else ""
 
 
 def _begins(name: str) -> str:
@@ -45,4 +81,6 @@ def _taken_apart(name: str) -> Name:
     words = [word.casefold() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+", name)]
     side = next((SIDES[word] for word in words if word in SIDES), "")
     stem = [str(int(word)) if word.isdecimal() else word for word in words if word not in SIDES]
+    if len(stem) > 1 and stem[0] == CENTER and not side:
+        stem = stem[1:]
     return Name(side, "".join(stem))

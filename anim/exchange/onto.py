@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from anim.errors import NotFoundError
+from anim.exchange.alignment import Measure
+from anim.exchange.bind_pose import bind_pose, completed
+from anim.exchange.floor import has_feet
 from anim.exchange.from_euler import Converted
 from anim.exchange.match import Matching, match
 from anim.exchange.retarget import Floor, retarget
+from anim.exchange.same_tree import same_tree
 from anim.model import Clip, Scene
 
 
@@ -17,12 +22,18 @@ class Onto:
     """The clip for the character, and what became of the motion's joints.
 
     scale: of the path, character by motion. lowered: least and most that hips went down, metres.
+    measure: what the scale is taken from; None for curves that are the nodes' own. without: what of a person the path
+    and the floor need and is not matched, "hips", "legs" or "feet".
+    num_bound: joints whose rest was taken from the skins, because the nodes rest elsewhere.
     """
 
     clip: Clip
     matching: Matching
     scale: float
     lowered: tuple[float, float]
+    num_bound: int = 0
+    measure: Measure | None = None
+    without: tuple[str, ...] = ()
 
 
 def onto(
@@ -31,34 +42,47 @@ def onto(
     *,
     aliases: Mapping[str, str],
     nested: bool,
+    stated: Mapping[str, int] = MappingProxyType({}),
     floor: Floor = Floor.CONTACT,
     rest_at: float | None = None,
 ) -> Onto:
     """Return the motion as a clip of the character.
 
-    Joints are those of the character's skins, or all its nodes where it has none. See `match` and `retarget`.
+    Joints are those of the character's skins, then nodes without mesh in their tree; all its nodes where it has none,
+    or where the motion is of its own tree.
+    See `same_tree`, `match` and `retarget`.
+    stated: the character's nodes by role, where its file states them (`humanoid.stated_roles`).
     nested: whether the motion has a hierarchy; if not, its curves are the nodes' own and go to them as they are.
     Raises NotFoundError where no joint is matched, or there is none.
     """
     joints = {int(node) for each in target.instances if each.skin is not None for node in each.skin.joints}
+    moving = _parents_first(source)
     matching = match(
         source.skeleton.names,
         target.skeleton.names,
         aliases=aliases,
-        of_source=_parents_first(source),
+        of_source=moving,
         of_target=sorted(joints) if joints and nested else list(range(len(target.skeleton))),
+        others=_others(target, joints) if nested else [],
+        same=same_tree(source.skeleton, target.skeleton, moving) if nested else {},
+        stated=stated,
     )
     if not target.skeleton.names:
         raise NotFoundError("the character has no nodes that a motion could move")
     if not matching.pairs:
-        first = source.skeleton.names[0], target.skeleton.names[min(joints, default=0)]
+        tops = [int(n) for level in target.skeleton.levels() for n in level if not joints or int(n) in joints]
+        first = source.skeleton.names[moving[0]], target.skeleton.names[tops[0]]
         raise NotFoundError(
             "no joint of the motion is one of the character",
             help=f"pair them in an --alias file, in lines such as '{first[0]},{first[1]}'",
         )
     if nested:
-        done = retarget(source, target, matching, floor=floor, rest_at=rest_at)
-        return Onto(done.clip, matching, done.scale, done.lowered)
+        bound = bind_pose(
+            target.skeleton, [(each.node, each.skin) for each in target.instances if each.skin is not None]
+        )
+        done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, rest_at=rest_at)
+        clip = completed(done.clip, bound.skeleton, target.skeleton)
+        return Onto(clip, matching, done.scale, done.lowered, bound.num_joints, done.measure, _without(matching))
     tracks = [
         replace(track, node=matching.pairs[track.node])
         for track in source.clip.tracks
@@ -67,5 +91,22 @@ def onto(
     return Onto(Clip(source.clip.name, tuple(tracks)), matching, 1.0, (0.0, 0.0))
 
 
+def _without(matching: Matching) -> tuple[str, ...]:
+    found = set(matching.target_roles)
+    legs = any({f"{side}_{role}" for role in ("upper_leg", "lower_leg")} <= found for side in ("left", "right"))
+    here = {"hips": "hips" in found, "legs": legs, "feet": has_feet(found)}
+    return tuple(name for name, known in here.items() if not known)
+
+
 def _parents_first(source: Converted) -> list[int]:
     return [int(n) for level in source.skeleton.levels() for n in level if int(n) not in source.ends]
+
+
+def _others(target: Scene, joints: Set[int]) -> list[int]:
+    """Nodes without mesh below the parents of topmost joints: limbs that the skin of a head, or of armor, lacks."""
+    parents = target.skeleton.parents
+    holders = {each.node for each in target.instances}
+    inside = set(joints) | {int(parents[node]) for node in joints}
+    for level in target.skeleton.levels():
+        inside |= {node for node in level.tolist() if int(parents[node]) in inside}
+    return sorted(inside - joints - holders - {-1})

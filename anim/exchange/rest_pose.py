@@ -20,11 +20,18 @@ LIMBS = {"upper_arm": "lower_arm", "lower_arm": "hand", "upper_leg": "lower_leg"
 
 @dataclass(frozen=True, slots=True)
 class RestPose:
-    """A skeleton at rest in world space: positions (N, 3), rotations (N, 4), and parents (N,)."""
+    """A skeleton at rest in world space: positions (N, 3), rotations (N, 4), and parents (N,).
+
+    scales: (N, 3) in the parent's space. local: (N, 3, 3), parent_from_node, and to_node: (N, 3, 3), node_from_world,
+    both without translation.
+    """
 
     positions: Floats
     rotations: Floats
     parents: tuple[int, ...]
+    scales: Floats
+    local: Floats
+    to_node: Floats
 
 
 def facing(source: RestPose, target: RestPose, matching: Matching) -> Floats:

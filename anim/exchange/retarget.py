@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -10,17 +11,18 @@ import numpy as np
 from anim.arrays import Floats, sorted_unique
 from anim.errors import NotFoundError, RangeError
 from anim.exchange import between
-from anim.exchange.floor import at_or_below, heights_above_contact, soles
+from anim.exchange.alignment import Measure
+from anim.exchange.floor import at_or_below, has_feet, heights_above_contact, soles
 from anim.exchange.from_euler import Converted
 from anim.exchange.match import Matching
-from anim.exchange.strays import with_strays
-from anim.exchange.transfer import Transfer, transfer
-from anim.maths import matrix, quaternion
-from anim.model import Clip, Interpolation, Scene, Skeleton, Track
-from anim.sampling import pose as posed
+from anim.exchange.steps import is_held, just_before, linear, step, within
+from anim.exchange.transfer import Followed, Transfer, transfer
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import rest, world_matrices
 
 LONGEST = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
+STILL = 1e-7  # rad, factor, and share of the target's size: what rounding leaves of no motion
 CONTACT_STEP = 1 / 30  # s between times at which soles are looked at, where keys stand farther apart
 
 
@@ -33,11 +35,45 @@ class Floor(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Retargeted:
-    """The clip for the target, the target's size by the source's, and the least and most that hips went down, in m."""
+    """The clip for the target, the target's size by the source's, and the least and most that hips went down, in m.
+
+    measure: what the scale is taken from.
+    """
 
     clip: Clip
     scale: float
     lowered: tuple[float, float]
+    measure: Measure
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What the target does at times (K,), and which keys its tracks get.
+
+    before: those of the times that stand before steps. inside: what it does at `within(knots)`; None without steps.
+    thin: whether keys may be left out where nothing changes; recordings keep their grid.
+    """
+
+    times: Floats
+    found: Followed
+    before: Floats
+    knots: Floats
+    inside: Followed | None
+    thin: bool
+
+    def track(self, node: int, path: str, tolerance: float) -> Track:
+        """STEP where the value holds between all knots of the source, LINEAR otherwise."""
+        values = _of(self.found, node, path)
+        if self.inside is not None and is_held(_of(self.inside, node, path), tolerance=tolerance):
+            at = np.isin(self.times, self.knots)
+            return step(node, path, self.times[at], values[at])
+        return linear(node, path, self.times, values, before=self.before, thin=self.thin)
+
+
+def _of(found: Followed, node: int, path: str) -> Floats:
+    if path == "rotation":
+        return quaternion.align_signs(found.rotations[node])
+    return found.translations[node] if path == "translation" else found.scales[node]
 
 
 def retarget(
@@ -53,8 +89,8 @@ def retarget(
     Keys stand at all times of the source, and between them where what a player makes there would leave the motion by
     more than the source's tolerance, of the target's size for its path; recordings keep their grid.
     floor: CONTACT moves the hips up or down so that the soles stand where they stand at rest while a foot of the
-    source is down; KEEP scales heights only. rest_at: s, the time at which the source stands in its rest pose; None
-    for the pose in which every angle is zero.
+    source is down; KEEP scales heights only, and so does CONTACT where no foot is matched.
+    rest_at: s, the time at which the source stands in its rest pose; None for the pose in which every angle is zero.
     Raises NotFoundError where no joint is matched, RangeError for CONTACT in a motion of over a day.
     """
     if not matching.pairs:
@@ -63,30 +99,33 @@ def retarget(
         seconds = source.clip.end - source.clip.start
         raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
     follow = transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
-    times = _times(source.clip)
+    size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
+    knots, before = _times(source.clip)
+    times = sorted_unique(np.concatenate((knots, before)))
     looked_at, lowered = times, np.zeros(len(times))
-    if floor == Floor.CONTACT:
+    if floor == Floor.CONTACT and not follow.aligned.alike and has_feet(matching.target_roles):
         looked_at = times if source.tolerance is None else _no_farther(times, CONTACT_STEP)
         lowered = _too_high(follow, target, matching, looked_at)
 
-    def at(when: Floats) -> tuple[dict[int, Floats], Floats]:
-        found = follow.at(when)
-        return found.rotations, found.path - np.interp(when, looked_at, lowered)[:, None] * [0, 1, 0]
+    def at(when: Floats) -> Followed:
+        return follow.at(when, np.interp(when, looked_at, lowered))
 
     if source.tolerance is not None:
-        size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
-        times = between.refined(times, at, tolerance=source.tolerance, size=size)
-    rotations, path = at(times)
-    clip = _clip(source.clip.name, follow, times, rotations, path)
-    return Retargeted(clip, follow.scale, (float(lowered.min()), float(lowered.max())))
+        lengths = _lengths(follow)
+        times = between.refined(
+            times, lambda when: _rotations_and_paths(at(when), lengths, size), tolerance=source.tolerance, size=size
+        )
+    inside = at(within(knots)) if len(before) else None
+    wanted = _Wanted(times, at(times), before, knots, inside, thin=source.tolerance is not None)
+    clip = Clip(source.clip.name, tuple(_tracks(follow, wanted, size)))
+    return Retargeted(clip, follow.aligned.scale, (float(lowered.min()), float(lowered.max())), follow.aligned.measure)
 
 
-def _times(clip: Clip) -> Floats:
-    """All key times; where a step jumps, also the float32 time just before: the target's tracks are straight."""
+def _times(clip: Clip) -> tuple[Floats, Floats]:
+    """All key times (T,), and float32 times just before those at which a step may jump."""
     arrays = {id(track.times): track.times for track in clip.tracks}
-    steps = {id(t.times): t.times[1:] for t in clip.tracks if t.interpolation is Interpolation.STEP}
-    before = [np.nextafter(each.astype(np.float32), np.float32(0)).astype(np.float64) for each in steps.values()]
-    return sorted_unique(np.concatenate([*arrays.values(), *before]))
+    steps = {id(t.times): just_before(t.times[1:]) for t in clip.tracks if t.interpolation is Interpolation.STEP}
+    return sorted_unique(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
 
 
 def _no_farther(times: Floats, step: float) -> Floats:
@@ -98,27 +137,41 @@ def _no_farther(times: Floats, step: float) -> Floats:
 def _too_high(follow: Transfer, target: Scene, matching: Matching, times: Floats) -> Floats:
     """How far (F,) above the floor the target would be with heights scaled only, in metres."""
     found = follow.at(times)
-    clip = _clip("", follow, times, found.rotations, found.path)
-    world = world_matrices(target.skeleton, posed(target.skeleton, clip, times))
     feet = soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
     roles = matching.source_roles
     of_source = [at_or_below(follow.source, {roles[f]}) for f in ("left_foot", "right_foot") if f in roles]
-    return heights_above_contact(times, found.heights, of_source, feet.heights(world), feet.floor, follow.scale)
+    heights, world = found.source[:, :, 1, 3].T, found.world.transpose(1, 0, 2, 3)
+    return heights_above_contact(times, heights, of_source, feet.heights(world), feet.floor, follow.aligned.scale)
 
 
-def _clip(name: str, follow: Transfer, times: Floats, rotations: dict[int, Floats], path: Floats) -> Clip:
-    tracks = [_track(node, "rotation", times, quaternion.align_signs(q)) for node, q in sorted(rotations.items())]
-    return with_strays(Clip(name, (*tracks, _path_track(follow.target, follow.top, times, path))), follow, times)
+def _lengths(follow: Transfer) -> dict[int, float]:
+    """Meters per unit of the space that each matched node of the target moves in, at rest."""
+    skeleton = follow.target
+    world = world_matrices(skeleton, rest(skeleton))[0]
+    lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
+    return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
 
 
-def _path_track(skeleton: Skeleton, node: int, times: Floats, path: Floats) -> Track:
-    """The local translation that puts a node on a path (F, 3) in world space; what is above it rests."""
-    parent = int(skeleton.parents[node])
-    if parent >= 0:
-        above = world_matrices(skeleton, rest(skeleton))[0, parent]
-        path = matrix.apply(matrix.inverse(above), path)
-    return _track(node, "translation", times, path)
+def _rotations_and_paths(
+    found: Followed, lengths: Mapping[int, float], size: float
+) -> tuple[dict[int, Floats], Floats]:
+    """What must be followed between keys: rotations, and as metres (F, P, 3) translations and scales."""
+    places = [found.translations[node] * length for node, length in lengths.items()]
+    return found.rotations, np.stack([*places, *(scale * size for scale in found.scales.values())], axis=1)
 
 
-def _track(node: int, path: str, times: Floats, values: Floats) -> Track:
-    return Track(node, path, Interpolation.LINEAR, times, values)
+def _tracks(follow: Transfer, wanted: _Wanted, size: float) -> list[Track]:
+    """Tracks of the matched nodes; none for what stays at rest and has no track in the source either."""
+    moved = {(track.node, track.path) for track in follow.clip.tracks}
+    lengths, still, found = _lengths(follow), follow.target, wanted.found
+    tracks = []
+    for a, b in sorted(follow.pairs.items(), key=lambda pair: pair[1]):
+        rotation = quaternion.align_signs(found.rotations[b])
+        if (a, "rotation") in moved or quaternion.angle_between(rotation, still.rotation[b]).max() > STILL:
+            tracks.append(wanted.track(b, "rotation", STILL))
+        far = np.abs(found.translations[b] - still.translation[b]).max() * lengths[b]
+        if (b == follow.top and (a, "translation") in moved) or far > STILL * size:
+            tracks.append(wanted.track(b, "translation", STILL * size / lengths[b]))
+        if np.abs(found.scales[b] - still.scale[b]).max() > STILL:
+            tracks.append(wanted.track(b, "scale", STILL))
+    return tracks or [wanted.track(follow.top, "translation", STILL)]

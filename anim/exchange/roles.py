@@ -6,23 +6,24 @@ from collections.abc import Sequence
 
 from anim.exchange.names import Name
 
-# Stems by role, the surest first: CMU, Mixamo, Biped (3ds Max), Rigify, Unreal, VRM, Poser, KayKit, Quaternius.
+# Stems by role, the surest first: CMU, Mixamo, Biped (3ds Max), Rigify, Unreal, VRM, Poser, KayKit, Quaternius,
+# Daz; last what Rigify calls them, whose spine begins with the hips, as in rigs that only number theirs.
 MIDDLE = {
-    "hips": ("hips", "pelvis", "hip"),
-    "spine": ("spine", "spine1", "abdomen", "lowerback", "waist", "torso"),
-    "chest": ("chest", "upperchest", "spine3", "spine2", "spine1", "thorax", "ribcage", "torso"),
-    "neck": ("neck", "neck1", "neck01"),
-    "head": ("head",),
+    "hips": ("hips", "pelvis", "hip", "spine", "spine1"),
+    "spine": ("spine", "spine1", "abdomen", "abdomenlower", "lowerback", "waist", "torso"),
+    "chest": ("chest", "upperchest", "spine3", "spine2", "spine1", "chestlower", "thorax", "ribcage", "torso"),
+    "neck": ("neck", "neck1", "necklower", "spine4"),
+    "head": ("head", "head1", "spine6"),
 }
 SIDED = {
     "shoulder": ("shoulder", "collar", "clavicle", "collarbone"),
-    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "armupper", "bicep"),
-    "lower_arm": ("lowerarm", "lowarm", "forearm", "elbow", "armlower"),
-    "hand": ("hand", "wrist"),
-    "upper_leg": ("upperleg", "upleg", "thigh", "hip", "legupper"),
-    "lower_leg": ("lowerleg", "lowleg", "leg", "shin", "calf", "knee", "leglower"),
-    "foot": ("foot", "ankle"),
-    "toe": ("toes", "toe", "toebase", "ball", "toe0"),
+    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "shldrbend", "armupper", "armupper1", "bicep"),
+    "lower_arm": ("lowerarm", "lowarm", "forearm", "forearmbend", "elbow", "armlower", "armlower1"),
+    "hand": ("hand", "hand1", "wrist"),
+    "upper_leg": ("upperleg", "upleg", "thigh", "thighbend", "hip", "legupper", "legupper1"),
+    "lower_leg": ("lowerleg", "lowleg", "leg", "shin", "calf", "knee", "leglower", "leglower1"),
+    "foot": ("foot", "foot1", "ankle"),
+    "toe": ("toes", "toe", "toebase", "ball", "toe0", "foot2"),
 }
 PERSON = ("hips", "left_upper_leg", "right_upper_leg", "left_foot", "right_foot")
 

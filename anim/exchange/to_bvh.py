@@ -22,7 +22,7 @@ from anim.sampling import pose, rest, world_matrices
 EVEN = 1e-3  # share of a frame by which frames may be off an even grid
 MAX_FRAMES = 10_000_000
 ROUNDING = 2e-7  # share of a time that float32 may be off
-STILL = 1e-5  # share of the skeleton's size by which an offset may differ and still be one
+STILL = 1e-6  # share of the skeleton's size by which an offset may differ and still be one
 BRACES = "{}"
 END = "_end"  # a leaf of this name that nothing moves is where its parent ends
 
@@ -53,7 +53,7 @@ def to_bvh(
     shown, times = _frames(clip, fps)
     figure = _Figure(skeleton, clip, chosen, times)
     nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
-    notes = left_out(_lost(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen)
+    notes = left_out(_lost(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen) + _begun(clip)
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 
@@ -157,6 +157,10 @@ def _names(skeleton: Skeleton) -> list[str]:
 def _renamed(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:
     changed = [names[node] for node in sorted(chosen) if set(skeleton.names[node]) & set(BRACES)]
     return (f"braces in names became parentheses: {', '.join(changed)}",) if changed else ()
+
+
+def _begun(clip: Clip) -> tuple[str, ...]:
+    return (f"the first key is at {clip.start:.6g} s: a BVH begins there, at 0",) if clip.start > 0 else ()
 
 
 def _lost(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -28,6 +29,13 @@ class Accessors:
         self._accessors = items(document.json, "accessors")
         self._views = items(document.json, "bufferViews")
         self._bytes: dict[int, Bytes] = {}
+        self._given: Mapping[int, NDArray[Any]] = {}
+
+    def over(self, given: Mapping[int, NDArray[Any]]) -> Accessors:
+        """Return accessors in which some, by number, hold these numbers (count, components) instead of their own."""
+        other = copy(self)
+        other._given = {**self._given, **given}
+        return other
 
     def about(self, index: int) -> Json:
         """Return the JSON of an accessor."""
@@ -83,12 +91,14 @@ class Accessors:
             raise error.at(f"accessor {index}") from None
 
     def _raw(self, index: int) -> NDArray[Any]:
+        if index in self._given:
+            return self._given[index]
         about = self._accessors[index]
         form = _form(about["componentType"], about["type"])
         if "bufferView" in about:
             number = about["bufferView"]
             stride = self._views[number].get("byteStride", form.columns * form.column)
-            base = _strided(self._view(number), about.get("byteOffset", 0), about["count"], stride, form)
+            base = _strided(self.view(number), about.get("byteOffset", 0), about["count"], stride, form)
         else:
             base = np.broadcast_to(np.zeros((), form.dtype), (about["count"], form.columns * form.rows))
         return self._with_sparse(base, about, form) if "sparse" in about else base
@@ -97,11 +107,11 @@ class Accessors:
         sparse = about["sparse"]
         count, where, values = sparse["count"], sparse["indices"], sparse["values"]
         whole = _form(where["componentType"], "SCALAR")
-        view = self._view(where["bufferView"])
+        view = self.view(where["bufferView"])
         places = _strided(view, where.get("byteOffset", 0), count, whole.column, whole)[:, 0].astype(np.int64)
         if places[-1] >= about["count"] or (np.diff(places) <= 0).any():
             raise FormatError("sparse indices are not increasing, or beyond its count")
-        view = self._view(values["bufferView"])
+        view = self.view(values["bufferView"])
         full = base.copy()
         full[places] = _strided(view, values.get("byteOffset", 0), count, form.columns * form.column, form)
         full.flags.writeable = False
@@ -114,7 +124,8 @@ class Accessors:
             return denormalized(values, raw.dtype)
         return values
 
-    def _view(self, number: int) -> Bytes:
+    def view(self, number: int) -> Bytes:
+        """Return the bytes of a buffer view, decompressed. Raises FormatError, UnsupportedError."""
         found = self._bytes.get(number)
         if found is None:
             found = self._bytes[number] = self._opened(number)

@@ -23,7 +23,7 @@ class Reader:
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
         self._nodes = items(document.json, "nodes")
-        self._meshes = items(document.json, "meshes")
+        self._json = document.json
         self._accessors = accessors
         self._times: dict[int, Floats] = {}
         self._values: dict[int, Floats] = {}
@@ -39,7 +39,7 @@ class Reader:
             return self._track(animation["samplers"][channel["sampler"]], node, path, address)
         except AnimError as error:
             if isinstance(error, RangeError | ShapeError):  # of the file, not of a caller
-                error = FormatError(error.problem, where=error.where)
+                error = FormatError(error.problem, where=error.where, help=error.help)
             raise error.at(f"track {number} ({self._target_label(node, path, address)})", ": ") from None
 
     def _track(self, sampler: Json, node: int | None, path: str, address: str | None) -> Track:
@@ -55,7 +55,8 @@ class Reader:
             raise FormatError("CUBICSPLINE with one key (expected at least two)")
         values = self._values.get(sampler["output"])
         if values is None:
-            values = self._values[sampler["output"]] = self._accessors.unchecked(sampler["output"])
+            values = arrays.read_only(self._accessors.unchecked(sampler["output"]))
+            self._values[sampler["output"]] = values
         rows = len(times) * (3 if cubic else 1)
         if width is None:  # a pointer: an array of elements per key where the count says so
             width = values.size // rows
@@ -85,9 +86,9 @@ class Reader:
                 got = f"{about['type']} of {about['componentType']}"
                 raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
             try:
-                found = arrays.times(self._accessors.floats(index)[:, 0])
+                found = arrays.times(arrays.read_only(self._accessors.floats(index))[:, 0])
             except AnimError as error:
-                raise FormatError(error.problem, where=error.where) from None
+                raise FormatError(error.problem, where=error.where, help=error.help) from None
             self._times[index] = found
         return found
 
@@ -104,9 +105,7 @@ class Reader:
         return WIDTHS[path] if path != "weights" else self._target_count(node)
 
     def _target_count(self, node: int | None) -> int:
-        mesh = self._nodes[node].get("mesh") if node is not None else None
-        primitives = self._meshes[mesh]["primitives"] if mesh is not None else []
-        count = len(primitives[0].get("targets", ())) if primitives else 0
+        count = targets.target_count(self._json, node) if node is not None else 0
         if not count:
             raise FormatError("animates weights of a node without morph targets")
         return count

@@ -7,13 +7,14 @@ import re
 import struct
 from collections.abc import Callable, Iterator
 from itertools import count
-from typing import TypeAlias
+from typing import TypeAlias, TypeGuard
 
 import numpy as np
 
-from anim.errors import FormatError, UnsupportedError
+from anim.errors import FormatError, ShapeError, UnsupportedError
 from anim.gltf import structure, text, uri
 from anim.gltf.document import Buffer, Bytes, Document, Json, items
+from anim.gltf.node_matrix import expand_matrices
 
 MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
@@ -21,16 +22,30 @@ BIN_CHUNK = 0x004E4942
 MAX_GLB = 2**32 - 1  # the header's length field has 32 bits
 LFS_POINTER = b"version https://git-lfs"
 
-Resolve: TypeAlias = Callable[[str], Bytes]
+Resolve: TypeAlias = Callable[[str], Bytes | bytes | bytearray | memoryview]
+Choose: TypeAlias = Callable[[int, str, Bytes], str]
 
 
-def read(data: Bytes, resolve: Resolve | None = None) -> Document:
+def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None = None) -> Document:
     """Return the document in `data`, a GLB or a .gltf text.
 
-    data: uint8 array, best a memory map: nothing of a GLB's BIN chunk is copied or even touched.
-    resolve: gives the bytes of a file beside the input by its relative path; None where there is no such place.
-    Raises FormatError with what is wrong and where.
+    data: uint8 array, best a memory map: nothing of a GLB's BIN chunk is copied or even touched; or bytes.
+    resolve: gives the bytes of a file beside the input by its relative path, when they are first needed; None where
+    there is no such place.
+    Raises FormatError with what is wrong and where, ShapeError for what are no bytes.
     """
+    if isinstance(data, (bytes, bytearray, memoryview)):
+        data = np.frombuffer(data, np.uint8)
+    if not _is_bytes(data):
+        raise ShapeError(
+            f"data is no bytes (got {_kind(data)}, expected a uint8 array or bytes)",
+            help='the library opens no files: container.read(np.fromfile("walk.glb", np.uint8))',
+        )
+    if resolve is not None and not callable(resolve):
+        raise ShapeError(
+            f"resolve is {_kind(resolve)} (expected a function from a relative path to bytes)",
+            help='container.read(data, resolve=lambda name: np.fromfile(f"folder/{name}", np.uint8))',
+        )
     head = data[:4096].tobytes()
     if head[:4] == MAGIC:
         return _read_glb(data, resolve)
@@ -41,8 +56,8 @@ def read(data: Bytes, resolve: Resolve | None = None) -> Document:
     if head.lstrip()[:1] != b"{":
         raise FormatError(f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)")
     raw = data.tobytes()
-    parsed = _parse(raw)
-    return Document(parsed, _buffers(parsed, None, resolve, glb=False), indent=text.indent_of(raw))
+    parsed, expanded = _parse(raw)
+    return Document(parsed, buffers_of(parsed, None, resolve, glb=False), (), text.indent_of(raw), expanded)
 
 
 def glb(document: Document) -> list[Bytes]:
@@ -72,11 +87,14 @@ def glb(document: Document) -> list[Bytes]:
     return [_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
 
 
-def gltf(document: Document, stem: str, *, keep_external: bool = False) -> dict[str, list[Bytes]]:
+def gltf(
+    document: Document, stem: str, *, keep_external: bool = False, choose: Choose = lambda _, name, __: name
+) -> dict[str, list[Bytes]]:
     """Return the files of a .gltf by name: `stem`.gltf last, before it the .bin files that it needs.
 
     A buffer that was a data URI stays one; others become `stem`.bin, `stem`-1.bin, … With `keep_external` a buffer
-    that was a file of its own and has not changed stays that file.
+    that was a file of its own and has not changed stays that file. choose: gets the index, this name and the bytes of
+    each buffer that is to be a file, and returns its name.
     """
     content = dict(document.json)
     described = items(content, "buffers")
@@ -88,7 +106,7 @@ def gltf(document: Document, stem: str, *, keep_external: bool = False) -> dict[
         if buffer.uri is not None and uri.is_data(buffer.uri):
             about["uri"] = _kept_data_uri(buffer)
         elif buffer.has_data and not (keep_external and _stays(buffer)):
-            name = next(n for n in _names(stem, i) if n not in taken)
+            name = choose(i, next(n for n in _names(stem, i) if n not in taken), buffer.data)
             taken.add(name)
             about["uri"] = uri.from_path(name)
             files[name] = [buffer.data]
@@ -97,6 +115,17 @@ def gltf(document: Document, stem: str, *, keep_external: bool = False) -> dict[
         content["buffers"] = beside
     files[f"{stem}.gltf"] = [_bytes(text.dump(content, indent=document.indent) + b"\n")]
     return files
+
+
+def _is_bytes(data: object) -> TypeGuard[Bytes]:
+    return isinstance(data, np.ndarray) and data.dtype == np.uint8 and data.ndim == 1
+
+
+def _kind(value: object) -> str:
+    """How messages call what some value is: "an array of float64 with shape (2, 3)", "str"."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} with shape {value.shape}"
+    return "None" if value is None else type(value).__name__
 
 
 def _too_large(size: int) -> UnsupportedError:
@@ -124,13 +153,14 @@ def _read_glb(data: Bytes, resolve: Resolve | None) -> Document:
         state = "is truncated" if total > len(data) else "has a wrong length in its header"
         raise FormatError(f"GLB {state} ({len(data)} bytes, the header says {total})")
     parsed: Json | None = None
+    expanded: tuple[int, ...] = ()
     binary: Bytes | None = None
     others: list[tuple[int, bytes]] = []
     for number, (kind, body) in enumerate(_chunks(data[:total])):
         if number == 0:
             if kind != JSON_CHUNK:
                 raise FormatError(f"GLB's first chunk has type {kind:#010x} (expected JSON, {JSON_CHUNK:#010x})")
-            parsed = _parse(body.tobytes())
+            parsed, expanded = _parse(body.tobytes())
         elif kind == BIN_CHUNK and number == 1:
             binary = body
         elif kind in (JSON_CHUNK, BIN_CHUNK):
@@ -139,7 +169,7 @@ def _read_glb(data: Bytes, resolve: Resolve | None) -> Document:
             others.append((kind, body.tobytes()))
     if parsed is None:
         raise FormatError("GLB has no JSON chunk")
-    return Document(parsed, _buffers(parsed, binary, resolve, glb=True), tuple(others))
+    return Document(parsed, buffers_of(parsed, binary, resolve, glb=True), tuple(others), None, expanded)
 
 
 def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
@@ -158,18 +188,22 @@ def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
     return chunks
 
 
-def _parse(raw: bytes) -> Json:
+def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
+    """The JSON, and the nodes that had a matrix in it although they are animated."""
     parsed = text.parse(raw)
     structure.check(parsed)
-    return parsed
+    return expand_matrices(parsed)
 
 
-def _buffers(parsed: Json, binary: Bytes | None, resolve: Resolve | None, *, glb: bool) -> tuple[Buffer, ...]:
+def buffers_of(
+    parsed: Json, binary: Bytes | None, resolve: Resolve | None, *, glb: bool, check: bool = True
+) -> tuple[Buffer, ...]:
+    """Return the buffers of a JSON. check: refuse a BIN chunk that is missing or too short for the first one."""
     buffers = []
     for i, about in enumerate(items(parsed, "buffers")):
         load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
         buffers.append(Buffer(about["byteLength"], about.get("uri"), load, where=where))
-        if glb and i == 0 and "uri" not in about:
+        if check and glb and i == 0 and "uri" not in about:
             _check_binary(about, binary)
     return tuple(buffers)
 
@@ -187,9 +221,18 @@ def _beside(address: str, resolve: Resolve | None) -> Bytes:
     path = uri.relative_path(address)
     if resolve is None:
         raise FormatError(
-            f"'{path}' lies beside the file, but the input is a pipe", help="give the file's path, or pipe a GLB"
+            f"the bytes of '{path}' are not given",
+            help="container.read(data, resolve=…) takes a function that reads it",
         )
-    return resolve(path)
+    data = resolve(path)
+    if isinstance(data, (bytes, bytearray, memoryview)):
+        data = np.frombuffer(data, np.uint8)
+    if not _is_bytes(data):
+        raise ShapeError(
+            f"resolve gives {_kind(data)} for '{path}' (expected a uint8 array or bytes)",
+            help="raise FormatError in resolve where there is no such file",
+        )
+    return data
 
 
 def _check_binary(about: Json, binary: Bytes | None) -> None:

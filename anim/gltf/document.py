@@ -68,12 +68,20 @@ class Document:
     buffers: one for each of the JSON's `buffers`.
     chunks: unknown chunks of a GLB after JSON and BIN, (type, bytes): kept and written again.
     indent: spaces per level of a .gltf text, None where it was compact or a GLB.
+    expanded: numbers of nodes that had a `matrix` although a channel animates them; the JSON here has TRS instead.
     """
 
     json: Json
     buffers: tuple[Buffer, ...]
     chunks: tuple[tuple[int, bytes], ...] = ()
     indent: int | None = None
+    expanded: tuple[int, ...] = ()
+
+
+def node_label(json: Json, number: int) -> str:
+    """Return how messages call a node: "node 7 'hip'"."""
+    name = items(json, "nodes")[number].get("name")
+    return f"node {number} '{name}'" if name else f"node {number}"
 
 
 def items(json: Json, key: str) -> list[Json]:

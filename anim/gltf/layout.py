@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from anim.errors import FormatError, UnsupportedError
+from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Json, items
 
 COMPONENT_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes by componentType
@@ -26,7 +26,7 @@ def check(json: Json) -> None:
     for i, accessor in enumerate(items(json, "accessors")):
         try:
             _check_accessor(accessor, views)
-        except FormatError as error:
+        except AnimError as error:
             raise error.at(f"accessors[{i}]", ".") from None
 
 

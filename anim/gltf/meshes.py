@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import AnimError, FormatError, UnsupportedError
+from anim.errors import AnimError, FormatError
+from anim.gltf import draco
 from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document, Json, items
+from anim.gltf.influences import read_influences
 from anim.model import Mesh, Primitive
 
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
-HIDING = ("KHR_draco_mesh_compression",)  # extensions that keep a primitive's vertices from us
 
 
 class Meshes:
@@ -23,6 +24,7 @@ class Meshes:
         self, document: Document, accessors: Accessors, *, normals: bool = False, tangents: bool = False
     ) -> None:
         self._meshes = items(document.json, "meshes")
+        self._views = len(items(document.json, "bufferViews"))
         self._accessors = accessors
         self._wanted = {"NORMAL": normals, "TANGENT": tangents}
         self._done: dict[tuple[int, int], Mesh] = {}
@@ -30,7 +32,7 @@ class Meshes:
     def mesh(self, number: int, *, joint_count: int) -> Mesh:
         """Return a mesh, its primitives one after another. joint_count: of the skin it is used with, 0 without one.
 
-        Raises FormatError for influences outside the skin, UnsupportedError for vertices that are hidden.
+        Raises FormatError for influences outside the skin, UnsupportedError for Draco without DracoPy.
         """
         key = (number, joint_count)
         if key not in self._done:
@@ -66,64 +68,44 @@ class Meshes:
             tuple(primitive for part in parts for primitive in part.primitives),
             _of_all([part.tangents for part in parts]),
             _targets_of_all([(part.tangent_targets, part.targets) for part in parts]),
+            _sums_of_all(parts),
         )
 
     def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
-        hidden = [name for name in HIDING if name in primitive.get("extensions", {})]
-        if hidden:
-            raise UnsupportedError(f"vertices are compressed by {hidden[0]}, which is not handled")
+        accessors, faces = self._accessors, None
+        if draco.EXTENSION in primitive.get("extensions", {}):
+            accessors, faces = draco.read_primitive(primitive, accessors, views=self._views)
         attributes = primitive["attributes"]
         if "POSITION" not in attributes:
             return _nothing(len(primitive.get("targets", ())))
-        positions = self._accessors.floats(attributes["POSITION"])
+        positions = accessors.floats(attributes["POSITION"])
         if positions.shape[1] != 3:
             raise FormatError(f"POSITION has {positions.shape[1]} components (expected 3)")
-        joints, weights = self._influences(attributes, len(positions), joint_count)
+        held = read_influences(accessors, attributes, len(positions), joint_count)
         about = primitive.get("targets", ())
         targets = self._displacements(about, "POSITION", len(positions))
-        faces = self._faces(primitive, len(positions))
+        faces = self._faces(primitive, len(positions)) if faces is None else faces
         part = Primitive(len(positions), len(faces), primitive.get("material", -1))
         return Mesh(
             "",
             positions,
             faces,
-            joints,
-            weights,
+            held.joints,
+            held.weights,
             targets,
             np.zeros(len(targets)),
-            self._directions(attributes, "NORMAL", (len(positions), 3)),
+            self._directions(accessors, attributes, "NORMAL", (len(positions), 3)),
             self._turns(about, "NORMAL", len(positions)),
             (part,),
-            self._directions(attributes, "TANGENT", (len(positions), 4)),
+            self._directions(accessors, attributes, "TANGENT", (len(positions), 4)),
             self._turns(about, "TANGENT", len(positions)),
+            held.sums,
         )
 
-    def _influences(self, attributes: Json, vertices: int, joint_count: int) -> tuple[Ints, Floats]:
-        joints: list[Ints] = []
-        weights: list[Floats] = []
-        while joint_count and f"JOINTS_{len(joints)}" in attributes and f"WEIGHTS_{len(joints)}" in attributes:
-            k = len(joints)
-            joints.append(self._accessors.numbers_of_things(attributes[f"JOINTS_{k}"]))
-            weights.append(self._accessors.floats(attributes[f"WEIGHTS_{k}"]))
-            if joints[k].shape != (vertices, 4) or weights[k].shape != (vertices, 4):
-                raise FormatError(f"JOINTS_{k} or WEIGHTS_{k} don't have 4 numbers for each of {vertices} vertices")
-        if joint_count and not joints:
-            raise FormatError("is used with a skin but has no JOINTS_0 and WEIGHTS_0")
-        if not joints:
-            return np.empty((vertices, 0), np.int64), np.empty((vertices, 0))
-        all_joints, all_weights = np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
-        outside = (all_joints >= joint_count) & (all_weights != 0)
-        if outside.any():
-            raise FormatError(
-                f"vertex {int(np.argmax(outside.any(axis=1)))} uses joint {int(all_joints[outside][0])} "
-                f"(the skin has {joint_count})"
-            )
-        return np.where(all_weights != 0, all_joints, 0), all_weights
-
-    def _directions(self, attributes: Json, name: str, shape: tuple[int, int]) -> Floats | None:
+    def _directions(self, accessors: Accessors, attributes: Json, name: str, shape: tuple[int, int]) -> Floats | None:
         if not self._wanted[name] or name not in attributes:
             return None
-        found = self._accessors.floats(attributes[name])
+        found = accessors.floats(attributes[name])
         if found.shape != shape:
             raise FormatError(f"{name} has shape {found.shape} for {shape[0]} vertices (expected {shape})")
         return found
@@ -176,6 +158,14 @@ def _of_all(parts: list[Floats | None]) -> Floats | None:
     """Normals or tangents of all primitives, None where one has none: normals then come from the faces."""
     found = [part for part in parts if part is not None]
     return np.concatenate(found) if found and len(found) == len(parts) else None
+
+
+def _sums_of_all(parts: list[Mesh]) -> Floats | None:
+    """Sums of skin weights as stored of all primitives, None where all are 1."""
+    if all(part.weight_sums is None for part in parts):
+        return None
+    sums = (np.ones(len(part.positions)) if part.weight_sums is None else part.weight_sums for part in parts)
+    return np.concatenate(list(sums))
 
 
 def _targets_of_all(parts: list[tuple[Floats | None, Floats]]) -> Floats | None:

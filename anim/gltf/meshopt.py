@@ -10,7 +10,17 @@ from anim.gltf.document import Bytes, Json
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 VERSIONS = {"EXT_meshopt_compression": 0, "KHR_meshopt_compression": 1}  # of the attribute bitstream
-MAX_STRIDE = 256  # bytes
+MAX_STRIDE = 256  # bytes of a row that the codec takes, by both extensions
+
+
+def row_size(key_size: int, element_size: int) -> int:
+    """Return the bytes of a row of a stream: a whole key, or an element where the codec takes no key as long as that.
+
+    Both are in bytes; an element is a multiple of 4, a key one or more of them (weights have an element per target).
+    Rows of whole keys compress better: each number lies above the same one of the key before.
+    (40 weights, 160, 4) → 160; (65 weights, 260, 4) → 4
+    """
+    return key_size if key_size % element_size == 0 and key_size <= MAX_STRIDE else element_size
 
 
 def encode(rows: Bytes, extension: str) -> bytes:
@@ -47,7 +57,7 @@ def decode(stored: Bytes, about: Json) -> Bytes:
 
 def _check_stride(mode: str, chosen_filter: str, stride: int, count: int) -> None:
     if mode == "ATTRIBUTES":
-        good = stride % 4 == 0 and stride <= 256
+        good = stride % 4 == 0 and stride <= MAX_STRIDE
         good &= {"OCTAHEDRAL": stride in (4, 8), "QUATERNION": stride == 8, "COLOR": stride in (4, 8)}.get(
             chosen_filter, True
         )

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import AnimError, FormatError
-from anim.gltf import channels, hierarchy
+from anim.errors import AnimError, FormatError, ShapeError
+from anim.gltf import channels, hierarchy, node_matrix
 from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document, Json, items
 from anim.gltf.meshes import Meshes
-from anim.maths import matrix
 from anim.model import Clip, Instance, Scene, Skeleton, Skin
 
-MAX_SHEAR = 1e-4  # relative; what float32 products of rotations and scales leave behind is below
+LISTED = 3  # clips that a message names
 
 
 def skeleton(document: Document) -> Skeleton:
     """Return all nodes in their rest pose; a `matrix` is taken apart, and kept whole where it is sheared."""
+    _check(document)
     nodes = items(document.json, "nodes")
     n = len(nodes)
     translation, rotation, scale = np.zeros((n, 3)), np.tile((0.0, 0.0, 0.0, 1.0), (n, 1)), np.ones((n, 3))
     sheared: dict[int, Floats] = {}
     for i, node in enumerate(nodes):
         if "matrix" in node:
-            local = np.array(node["matrix"], float).reshape(4, 4).T[:3]
-            translation[i], rotation[i], scale[i], shear = matrix.decompose(local)
-            if shear > MAX_SHEAR:
-                sheared[i] = local
+            translation[i], rotation[i], scale[i], whole = node_matrix.decompose(node["matrix"])
+            if whole is not None:
+                sheared[i] = whole
             continue
         if "translation" in node:
             translation[i] = node["translation"]
@@ -53,14 +52,30 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
 
     Raises FormatError with clip, track and target for the first fault.
     """
+    _check(document)
     accessors = accessors or Accessors(document)
     reader = channels.Reader(document, accessors)
     with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
         return tuple(_clip(i, animation, reader) for i, animation in enumerate(items(document.json, "animations")))
 
 
+def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, Clip], list[AnimError]]:
+    """Return the animations that can be read, by number, and what is wrong with each of the others."""
+    reader = channels.Reader(document, accessors)
+    found: dict[int, Clip] = {}
+    faults: list[AnimError] = []
+    with np.errstate(invalid="ignore"):
+        for i, animation in enumerate(items(document.json, "animations")):
+            try:
+                found[i] = _clip(i, animation, reader)
+            except AnimError as error:
+                faults.append(error)
+    return found, faults
+
+
 def names(document: Document) -> tuple[str, ...]:
     """Return the names of the animations, empty where one has none, without reading them."""
+    _check(document)
     return tuple(animation.get("name", "") for animation in items(document.json, "animations"))
 
 
@@ -70,8 +85,9 @@ def scene(
     """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
 
     normals, tangents: read those of vertices and morph targets too.
-    Raises UnsupportedError where vertices are hidden by an extension that is not handled (Draco).
+    Raises UnsupportedError where vertices can't be had: Draco without the package DracoPy, an unknown compression.
     """
+    _check(document)
     accessors = accessors or Accessors(document)
     meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
@@ -85,6 +101,13 @@ def scene(
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(Instance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
     return Scene(skeleton(document), tuple(instances))
+
+
+def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
+    """Return the nodes that hold a skinned mesh, each with its skin, without reading any vertex."""
+    accessors = Accessors(document)
+    found = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
+    return tuple((i, found[node["skin"]]) for i, node in enumerate(items(document.json, "nodes")) if "skin" in node)
 
 
 def depth_first(json: Json) -> Iterator[int]:
@@ -104,9 +127,31 @@ def depth_first(json: Json) -> Iterator[int]:
         stack.extend(reversed(nodes[node].get("children", ())))
 
 
-def label(name: str, number: int) -> str:
-    """Return how messages call a clip: "clip 'walk'", or "clip 3" where it has no name."""
-    return f"clip '{name}'" if name else f"clip {number}"
+def label(name: str, number: int, what: str = "clip") -> str:
+    """Return how messages call a clip (or another thing): "clip 'walk'", or "clip #3" where it has no name."""
+    return f"{what} '{name}'" if name else f"{what} {clip_name(name, number)}"
+
+
+def labels(clips: Sequence[tuple[str, int]]) -> str:
+    """Return how messages call several clips, by names and numbers: "clips 'walk', #3, 'run' and 4 more"."""
+    if len(clips) == 1:
+        return label(*clips[0])
+    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:LISTED]]
+    more = f" and {len(clips) - LISTED} more" if len(clips) > LISTED else ""
+    return f"clips {', '.join(names)}{more}"
+
+
+def clip_name(name: str, number: int) -> str:
+    """Return how tables and lists call a clip: its name, or "#3" without one, as selections take it."""
+    return name or f"#{number}"
+
+
+def _check(document: object) -> None:
+    if not isinstance(document, Document):
+        raise ShapeError(
+            f"document is {type(document).__name__} (expected a Document)",
+            help='container.read(np.fromfile("walk.glb", np.uint8)) gives one',
+        )
 
 
 def _clip(number: int, animation: Json, reader: channels.Reader) -> Clip:

@@ -92,7 +92,9 @@ def _of_instancing(json: Json) -> Iterator[int]:
 
 def _of_draco(json: Json) -> Iterator[int]:
     for primitive in _primitives(json):
-        yield from _whole_numbers(primitive.get("extensions", {}).get("KHR_draco_mesh_compression", {}))
+        draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
+        if isinstance(draco, dict):  # its other numbers name attributes inside the Draco data
+            yield from _whole_numbers(draco.get("bufferView"))
 
 
 def _unknown_parts(value: Any) -> Iterator[Any]:

@@ -105,9 +105,7 @@ def _streams(contents: Sequence[Numbers], members: Sequence[int], extension: str
     one = [_encoded(contents, members, name, stride, extension)]
     by_key: dict[int, list[int]] = {}
     for i in members:
-        key_size = contents[i].key_size
-        whole = key_size % stride == 0 and key_size <= meshopt.MAX_STRIDE
-        by_key.setdefault(key_size if whole else stride, []).append(i)
+        by_key.setdefault(meshopt.row_size(contents[i].key_size, stride), []).append(i)
     if list(by_key) == [stride]:
         return one
     several = [_encoded(contents, each, name, wide, extension) for wide, each in by_key.items()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TypeAlias
 
-from anim.errors import FormatError
+from anim.errors import FormatError, NotFoundError, RangeError
 from anim.gltf.document import Json, items
 from anim.model.track import PATHS
 
@@ -31,7 +31,7 @@ def of_channel(channel: Json) -> Target | None:
 
 
 def check(json: Json) -> None:
-    """Raise FormatError for a channel on a node that is missing or has a matrix, or a second one for its property.
+    """Raise FormatError for a channel on a node that is missing, or a second one for its property.
 
     Two channels for one pointer outside the nodes stand in files of real exporters; they are read and kept as they are.
     """
@@ -48,6 +48,24 @@ def check(json: Json) -> None:
                 raise error.at(f"animations[{i}].channels[{k}].target", ".") from None
 
 
+def check_node(json: Json, node: int, path: str, width: int) -> None:
+    """Raise NotFoundError or RangeError where no node has a `path` of `width` numbers to animate."""
+    nodes = items(json, "nodes")
+    if node >= len(nodes):
+        raise NotFoundError(f"there is no node {node} (the file has {len(nodes)}, from 0 on)")
+    if path == "weights":
+        count = target_count(json, node)
+        if width != count:
+            raise RangeError(f"has {width} weights for {count} morph targets")
+
+
+def target_count(json: Json, node: int) -> int:
+    """Return how many morph targets the mesh of a node has."""
+    mesh = items(json, "nodes")[node].get("mesh")
+    primitives = items(json, "meshes")[mesh]["primitives"] if mesh is not None else []
+    return len(primitives[0].get("targets", ())) if primitives else 0
+
+
 def _check(target: Target, nodes: list[Json], seen: set[tuple[int, str]]) -> None:
     node, path, _ = target
     if node is None:
@@ -57,8 +75,6 @@ def _check(target: Target, nodes: list[Json], seen: set[tuple[int, str]]) -> Non
     seen.add((node, path))
     if node >= len(nodes):
         raise FormatError(f"names node {node} (the file has {len(nodes)} nodes)")
-    if path != "weights" and "matrix" in nodes[node]:
-        raise FormatError(f"animates {path} of node {node}, which has a matrix")
 
 
 def _pointed(extension: object) -> Target | None:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 
-from anim.errors import AnimError, RangeError
-from anim.gltf import encode, targets
+from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
+from anim.gltf import encode, read, targets
 from anim.gltf.assemble import Place, assemble
 from anim.gltf.document import Document, Json, items
 from anim.gltf.encode import Numbers
+from anim.gltf.node_matrix import expand_matrices
 from anim.gltf.pack import PLAIN, Filtered, Packing
 from anim.model import Clip, Interpolation, Track
 
@@ -25,18 +27,31 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, packing: Pac
     """Return the document with the animations numbered in `clips` replaced; all others stay as they are.
 
     Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
-    channel get one. Names, extras and extensions of animations, channels and samplers stay.
+    channel get one, and their nodes TRS in place of a `matrix`. Names, extras and extensions of animations, channels
+    and samplers stay.
     packing: how the new numbers are stored, see `pack`.
-    Raises RangeError where keys fall together in float32, or no channel is left.
+    Raises RangeError where keys fall together in float32, no channel is left, or weights are not as many as the node's
+    morph targets; NotFoundError for a number that no animation or node has.
+    replace_clips(document, {0: clip}): the first animation becomes `clip`
     """
     if not clips:
         return document
+    count = len(items(document.json, "animations"))
+    for number in clips:
+        if not isinstance(number, int):
+            raise ShapeError(
+                f"clips has the key {number!r} (expected the number of an animation)",
+                help="gltf.read.names(document) lists the names in the order of the numbers",
+            )
+        if not 0 <= number < count:
+            raise NotFoundError(f"there is no clip #{number} (the file has {count}, from #0 on)")
     pool = _Pool(packing.filtered)
     animations = [
-        _named_animation(animation, i, clips[i], pool) if i in clips else animation
+        _named_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
         for i, animation in enumerate(items(document.json, "animations"))
     ]
-    return assemble(document, animations, set(clips), pool.numbers, packing)
+    written = assemble(document, animations, set(clips), pool.numbers, packing)
+    return replace(written, json=expand_matrices(written.json)[0])
 
 
 class _Pool:
@@ -69,11 +84,13 @@ class _Pool:
         return found
 
 
-def _named_animation(animation: Json, number: int, clip: Clip, pool: _Pool) -> Json:
+def _named_animation(json: Json, animation: Json, clip: Clip, number: int, pool: _Pool) -> Json:
     try:
+        for track in clip.tracks:
+            _check_target(json, track)
         return _animation(animation, clip, pool)
     except AnimError as error:
-        raise error.at(f"clip '{clip.name}'" if clip.name else f"clip {number}") from None
+        raise error.at(read.label(clip.name, number)) from None
 
 
 def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
@@ -119,7 +136,7 @@ class _Samplers:
         try:
             times, values = self._pool.axis(track), self._pool.values(track)
         except AnimError as error:
-            raise error.at(f"{track.path} of node {track.node}" if track.pointer is None else track.pointer) from None
+            raise error.at(_label(track)) from None
         own = {} if old is None else {k: v for k, v in self._old[old].items() if k not in _SAMPLER_KEYS}
         sampler: Json = {"input": Place(times), "output": Place(values), **own}
         if track.interpolation is not Interpolation.LINEAR:
@@ -132,6 +149,18 @@ class _Samplers:
             number = self._numbers[key] = len(self.list)
             self.list.append(sampler)
         return number
+
+
+def _check_target(json: Json, track: Track) -> None:
+    if track.node is not None:
+        try:
+            targets.check_node(json, track.node, track.path, track.values.shape[1])
+        except AnimError as error:
+            raise error.at(_label(track)) from None
+
+
+def _label(track: Track) -> str:
+    return f"{track.path} of node {track.node}" if track.pointer is None else track.pointer
 
 
 def _target(track: Track) -> Json:

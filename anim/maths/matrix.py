@@ -7,6 +7,9 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 
+SHORT = 0.01  # of the longest axis; in float32, directions of shorter ones may be mostly rounding
+STRAIGHT = 1e-9  # cosine between axes that counts as 0
+
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
     """Return T·R·S as (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4) and scale (..., 3)."""
@@ -58,24 +61,29 @@ def inverse(matrix: Floats) -> Floats:
 def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return translation (..., 3), unit quaternion (..., 4), scale (..., 3) and shear (...) of matrices (..., 3, 4).
 
-    shear: the largest cosine between two axes; the parts give the matrix back where it is 0, and are the nearest
-    rotation with the axes' lengths elsewhere. A mirroring matrix gets a negative x scale. An axis of length 0 gets
-    scale 0 and a direction that completes the others.
+    shear: how far an axis of the matrix is from what the parts give, as a share of its length; the parts give the
+    matrix back where it is 0, and are the nearest rotation with the axes' lengths elsewhere. Of axes shorter than
+    SHORT of the longest, directions count less: in float32 they are mostly rounding. A mirroring matrix gets a
+    negative x scale. An axis of length 0 gets scale 0 and a direction that completes the others.
     """
     axes = np.swapaxes(matrix[..., :3], -1, -2)  # rows are the axes
     scale: Floats = np.sqrt((axes * axes).sum(axis=-1))
+    floor = SHORT * scale.max(axis=-1, keepdims=True)
     directions = axes / np.where(scale > 0, scale, 1)[..., None]
     if not scale.all():
         directions = _completed(directions, scale)
     cosines = directions @ np.swapaxes(directions, -1, -2)
-    shear: Floats = np.abs(cosines * (1 - np.eye(3))).max(axis=(-1, -2))
+    skewed = (np.abs(cosines * (1 - np.eye(3))) > STRAIGHT).any()
+    lengths = scale + floor
     mirror = np.where(np.linalg.det(directions) < 0, -1.0, 1.0)
     scale[..., 0] *= mirror
     directions[..., 0, :] *= mirror[..., None]
-    rotations = np.swapaxes(directions, -1, -2)
-    if (shear > 1e-9).any():
-        rotations = _nearest_rotation(rotations)
-    return matrix[..., 3].copy(), quaternion.from_matrix(rotations), scale, shear
+    if skewed:
+        counted = np.minimum(np.abs(scale), floor) / np.where(floor > 0, floor, 1)
+        directions = _nearest_rotation(directions * (counted * counted)[..., None])
+    misses = np.linalg.norm(axes - scale[..., None] * directions, axis=-1)
+    shear: Floats = (misses / np.where(lengths > 0, lengths, 1)).max(axis=-1)
+    return matrix[..., 3].copy(), quaternion.from_matrix(np.swapaxes(directions, -1, -2)), scale, shear
 
 
 def chained(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
@@ -111,6 +119,8 @@ def _orthogonal(rows: Floats, missing: int) -> Floats:
 
 
 def _nearest_rotation(matrix: Floats) -> Floats:
+    """The rotations nearest to matrices (..., 3, 3), also of those that flatten space."""
     u, _, v = np.linalg.svd(matrix)
+    u[..., 2] *= np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[..., None]
     nearest: Floats = u @ v
     return nearest

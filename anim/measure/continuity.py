@@ -61,7 +61,7 @@ class Largest:
 
 @dataclass(frozen=True, slots=True)
 class Seam:
-    """From the last key of the clip to its first: `jump` where the track does not close."""
+    """From the last key of the clip to its first: `jump` where the track does not close, or steps."""
 
     grade: Grade
     value_jump: float
@@ -167,10 +167,11 @@ class _Analysis:
         return self._graded(joints.interior(self.track), 0.0)
 
     def seam(self, start: float, end: float) -> Seam:
-        """The joint of the clip's end and its start."""
+        """The joint of the clip's end and its start; of a STEP track's two the one that jumps further."""
         found = self._graded(joints.around(self.track, start=start, end=end), CLOSED * self._range())
-        sizes = (float(each[0]) for each in (found.value, found.speed, found.acceleration))
-        return Seam(found.grades[0], *sizes)
+        worst = int(found.value.argmax())
+        sizes = (float(each[worst]) for each in (found.value, found.speed, found.acceleration))
+        return Seam(found.grades[worst], *sizes)
 
     def _graded(self, at: Joints, allowed: float) -> KeyJumps:
         """The jumps at joints with their grades; values may differ by `allowed` and rounding."""

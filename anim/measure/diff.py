@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Ints
 from anim.measure import matching
 from anim.measure.error import FPS, MotionError, Ruler, dense_times
+from anim.measure.players import pair
 from anim.measure.proof.certified import Prover
 from anim.measure.statistics import Statistics, statistics
 from anim.model import Clip, Scene
@@ -67,7 +68,8 @@ def diff(
 ) -> Diff:
     """Return how far the `new` clips are from the `old` ones, on the two scenes of the ruler.
 
-    chosen: numbers of the old clips that are looked at, all by default. player: a name in PLAYERS, who plays both.
+    chosen: numbers of the old clips that are looked at, all by default. player: a name in PLAYERS, who plays both, or
+    two, "spec,nlerp": then `old` and `new` can be the same clips, and nothing is proven between the times looked at.
     fps: frames per second of the grid that is looked at beside the keys of both.
     Clips are matched by name, then by their order where one has no name or none is in both files.
     """
@@ -97,13 +99,16 @@ def _compared(prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, p
     before, after, ruler = old[1], new[1], prover.ruler
     times = dense_times(before, after, fps=fps)
     look = ruler.look(before, after, times, player=player)
-    proof = prover.certified(before, after, times, {player: look})
+    error, bound = look.error, None
+    if len(set(pair(player))) == 1:
+        proof = prover.certified(before, after, times, {player: look})
+        error, bound = proof.error, proof.bound
     found = statistics(ruler, before, after, times=times, player=player, fps=fps)
     one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))
     missing = tuple(name for key, name in one.items() if key not in other)
     added = tuple(name for key, name in other.items() if key not in one)
     names = before.name, after.name
-    return ClipDiff(old[0], new[0], *names, proof.error, proof.bound, found, before.end, after.end, missing, added)
+    return ClipDiff(old[0], new[0], *names, error, bound, found, before.end, after.end, missing, added)
 
 
 def _targets(ruler: Ruler, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:

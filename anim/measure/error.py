@@ -17,7 +17,7 @@ from anim.arrays import Floats, sorted_unique
 from anim.measure.fields import longest
 from anim.measure.pairs import Pairs, paired
 from anim.measure.parts import Measured, Part, Posed
-from anim.measure.players import played, sampler
+from anim.measure.players import pair, played, sampler
 from anim.measure.pointers import pointer_error
 from anim.measure.shells import Shells, hidden
 from anim.measure.surface import diagonal, has_vertices, surfaces
@@ -100,7 +100,7 @@ class Ruler:
     def error_at(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> MotionError:
         """Return how far `after` is from `before` at `times` (F,) in seconds.
 
-        player: a name in PLAYERS, who plays both of them.
+        player: a name in PLAYERS, who plays both of them; or two, "spec,nlerp", for `before` and `after`.
         """
         return self._looked(before, after, times, player, None)
 
@@ -135,12 +135,13 @@ class Ruler:
     def blocks(
         self, before: Clip, after: Clip, times: Floats, *, player: str = "spec", overlap: int = 0
     ) -> Iterator[Block]:
-        """Yield `times` (F,) in s a block after the other, both clips posed there by a player.
+        """Yield `times` (F,) in s a block after the other, both clips posed there by a player, or one by each of two.
 
         overlap: how many of a block's last times the next one starts with.
         """
         old, new = (
-            played(scene.skeleton, clip, player=player) for scene, clip in ((self.scene, before), (self.other, after))
+            played(scene.skeleton, clip, player=name)
+            for scene, clip, name in zip((self.scene, self.other), (before, after), pair(player), strict=True)
         )
         for start in range(0, max(len(times) - overlap, 1), self.length):
             chosen = times[start : start + self.length + overlap]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from anim.errors import AnimError
 from anim.measure.findings import Finding
 
 
@@ -31,8 +32,12 @@ class ClipFacts:
     """One clip. duration_s: from its first to its last key; players count from 0 to end_s.
 
     frame_rate_fps, frame_rate_regular: the estimate and the share of keys on its grid; None where it is open.
-    data_bytes, json_bytes, share: what it costs, and that as a share of the file; what clips share counts in each.
-    seam_m, seam_speed_m_per_s: from end to start, the root's way taken off; root_*: that way.
+    data_bytes, stored_bytes, json_bytes: its numbers decoded, its part of them as they are stored (compressed or not),
+    and its JSON; share: the last two as a share of the file. What clips share counts in each.
+    repeating_tracks: constant, of several keys, and neither at rest nor needed to hold the clip's end.
+    sign_flips_in_splines: those of sign_flips that are on CUBICSPLINE tracks.
+    root_*: the root's way. seam_m, seam_speed_m_per_s: from end to start, the way of a root that travels taken off;
+    seam_measured_on: "skin", or "nodes" where no vertices can be read.
     """
 
     index: int
@@ -46,17 +51,21 @@ class ClipFacts:
     frame_rate_fps: float | None
     frame_rate_regular: float | None
     data_bytes: int
+    stored_bytes: int
     json_bytes: int
     share: float
     constant_tracks: int
     no_effect_tracks: int
+    repeating_tracks: int
     redundant_keys: int
     non_unit_rotations: int
     sign_flips: int
+    sign_flips_in_splines: int
     wide_steps: int
     widest_step_rad: float
     seam_m: float
     seam_speed_m_per_s: float
+    seam_measured_on: str
     root: str
     root_distance_m: float
     root_speed_m_per_s: float
@@ -84,7 +93,10 @@ class SkinFacts:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """A whole file. animation_data_bytes and animation_json_bytes count what clips share once."""
+    """A whole file. animation_*_bytes: numbers decoded, as stored, and JSON; what clips share counts once.
+
+    faults: for which commands refuse the file; what they concern is left out of the rest.
+    """
 
     generator: str
     extensions_used: tuple[str, ...]
@@ -92,7 +104,9 @@ class Facts:
     meshes: int
     vertices: int | None
     animation_data_bytes: int
+    animation_stored_bytes: int
     animation_json_bytes: int
     clips: tuple[ClipFacts, ...]
     skins: tuple[SkinFacts, ...]
     findings: tuple[Finding, ...]
+    faults: tuple[AnimError, ...] = ()

@@ -7,44 +7,75 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from anim.arrays import sorted_unique
+from anim.arrays import Bools, sorted_unique
 from anim.errors import AnimError
 from anim.gltf import read
 from anim.gltf.accessors import Accessors
+from anim.gltf.broken import Broken
 from anim.gltf.document import Document, items
 from anim.measure import advice, findings, footprint, rate, travel
+from anim.measure.ends import LoopRange
 from anim.measure.facts import ClipFacts, Facts, SkinFacts, TrackFacts
 from anim.measure.findings import Finding
+from anim.measure.seam import Seam, SkinMotion
+from anim.measure.stored import stored
 from anim.measure.tracks import TrackStats, stats
-from anim.model import Clip, Scene, Skeleton, Track
+from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.model.scene import Instance
-from anim.sampling.joined import joined
+from anim.sampling.joined import Joined, joined
 
 
-def inspect(document: Document, *, file_bytes: int, chosen: Iterable[int] | None = None, tracks: bool = False) -> Facts:
+def inspect(
+    document: Document,
+    *,
+    file_bytes: int,
+    chosen: Iterable[int] | None = None,
+    tracks: bool = False,
+    broken: Broken | None = None,
+) -> Facts:
     """Return the facts of a document.
 
     file_bytes: the size that shares refer to. chosen: numbers of the clips to look at, None for all.
-    tracks: list every track too. Raises FormatError where animations can't be read; vertices that can't be read
-    only become a finding.
+    tracks: list every track too. broken: what is wrong with a document that is only a part of its file.
+    Clips that can't be read become faults and findings, vertices that can't be read a finding.
     """
     json = document.json
     accessors = Accessors(document)
-    clips = read.clips(document, accessors)
+    clips, unread = read.readable_clips(document, accessors)
     skeleton = read.skeleton(document)
-    numbers = list(range(len(clips)) if chosen is None else chosen)
+    lost_clips, lost_skins = (broken.lost_clips, broken.lost_skins) if broken else (frozenset(), frozenset())
+    faults = (*broken.faults, *unread) if broken else tuple(unread)
+    wanted = clips.keys() if chosen is None else chosen
+    numbers = [i for i in wanted if i in clips and i not in lost_clips]
     looked_at = [clips[i] for i in numbers]
     groups = joined([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
     ways = travel.travels(skeleton, looked_at, groups)
+    scene, hidden = _scene(document, accessors)
+    skin = SkinMotion(scene or Scene(skeleton, ()))
+    seams = _seams(skin, looked_at, groups)
+    measured_on = "skin" if skin.is_skin else "nodes"
     costs, cost = footprint.footprints(document)
+    stored_bytes = min(stored(document), cost.data)
+    packed = stored_bytes / cost.data if cost.data else 1.0
     clip_facts = tuple(
-        _clip(i, clip, ways[n], skeleton, counted[ends[n] : ends[n + 1]], costs[i], file_bytes, tracks=tracks)
+        _clip(
+            i,
+            clip,
+            ways[n],
+            seams[n],
+            measured_on,
+            skeleton,
+            counted[ends[n] : ends[n + 1]],
+            costs[i],
+            packed,
+            file_bytes,
+            tracks=tracks,
+        )
         for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
     )
-    scene, hidden = _scene(document, accessors)
-    skins = tuple(_skin(i, document, scene) for i in range(len(items(json, "skins"))))
+    skins = tuple(_skin(i, document, scene) for i in range(len(items(json, "skins"))) if i not in lost_skins)
     return Facts(
         str(json["asset"].get("generator", "")),
         tuple(json.get("extensionsUsed", ())),
@@ -52,25 +83,44 @@ def inspect(document: Document, *, file_bytes: int, chosen: Iterable[int] | None
         len(items(json, "meshes")),
         scene.vertex_count if scene is not None else None,
         cost.data,
+        stored_bytes,
         cost.json,
         clip_facts,
         skins,
-        (*findings.of_json(json), *hidden, *advice.of_clips(clip_facts), *advice.of_skins(skins)),
+        (
+            *findings.of_faults(faults),
+            *findings.of_document(document),
+            *hidden,
+            *advice.of_clips(clip_facts),
+            *advice.of_skins(skins),
+        ),
+        faults,
     )
+
+
+def _seams(skin: SkinMotion, clips: list[Clip], groups: list[Joined]) -> list[Seam]:
+    """The seams of whole clips, as `loop` measures them."""
+    roots = (travel.traveling_root(skin.skeleton, clip) for clip in clips)
+    parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
+    return skin.seams(parts, groups)
 
 
 def _clip(
     number: int,
     clip: Clip,
     way: travel.Travel,
+    seam: Seam,
+    measured_on: str,
     skeleton: Skeleton,
     counted: TrackStats,
     cost: footprint.Footprint,
+    packed: float,
     file_bytes: int,
     *,
     tracks: bool,
 ) -> ClipFacts:
     start, end, axes = clip.start, clip.end, clip.axes
+    stored_bytes = round(packed * cost.data)
     estimated = rate.estimate(sorted_unique(np.concatenate(axes))) if axes else None
     return ClipFacts(
         index=number,
@@ -84,22 +134,38 @@ def _clip(
         frame_rate_fps=estimated.fps if estimated else None,
         frame_rate_regular=estimated.regular if estimated else None,
         data_bytes=cost.data,
+        stored_bytes=stored_bytes,
         json_bytes=cost.json,
-        share=cost.total / file_bytes if file_bytes else 0.0,
+        share=(stored_bytes + cost.json) / file_bytes if file_bytes else 0.0,
         constant_tracks=int(counted.constant.sum()),
         no_effect_tracks=int(counted.no_effect.sum()),
+        repeating_tracks=_repeating(clip, counted),
         redundant_keys=int(counted.redundant.sum()),
         non_unit_rotations=int(counted.non_unit.sum()),
         sign_flips=int(counted.flips.sum()),
+        sign_flips_in_splines=int(counted.flips[_splines(clip)].sum()),
         wide_steps=int(counted.wide.sum()),
         widest_step_rad=float(counted.widest.max(initial=0.0)),
-        seam_m=way.seam,
-        seam_speed_m_per_s=way.speed_seam,
+        seam_m=seam.gap,
+        seam_speed_m_per_s=seam.speed,
+        seam_measured_on=measured_on,
         root=(skeleton.names[way.root] or f"node {way.root}") if way.root >= 0 else "",
         root_distance_m=way.distance,
         root_speed_m_per_s=way.speed,
         track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
     )
+
+
+def _splines(clip: Clip) -> Bools:
+    return np.array([track.interpolation is Interpolation.CUBICSPLINE for track in clip.tracks], np.bool_)
+
+
+def _repeating(clip: Clip, counted: TrackStats) -> int:
+    """How many tracks say one value again and again; where nothing else moves, one of them holds the clip's end."""
+    needed = np.where(_splines(clip), 2, 1)  # keys; a spline has two at least
+    several = np.array([len(track.times) for track in clip.tracks], np.int64) > needed
+    count = int((counted.constant & ~counted.no_effect & several).sum())
+    return max(count - 1, 0) if counted.constant.all() and clip.end > clip.start else count
 
 
 def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackFacts:
@@ -137,7 +203,8 @@ def _skin(number: int, document: Document, scene: Scene | None) -> SkinFacts:
     if scene is None or not using:
         return SkinFacts(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
     counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
-    sums = np.concatenate([np.abs(i.mesh.weights.sum(axis=1) - 1) for i in using])
+    off = [np.abs(i.mesh.weight_sums - 1) for i in using if i.mesh.weight_sums is not None]
+    sums = np.concatenate([np.empty(0), *off])
     unused = len(joints) - len(_useful(using, joints, scene.skeleton))
     return SkinFacts(
         number,
@@ -147,12 +214,9 @@ def _skin(number: int, document: Document, scene: Scene | None) -> SkinFacts:
         unused,
         int(counts.max(initial=0)),
         float(counts.mean()) if len(counts) else 0.0,
-        int((sums > WEIGHT_SUM).sum()),
+        int((sums > 0).sum()),
         float(sums.max(initial=0.0)),
     )
-
-
-WEIGHT_SUM = 1e-3  # a sum of weights further off 1 than this is seen as a dent or a bulge
 
 
 def _useful(instances: list[Instance], joints: list[int], skeleton: Skeleton) -> set[int]:

@@ -63,14 +63,21 @@ def interior(track: Track) -> Joints:
 
 
 def around(track: Track, *, start: float, end: float) -> Joints:
-    """Return the one joint of a clip's end and its start, in seconds; outside its keys the track stands still."""
+    """Return the joint of a clip's end and its start, in seconds; outside its keys the track stands still.
+
+    Of a STEP track two: a loop shows the value before the last key until the end, a player that stops shows the last.
+    """
     ends, starts = np.array([end]), np.array([start])
+    shown = ends
+    if track.interpolation is Interpolation.STEP:
+        shown = np.array([end - PAIR - 2 * FLOAT32 * end, end])
+        ends, starts = np.array([end, end]), np.array([start, start])
     return Joints(
         ends,
-        (sample(track, ends), sample(track, starts)),
+        (sample(track, shown), sample(track, starts)),
         (slopes.rates(track, ends, before=True), slopes.rates(track, starts, before=False)),
         (accelerations(track, ends, before=True), accelerations(track, starts, before=False)),
-        (_duration_at(track, end, before=True), _duration_at(track, start, before=False)),
+        (_duration_at(track, ends, before=True), _duration_at(track, starts, before=False)),
     )
 
 
@@ -128,7 +135,7 @@ def _one_sided(before: Floats, after: Floats, at_start: Bools, at_end: Bools) ->
     return np.where(at_start[:, None], after, before), np.where(at_end[:, None], before, after)
 
 
-def _duration_at(track: Track, time: float, *, before: bool) -> Floats:
-    k = int(np.searchsorted(track.times, time, side="left" if before else "right")) - 1
-    inside = 0 <= k < len(track.times) - 1
-    return np.array([track.times[k + 1] - track.times[k] if inside else np.inf])
+def _duration_at(track: Track, times: Floats, *, before: bool) -> Floats:
+    """Lengths (F,) of the pieces just before or just after times (F,), infinite outside the keys."""
+    k = np.searchsorted(track.times, times, side="left" if before else "right")
+    return np.diff(track.times, prepend=-np.inf, append=np.inf)[k]

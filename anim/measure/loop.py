@@ -8,14 +8,17 @@ from enum import StrEnum
 import numpy as np
 
 from anim.arrays import Floats, sorted_unique
-from anim.measure import levers, rate
-from anim.model import Clip, Skeleton
-from anim.sampling import pose
-from anim.sampling.pose import world_by_node
+from anim.measure import rate
+from anim.measure.ends import LoopRange
+from anim.measure.seam import JointGap, Seam, SkinMotion
+from anim.model import Clip, Scene
+from anim.sampling.pose import pose, world_by_node
 
-CLOSED = 1e-3  # of the skeleton's size; a seam below a thousandth is not seen
+CLOSED = (1e-5, 1e-3)  # of the model's size: a seam below the first is rounding, one above the second is seen
+UNSEEN = 0.1  # of the usual motion per frame; between these two, a smaller seam is not seen
 ONE_FRAME = 1.6  # an open loop's seam against the motion per frame next to it: about one frame's worth
 MAX_FRAMES = 600  # looked at by `best_ranges`
+MAX_STEPS = 300  # pairs of frames looked at inside a clip
 DEFAULT_FPS = 30.0
 
 
@@ -24,17 +27,31 @@ class LoopKind(StrEnum):
 
     CLOSED = "closed"
     OPEN_BY_ONE_FRAME = "open by one frame"
+    CLOSED_EXCEPT = "closed except some joints"
     NOT_A_LOOP = "not a loop"
+    SINGLE_POSE = "a single pose"
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """What any vertex does at most from one frame to the next: largest, typical: m, over all frames, and their median.
+
+    speed: m/s, the largest change of velocity.
+    """
+
+    largest: float = 0.0
+    typical: float = 0.0
+    speed: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """A clip, or a part of it, as a loop.
+    """A clip, or a part of it, as a loop; all is measured on the skin.
 
-    start, end: seconds. seam: m, how far the worst node, or what turns with it, is from where it started; the way that
-    the root has made is taken off. speed_seam: m/s. node: the worst one's name, by speed where the loop is closed.
-    frame: m, the motion per frame at the
-    seam. travel: m, the root's way. fps: the rate that frames were counted at.
+    start, end: seconds. seam: m, how far the worst vertex is from where it started; the way that the root has made is
+    taken off. speed_seam: m/s. node: the joint that opens the seam most, by speed where the loop is closed. frame: m,
+    the motion per frame at the seam. inside: what the clip does from frame to frame. travel: m, the root's way. fps:
+    the rate that frames were counted at. joints: those that don't close, the largest gap first; none of a closed loop.
     """
 
     kind: LoopKind
@@ -44,16 +61,28 @@ class Loop:
     speed_seam: float
     node: str
     frame: float
+    inside: Steps
     travel: float
     fps: float
+    joints: tuple[JointGap, ...] = ()
 
 
-def loop(skeleton: Skeleton, clip: Clip, *, root: int = -1) -> Loop:
-    """Return what kind of loop the clip is. root: the node whose way does not count, −1 for none."""
-    return _judged(skeleton, clip, clip.start, clip.end, root)
+def loop(scene: Scene, clip: Clip, *, root: int = -1) -> Loop:
+    """Return what kind of loop the clip is.
+
+    Closed: no vertex that is seen to jump. Closed except some joints: fewer joints stay open than close while they
+    move, and they jump no further than the clip moves from frame to frame. Open by one frame: the seam is about the
+    next frame's motion. root: the node whose way does not count, −1 for none.
+    """
+    return judge(SkinMotion(scene), clip, root=root)
 
 
-def best_ranges(skeleton: Skeleton, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:
+def judge(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
+    """Return the same of a clip on a skin that is there already: for many clips."""
+    return _judged(skin, clip, clip.start, clip.end, root)
+
+
+def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:
     """Return the parts of a clip that loop best, the best first, none shorter than `shortest` seconds.
 
     Poses and their speeds are compared at the clip's frame rate, or at as many frames as fit in MAX_FRAMES; parts that
@@ -64,7 +93,7 @@ def best_ranges(skeleton: Skeleton, clip: Clip, *, root: int = -1, shortest: flo
         return []
     fps = min(_fps(clip), (MAX_FRAMES - 1) / duration)
     times = clip.start + np.arange(int(duration * fps + 1e-6) + 1) / fps
-    points = _points(skeleton, clip, times, root)
+    points = skin.places(clip, times, root)
     speeds = np.gradient(points, axis=1) if points.shape[1] > 1 else np.zeros_like(points)
     features = np.concatenate((points, speeds), axis=0).transpose(1, 0, 2).reshape(len(times), -1)
     squares = (features * features).sum(axis=1)
@@ -79,35 +108,48 @@ def best_ranges(skeleton: Skeleton, clip: Clip, *, root: int = -1, shortest: flo
             break
         if all(abs(a - c) > 2 or abs(b - d) > 2 for c, d in taken):
             taken.append((a, b))
-            found.append(_judged(skeleton, clip, float(times[a]), float(times[b]), root))
+            found.append(_judged(skin, clip, float(times[a]), float(times[b]), root))
     looping = [each for each in found if each.kind is not LoopKind.NOT_A_LOOP] or found
     return sorted(looping, key=lambda each: (list(LoopKind).index(each.kind), each.seam))
 
 
-def _judged(skeleton: Skeleton, clip: Clip, start: float, end: float, root: int) -> Loop:
+def _judged(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> Loop:
     fps = _fps(clip)
     frame_step = min(1 / fps, (end - start) / 2) if end > start else 0.0
-    if not len(skeleton) or frame_step == 0:
-        return Loop(LoopKind.NOT_A_LOOP, start, end, 0.0, 0.0, "", 0.0, 0.0, fps)
-    step = min(levers.SPEED_STEP, frame_step / 2)
-    times = np.array([start, start + step, start + frame_step, end - frame_step, end - step, end])
-    points = _points(skeleton, clip, times, root)
-    first, just_after, second, last_but_one, just_before, last = (points[:, i] for i in range(len(times)))
-    size = levers.size(points)
-    off = np.linalg.norm(last - first, axis=1)
-    speeds = np.linalg.norm((last - just_before) - (just_after - first), axis=1) / step
-    frame = max(_longest(second - first), _longest(last - last_but_one))
-    seam = float(off.max())
-    going_on = _longest(last + (last - last_but_one) - first)  # how far the start is from where the end was heading
-    kind = LoopKind.NOT_A_LOOP
-    if seam <= CLOSED * size:
-        kind = LoopKind.CLOSED
-    elif seam <= ONE_FRAME * frame and going_on <= frame:
-        kind = LoopKind.OPEN_BY_ONE_FRAME
-    worst = int((speeds if kind is LoopKind.CLOSED else off).argmax()) // levers.PER_NODE
-    travel = _travel(skeleton, clip, times, root)
-    name = skeleton.names[worst] or f"node {worst}"
-    return Loop(kind, start, end, seam, float(speeds.max()), name, frame, travel, fps)
+    if not len(skin.points) or frame_step == 0:
+        kind = LoopKind.NOT_A_LOOP if end > start else LoopKind.SINGLE_POSE
+        return Loop(kind, start, end, 0.0, 0.0, "", 0.0, Steps(), 0.0, fps)
+    (seam,) = skin.seams([LoopRange(clip, start, end, frame_step, root)])
+    inside = _steps(skin, clip, start, end, frame_step, root)
+    gaps = skin.gaps(clip, start, end, root)
+    size = seam.gap
+    joints = tuple(each for each in gaps if each.gap > CLOSED[0] * skin.size)
+    if size <= min(max(UNSEEN * inside.typical, CLOSED[0] * skin.size), CLOSED[1] * skin.size):
+        kind, joints = LoopKind.CLOSED, ()
+    else:
+        closing = skin.moving(clip, start, end, frame_step, root) - {each.node for each in joints}
+        kind = _open_kind(seam, size, inside.largest, few=len(joints) < len(closing))
+    worst = joints[0].joint if joints else seam.fastest
+    travel = _travel(skin, clip, start, end, root)
+    return Loop(kind, start, end, size, seam.speed, worst, seam.frame, inside, travel, fps, joints)
+
+
+def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind:
+    """few: whether more joints close while they move than stay open; then no frame is missing."""
+    if few and size <= inside:
+        return LoopKind.CLOSED_EXCEPT
+    if not few and size <= ONE_FRAME * seam.frame and seam.going_on <= seam.frame:
+        return LoopKind.OPEN_BY_ONE_FRAME
+    return LoopKind.NOT_A_LOOP
+
+
+def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, root: int) -> Steps:
+    count = max(round((end - start) / step) - 1, 1)
+    frames = np.unique(np.linspace(1, count, min(count, MAX_STEPS)).round())
+    times = start + step * np.concatenate((frames - 1, frames, frames + 1))
+    before, here, after = np.split(skin.places(clip, np.minimum(times, end), root), 3, axis=1)
+    moved = np.linalg.norm(np.concatenate((here - before, after - here), axis=1), axis=2).max(axis=0)
+    return Steps(float(moved.max()), float(np.median(moved)), _longest(after - 2 * here + before) / step)
 
 
 def _fps(clip: Clip) -> float:
@@ -115,20 +157,11 @@ def _fps(clip: Clip) -> float:
     return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
 
 
-def _points(skeleton: Skeleton, clip: Clip, times: Floats, root: int) -> Floats:
-    """Points per node (see `levers`); the root's way taken off."""
-    world = world_by_node(skeleton, pose(skeleton, clip, times))
-    if root >= 0:
-        way = world[root, :, :, 3] - world[root, :1, :, 3]
-        world[..., 3] -= skeleton.below(root)[:, None, None] * way
-    return levers.points(world)
-
-
-def _travel(skeleton: Skeleton, clip: Clip, times: Floats, root: int) -> float:
+def _travel(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> float:
     if root < 0:
         return 0.0
-    places = world_by_node(skeleton, pose(skeleton, clip, times[[0, -1]]))[root, :, :, 3]
-    return float(np.linalg.norm(places[1] - places[0]))
+    both = world_by_node(skin.skeleton, pose(skin.skeleton, clip, np.array([start, end])))[root, :, :, 3]
+    return float(np.linalg.norm(both[1] - both[0]))
 
 
 def _longest(vectors: Floats) -> float:

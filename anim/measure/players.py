@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
+from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Skeleton
 from anim.sampling.batch import Batch
@@ -43,6 +44,17 @@ def played(skeleton: Skeleton, clip: Clip, *, player: str = "spec") -> Poses:
     world matrices from them scale, as they do in that player.
     """
     return Poses(skeleton, clip, sampler(player))
+
+
+def pair(player: str) -> tuple[str, str]:
+    """Return who plays the clip before and who the one after: "nlerp" plays both, "spec,nlerp" one each.
+
+    Raises RangeError for a name that is not in PLAYERS.
+    """
+    names = player.split(",")
+    if len(names) > 2 or any(name not in PLAYERS for name in names):
+        raise RangeError(f"players are '{player}' (expected one or two of {', '.join(PLAYERS)}, with a comma between)")
+    return names[0], names[-1]
 
 
 def sampler(player: str) -> Sampler:

@@ -40,6 +40,11 @@ def has_vertices(scene: Scene) -> bool:
     return any(len(instance.mesh.positions) for instance in scene.instances)
 
 
+def measured_at(scene: Scene) -> str:
+    """Return the word for what errors are measured on: "surface", or "nodes" where no mesh has a vertex."""
+    return "surface" if has_vertices(scene) else "nodes"
+
+
 def surfaces(scene: Scene) -> list[Surface]:
     """Return one surface per mesh instance; where no mesh has a vertex, one per node."""
     found = [_of_instance(scene, instance) for instance in scene.instances if len(instance.mesh.positions)]
@@ -60,7 +65,7 @@ def diagonal(scene: Scene) -> float:
 
 def placed(surface: Surface, world: Floats, weights: Floats) -> Floats:
     """Return the points (V, 3) in world space: morphed by weights (M,), then blended linearly by the joints' world
-    matrices (J, 3, 4), with skin weights as stored."""
+    matrices (J, 3, 4)."""
     return skinned(surface, morphed(surface, weights[None])[0], matrix.multiply(world, surface.bind))
 
 

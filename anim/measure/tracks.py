@@ -9,8 +9,9 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.model import Interpolation, Kind, Skeleton
-from anim.sampling.joined import Joined
+from anim.measure.removable import removable
+from anim.model import Interpolation, Kind, Skeleton, Track
+from anim.sampling.joined import Joined, joined
 
 FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two stored values are the same
 REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing
@@ -23,8 +24,10 @@ WIDE_STEP = np.radians(170.0)  # rad; from here on players disagree about which 
 class TrackStats:
     """Facts about T tracks; arrays (T,).
 
-    constant: never changes. no_effect: constant, and the node rests there anyway. redundant: keys that could go.
-    non_unit, flips, wide: keys with a length off 1, sign changes from key to key, steps of 170° or more (rotations).
+    constant: never changes. no_effect: constant, and the node rests there anyway. redundant: keys that could go and
+    save bytes by that (see `removable`).
+    non_unit, flips, wide: keys with a length off 1, sign changes from key to key (not under STEP), steps of 170° or
+    more (under LINEAR alone), of rotations.
     widest: largest step in rad.
     """
 
@@ -43,21 +46,42 @@ class TrackStats:
 
 def stats(groups: Sequence[Joined], skeleton: Skeleton) -> TrackStats:
     """Return the facts about tracks that were `joined`, in the order that they had before."""
-    count = sum(len(group.tracks) for group in groups)
-    result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
-    for group in groups:
-        _count(group, skeleton, result)
+    result, masks = _all_stats(groups, skeleton)
+    result.redundant[:] += np.array([mask.sum() for mask in masks], np.int64)
     return result
 
 
-def _count(group: Joined, skeleton: Skeleton, result: TrackStats) -> None:
+def removable_keys(tracks: Sequence[Track], skeleton: Skeleton) -> list[Bools]:
+    """Return which keys (K,) of each track could go and save bytes by that, for tracks that move; none of constants.
+
+    (keys at 0, 1, 2 s with the values 0, 5, 10) → [False, True, False]
+    """
+    return _all_stats(joined(tracks), skeleton)[1]
+
+
+def _all_stats(groups: Sequence[Joined], skeleton: Skeleton) -> tuple[TrackStats, list[Bools]]:
+    """The facts, with redundant keys of constants only, and which keys of all other tracks are redundant."""
+    count = sum(len(group.tracks) for group in groups)
+    result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
+    tracks: dict[int, Track] = {}
+    given: dict[int, Bools] = {}
+    for group in groups:
+        _count(group, skeleton, result, given)
+        tracks.update(zip(group.numbers.tolist(), group.tracks, strict=True))
+    return result, removable([tracks[i] for i in range(count)], given)
+
+
+def _count(group: Joined, skeleton: Skeleton, result: TrackStats, given: dict[int, Bools]) -> None:
+    """Put the facts about a group into `result`, and which keys of tracks that move could go into `given`."""
     values = group.values
     if group.kind is Kind.ROTATION:
         values = _turns(group, result)
     constant = _same_values(group, values)
     result.constant[group.numbers] = constant
     result.no_effect[group.numbers] = _at_rest(group, constant, skeleton)
-    result.redundant[group.numbers] = _redundant(group, values, constant)
+    result.redundant[group.numbers] = np.where(constant, group.counts - 1, 0)
+    masks = np.split(_redundant(group, values, constant), group.starts[1:])
+    given.update((number, masks[i]) for i, number in enumerate(group.numbers.tolist()) if not constant[i])
 
 
 def _turns(group: Joined, result: TrackStats) -> Floats:
@@ -71,8 +95,10 @@ def _turns(group: Joined, result: TrackStats) -> Floats:
     dots[group.starts] = 1.0
     angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))
     result.non_unit[group.numbers] = _sums(group, np.abs(lengths - 1) > allowed)
-    result.flips[group.numbers] = _sums(group, dots < 0)
-    result.wide[group.numbers] = _sums(group, angles > WIDE_STEP)
+    if group.interpolation is not Interpolation.STEP:  # which never is on the way from one key to the next
+        result.flips[group.numbers] = _sums(group, dots < 0)
+    if group.interpolation is Interpolation.LINEAR:
+        result.wide[group.numbers] = _sums(group, angles > WIDE_STEP)
     result.widest[group.numbers] = _largest(group, angles)
     return values * np.cumprod(np.where(dots < 0, -1.0, 1.0))[:, None]
 
@@ -102,14 +128,14 @@ def _at_rest(group: Joined, constant: Bools, skeleton: Skeleton) -> Bools:
     return constant & near
 
 
-def _redundant(group: Joined, values: Floats, constant: Bools) -> Ints:
-    """Keys that what is around them gives anyway: all but one of a constant track, inner ones of the others."""
+def _redundant(group: Joined, values: Floats, constant: Bools) -> Bools:
+    """Which keys (S,) inside a track that moves what is around them gives anyway."""
     of_track = np.repeat(np.arange(len(constant)), group.counts)
     inner = ~constant[of_track]
     inner[group.starts] = inner[group.starts + group.counts - 1] = False
     at = np.flatnonzero(inner)
-    given = _given(group, values, of_track, at)
-    return np.where(constant, group.counts - 1, np.bincount(of_track[at[given]], minlength=len(constant)))
+    inner[at] = _given(group, values, of_track, at)
+    return np.asarray(inner)
 
 
 def _given(group: Joined, values: Floats, of_track: Ints, at: Ints) -> Bools:

@@ -23,7 +23,7 @@ class Clip:
         targets = [(track.node, track.path) for track in self.tracks if track.node is not None]
         if len(set(targets)) < len(targets):
             node, path = next(target for target in targets if targets.count(target) > 1)
-            raise FormatError(f"two tracks for node {node}, {path}", where=f"clip '{self.name}'")
+            raise FormatError(f"two tracks for node {node}, {path}", where=f"clip '{self.name}'" if self.name else "")
 
     @property
     def axes(self) -> tuple[Floats, ...]:

@@ -11,6 +11,8 @@ from anim.arrays import Floats, Ints
 from anim.errors import FormatError, ShapeError
 from anim.model.skeleton import Skeleton
 
+SUM_TOLERANCE = 1e-3  # how far a vertex's skin weights may be from adding up to 1: more than rounding leaves
+
 
 @dataclass(frozen=True, slots=True)
 class Skin:
@@ -40,12 +42,14 @@ class Primitive:
 class Mesh:
     """Vertices of all primitives of a glTF mesh, one after another.
 
-    positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0, as stored.
+    positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0, of each vertex
+    adding up to 1.
     targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3), or None where any
     lacks or they were not read.
     tangents: (V, 4) xyz and handedness ±1, like normals. normal_targets, tangent_targets: (M, V, 3) what morph targets
     add to normals and tangents, or None where they add nothing.
-    primitives: in the order of the file; empty where unknown.
+    primitives: in the order of the file; empty where unknown. weight_sums: (V,) what weights added up to in the file,
+    where that is another number than 1 for any vertex and not by rounding.
     """
 
     name: str
@@ -60,12 +64,16 @@ class Mesh:
     primitives: tuple[Primitive, ...] = ()
     tangents: Floats | None = None
     tangent_targets: Floats | None = None
+    weight_sums: Floats | None = None
 
     def __post_init__(self) -> None:
         arrays.check_shape(self.positions, "V 3", name="positions")
         where = f"mesh '{self.name}'" if self.name else ""
         if len(self.weights) and self.weights.size and self.weights.min() < 0:
             raise FormatError(f"a skin weight is negative ({self.weights.min():g})", where=where)
+        if self.weights.size and (off := np.abs(self.weights.sum(axis=1) - 1)).max() > SUM_TOLERANCE:
+            v = int(off.argmax())
+            raise ShapeError(f"skin weights of vertex {v} add up to {self.weights[v].sum():g} (expected 1)")
         if self.faces.size and int(self.faces.max()) >= len(self.positions):
             raise FormatError(f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=where)
 

@@ -32,7 +32,7 @@ class Skeleton:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "parents", arrays.read_only(np.asarray(self.parents, dtype=np.int64)))
+        set_field(self, "parents", arrays.own(np.asarray(self.parents, dtype=np.int64)))
         arrays.check_shape(self.parents, "N", name="parents")
         for name, shape in (("translation", "N 3"), ("rotation", "N 4"), ("scale", "N 3")):
             array = arrays.floats(getattr(self, name), shape, name=name)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+
 from anim import arrays
 from anim.arrays import Floats
-from anim.errors import ShapeError
+from anim.errors import RangeError, ShapeError
 
 PATHS = ("translation", "rotation", "scale", "weights")
 WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}  # components per key; weights and pointers have their own
@@ -44,7 +47,7 @@ class Storage:
 FLOAT32 = Storage()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Track:
     """Keys of one property of one node, or of anything that a JSON pointer names.
 
@@ -54,6 +57,9 @@ class Track:
     in_tangents, out_tangents: (K, C) per second, for CUBICSPLINE and only there.
     pointer: the target by KHR_animation_pointer; `node` and `path` say the same where it names a node's property.
     storage: how the file held the values; writers use it again where it holds the new ones exactly.
+    Writable arrays are copied, read-only ones shared.
+    Raises ShapeError, or RangeError for a target or an interpolation that glTF does not know, or keys that can't be.
+    Track(0, "translation", "LINEAR", [0, 1], [[0, 0, 0], [0, 1, 0]]): node 0 rises by a metre in a second
     """
 
     node: int | None
@@ -68,6 +74,8 @@ class Track:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
+        set_field(self, "node", _node(self.node, self.path))
+        set_field(self, "interpolation", _interpolation(self.interpolation))
         times, values = arrays.times(self.times), arrays.floats(self.values, "K C", name="values")
         set_field(self, "times", times)
         set_field(self, "values", values)
@@ -81,6 +89,25 @@ class Track:
             set_field(self, "in_tangents", _tangents(self.in_tangents, shape, "in tangents"))
             set_field(self, "out_tangents", _tangents(self.out_tangents, shape, "out tangents"))
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the other is a track of the same numbers, target and storage."""
+        if not isinstance(other, Track):
+            return NotImplemented
+        if self is other:
+            return True
+        return self._words == other._words and all(map(_same, self._numbers, other._numbers))
+
+    def __hash__(self) -> int:
+        return hash((self._words, self.values.shape))
+
+    @property
+    def _words(self) -> tuple[object, ...]:
+        return self.node, self.path, self.interpolation, self.pointer, self.storage
+
+    @property
+    def _numbers(self) -> tuple[Floats | None, ...]:
+        return self.times, self.values, self.in_tangents, self.out_tangents
+
     @property
     def target(self) -> tuple[int | None, str]:
         """What this track moves, comparable: (node, path), or (None, pointer)."""
@@ -90,6 +117,36 @@ class Track:
     def kind(self) -> Kind:
         """How values may be interpolated: see `kind_of`."""
         return kind_of(self)
+
+
+def _same(one: Floats | None, other: Floats | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
+
+
+def _node(node: int | None, path: str) -> int | None:
+    """The node as a plain integer, which JSON can hold; None for a pointer's target."""
+    if path not in PATHS and path != "pointer":
+        raise RangeError(f"path is '{path}' (expected {', '.join(PATHS)} or pointer)")
+    if (node is None) is not (path == "pointer"):
+        raise RangeError(f"node is {node} with path '{path}' (expected a number, and None with path 'pointer' only)")
+    if node is None:
+        return None
+    try:
+        number = operator.index(node)
+    except TypeError:
+        raise ShapeError(f"node is {node!r} (expected its number in the file)") from None
+    if number < 0:
+        raise RangeError(f"node is {number} (expected its number in the file, 0 or more)")
+    return number
+
+
+def _interpolation(name: str) -> Interpolation:
+    try:
+        return Interpolation(name)
+    except ValueError:
+        raise RangeError(f"interpolation is {name!r} (expected {', '.join(Interpolation)})") from None
 
 
 def _tangents(values: Floats, shape: tuple[int, int], name: str) -> Floats:

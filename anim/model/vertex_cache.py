@@ -94,7 +94,15 @@ class VertexCache:
 def from_arrays(
     times: Floats, positions: AnyArray, faces: Ints, *, normals: AnyArray | None = None, rest: Floats | None = None
 ) -> VertexCache:
-    """Return a cache of frames that are in memory: positions and normals (F, V, 3)."""
+    """Return a cache of frames that are in memory: positions and normals (F, V, 3), times (F,) s.
+
+    Raises ShapeError where these don't fit together, RangeError for times that don't increase.
+    from_arrays([0, 1], positions of shape (2, 4, 3), [[0, 1, 2]]) → a cache of 2 frames of 4 vertices
+    """
+    times = arrays.times(times)
+    arrays.check_shape(np.asarray(positions), f"{len(times)} V 3", name="positions")
+    if normals is not None:
+        arrays.check_shape(np.asarray(normals), f"{len(times)} {positions.shape[1]} 3", name="normals")
     chunk = Chunk(0, np.asarray(positions, np.float32), None if normals is None else np.asarray(normals, np.float32))
     return VertexCache(
         times, positions.shape[1], faces, lambda: iter((chunk,)), rest=rest, has_normals=normals is not None

@@ -23,6 +23,19 @@ def with_last_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = N
     return Clip(clip.name, tuple(_extended(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
+def open_tracks(clip: Clip) -> frozenset[int]:
+    """Return the numbers of the tracks that end in another value than they start with; q and −q are the same.
+
+    (one track from 0 to 1 and back to 0, one from 0 to 1) → {1}
+    """
+    return frozenset(i for i, track in enumerate(clip.tracks) if not _is_closed(track))
+
+
+def _is_closed(track: Track) -> bool:
+    first, last = track.values[0], track.values[-1]
+    return bool((first == last).all() or (track.kind is Kind.ROTATION and (first == -last).all()))
+
+
 def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> Clip:
     """Return the clip with its last `blend` seconds bent so that it ends as it starts, in value and speed.
 

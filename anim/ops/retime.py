@@ -12,6 +12,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.model import Clip, Interpolation, Track
 
+NEAR_ZERO_S = 5e-4  # an offset that leads this near to 0 means 0: the times that it was read from are printed rounded
 JUMP = 1e-6  # s; how long a reversed STEP track shows the value that it ended on for an instant
 
 
@@ -31,7 +32,8 @@ def retime(
     interpolation: values stay, tangents are divided by what stretches time.
 
     speed: > 0; 0.25 takes four times as long. duration: seconds from first to last key, > 0. Not both.
-    The clip's start stays where it is, but for `offset` seconds, which must not lead below 0.
+    The clip's start stays where it is, but for `offset` seconds, which must not lead below 0; one that leads back to
+    within half a millisecond of 0 leads to 0 itself.
     Raises RangeError for values out of range.
     (keys 0, 1 s; speed 0.25) → keys 0, 4 s
     """
@@ -39,8 +41,7 @@ def retime(
         raise RangeError("speed and duration exclude each other")
     factor = _factor(clip, speed, duration)
     start, end = clip.start, clip.start + (clip.end - clip.start) * factor
-    if start + offset < 0:
-        raise RangeError(f"an offset of {offset:g} s leads to {start + offset:g} s (glTF's time starts at 0)")
+    offset = _checked_offset(offset, start)
     steps: list[Callable[[Track], Track]] = []
     if factor != 1:
         steps.append(lambda track: stretched(track, start, factor))
@@ -104,7 +105,7 @@ def _all(steps: list[Callable[[Track], Track]], track: Track) -> Track:
 def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if speed is not None:
         if not (math.isfinite(speed) and speed > 0):
-            raise RangeError(f"speed is {speed:g} (expected a number above 0; --reverse turns it round)")
+            raise RangeError(f"speed is {speed:g} (expected a number above 0)", help="to play it backwards, reverse it")
         return 1 / speed
     if duration is None:
         return 1.0
@@ -114,6 +115,18 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if own == 0:
         raise RangeError("the clip has no duration, so it can't be stretched to one")
     return duration / own
+
+
+def _checked_offset(offset: float, start: float) -> float:
+    """The offset, or the one that leads to 0 s exactly where that is what it means."""
+    if offset < 0 and abs(start + offset) < NEAR_ZERO_S:
+        return -start
+    if not start + offset >= 0:
+        raise RangeError(
+            f"an offset of {offset:g} s leads to {start + offset:g} s (glTF's time starts at 0)",
+            help=f"an offset of {-start:.4f} moves the first key to 0 s" if start else "",
+        )
+    return offset
 
 
 def _reversed_step(track: Track, times: Floats, start: float) -> Track:

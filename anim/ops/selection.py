@@ -24,7 +24,7 @@ class Selection:
 
         Raises NotFoundError for a glob that matches no clip, and says which name is near.
         """
-        return matching(self.clips, [name or str(i) for i, name in enumerate(names)], "clip")
+        return matching(self.clips, [name or f"#{i}" for i, name in enumerate(names)], "clip")
 
     def chosen_nodes(self, skeleton: Skeleton) -> list[int]:
         """Return the numbers of the nodes that are meant; a node without a name is called by its number."""
@@ -56,7 +56,8 @@ def matching(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]
 
 
 def _is_meant(number: int, name: str, glob: str) -> bool:
-    return glob == f"#{number}" or fnmatchcase(name, glob)
+    is_nameless = name == f"#{number}"
+    return glob == f"#{number}" or fnmatchcase(name, glob) or (is_nameless and glob == str(number))
 
 
 def _suggestion(glob: str, names: Iterable[str], what: str) -> str:

@@ -32,23 +32,35 @@ def trim(
     New end keys have the value, and under CUBICSPLINE the tangent, that the track has there; a cut piece of a rotation
     spline gets keys more where renormalized cubics need them. A track with no key in between becomes one key.
     start, end: by default the clip's own; times beyond it are brought back to it, others rounded to float32, as keys
-    are. A clip of one moment stays as it is.
+    are. Where both are left out, or the clip is one moment, nothing is cut.
     rebase: move all so that the part starts at 0 s. Raises RangeError for an empty part.
     (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
     """
-    if clip.end == clip.start:
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    if (start is not None or end is not None) and clip.end > clip.start:
+        clip = _cut(clip, start, end, chosen)
+    first = min((float(clip.tracks[i].times[0]) for i in chosen), default=0.0)
+    if not rebase or first == 0:
         return clip
+    return Clip(clip.name, tuple(shifted(t, -first) if i in chosen else t for i, t in enumerate(clip.tracks)))
+
+
+def _cut(clip: Clip, start: float | None, end: float | None, chosen: frozenset[int]) -> Clip:
     first = clip.start if start is None else max(float(np.float32(start)), clip.start)
     last = clip.end if end is None else min(float(np.float32(end)), clip.end)
     if not last > first:
-        raise RangeError(
-            f"nothing between {first:g} s and {last:g} s (the clip has {clip.start:g} s to {clip.end:g} s)"
-        )
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+        raise RangeError(_nothing_left(clip, start, end))
     new = [_trimmed(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
-    if rebase:
-        new = [shifted(track, -first) if i in chosen else track for i, track in enumerate(new)]
     return Clip(clip.name, tuple(new))
+
+
+def _nothing_left(clip: Clip, start: float | None, end: float | None) -> str:
+    has = f"the clip has {clip.start:g} s to {clip.end:g} s"
+    if start is not None and start >= clip.end:
+        return f"nothing is left from {start:g} s on ({has})"
+    if end is not None and end <= clip.start:
+        return f"nothing is left up to {end:g} s ({has})"
+    return f"nothing is left from {start or 0.0:g} s to {end or 0.0:g} s (expected an end after the start; {has})"
 
 
 def _trimmed(track: Track, start: float, end: float) -> Track:

@@ -14,10 +14,10 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
+from anim.measure.points import Points
 from anim.model import Skeleton
 from anim.optimize.axes import Axis
 from anim.optimize.candidates import Candidate, Candidates
-from anim.optimize.points import Points
 from anim.optimize.truth import LEVER_FRAMES, Truth
 from anim.optimize.worlds import worlds
 

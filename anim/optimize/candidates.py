@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.optimize import coding, play
 from anim.optimize.axes import Axis
+from anim.optimize.closure import close_ends
 from anim.optimize.coding import Form, Stored
 from anim.optimize.fit import Fit
 from anim.optimize.limits import Packing
@@ -34,6 +35,7 @@ class Candidates:
         self._truth = truth
         self._packing = packing
         self._paths = [PATHS.index(each.path) for each in truth.moving]
+        self._closures = np.array([each.closure for each in truth.moving])
         self._places: dict[bytes, Located] = {}
         self._fits: dict[bytes, Fit] = {}
         self._keys: dict[tuple[bytes, int], Floats] = {}
@@ -60,7 +62,7 @@ class Candidates:
         keys = aims[self._truth.on_grid[axis.keys]]
         if not axis.keys.all():
             keys = self._fit_on(axis, axis.keys.tobytes()).rotations(aims, keys)
-        by_track = list(np.moveaxis(keys, 1, 0))
+        by_track = list(np.moveaxis(close_ends(keys, self._closures[list(members)]), 1, 0))
         forms = [coding.form(by_track[k], "rotation", misses[i], self._packing) for k, i in enumerate(members)]
         return _candidates(coding.all_stored(by_track, forms), place, rotations=True)
 
@@ -89,6 +91,7 @@ class Candidates:
             if not axis.keys.all():
                 fit = self._fit_on(axis, name)
                 keys = fit.rotations(values, keys) if path == ROTATION else fit.vectors(values)
+            keys = close_ends(keys, self._closures[new])
             for k, i in enumerate(new):
                 self._keys[name, i] = keys[:, k]
 

@@ -104,8 +104,10 @@ class _Sorted:
         track = self._clip.tracks[i]
         slim = lossless.lossless(track)
         if len(slim.times) == 1 and self._droppable(i) and track.node is not None and track.path in PATHS:
-            rest = getattr(self._setting.skeleton, track.path)[track.node].astype(np.float32)
-            value = slim.values[0].astype(np.float32)
+            is_exact = self._setting.bounds.max_error == 0  # a rest pose in decimals differs from float32 keys
+            precision = np.float64 if is_exact else np.float32
+            rest = getattr(self._setting.skeleton, track.path)[track.node].astype(precision)
+            value = slim.values[0].astype(precision)
             if (value == rest).all() or (track.path == "rotation" and (value == -rest).all()):
                 self._dropped.append(i)
                 return

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Floats
-from anim.gltf import pack
+from anim.arrays import Bools, Floats
+from anim.gltf import meshopt, pack
 from anim.optimize.limits import Objective, Packing
 
 INT16 = 32767.0
@@ -93,6 +93,11 @@ class Stored:
         """What is the same of two tracks that are stored alike."""
         return self.codes or self.values.tobytes()
 
+    def only(self, keep: Bools) -> Stored:
+        """Return the keys of a mask (K,)."""
+        rows = np.frombuffer(self.codes, np.uint8).reshape(len(keep), -1)[keep]
+        return replace(self, values=self.values[keep], codes=rows.tobytes())
+
     def exact(self) -> Floats:
         """Return the values as meshopt itself decodes them: its filter computes in float32, a search needn't."""
         if self.form != "quaternion":
@@ -155,7 +160,7 @@ def compressed_size(streams: Sequence[Sequence[Stored]], packing: Packing) -> in
 
     total = 0
     for keys in streams:
-        stride = 8 if keys[0].form == "quaternion" else 4 * keys[0].values.shape[1]
+        stride = 8 if keys[0].form == "quaternion" else meshopt.row_size(4 * keys[0].values.shape[1], 4)
         rows = np.frombuffer(b"".join(each.codes for each in keys), np.uint8).reshape(-1, stride)
         total += len(encode_gltf_buffer(rows, "ATTRIBUTES", 1 if packing is Packing.KHR else 0))
     return total

@@ -14,8 +14,9 @@ from anim.optimize.clip import Task
 from anim.optimize.constants import known
 from anim.optimize.crew import crew
 from anim.optimize.rebase import rebase
+from anim.optimize.redundant import drop_redundant_keys
 from anim.optimize.request import Request
-from anim.optimize.site import Site, finished
+from anim.optimize.site import Site, finished, judged
 from anim.optimize.solution import Solution
 from anim.optimize.verify import Verdict
 from anim.optimize.written import differing, written
@@ -69,11 +70,22 @@ def optimize(
     solutions: dict[int, Solution] = {}
     verdicts: dict[int, Verdict] = {}
     without_loss: list[int] = []
+
+    def name(item: tuple[int, object]) -> str:
+        return read.label(clips[item[0]].name, item[0])
+
     with crew(min(workers, len(tasks)), site, start=start) as workforce:
-        for (number, _), each in zip(tasks, workforce.each(finished, tasks), strict=True):
+        results = workforce.each(finished, tasks, label=name)
+        for (number, _), each in zip(tasks, results, strict=True):
             solutions[number], verdicts[number] = each.solution, each.verdict
             without_loss += [number] if each.without_loss else []
             progress(len(solutions) / len(tasks))
+        lossy = {i: each for i, each in solutions.items() if i not in without_loss}
+        slimmer = drop_redundant_keys(lossy, site.after.skeleton, request)
+        items = [(i, each.clip) for i, each in slimmer.items()]
+        for (number, _), found in zip(items, workforce.each(judged, items, label=name), strict=True):
+            if found.holds:
+                solutions[number], verdicts[number] = slimmer[number], found
     new = written(base.document if base else document, solutions, request.packing)
     read_back = read.clips(new)
     for number in differing(read_back, solutions):

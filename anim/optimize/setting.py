@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
+from anim.measure import points as points_
+from anim.measure.points import Points
 from anim.measure.shells import hidden
 from anim.measure.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton
 from anim.optimize import morph
-from anim.optimize import points as points_
 from anim.optimize.coding import Coding
 from anim.optimize.limits import Bounds, Effort, Policy
-from anim.optimize.points import Points
 from anim.sampling.pose import rest, world_by_node
 
 

@@ -121,6 +121,11 @@ def finished(site: Site, item: tuple[int, Task]) -> Finished:
     return Finished(exact, site.judged(number, exact.clip), without_loss=is_last_resort)
 
 
+def judged(site: Site, item: tuple[int, Clip]) -> Verdict:
+    """Return how far a new version of clip `item[0]` is from its source."""
+    return site.judged(*item)
+
+
 def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 

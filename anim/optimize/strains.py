@@ -8,9 +8,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import matrix, quaternion
+from anim.measure.points import Points, stacked
 from anim.model import Skeleton
 from anim.optimize.limits import Bounds
-from anim.optimize.points import Points, stacked
 from anim.optimize.truth import ROTATION, Truth
 from anim.optimize.worlds import local_matrices
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints, sorted_unique
 from anim.maths import quaternion
+from anim.measure.points import Points, stacked
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimize import play
+from anim.optimize.closure import closure_sign
 from anim.optimize.limits import Reference
-from anim.optimize.points import Points, stacked
 from anim.optimize.worlds import needed_levels, worlds
 from anim.sampling import pose, times
 from anim.sampling.track import locate
@@ -33,6 +34,7 @@ class Moving:
     number: in its clip. values: (W, C) at the times to measure at; rotations unit, without jumps of sign. rest: (C,),
     for rotations on the side of the first value. middle: (C,), the single value that fits best. meters: how far a
     point moves per unit of the value, about. from_rest, from_middle: m, how far rest and middle are off, at most.
+    closure: s where the last value is s times the first, 0 where it is another (see `closure`).
     """
 
     number: int
@@ -44,6 +46,7 @@ class Moving:
     meters: float
     from_rest: float
     from_middle: float
+    closure: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +84,8 @@ def truth(
 ) -> Truth:
     """Return what `clip` does to `points`; the tracks numbered in `free` may change, all others stay as they are.
 
-    below: by node of a free track, which points (P,) hang on it. noticed: m; where chords and arcs are closer than this
-    they count as one.
+    below: by node of a free track, which points (P,) hang on it. noticed: m; where chords and arcs, or both ends of a
+    track, are closer than this they count as one.
     """
     tracks = [clip.tracks[i] for i in free]
     grid = key_grid(tracks)
@@ -94,7 +97,8 @@ def truth(
     reach = _reach(world, points, {node: below[node] for node in nodes})
     widening = _widening(skeleton, world, levels)
     moving = tuple(
-        _moving(number, track, skeleton, local, reach, widening) for number, track in zip(free, tracks, strict=True)
+        _moving(number, track, skeleton, local, reach, widening, noticed)
+        for number, track in zip(free, tracks, strict=True)
     )
     answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
     columns = stacked(world, points.nodes)
@@ -175,6 +179,7 @@ def _moving(
     local: tuple[Floats, Floats, Floats],
     reach: dict[int, float],
     widening: Floats,
+    noticed: float,
 ) -> Moving:
     node = track.node
     assert node is not None
@@ -189,8 +194,9 @@ def _moving(
         meters = widening[node]
     else:
         meters = reach[node] / max(float(np.abs(values).min()), 1e-6)
-    off = (np.linalg.norm(values - each, axis=1).max() * meters for each in (rest, middle))
-    return Moving(number, node, track.path, values, rest, middle, float(meters), *map(float, off))
+    from_rest, from_middle = (float(np.linalg.norm(values - each, axis=1).max() * meters) for each in (rest, middle))
+    closure = closure_sign(values, noticed / meters if meters else 0.0)
+    return Moving(number, node, track.path, values, rest, middle, float(meters), from_rest, from_middle, closure)
 
 
 def _reach(world: Floats, points: Points, answering: dict[int, Bools]) -> dict[int, float]:

@@ -9,6 +9,7 @@ from anim.measure.error import MotionError, Ruler, check_times, dense_times
 from anim.measure.proof.certified import Prover
 from anim.measure.statistics import Statistics, statistics
 from anim.model import Clip
+from anim.optimize.closure import opened_tracks
 from anim.optimize.limits import Bounds, Reference
 
 NOTHING = 1e-9  # of the diagonal: what rounding in float64 may show of motion that is the same
@@ -76,7 +77,7 @@ def verdict(
         shares.append(_share(about.angle.size, bounds.max_angle, NOTHING))
     if bounds.max_speed_error is not None and about is not None:
         shares.append(_share(about.speed.size, bounds.max_speed_error, least))
-    if (before.start, before.end) != (after.start, after.end):
+    if (before.start, before.end) != (after.start, after.end) or opened_tracks(before, after):
         shares.append(float("inf"))
     return Verdict(error, player, about, max(shares), certified)
 

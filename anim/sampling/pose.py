@@ -8,7 +8,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from anim import arrays
 from anim.arrays import Floats
+from anim.errors import NotFoundError
 from anim.maths import matrix
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.batch import Batch, stacks
@@ -18,7 +20,10 @@ Sampler: TypeAlias = Callable[[Batch, Floats, Located], Floats]
 
 
 def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
-    """Return the local transforms of all nodes at times `at` (F,) in seconds; what no track moves stays at rest."""
+    """Return the local transforms of all nodes at times `at` (F,) in seconds; what no track moves stays at rest.
+
+    Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.
+    """
     return Poses(skeleton, clip).at(at)
 
 
@@ -32,7 +37,14 @@ class Poses:
         self._skeleton = skeleton
         self._sample = sample
         nodes = len(skeleton)
-        self._stacks = stacks(track for track in clip.tracks if track.node is not None and track.node < nodes)
+        moving = [track for track in clip.tracks if track.node is not None]
+        highest = max((track.node for track in moving if track.node is not None), default=-1)
+        if highest >= nodes:
+            raise NotFoundError(
+                f"there is no node {highest} (the skeleton has {nodes}, from 0 on)",
+                where=f"clip '{clip.name}'" if clip.name else "",
+            )
+        self._stacks = stacks(moving)
 
     def sampled(self, sample: Sampler) -> Poses:
         """Return the same clip on the same skeleton, with the values of its tracks given by another sampler."""
@@ -42,7 +54,7 @@ class Poses:
 
     def at(self, at: Floats) -> Pose:
         """Return the local transforms of all nodes at times `at` (F,) in seconds."""
-        at = np.asarray(at, np.float64)
+        at = arrays.floats(at, "F", name="times")
         parts = {
             "translation": _at_rest(self._skeleton.translation, len(at)),
             "rotation": _at_rest(self._skeleton.rotation, len(at)),

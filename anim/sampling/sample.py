@@ -38,6 +38,7 @@ def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") 
     """Return where every node of the skeleton is at times `at` (F,) in seconds; before and after the clip it holds.
 
     space: "local", in the parent's space, or "world". Raises RangeError for another.
+    Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.
     """
     if space not in SPACES:
         raise RangeError(f"space is '{space}' (expected local or world)")

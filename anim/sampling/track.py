@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Kind, Track
@@ -42,12 +43,13 @@ def sample(track: Track, at: Floats) -> Floats:
     """Return the values (F, C) of a track at times `at` (F,) in seconds.
 
     At a key the key's own value; outside the keys the first or the last one; rotations are unit quaternions.
+    Raises ShapeError or RangeError for times that are none.
     (0 s: 1, 2 s: 3, LINEAR) at 0.5, 9 → 1.5, 3
     """
     tangents = None
     if track.in_tangents is not None and track.out_tangents is not None:
         tangents = (track.in_tangents, track.out_tangents)
-    place = locate(track.times, np.asarray(at, np.float64))
+    place = locate(track.times, arrays.floats(at, "F", name="times"))
     return interpolate(place, track.values, tangents, track.interpolation, track.kind)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,9 @@ from anim.maths import quaternion
 from anim.measure import rate
 from anim.model import Clip, Interpolation, Kind, Skeleton, Track
 from anim.ops.selection import Selection
+from anim.show.rotations import COMPONENTS, FROM_REST
 
+NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 STILL = 2e-5  # of the largest value; what moves less than this is rounding of the exporter
 COLORS = ("color", "Color", "ColorFactor", "emissiveFactor", "attenuationColor")  # ends of pointers that name colors
 SLOWEST = 8.0  # fps; fewer are the distances of a few poses and no frames
@@ -27,7 +31,8 @@ class Shown:
     """One track to draw.
 
     clip, target: names. labels: of its components. start, end: of its clip, s. fps: of its clip, None where unknown.
-    other: the same track in a second file, if there is one to compare.
+    other: the same track in a second file, if there is one to compare. view: what a rotation is drawn as: FROM_REST,
+    COMPONENTS, or an order of Euler angles. rest: (4,) rotation of the node at rest.
     """
 
     clip: str
@@ -38,6 +43,13 @@ class Shown:
     end: float
     fps: float | None
     other: Track | None = None
+    view: str = FROM_REST
+    rest: Floats = field(default_factory=lambda: NO_TURN)
+
+    @property
+    def is_in_degrees(self) -> bool:
+        """Whether a rotation is drawn as angles, not as the components of its quaternion."""
+        return self.track.kind is Kind.ROTATION and self.view != COMPONENTS
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -54,14 +66,17 @@ class Chosen:
     more: int = 0
 
 
-def choose(document: Document, selection: Selection, *, limit: int) -> Chosen:
+def choose(document: Document, selection: Selection, *, limit: int, view: str = FROM_REST) -> Chosen:
     """Return the selected tracks that move, at most `limit`; still ones only where nothing else is meant.
 
+    view: what rotations are drawn as; with an order of Euler angles only rotations are selected.
     Raises NotFoundError where no track is selected.
     """
-    found = _selected(document, selection)
+    found = _selected(document, selection, view)
+    if view not in (FROM_REST, COMPONENTS):
+        found = [each for each in found if each.track.kind is Kind.ROTATION]
     if not found:
-        raise NotFoundError("no track is selected", help="see them with: gltf-anim inspect --tracks")
+        raise NotFoundError("no track is selected", help="gltf-anim inspect IN --tracks lists them")
     moving = [each for each in found if _moves(each.track)] or found
     return Chosen(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
 
@@ -71,7 +86,7 @@ def compare(chosen: Chosen, other: Document) -> tuple[Chosen, int]:
 
     Raises NotFoundError where none has.
     """
-    partners = {each.key: each for each in reversed(_selected(other, Selection()))}
+    partners = {each.key: each for each in reversed(_selected(other, Selection(), FROM_REST))}
     shown = tuple(_with(each, partners.get(each.key)) for each in chosen.shown)
     alone = sum(each.other is None for each in shown)
     if alone == len(shown):
@@ -95,7 +110,7 @@ def _with(each: Shown, partner: Shown | None) -> Shown:
     )
 
 
-def _selected(document: Document, selection: Selection) -> list[Shown]:
+def _selected(document: Document, selection: Selection, view: str) -> list[Shown]:
     clips, skeleton = read.clips(document), read.skeleton(document)
     targets = _morph_targets(document)
     found = []
@@ -104,9 +119,10 @@ def _selected(document: Document, selection: Selection) -> list[Shown]:
         fps = _rate(clip)
         for i in sorted(selection.chosen_tracks(clip, skeleton)):
             track = _aligned(clip.tracks[i])
-            labels = _labels(track, targets)
-            name = _shown(clip.name or f"clip {number}")
-            found.append(Shown(name, _shown(_target(track, skeleton)), track, labels, clip.start, clip.end, fps))
+            labels = _labels(track, targets, view)
+            name, target = _shown(read.clip_name(clip.name, number)), _shown(_target(track, skeleton))
+            rest = NO_TURN if track.node is None else skeleton.rotation[track.node]
+            found.append(Shown(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
     return found
 
 
@@ -140,13 +156,12 @@ def _target(track: Track, skeleton: Skeleton) -> str:
     return skeleton.names[track.node] or f"node {track.node}"
 
 
-def _labels(track: Track, targets: Mapping[int, Sequence[str]]) -> tuple[str, ...]:
+def _labels(track: Track, targets: Mapping[str, Sequence[str]], view: str) -> tuple[str, ...]:
     count = track.values.shape[1]
-    if track.path == "weights" and track.node is not None:
-        names = targets.get(track.node, ())
-        if len(names) == count:
-            return _shortened([_shown(name) for name in names])
-        return tuple(str(i) for i in range(count))
+    if track.kind is Kind.ROTATION and view != COMPONENTS:
+        return tuple("xyz") if view == FROM_REST else _euler_labels(view)
+    if named := _weight_names(track, targets):
+        return named
     if count in (3, 4) and track.pointer is not None and track.pointer.endswith(COLORS):
         return tuple("rgba"[:count])
     if count == 1:
@@ -154,16 +169,46 @@ def _labels(track: Track, targets: Mapping[int, Sequence[str]]) -> tuple[str, ..
     return tuple("xyzw"[:count]) if count <= 4 else tuple(str(i) for i in range(count))
 
 
-def _morph_targets(document: Document) -> dict[int, tuple[str, ...]]:
-    """Names of the morph targets by node, where the mesh has any in `extras.targetNames`, as exporters write them."""
-    meshes = items(document.json, "meshes")
-    result = {}
+def _euler_labels(order: str) -> tuple[str, ...]:
+    """The axes in their order, told apart where the first is the third again: ("Z", "X", "Y"), ("Z1", "X", "Z2")."""
+    if order[0] != order[2]:
+        return tuple(order)
+    return f"{order[0]}1", order[1], f"{order[2]}2"
+
+
+def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """What morph weights are called, by the target's name or number; none for other tracks."""
+    pointer = f"/nodes/{track.node}/weights" if track.path == "weights" else track.pointer or ""
+    whole = re.fullmatch(r"(/(?:nodes|meshes)/\d+/weights)(?:/(\d+))?", pointer)
+    if whole is None:
+        return ()
+    names, count = targets.get(whole[1], ()), track.values.shape[1]
+    if whole[2] is not None:
+        number = int(whole[2])
+        return (_shown(names[number]) if number < len(names) else f"target {number}",)
+    if len(names) == count:
+        return _shortened([_shown(name) for name in names])
+    return tuple(f"target {i}" for i in range(count))
+
+
+def _morph_targets(document: Document) -> dict[str, tuple[str, ...]]:
+    """Names of morph targets by the pointer to their weights, where a mesh has any in `extras.targetNames`."""
+    result: dict[str, tuple[str, ...]] = {}
+    for i, mesh in enumerate(items(document.json, "meshes")):
+        names = _target_names(mesh) or _target_names(mesh["primitives"][0])
+        if names:
+            result[f"/meshes/{i}/weights"] = names
     for i, node in enumerate(items(document.json, "nodes")):
-        extras = meshes[node["mesh"]].get("extras") if "mesh" in node else None
-        names = extras.get("targetNames") if isinstance(extras, dict) else None
-        if isinstance(names, list) and all(isinstance(name, str) for name in names):
-            result[i] = tuple(names)
+        pointer = f"/meshes/{node.get('mesh')}/weights"
+        if pointer in result:
+            result[f"/nodes/{i}/weights"] = result[pointer]
     return result
+
+
+def _target_names(owner: Mapping[str, Any]) -> tuple[str, ...]:
+    extras = owner.get("extras")
+    names = extras.get("targetNames") if isinstance(extras, dict) else None
+    return tuple(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
 
 
 def _shown(name: str) -> str:
@@ -176,7 +221,8 @@ def _shortened(names: Sequence[str]) -> tuple[str, ...]:
     first, last = min(names), max(names)  # what these two share, all share
     same = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
     cut = max(first[:same].rfind(mark) for mark in "_.-/ ") + 1
-    return tuple(name[cut:] or name for name in names)
+    short = [name[cut:] for name in names]
+    return tuple(names) if any(not name or name.isdecimal() for name in short) else tuple(short)
 
 
 def _moves(track: Track) -> bool:

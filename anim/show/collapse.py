@@ -36,7 +36,7 @@ def collapse(found: Sequence[Found], *, title: str, kind: str) -> bytes:
     without those of one frame.
 
     Each: the least collapse index of its mesh over time, the pinched part below 0.7 filled; below it the enclosed
-    volume by each method against bind pose, where the mesh is closed.
+    volume by each method against bind pose, where the mesh is closed. All clips and methods have one scale.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
     moving = [each for each in found if len(each.mesh.times) > 1] or list(found)
@@ -51,13 +51,15 @@ def collapse(found: Sequence[Found], *, title: str, kind: str) -> bytes:
         sheet.text(MARGIN + 0.1, 0.33, title, fontsize=TITLE + 2, weight="bold")
         words = f"the worst {len(shown)} of {len(found)} clips" if len(found) > len(shown) else ""
         sheet.text(sheet.width - MARGIN - 0.1, 0.33, words, fontsize=SMALL, color=SOFT, ha="right")
+        scale = _volume_range(shown)
         for r, row in enumerate(rows):
             for c, each in enumerate(row):
-                _cell(sheet, each, MARGIN + c * width, TOP + r * height, width)
+                _cell(sheet, each, MARGIN + c * width, TOP + r * height, width, scale)
         return sheet.render(kind)
 
 
-def _cell(sheet: Sheet, found: Found, x: float, y: float, width: float) -> None:
+def _cell(sheet: Sheet, found: Found, x: float, y: float, width: float, scale: tuple[float, float]) -> None:
+    """One clip. scale: least and greatest volume of all clips, %."""
     mesh, left, across = found.mesh, x + LEFT, width - LEFT - RIGHT
     at = left + 0.14 + sheet.text(left, y + 0.2, found.clip, fontsize=TITLE, weight="bold")
     sheet.text(at, y + 0.2, f"{mesh.mesh}  ·  least index, lbs", fontsize=SMALL, color=SOFT)
@@ -68,7 +70,7 @@ def _cell(sheet: Sheet, found: Found, x: float, y: float, width: float) -> None:
     words = "enclosed volume, % of bind pose" if volumes else "no part of the mesh is closed: no volume"
     sheet.text(left, y - 0.07, words, fontsize=SMALL, color=SOFT)
     if volumes:
-        _draw_volumes(sheet.panel(left, y, across, TALL), mesh.times, volumes)
+        _draw_volumes(sheet.panel(left, y, across, TALL), mesh.times, volumes, scale)
 
 
 def _draw_index(axes: Axes, times: Floats, indices: Floats) -> None:
@@ -81,10 +83,16 @@ def _draw_index(axes: Axes, times: Floats, indices: Floats) -> None:
     axes.set_xticklabels([])
 
 
-def _draw_volumes(axes: Axes, times: Floats, volumes: dict[str, Floats]) -> None:
-    low = 100 * min(float(each.min()) for each in volumes.values())
-    high = 100 * max(float(each.max()) for each in volumes.values())
-    low, high = min(low, 95.0), max(high, 101.0)
+def _volume_range(found: Sequence[Found]) -> tuple[float, float]:
+    """The least and the greatest volume of any clip by any method, % of bind pose."""
+    volumes = [each.volume for one in found for each in one.mesh.methods if each.volume is not None]
+    low = min((100 * float(each.min()) for each in volumes), default=100.0)
+    high = max((100 * float(each.max()) for each in volumes), default=100.0)
+    return min(low, 95.0), max(high, 101.0)
+
+
+def _draw_volumes(axes: Axes, times: Floats, volumes: dict[str, Floats], scale: tuple[float, float]) -> None:
+    low, high = scale
     room = ROOM * (high - low)
     axes.set_ylim(low - room, high + room)
     axes.axhline(100, color=HAIR, linewidth=0.8)

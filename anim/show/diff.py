@@ -24,26 +24,33 @@ UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"
 
 
 def diff(profiles: Sequence[Profile], *, title: str, kind: str, limit: float | None = None, note: str = "") -> bytes:
-    """Return a picture of clips as the bytes of a PNG or SVG file, the first twelve.
+    """Return a picture of clips as the bytes of a PNG or SVG file, the first twelve that differ.
 
     Each: the largest distance of any vertex over time, filled, and over it that of the worst joints' own vertices, by
     color, the names of the worst at the top.
     limit: m, drawn as a line. note: words for the head of the sheet.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
-    shown = profiles[:LIMIT]
+    shown = differing(profiles)[:LIMIT]
     with style(kind):
         columns = 1 if len(shown) < 2 else 2
         width = WIDE if columns == 1 else COLUMN
         rows = [shown[i : i + columns] for i in range(0, len(shown), columns)]
         height = HEAD + TALL + FOOT
-        sheet = Sheet(columns * width + 2 * MARGIN, TOP + len(rows) * height)
+        sheet = Sheet(columns * width + 2 * MARGIN, TOP + (len(rows) * height if rows else FOOT))
         sheet.text(MARGIN + 0.1, 0.33, title, fontsize=TITLE + 2, weight="bold")
         sheet.text(sheet.width - MARGIN - 0.1, 0.33, note, fontsize=SMALL, color=SOFT, ha="right")
+        if not shown:
+            sheet.text(MARGIN + 0.1, TOP + 0.15, "no difference", color=SOFT)
         for r, row in enumerate(rows):
             for c, each in enumerate(row):
                 _cell(sheet, each, MARGIN + c * width, TOP + r * height, width, limit)
         return sheet.render(kind)
+
+
+def differing(profiles: Sequence[Profile]) -> list[Profile]:
+    """Return those of clips that are apart at any time."""
+    return [each for each in profiles if each.error.any()]
 
 
 def _cell(sheet: Sheet, profile: Profile, x: float, y: float, width: float, limit: float | None) -> None:

@@ -161,16 +161,18 @@ class _Cell:
         return f"at most {short(most)}×" if most < 1e3 else "vertical in places"
 
     def _tempo(self, axes: Axes, values: tuple[float, float]) -> None:
-        """Dots on a track; values: the least and the greatest of all eases on the sheet."""
+        """Dots on a track with marks at 0 and 1; values: the least and the greatest of all eases on the sheet."""
         places = self.easing.value(np.linspace(0, 1, DOTS + 1))
         axes.grid(visible=False)
         axes.spines["bottom"].set_visible(False)
         axes.plot((0, 1), (0, 0), color=FAINT, linewidth=5, solid_capstyle="round", zorder=1)
+        axes.vlines((0, 1), -0.8, 0.8, color=SOFT, linewidth=0.8, clip_on=False, zorder=1.5)
         dot = {"markersize": 5.2, "alpha": 0.55, "markeredgewidth": 0}
         axes.plot(places, np.zeros(len(places)), "o", color=ACCENT, clip_on=False, **dot)
         axes.set_xlim(*values)
         axes.set_ylim(-1, 1)
-        axes.set_xticks([])
+        axes.set_xticks([0, 1], ["0", "1"])
+        axes.tick_params(axis="x", length=0, pad=0)
         axes.set_yticks([])
 
 

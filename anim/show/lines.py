@@ -60,10 +60,10 @@ def speed_line(track: Track) -> Line:
     return Line(times.reshape(-1), speeds.reshape(-1, 1))
 
 
-def angle_line(track: Track) -> Line:
-    """Return the angle (P, 1) in rad, 0 … π, of a rotation from its first key."""
+def angle_line(track: Track, start: Floats) -> Line:
+    """Return the angle (P, 1) in rad, 0 … π, of a rotation from another: start (4,)."""
     line = value_line(track)
-    first = quaternion.normalize(track.values[:1])
+    first = quaternion.normalize(start[None])
     broken: Bools = np.isnan(line.values[:, 0])
     whole = quaternion.normalize(np.where(broken[:, None], first, line.values))
     angle = quaternion.angle_between(np.broadcast_to(first, whole.shape), whole)

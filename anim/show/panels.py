@@ -13,6 +13,7 @@ from anim.model import Interpolation, Kind, Track
 from anim.show import lines
 from anim.show.chosen import Shown
 from anim.show.lines import Line
+from anim.show.rotations import COMPONENTS, FROM_REST, NEAR_LOCK_DEG, Curve, lock_line, rotation_curve
 from anim.show.sheet import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, short, spread
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 LABEL = 8.0  # points
 BEHIND, PALE, THIN = 4.5, 0.25, 1.1  # width and opacity of a first file's lines, width of the second's
 COLORED = 6  # components in color; the others are a quiet background
-DOTS, HANDLES, RIMS = 11, 14, 30  # px from key to key, from which on there is room for them
+TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px from key to key, from which on there is room for marks
 FAR = 4.0  # times the widest range; values that stand further apart are drawn from their first key
 GAP = 12.5  # px between names of components
 ROUND, ROUND_ANGLES = (1.0, 2.0, 2.5, 5.0, 10.0), (1.0, 1.5, 3.0, 4.5, 9.0, 10.0)  # steps of ticks
@@ -33,7 +34,7 @@ def kinds(each: Shown) -> list[str]:
     """Return what a track is drawn as, from top to bottom: names of DRAW."""
     names = ["value"]
     if each.track.kind is Kind.ROTATION:
-        names.append("angle")
+        names.append("angle" if each.view in (FROM_REST, COMPONENTS) else "lock")
     if any(np.nan_to_num(lines.speed_line(track).values).any() for track in _tracks(each)):
         names.append("speed")
     if each.other is not None:
@@ -73,26 +74,47 @@ def time_axis(axes: Axes, each: Shown, *, labeled: bool) -> None:
 
 def _value(axes: Axes, each: Shown) -> str:
     """The values: those of the second file over those of the first, keys and handles of the one on top."""
-    origin = _origin(each)
     front = each.other or each.track
+    curves = [_curve(each, track) for track in _tracks(each)]
+    top = curves[-1]
+    origin = _origin(each, curves[0])
     if each.other is not None:
-        _curves(axes, each, lines.value_line(each.track), origin, linewidth=BEHIND, alpha=PALE)
-    _curves(axes, each, lines.value_line(front), origin, linewidth=LINE if each.other is None else THIN)
-    if front.interpolation is Interpolation.STEP:
-        jumps = lines.risers(front)
-        _curves(axes, each, jumps, origin, linewidth=0.6, alpha=0.5)
-    handles = front.interpolation is Interpolation.CUBICSPLINE and _spacing(axes, each) >= HANDLES
-    _limits(axes, each, origin, handles=handles)
+        _draw_lines(axes, each, curves[0].line, origin, linewidth=BEHIND, alpha=PALE)
+    _draw_lines(axes, each, top.line, origin, linewidth=LINE if each.other is None else THIN)
+    if top.risers is not None:
+        _draw_lines(axes, each, top.risers, origin, linewidth=0.6, alpha=0.5)
+    is_plain = front.interpolation is Interpolation.CUBICSPLINE and not each.is_in_degrees
+    handles = is_plain and _spacing(axes, each) >= HANDLES
+    _limits(axes, each, curves, origin, handles=handles)
+    _mark_lock(axes, each)
     if handles:
         _handles(axes, each, front, origin)
-    _keys(axes, each, front, origin)
-    _component_names(axes, each, front.values[-1] - origin)
+    _keys(axes, each, front.times, top.keys - origin)
+    _component_names(axes, each, top.keys[-1] - origin)
     return ", from its first key" if origin.any() else ""
 
 
 def _angle(axes: Axes, each: Shown) -> str:
-    _single(axes, [lines.angle_line(track) for track in _tracks(each)], DEGREES, INK, steps=ROUND_ANGLES)
-    return "angle from the first key, °"
+    start = each.rest if each.is_in_degrees else each.track.values[0]
+    _single(axes, [lines.angle_line(track, start) for track in _tracks(each)], DEGREES, INK, steps=ROUND_ANGLES)
+    return "angle from rest, °" if each.is_in_degrees else "angle from the first key, °"
+
+
+def _lock(axes: Axes, each: Shown) -> str:
+    """How far an order of Euler angles is from gimbal lock, 90° at best; what is nearer than 5° is filled."""
+    found = [lock_line(track, order=each.view) for track in _tracks(each)]
+    for i, line in enumerate(found):
+        behind = len(found) > 1 and i == 0
+        look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
+        axes.plot(line.times, line.values[:, 0] * DEGREES, color=INK, **look)
+    axes.set_ylim(0, 90 * 1.08)
+    axes.set_yticks([0, 45, 90])
+    axes.axhspan(0, NEAR_LOCK_DEG, color=COLORS[0], alpha=0.3, linewidth=0)
+    line = found[-1]
+    at = int(np.nanargmin(line.values[:, 0]))
+    least, time = float(line.values[at, 0]) * DEGREES, float(line.times[at])
+    axes.plot(time, least, "o", color=COLORS[0], markersize=3.4, clip_on=False, zorder=3)
+    return f"distance to gimbal lock of {each.view}: at least {short(least)}° at {short(time)} s"
 
 
 def _speed(axes: Axes, each: Shown) -> str:
@@ -118,9 +140,28 @@ def _difference(axes: Axes, each: Shown) -> str:
     return f"difference: at most {short(most * factor)}{unit} at {short(float(line.times[at]))} s"
 
 
+def _mark_lock(axes: Axes, each: Shown) -> None:
+    """Shade the times at which Euler angles are near gimbal lock, with a line at the nearest."""
+    if not each.is_in_degrees or each.view == FROM_REST:
+        return
+    line = lock_line(each.other or each.track, order=each.view)
+    distance = np.nan_to_num(line.values[:, 0], nan=np.inf) * DEGREES
+    is_near = np.concatenate(([False], distance < NEAR_LOCK_DEG, [False]))
+    starts, ends = np.flatnonzero(is_near[1:] & ~is_near[:-1]), np.flatnonzero(is_near[:-1] & ~is_near[1:]) - 1
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        nearest = line.times[start + int(distance[start : end + 1].argmin())]
+        axes.axvspan(line.times[start], line.times[end], color=COLORS[0], alpha=0.18, linewidth=0, zorder=0.5)
+        axes.axvline(nearest, color=COLORS[0], linewidth=0.9, linestyle=(0, (3, 2)), zorder=0.6)
+        axes.annotate(
+            "lock", (nearest, 1), xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points",
+            ha="center", fontsize=SMALL, color=COLORS[0],
+        )  # fmt: skip
+
+
 DRAW: dict[str, Callable[[Axes, Shown], str]] = {
     "value": _value,
     "angle": _angle,
+    "lock": _lock,
     "speed": _speed,
     "difference": _difference,
 }
@@ -130,19 +171,32 @@ def _tracks(each: Shown) -> list[Track]:
     return [each.track] if each.other is None else [each.track, each.other]
 
 
+def _curve(each: Shown, track: Track) -> Curve:
+    """A track as numbers that are drawn."""
+    if each.is_in_degrees:
+        return rotation_curve(track, view=each.view, rest=each.rest)
+    risers = lines.risers(track) if track.interpolation is Interpolation.STEP else None
+    return Curve(lines.value_line(track), track.values, risers)
+
+
 def _colored(each: Shown) -> list[int]:
     """Numbers of the components that move most."""
-    ranges = np.ptp(each.track.values, axis=0)
+    ranges = np.ptp(_curve(each, each.track).keys, axis=0)
     return sorted(np.argsort(-ranges, kind="stable")[:COLORED].tolist())
 
 
-def _color(component: int, colored: list[int]) -> str:
+def _color(each: Shown, component: int) -> str:
+    """Red, green and blue for turns about x, y and z; else the next color for each component that moves most."""
+    if each.is_in_degrees:
+        is_twice = len({label[0] for label in each.labels}) < len(each.labels)
+        return COLORS[component if is_twice else "xyz".index(each.labels[component].lower())]
+    colored = _colored(each)
     return COLORS[colored.index(component)] if component in colored else HAIR
 
 
-def _origin(each: Shown) -> Floats:
+def _origin(each: Shown, curve: Curve) -> Floats:
     """What values are drawn from (C,): 0, or the first key where curves far apart would hide how they move."""
-    values = each.track.values
+    values = curve.keys
     width = float(np.ptp(values, axis=0).max())
     far = values.shape[1] <= COLORED and float(values.max() - values.min()) > FAR * width > 0
     return values[0] if far and each.track.kind is not Kind.ROTATION else np.zeros(values.shape[1])
@@ -157,20 +211,23 @@ def _unit(each: Shown, most: float) -> tuple[float, str]:
     return next(((factor, unit) for factor, unit, limit in UNITS if most < limit), (1.0, "m"))
 
 
-def _curves(axes: Axes, each: Shown, line: Line, origin: Floats, **look: Any) -> None:
+def _draw_lines(axes: Axes, each: Shown, line: Line, origin: Floats, **look: Any) -> None:
+    """Draw components, those in color over the others, and of those the ones that move least first."""
+    if not len(line.times):
+        return
     colored = _colored(each)
     others = [c for c in range(line.values.shape[1]) if c not in colored]
-    still_first = sorted(colored, key=lambda c: float(np.ptp(each.track.values[:, c])))
+    still_first = sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c]))))
     for c in (*others, *still_first):
         chosen = {"linewidth": 0.6, "alpha": 0.7, "zorder": 1.5} if c in others else look
-        axes.plot(line.times, line.values[:, c] - origin[c], color=_color(c, colored), **chosen)
+        axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **chosen)
 
 
-def _limits(axes: Axes, each: Shown, origin: Floats, *, handles: bool) -> None:
+def _limits(axes: Axes, each: Shown, curves: Sequence[Curve], origin: Floats, *, handles: bool) -> None:
     """Room for all values, and for handles as far as they don't press the curve flat."""
     from matplotlib.ticker import MaxNLocator
 
-    values = np.concatenate([lines.value_line(track).values for track in _tracks(each)]) - origin
+    values = np.concatenate([part for curve in curves for part in (curve.line.values, curve.keys)]) - origin
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     size = max(high - low, 1e-4 * max(abs(low), abs(high)), 1e-6)
     if high - low < size:
@@ -180,7 +237,8 @@ def _limits(axes: Axes, each: Shown, origin: Floats, *, handles: bool) -> None:
         low, high = max(min(low, float(tips.min())), low - size / 2), min(max(high, float(tips.max())), high + size / 2)
     pad = 0.07 * (high - low)
     axes.set_ylim(low - pad, high + pad)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=list(ROUND)))
+    steps = ROUND_ANGLES if each.is_in_degrees and high - low > 4 else ROUND
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=list(steps)))
     plain(axes)
 
 
@@ -190,25 +248,26 @@ def _handles(axes: Axes, each: Shown, front: Track, origin: Floats) -> None:
     for c in colored:
         pieces = np.concatenate(np.split(values[:, :, c], 2), axis=1)  # both keys and both handles of every piece
         bent = np.tile(np.ptp(pieces, axis=1) > 0, 2)
-        color, places = _color(c, colored), values[bent, :, c] - origin[c]
+        color, places = _color(each, c), values[bent, :, c] - origin[c]
         for t, v in zip(times[bent], places, strict=True):
             axes.plot(t, v, color=color, linewidth=0.7, alpha=0.55, zorder=2.5)
         ring = {"color": PAPER, "markeredgecolor": color, "markersize": 2.6, "markeredgewidth": 0.7, "zorder": 2.6}
         axes.plot(times[bent, 1], places[:, 1], "o", **ring)
 
 
-def _keys(axes: Axes, each: Shown, front: Track, origin: Floats) -> None:
+def _keys(axes: Axes, each: Shown, times: Floats, values: Floats) -> None:
     """Keys as dots, or as a row of fine ticks at the foot where they are too close."""
     spacing = _spacing(axes, each)
     if spacing < DOTS:
         low, high = axes.get_ylim()
-        axes.vlines(front.times, low, low + 0.025 * (high - low), color=SOFT, linewidth=0.5, alpha=0.55)
+        if spacing >= TOO_DENSE:
+            axes.vlines(times, low, low + 0.025 * (high - low), color=SOFT, linewidth=0.5, alpha=0.55)
         return
     colored = _colored(each)
     for c in colored:
         rim = 0.6 if spacing >= RIMS else 0.0  # closer ones would cut the line into dashes
-        dot = {"color": _color(c, colored), "markersize": 3.6, "markeredgecolor": PAPER, "markeredgewidth": rim}
-        axes.plot(front.times, front.values[:, c] - origin[c], "o", zorder=3, clip_on=False, **dot)
+        dot = {"color": _color(each, c), "markersize": 3.6, "markeredgecolor": PAPER, "markeredgewidth": rim}
+        axes.plot(times, values[:, c], "o", zorder=3, clip_on=False, **dot)
 
 
 def _component_names(axes: Axes, each: Shown, last: Floats) -> None:
@@ -220,7 +279,7 @@ def _component_names(axes: Axes, each: Shown, last: Floats) -> None:
     places = spread([float(last[c]) for c in upwards], gap, low + gap / 2, high - gap / 2)
     beside = {"xycoords": ("axes fraction", "data"), "xytext": (6, 0), "textcoords": "offset points", "va": "center"}
     for c, place in zip(upwards, places, strict=True):
-        color = _color(c, colored)
+        color = _color(each, c)
         axes.annotate(each.labels[c][:16], (1, place), color=color, fontsize=LABEL, parse_math=False, **beside)
     rest = len(last) - len(colored)
     if rest:

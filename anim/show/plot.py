@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from anim.show import panels
 from anim.show.chosen import Shown
+from anim.show.rotations import FROM_REST
 from anim.show.sheet import INK, SMALL, SOFT, TITLE, Sheet, short, style, text_width
 
 LIMIT = 12  # tracks on one sheet
@@ -16,7 +17,7 @@ MARGIN, LEFT, HEAD, CAPTION, FOOT = 0.2, 0.62, 0.36, 0.27, 0.5
 RIGHT, MOST_RIGHT = 0.5, 1.3  # for the names of components, which may take more
 TALL, LOW = 1.75, 0.72  # heights of the first panel and of the others
 TOP, TOP_OF_TWO = 0.62, 0.84
-WORDS = {"translation": "translation, m", "rotation": "rotation", "scale": "scale, factor", "pointer": ""}
+WORDS = {"translation": "translation, m", "rotation": "rotation, quaternion", "scale": "scale, factor", "pointer": ""}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +32,11 @@ def plot(shown: Sequence[Shown], *, title: str, kind: str, names: Names | None =
     """Return a picture of tracks as the bytes of a PNG or SVG file.
 
     Each track has a panel of its values, with keys and CUBICSPLINE handles (Bézier points, a third of the way), and
-    below it one of its speed; a rotation also one of the angle from its first key. Where the values stand far apart
-    and move little, they are drawn from their first key. Where tracks have a partner in a second file, that is drawn
-    over the first, and their difference at the bottom. Ticks mark frames where their rate is known.
+    below it one of its speed. A rotation is drawn in degrees about the joint's axes from its rest pose, with the whole
+    angle below; as Euler angles, with the distance to gimbal lock below; or as the components of its quaternion.
+    Where the values stand far apart and move little, they are drawn from their first key. Where tracks have a partner
+    in a second file, that is drawn over the first, and their difference at the bottom. Ticks mark frames where their
+    rate is known.
 
     title, note: words for the head of the sheet. names: of the files, where two are compared.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
@@ -97,10 +100,17 @@ def _cell(sheet: Sheet, each: Shown, x: float, y: float, width: float, slack: fl
 
 def _title(sheet: Sheet, each: Shown, x: float, y: float, caption: str, *, many_clips: bool) -> None:
     x += 0.14 + sheet.text(x, y, _tail(each.target, 36), fontsize=TITLE, weight="bold")
-    words = [WORDS.get(each.track.path, each.track.path) + caption, _keys(each)]
+    words = [_what(each) + caption, _keys(each)]
     if many_clips:
         words.insert(0, _tail(each.clip, 24))
     sheet.text(x, y, "  ·  ".join(word for word in words if word), fontsize=SMALL, color=SOFT)
+
+
+def _what(each: Shown) -> str:
+    """What the values are: "rotation from rest, °", "Euler angles ZXY, °", "scale, factor"."""
+    if not each.is_in_degrees:
+        return WORDS.get(each.track.path, each.track.path)
+    return "rotation from rest, °" if each.view == FROM_REST else f"Euler angles {each.view}, °"
 
 
 def _keys(each: Shown) -> str:

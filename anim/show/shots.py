@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats
+from anim.arrays import AnyArray, Bools, Floats
 from anim.caches import axes, frames
 from anim.caches.frames import SAME
 from anim.errors import NotFoundError, RangeError
@@ -16,8 +16,9 @@ from anim.gltf import read
 from anim.gltf.document import Document, items
 from anim.model import Clip, Instance, Mesh, Scene, Skeleton, VertexCache
 from anim.sampling import grid
-from anim.show import heat, palette
-from anim.show.filmstrip import MOST_POINTS, Row
+from anim.show import follow, heat, palette
+from anim.show.filmstrip import MOST_POINTS, Extent, Row
+from anim.show.ground import ground_height
 from anim.skinning.bake import bake
 from anim.skinning.methods import SKINNING_METHODS
 
@@ -77,7 +78,7 @@ class When:
 class Shot:
     """One motion. clip, method: what it is, or empty. cache: its chosen frames; path: some frames of all of it.
 
-    colors: (T, 3) linear, of the faces.
+    colors: (T, 3) linear, of the faces. body: (V,) vertices that a skin moves, or None where that is unknown.
     """
 
     clip: str
@@ -85,17 +86,26 @@ class Shot:
     cache: VertexCache
     path: VertexCache
     colors: Floats
+    body: Bools | None = None
 
 
-def of_document(document: Document, clips: Sequence[int], methods: Sequence[str], when: When) -> list[Shot]:
+def of_document(
+    document: Document,
+    clips: Sequence[int],
+    methods: Sequence[str],
+    when: When,
+    *,
+    nodes: Collection[int] | None = None,
+) -> list[Shot]:
     """Return a shot for each clip by number and each skinning method; without clips one of the rest pose.
 
-    A file without a mesh is shown as sticks from joint to joint. Raises NotFoundError for a file without anything.
+    nodes: only meshes on these; None for all. A file without a mesh is shown as sticks from joint to joint.
+    Raises NotFoundError for a file without anything.
     """
     for name in methods:
         if name not in SKINNING_METHODS:
             raise RangeError(f"method is '{name}' (expected {', '.join(SKINNING_METHODS)})")
-    scene = _visible(read.scene(document))
+    scene = _visible(read.scene(document), nodes)
     known = read.clips(document)
     chosen = [(known[i].name, known[i]) for i in clips] or [("", Clip("", ()))]
     moving = [clip for _, clip in chosen if clip.tracks]
@@ -110,7 +120,7 @@ def of_document(document: Document, clips: Sequence[int], methods: Sequence[str]
             cache = bake(scene, clip, times=times, method=method, rigid=True)
             whole = bake(scene, clip, times=path, method=method, rigid=True)
             colors = palette.of_faces(cache, _materials(document))
-            found.append(Shot(name, method if methods else "", cache, whole, colors))
+            found.append(Shot(name, method if methods else "", cache, whole, colors, _body(scene, cache)))
     if not found:
         raise RangeError(f"no clip has a frame at {', '.join(f'{time:g} s' for time in when.at)}")
     return found
@@ -128,33 +138,60 @@ def of_cache(cache: VertexCache, when: When) -> list[Shot]:
     return [Shot("", "", chosen, whole, palette.of_faces(cache))]
 
 
-def rows(shots: Sequence[Shot], *, heated: bool = False) -> tuple[list[Row], AnyArray]:
-    """Return the rows of a filmstrip, and the places (P, 3) that its camera has to hold.
+def rows(shots: Sequence[Shot], *, heated: bool = False, followed: bool | None = None) -> tuple[list[Row], Extent]:
+    """Return the rows of a filmstrip, and what its camera has to hold.
 
     heated: color how far vertices are from where the clip's first method has them; from the rest pose where there is
     one method only. Raises NotFoundError where there is no rest pose.
+    followed: whether the camera goes with the figure; None for where it leaves its place by more than its own size.
     """
     several_clips = len({shot.clip for shot in shots}) > 1
     found: list[Row] = []
+    points: list[AnyArray] = []
+    first = shots[0]
     reference: AnyArray = np.empty(0)
     for i, shot in enumerate(shots):
         positions = shot.cache.whole().positions
-        is_first = i == 0 or shots[i - 1].clip != shot.clip
-        reference = positions if is_first else reference
-        label = " ".join(word for word in (shot.clip if several_clips else "", shot.method) if word)
-        distances = None
-        if heated and sum(other.clip == shot.clip for other in shots) == 1:
-            if shot.cache.rest is None:
-                raise NotFoundError("has no rest pose that distances could be measured from")
-            distances = heat.distances(positions, shot.cache.rest)
-        elif heated and not is_first:
-            distances = heat.distances(positions, reference)
-        found.append(Row(label, shot.cache.times, positions, shot.cache.faces, shot.colors, distances))
-    return found, np.concatenate([_places(shot.path) for shot in shots] + [_places(shot.cache) for shot in shots])
+        if i == 0 or first.clip != shot.clip:
+            first, reference = shot, positions
+            goes = follow.travels(shot.path) if followed is None else followed
+            way = follow.way(shot.path) if goes else None
+        alone = sum(other.clip == shot.clip for other in shots) == 1
+        distances = _distances(shot, positions, reference, alone, shot is first) if heated else None
+        heading = (shot.clip or "(no name)") if several_clips else ""
+        cache = shot.cache
+        found.append(
+            Row(shot.method, cache.times, positions, cache.faces, shot.colors, distances, heading, way, cache.rest)
+        )
+        points += [_places(each, way) for each in (shot.path, shot.cache)]
+    ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
+    return found, Extent(np.concatenate(points), ground)
 
 
-def _visible(scene: Scene) -> Scene:
-    """The scene, with sticks on its joints where it has no faces."""
+def _distances(shot: Shot, positions: AnyArray, reference: AnyArray, alone: bool, is_first: bool) -> Floats | None:
+    """Distances (F, V) m from the clip's first method, or from the rest pose of what is alone."""
+    if not alone:
+        return None if is_first else heat.distances(positions, reference)
+    if shot.cache.rest is None:
+        raise NotFoundError("has no rest pose that distances could be measured from")
+    return heat.distances(positions, shot.cache.rest)
+
+
+def _body(scene: Scene, cache: VertexCache) -> Bools:
+    """Vertices (V,) of meshes with a skin."""
+    skinned = {instance.node for instance in scene.instances if instance.skin is not None}
+    body = np.zeros(cache.vertex_count, bool)
+    for part in cache.parts:
+        body[slice(*part.vertices)] = part.node in skinned
+    return body
+
+
+def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
+    """The scene with the chosen meshes, or with sticks on its joints where it has no faces."""
+    if nodes is not None:
+        scene = replace(scene, instances=tuple(each for each in scene.instances if each.node in nodes))
+        if not any(len(instance.mesh.faces) for instance in scene.instances):
+            raise NotFoundError("no mesh is left to draw")
     if any(len(instance.mesh.faces) for instance in scene.instances):
         return scene
     if not len(scene.skeleton):
@@ -195,8 +232,15 @@ def _spread(start: float, end: float) -> Floats:
     return np.linspace(start, end, AROUND) if end > start else np.array([start])
 
 
-def _places(cache: VertexCache) -> AnyArray:
-    """Vertices of all frames, of frames farther apart where they are too many."""
+def _places(cache: VertexCache, way: follow.Way | None) -> AnyArray:
+    """Vertices of all frames as the camera sees them, of frames farther apart where they are too many."""
     step = max(1, -(-cache.frame_count * cache.vertex_count // MOST_POINTS))
-    found = [chunk.positions[-chunk.first % step :: step].reshape(-1, 3) for chunk in cache.chunks()]
+    found = []
+    for chunk in cache.chunks():
+        chosen = slice(-chunk.first % step, None, step)
+        positions = chunk.positions[chosen].copy()
+        if way is not None:
+            times = cache.times[chunk.first : chunk.first + len(chunk.positions)][chosen]
+            positions[..., [0, 2]] -= way.at(times)[:, None]
+        found.append(positions.reshape(-1, 3))
     return np.concatenate(found)

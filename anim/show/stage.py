@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.show.camera import Camera
 from anim.show.raster import visible
+from anim.show.surface import Marks
 
 SAMPLES = 3  # across and down in each pixel
 BAND = 1 << 22  # samples that are drawn at a time, about: they take 60 bytes each
@@ -23,12 +25,17 @@ STEEPER = 0.5  # the light that casts shadows falls this much more from above, s
 SHADOW_BLUR = 0.012  # of the picture's height
 CELLS = 7.0  # squares of the grid across the motion, about
 GRID_DEPTH = 0.38
+DOT, DOT_DEPTH = 0.08, 0.75  # radius of marks on the ground as a share of their spacing, and how dark they are
+FADED = 1.6  # radii of the motion from its middle, where the ground's grid ends
 GAMMA = 2.2
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """What all frames share. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m."""
+    """What all frames share. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m.
+
+    background: (H, W, 3) linear, with the grid as it lies while the camera stands where it began.
+    """
 
     camera: Camera
     ground: float
@@ -37,37 +44,64 @@ class Stage:
     background: Floats
 
 
-def stage(camera: Camera, points: Floats) -> Stage:
-    """Return the stage for a motion whose vertices are `points` (P, 3), the ground under the lowest of them."""
+def stage(camera: Camera, points: Floats, ground: float) -> Stage:
+    """Return the stage for a motion whose vertices are `points` (P, 3), with the ground at a height in m."""
     low, high = points.min(axis=0), points.max(axis=0)
-    ground = float(low[1])
-    if 0 <= ground <= 0.05 * (high[1] - low[1]):  # feet that hardly lift stand on the floor of the scene
-        ground = 0.0
     middle = (low[[0, 2]] + high[[0, 2]]) / 2
     reach = max(float(np.linalg.norm(high - low)) / 2, 1e-6)
-    return Stage(camera, ground, middle, reach, _background(camera, ground, middle, reach))
+    return Stage(camera, ground, middle, reach, _background(camera, ground, middle, reach, np.zeros(2)))
 
 
-def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats) -> Floats:
-    """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces."""
+def moved(stage: Stage, place: Floats, milestones: Floats) -> Stage:
+    """Return the stage under a camera that has gone to a place (2,), m in x and z from where it began.
+
+    milestones: (M, 2) m of x and z, shown as dots on the ground.
+    """
+    camera, ground = stage.camera, stage.ground
+    background = _background(camera, ground, stage.middle, stage.reach, place)
+    spots = np.zeros((len(milestones), 3))
+    spots[:, 1] = ground
+    spots[:, [0, 2]] = milestones - place
+    for spot in spots[np.linalg.norm(milestones - place - stage.middle, axis=1) < FADED * stage.reach]:
+        _draw_dot(background, camera, spot, DOT * mark_spacing(stage))
+    return replace(stage, background=background)
+
+
+def mark_spacing(stage: Stage) -> float:
+    """Return the distance in m from mark to mark along the way of a figure that the camera goes with."""
+    return nice(stage.reach / 2)
+
+
+def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats, marks: Sequence[Marks] = ()) -> Floats:
+    """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces.
+
+    marks: drawn on the surface, each over the one before.
+    """
     camera = stage.camera
     corners = _larger(camera, SAMPLES).project(positions)[faces]
     painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
     picture: Floats = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
     rows = max(BAND // (camera.width * SAMPLES**2), 1)
     for top in range(0, camera.height, rows):
-        _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted)
+        _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted, marks)
     return picture
 
 
-def _paint(band: Floats, corners: Floats, painted: Floats) -> None:
+def _paint(band: Floats, corners: Floats, painted: Floats, marks: Sequence[Marks]) -> None:
     """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
     height, width = band.shape[:2]
     seen = visible(corners, width=width * SAMPLES, height=height * SAMPLES)
     shape = (height, SAMPLES, width, SAMPLES)
     cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
+    colors = painted[seen]
+    y, x = np.nonzero(seen >= 0)
+    for mark in marks:
+        chosen = seen[y, x]
+        shown = corners[chosen] * (1 / SAMPLES, 1 / SAMPLES, 1)
+        samples = np.stack(((x + 0.5) / SAMPLES, (y + 0.5) / SAMPLES), axis=1)
+        colors[y, x] *= mark(shown, samples, chosen)[:, None]
     band *= 1 - cover
-    band += painted[seen].reshape(*shape, 3).mean(axis=(1, 3))
+    band += colors.reshape(*shape, 3).mean(axis=(1, 3))
 
 
 def encoded(image: Floats) -> np.ndarray:
@@ -95,7 +129,7 @@ def _shade(camera: Camera, positions: Floats, faces: Ints) -> Floats:
     return light + FROM_BELOW + (FROM_ABOVE - FROM_BELOW) * above
 
 
-def _background(camera: Camera, ground: float, middle: Floats, reach: float) -> Floats:
+def _background(camera: Camera, ground: float, middle: Floats, reach: float, place: Floats) -> Floats:
     share = np.linspace(0, 1, camera.height)[:, None, None]
     image = np.broadcast_to(SKY * (1 - share) + EARTH * share, (camera.height, camera.width, 3)).copy()
     rays = camera.rays()
@@ -103,12 +137,25 @@ def _background(camera: Camera, ground: float, middle: Floats, reach: float) -> 
     is_ground = (down > 1e-6) & (height > 0)
     far = height / np.where(is_ground, down, 1)
     places = camera.eye[[0, 2]] + rays[..., [0, 2]] * far[..., None]
-    fade = np.clip(1.25 - np.linalg.norm(places - middle, axis=-1) / (1.6 * reach), 0, 1)
+    fade = np.clip(1.25 - np.linalg.norm(places - middle, axis=-1) / (FADED * reach), 0, 1)
     step = nice(2 * reach / CELLS)
-    line = np.maximum(_lines(places[..., 0], step), _lines(places[..., 1], step))
+    line = np.maximum(*(_lines(places[..., i] + place[i], step) for i in (0, 1)))
     line = np.where(is_ground, line * fade * GRID_DEPTH, 0)[..., None]
     picture: Floats = image * (1 - line) + LINE * line
     return picture
+
+
+def _draw_dot(image: Floats, camera: Camera, spot: Floats, radius: float) -> None:
+    """Draw a disc that lies on the ground: an ellipse, as flat as the eye is low."""
+    x, y, near = camera.project(spot)
+    across = max(radius * near * camera.scale, 1.2)
+    away = (camera.eye - spot) / np.linalg.norm(camera.eye - spot)
+    down = max(across * abs(float(away[1])), 0.8)
+    dx = (np.arange(camera.width) + 0.5 - x) / across
+    dy = (np.arange(camera.height) + 0.5 - y) / down
+    off = np.hypot(dx[None, :], dy[:, None])
+    depth = DOT_DEPTH * np.clip((1 - off) * down + 0.5, 0, 1)[..., None]
+    image += (LINE * 0.5 - image) * depth
 
 
 def _lines(places: Floats, step: float) -> Floats:

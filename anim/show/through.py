@@ -233,14 +233,14 @@ def _lens(sheet: Sheet, curves: Sequence[_Curve], widest: _Curve, x: float, y: f
 
 
 def _smoothness(jumps: KeyJumps) -> str:
-    """The grades of the interior keys: "C1 at every key", "C0 at 1 key, C1 at 3"."""
+    """The grades of the interior keys: "C1 at every key", "C0 at 1 key, C1 at 3 keys"."""
     counts = Counter(jumps.grades)
     if not counts:
         return "one piece"
     if len(counts) == 1:
         grade = jumps.grades[0]
         return "jumps at every key" if grade is Grade.JUMP else f"{grade} at every key"
-    return ", ".join(f"{grade} at {counts[grade]}" for grade in Grade if counts[grade])
+    return ", ".join(f"{grade} at {counts[grade]} key{'s' * (counts[grade] > 1)}" for grade in Grade if counts[grade])
 
 
 def _overshoot(curve: _Curve) -> str:

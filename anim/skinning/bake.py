@@ -12,7 +12,6 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError, UnsupportedError
 from anim.model import Clip, Instance, Part, Primitive, Scene, VertexCache
-from anim.skinning.buffers import Buffers
 from anim.skinning.bulge import Clamped
 from anim.skinning.frames import Playback
 from anim.skinning.layer import Layer, Make, layer
@@ -108,7 +107,6 @@ def baker(
         normals,
         _handedness(chosen) if tangents else None,
         threads or _cores(),
-        Buffers(),
     )
 
 
@@ -130,7 +128,6 @@ class Baker:
     normals: bool
     handedness: Floats | None
     threads: int
-    buffers: Buffers
 
     def bake(self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda frames: None) -> VertexCache:
         """Return where the vertices are at `times` (F,) in seconds while a clip plays.
@@ -141,7 +138,7 @@ class Baker:
         """
         seconds = arrays.times(times)
         wanted = (self.normals, self.handedness is not None)
-        stream = Stream(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads, self.buffers)
+        stream = Stream(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads)
         return VertexCache(
             seconds,
             self.vertices,

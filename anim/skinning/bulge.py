@@ -9,8 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.lanes import Shape, Singles, Target
+from anim.skinning.kernels.layout import Shape, Singles, Target
 from anim.skinning.rig import Rig
 from anim.skinning.skinner import Skinner
 from anim.skinning.stretch import pivots
@@ -41,7 +40,9 @@ def links(rig: Rig) -> Links:
     found = Links(start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _share(rig), pivots(rig))
     points, at = rig.points[None].astype(np.float32), found.joints[None].astype(np.float32)
     squared = np.zeros((1, len(rig.points)), np.float32)
-    compiled(stand_off)(points, 0, rig.start, rig.joint, start, found.tips, at, squared)
+    from anim.skinning.kernels.bone_distance import squared_bone_distance
+
+    squared_bone_distance(points, 0, rig.start, rig.joint, start, found.tips, at, squared)
     return Links(start, found.tips, np.sqrt(squared[0]), found.share, found.joints)
 
 
@@ -66,11 +67,13 @@ class Clamped:
 
     def place(self, packed: tuple[Any, Singles, Singles], shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
+        from anim.skinning.kernels.bone_distance import clamp_to_bones
+
         inner, joints, scales = packed
         self.inner.place(inner, shape, target, first, last)
-        held = (self.rig.start, self.rig.joint, self.links.start, self.links.tips)
-        rest = (self.links.distance, self.links.share)
-        compiled(pull_back)(target.positions, target.at, *held, joints, scales, *rest, first, last)
+        start, joint, links = self.rig.start, self.rig.joint, self.links
+        moved = (joints, scales, links.distance, links.share, first, last)
+        clamp_to_bones(target.positions, target.at, start, joint, links.start, links.tips, *moved)
 
 
 def placed(of: Links, matrices: Floats) -> tuple[Singles, Singles]:
@@ -78,76 +81,6 @@ def placed(of: Links, matrices: Floats) -> tuple[Singles, Singles]:
     at = matrix.apply(matrices, of.joints[:, None])[..., 0, :]
     scales = np.cbrt(np.abs(np.linalg.det(matrices[..., :3])))
     return at.astype(np.float32), scales.astype(np.float32)
-
-
-def stand_off(
-    positions: Singles,
-    at: int,
-    start: Ints,
-    joint: Ints,
-    link_start: Ints,
-    tips: Ints,
-    joints: Singles,
-    squared: Singles,
-) -> None:
-    """Write the squared distance (n, V) of vertices, columns `at` + v of positions, from the nearest of their links."""
-    for f in range(len(positions)):
-        for v in range(squared.shape[1]):
-            p = positions[f, at + v]
-            squared[f, v] = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)[0]
-
-
-def pull_back(
-    positions: Singles,
-    at: int,
-    start: Ints,
-    joint: Ints,
-    link_start: Ints,
-    tips: Ints,
-    joints: Singles,
-    scales: Singles,
-    distance: Singles,
-    share: Singles,
-    first: int,
-    last: int,
-) -> None:
-    """Move vertices first … last towards their nearest link where they are farther from it than at rest."""
-    for f in range(len(positions)):
-        for v in range(first, last):
-            if share[v] == 0:
-                continue
-            p = positions[f, at + v]
-            squared, x, y, z = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)
-            allowed = distance[v] * scales[f, joint[start[v]]]
-            if squared <= allowed * allowed:
-                continue
-            pull = share[v] * (np.float32(1) - allowed / np.sqrt(squared))
-            p[0] += pull * (x - p[0])
-            p[1] += pull * (y - p[1])
-            p[2] += pull * (z - p[2])
-
-
-def _nearest(
-    p: Singles, joints: Singles, joint: Ints, begin: int, end: int, link_start: Ints, tips: Ints
-) -> tuple[Any, Any, Any, Any]:
-    """Squared distance to the nearest link of influences begin … end, and the point on it."""
-    best = np.float32(np.inf)
-    nx, ny, nz = p[0], p[1], p[2]
-    for e in range(begin, end):
-        j = joint[e]
-        ax, ay, az = joints[j, 0], joints[j, 1], joints[j, 2]
-        for b in range(link_start[j], link_start[j + 1]):
-            t = tips[b]
-            dx, dy, dz = joints[t, 0] - ax, joints[t, 1] - ay, joints[t, 2] - az
-            length = dx * dx + dy * dy + dz * dz
-            along = (p[0] - ax) * dx + (p[1] - ay) * dy + (p[2] - az) * dz
-            u = min(max(along / length, np.float32(0)), np.float32(1)) if length > 0 else np.float32(0)
-            x, y, z = ax + u * dx, ay + u * dy, az + u * dz
-            squared = (p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2
-            if squared < best:
-                best = squared
-                nx, ny, nz = x, y, z
-    return best, nx, ny, nz
 
 
 def _share(rig: Rig) -> Singles:

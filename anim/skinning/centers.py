@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.lanes import Singles
 from anim.skinning.rig import Rig
 
 WIDTH = 0.1  # σ of the paper: how alike weights must be to count
@@ -40,7 +38,9 @@ def centers(rig: Rig) -> Floats:
     """
     pairs = _pairs(rig)
     sums = np.zeros((len(rig.points), 4))
-    compiled(add_up)(
+    from anim.skinning.kernels.center_sums import accumulate_centers
+
+    accumulate_centers(
         rig.start, rig.joint, rig.weight, len(rig.nodes), pairs.key, pairs.start, pairs.weights, pairs.area,
         pairs.moment, 1 / WIDTH**2, sums,
     )  # fmt: skip
@@ -48,41 +48,6 @@ def centers(rig: Rig) -> Floats:
     has = sums[:, 3] > 0
     found[has] = sums[has, :3] / sums[has, 3:]
     return found
-
-
-def add_up(
-    start: Ints,
-    joint: Ints,
-    weight: Singles,
-    joints: int,
-    key: Ints,
-    row_start: Ints,
-    weights: Floats,
-    area: Floats,
-    moment: Floats,
-    sharpness: float,
-    sums: Floats,
-) -> None:
-    """Add moment and area (V, 4) of all triangles to each vertex, by their similarity."""
-    for v in range(len(sums)):
-        for e in range(start[v], start[v + 1]):
-            for other in range(e + 1, start[v + 1]):
-                a, b = e, other
-                if joint[a] > joint[b]:
-                    a, b = b, a
-                wanted = np.int64(joint[a]) * joints + joint[b]
-                at = np.searchsorted(key, wanted)
-                if at == len(key) or key[at] != wanted:
-                    continue
-                wa, wb = np.float64(weight[a]), np.float64(weight[b])
-                for r in range(row_start[at], row_start[at + 1]):
-                    ta, tb = weights[r, 0], weights[r, 1]
-                    apart = wa * tb - wb * ta
-                    similar = wa * wb * ta * tb * np.exp(-apart * apart * sharpness)
-                    sums[v, 0] += similar * moment[r, 0]
-                    sums[v, 1] += similar * moment[r, 1]
-                    sums[v, 2] += similar * moment[r, 2]
-                    sums[v, 3] += similar * area[r]
 
 
 def _pairs(rig: Rig) -> Pairs:

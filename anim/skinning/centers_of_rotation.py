@@ -8,51 +8,53 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
+from anim.skinning.carriers import Carriers
 from anim.skinning.centers import centers
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.around_centers import around_centers
-from anim.skinning.kernels.lanes import LANES, Held, Shape, Singles, Target, room
-from anim.skinning.rig import Rig, whole_weights
+from anim.skinning.kernels.layout import Shape, Singles, Stretches, Target, output, vertices
+from anim.skinning.rig import Rig
 from anim.skinning.skinner import lanes
-from anim.skinning.stretch import pivots, split, topmost
 
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """Rotations (J, 4, L), rigid motions (J, 12, L), and what is stretched before them, (J, 12, L) or (0, 12, L)."""
+    """Rotations (U, 4, L) and rigid motions (U, 12, L) of joints with weight; (U, 15, L) where any is stretched.
+
+    The last three are what is added to the translation for each unit of scale.
+    """
 
     turns: Singles
     rigids: Singles
-    stretches: Singles
+    stretches: Stretches | None
 
 
 @dataclass(frozen=True)
 class CentersOfRotation:
-    """Turns each vertex by the blended quaternion about a center that blends linearly; weights as shares of their sum.
+    """Turns each vertex by the blended quaternion about a center that blends linearly.
 
     The center belongs to the mesh at rest, morph targets don't move it. Stretches come first, as with dual quaternions.
     Source: Le & Hodgins 2016, "Real-time Skeletal Skinning with Optimized Centers of Rotation", algorithm 1.
     """
 
     rig: Rig
-    held: Held = field(init=False, repr=False)
-    pivots: Floats = field(init=False, repr=False)
+    carriers: Carriers = field(init=False, repr=False)
     centers: Singles = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "held", self.rig.held._replace(weight=whole_weights(self.rig)))
-        object.__setattr__(self, "pivots", pivots(self.rig))
+        object.__setattr__(self, "carriers", Carriers(self.rig))
         object.__setattr__(self, "centers", centers(self.rig).astype(np.float32)[:, :, None])
 
     def pack(self, matrices: Floats) -> Packed:
         """Return the matrices (n, J, 3, 4) as the kernel reads them."""
-        parts = split(matrices, self.pivots, topmost(self.rig.above))
-        rigid = np.concatenate((quaternion.to_matrix(parts.rotation), parts.translation[..., None]), axis=-1)
-        stretches = np.empty((0, 12, LANES), np.float32) if parts.stretch is None else lanes(parts.stretch)
-        return Packed(lanes(parts.rotation), lanes(rigid), stretches)
+        parts = self.carriers.split(matrices)
+        turn = quaternion.to_matrix(parts.rotation)
+        rigid = np.concatenate((turn, parts.translation[..., None]), axis=-1).reshape(*turn.shape[:2], 12)
+        if parts.stretch is not None:
+            rigid = np.concatenate((rigid, -quaternion.rotate(parts.rotation, self.carriers.pivots)), axis=-1)
+        return Packed(lanes(parts.rotation), lanes(rigid), self.carriers.stretches(parts))
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
+        from anim.skinning.kernels.centers import skin_centers
+
         moves = (packed.turns, packed.rigids, packed.stretches)
-        into = (first, last, room(self.rig.most), target)
-        compiled(around_centers)(shape, self.centers, self.held, *moves, *into)
+        skin_centers(*vertices(shape), self.centers, self.carriers.held, *moves, first, last, *output(target))

@@ -80,7 +80,8 @@ class Comparison:
             method: baker(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)
             for method in methods
         }
-        self._subjects = [subject(layer) for layer in next(iter(self._bakers.values())).layers]
+        self._linear = self._bakers.get("lbs") or baker(scene, nodes=skinned)
+        self._subjects = [subject(layer, scene.skeleton) for layer in next(iter(self._bakers.values())).layers]
         self.meshes = len(self._subjects)
 
     def of(
@@ -89,7 +90,7 @@ class Comparison:
         """Return what happens to each mesh while a clip plays. progress: called with the methods done."""
         by_method = []
         for i, (method, made) in enumerate(self._bakers.items()):
-            by_method.append(list(fared(made, method, self._subjects, clip, times)))
+            by_method.append(list(fared(made, self._linear, method, self._subjects, clip, times)))
             progress(i + 1)
         found = []
         for each, methods in zip(self._subjects, zip(*by_method, strict=True), strict=True):

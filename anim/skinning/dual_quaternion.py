@@ -8,25 +8,27 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import dual_quaternion as duals
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.around_duals import around_duals
-from anim.skinning.kernels.lanes import LANES, Held, Shape, Singles, Target, room
-from anim.skinning.rig import Rig, whole_weights
+from anim.maths import quaternion
+from anim.skinning.carriers import Carriers
+from anim.skinning.kernels.layout import Shape, Singles, Stretches, Target, output, vertices
+from anim.skinning.rig import Rig
 from anim.skinning.skinner import lanes
-from anim.skinning.stretch import pivots, split, topmost
 
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """Rigid motions (J, 8, L) and what is stretched before them, (J, 12, L) or (0, 12, L)."""
+    """Rigid motions of joints with weight (U, 8, L); (U, 12, L) where any is stretched.
+
+    The last four are what is added to the dual part for each unit of scale.
+    """
 
     duals: Singles
-    stretches: Singles
+    stretches: Stretches | None
 
 
 @dataclass(frozen=True)
 class DualQuaternion:
-    """Blends rigid motions as dual quaternions, after stretches linearly; weights count as shares of their sum.
+    """Blends rigid motions as dual quaternions, after stretches linearly.
 
     One influence gives exactly its matrix: scale, shear and mirror included.
     Source: Kavan, Collins, Žára & O'Sullivan 2008, "Geometric Skinning with Approximate Dual Quaternion Blending",
@@ -34,20 +36,23 @@ class DualQuaternion:
     """
 
     rig: Rig
-    held: Held = field(init=False, repr=False)
-    pivots: Floats = field(init=False, repr=False)
+    carriers: Carriers = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "held", self.rig.held._replace(weight=whole_weights(self.rig)))
-        object.__setattr__(self, "pivots", pivots(self.rig))
+        object.__setattr__(self, "carriers", Carriers(self.rig))
 
     def pack(self, matrices: Floats) -> Packed:
         """Return the matrices (n, J, 3, 4) as the kernel reads them."""
-        parts = split(matrices, self.pivots, topmost(self.rig.above))
-        rigid = lanes(duals.from_rigid(parts.rotation, parts.translation))
-        return Packed(rigid, np.empty((0, 12, LANES), np.float32) if parts.stretch is None else lanes(parts.stretch))
+        parts = self.carriers.split(matrices)
+        rigid = duals.from_rigid(parts.rotation, parts.translation)
+        if parts.stretch is not None:
+            turned = quaternion.rotate(parts.rotation, self.carriers.pivots)
+            rigid = np.concatenate((rigid, duals.from_rigid(parts.rotation, -turned)[..., 4:]), axis=-1)
+        return Packed(lanes(rigid), self.carriers.stretches(parts))
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        into = (first, last, room(self.rig.most), target)
-        compiled(around_duals)(shape, self.held, packed.duals, packed.stretches, *into)
+        from anim.skinning.kernels.dual_quaternion import skin_dual_quaternion
+
+        moves = (self.carriers.held, packed.duals, packed.stretches)
+        skin_dual_quaternion(*vertices(shape), *moves, first, last, *output(target))

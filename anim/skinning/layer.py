@@ -13,7 +13,7 @@ from anim.errors import AnimError, RangeError
 from anim.maths import matrix
 from anim.model import Instance, Skeleton
 from anim.skinning.frames import Frames
-from anim.skinning.kernels.lanes import NOTHING, Shape, Singles, Target
+from anim.skinning.kernels.layout import NOTHING, Shape, Singles, Target
 from anim.skinning.rig import Rig, rig
 from anim.skinning.skinner import Skinner, filled
 from anim.skinning.smooth_normals import SmoothNormals

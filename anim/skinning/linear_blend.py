@@ -7,10 +7,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim.arrays import Floats
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.lanes import LANES, TILE, Shape, Singles, Target, aligned, room
-from anim.skinning.kernels.linear import linear
-from anim.skinning.kernels.points_only import points_only
+from anim.skinning.kernels.layout import (
+    LANES,
+    Held,
+    Shape,
+    Singles,
+    Target,
+    aligned,
+    group_influences,
+    output,
+    vertices,
+)
 from anim.skinning.rig import Rig
 from anim.skinning.skinner import lanes
 
@@ -25,7 +32,7 @@ class Packed:
 
 @dataclass(frozen=True)
 class LinearBlend:
-    """Blends matrices: p′ = (Σ w M) p, weights as stored; normals by its inverse transpose, tangents by itself.
+    """Blends matrices: p′ = (Σ w M) p; normals by its inverse transpose, tangents by itself.
 
     plain: no frame has points of its own and no directions are wanted, which takes a shorter way to the same numbers.
     Source: glTF 2.0, 3.7.3.1; Magnenat-Thalmann et al. 1988.
@@ -33,12 +40,14 @@ class LinearBlend:
 
     rig: Rig
     plain: bool
+    held: Held = field(init=False, repr=False)
     coefficients: Singles = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         owner = np.repeat(np.arange(len(self.rig.points)), np.diff(self.rig.start))
         whole = np.concatenate((self.rig.points, np.ones((len(self.rig.points), 1))), axis=1)
         weighted = self.rig.weight[:, None] * whole[owner] if self.plain else np.empty((0, 4))
+        object.__setattr__(self, "held", self.rig.held if self.plain else group_influences(self.rig.held))
         object.__setattr__(self, "coefficients", weighted.astype(np.float32))
 
     def pack(self, matrices: Floats) -> Packed:
@@ -53,9 +62,12 @@ class LinearBlend:
 
     def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        held = self.rig.held
         if packed.columns is not None:
-            tile = aligned(TILE, 3 * LANES)
-            compiled(points_only)(self.coefficients, held, packed.columns, first, last, tile, target)
-        else:
-            compiled(linear)(shape, held, packed.rows, first, last, room(self.rig.most), target)
+            from anim.skinning.kernels.linear_points import skin_linear_points
+
+            coefficients, columns = self.coefficients, packed.columns
+            skin_linear_points(coefficients, self.held, columns, first, last, target.at, target.positions)
+        elif packed.rows is not None:
+            from anim.skinning.kernels.linear_full import skin_linear
+
+            skin_linear(*vertices(shape), self.held, packed.rows, first, last, *output(target))

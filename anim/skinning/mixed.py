@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.skinning.kernels.lanes import Shape, Singles, Target
+from anim.skinning.kernels.layout import Shape, Singles, Target
 from anim.skinning.skinner import Skinner
 
 

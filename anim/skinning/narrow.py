@@ -9,14 +9,12 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.model import Clip, Scene, Skeleton
-from anim.skinning.compiled import compiled
-from anim.skinning.frames import Playback
-from anim.skinning.kernels.lanes import LANES, Singles, room
-from anim.skinning.kernels.shrinkage import shrinkage
+from anim.skinning.frames import Playback, at_rest
+from anim.skinning.kernels.layout import LANES, Singles, group_influences
 from anim.skinning.layer import Layer
-from anim.skinning.rig import whole_weights
+from anim.skinning.rig import Rig
 from anim.skinning.skinner import filled, lanes
-from anim.skinning.stretch import pivots, split, topmost
+from anim.skinning.stretch import pivots, split
 
 TWIST = 0.7  # cosine between the axis of a turn and the link, above which the turn is a twist
 
@@ -56,19 +54,23 @@ class Indices:
 def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     """Return the collapse indices of a skinned mesh at `times` (F,) s while a clip plays.
 
-    √D with D = det(Σ w A) / Π |det A|^w, A the linear parts of the joints' matrices and w shares of the weights' sum:
-    scales are divided out. Joints of scale 0 don't count as collapse.
+    √D with D = ±det(Σ w A) / Π |det A|^w, A the linear parts of the joints' matrices and w the skin weights: scales
+    are divided out, and so is the mirroring of a vertex all of whose joints are mirrored at rest (the minus). Joints
+    of scale 0 don't count as collapse.
     """
+    from anim.skinning.kernels.volume_ratio import volume_ratio
+
     rig = layer.rig
     playback = Playback(scene.skeleton, clip)
-    held, space = rig.held._replace(weight=whole_weights(rig)), room(rig.most)
+    held, sides = group_influences(rig.held), _sides(rig, layer.matrices(at_rest(scene.skeleton), slice(None))[0])
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
     by_frame = np.zeros(len(times))
     for first in range(0, len(times), LANES):
         matrices = layer.matrices(playback.at(times[first : first + LANES]), slice(None))
         factors: Singles = np.empty((len(rig.points), len(matrices)), np.float32)
-        compiled(shrinkage)(held, lanes(matrices), _logs(matrices), space, factors)
+        volume_ratio(held, lanes(matrices), _logs(matrices), factors)
+        factors *= sides[:, None]
         factors[~np.isfinite(factors) | (np.diff(rig.start) == 0)[:, None]] = 1
         by_frame[first : first + LANES] = factors.min(axis=0, initial=1)
         at = factors.argmin(axis=1)
@@ -80,6 +82,14 @@ def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     time = float(times[when[worst]])
     narrow = _narrow(scene.skeleton, layer, playback, worst, time, float(root[worst]))
     return Indices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
+
+
+def _sides(rig: Rig, still: Floats) -> Singles:
+    """−1 for each vertex (V,) whose joints are all mirrored in matrices (J, 3, 4) at rest, 1 for the others."""
+    signs, size = np.sign(np.linalg.det(still[..., :3]))[rig.joint], len(rig.points)
+    vertex = np.repeat(np.arange(size), np.diff(rig.start))
+    mirrored, others = np.bincount(vertex, signs < 0, size), np.bincount(vertex, signs > 0, size)
+    return np.where((mirrored > 0) & (others == 0), -1, 1).astype(np.float32)
 
 
 def _logs(matrices: Floats) -> Singles:
@@ -95,9 +105,10 @@ def _narrow(names: Skeleton, layer: Layer, playback: Playback, vertex: int, time
         return Narrow(index, vertex, "", "", time, 0.0, False)
     a, b = held[0], held[1] if len(held) > 1 else held[0]
     matrices = layer.matrices(playback.at(np.array([time])), slice(None))
-    rotation = split(matrices, pivots(rig), topmost(rig.above)).rotation[0]
-    turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(rotation[a]), rotation[b]))
-    angle, link = float(np.linalg.norm(turn)), np.diff(pivots(rig)[[a, b]], axis=0)[0]
+    places = pivots(rig)[[a, b]]
+    first, second = split(matrices[:, [a, b]], places).rotation[0]
+    turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(first), second))
+    angle, link = float(np.linalg.norm(turn)), places[1] - places[0]
     along = abs(float(turn @ link))
     is_twist = along > TWIST * angle * float(np.linalg.norm(link)) and along > 0
     return Narrow(index, vertex, _name(names, rig.nodes[a]), _name(names, rig.nodes[b]), time, angle, is_twist)

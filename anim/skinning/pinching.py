@@ -6,6 +6,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.skinning.collapse import LOW, MeshCollapse
+from anim.skinning.fared import Fared
 from anim.skinning.standings import ALIKE
 
 KEPT = 0.9  # of the volume: 1 − ⅔ f sin²(θ/2) of a quarter turn that is blended over f = 30 % of a tube
@@ -34,5 +35,9 @@ def linear_volume(mesh: MeshCollapse) -> Floats | None:
 
 def _avoidable(mesh: MeshCollapse, linear: Floats) -> Bools:
     """At which times (F,) another method keeps more, or whether there is no other to tell."""
-    others = [each.volume for each in mesh.methods if each.method != "lbs" and each.volume is not None]
+    others = [each.volume for each in mesh.methods if _helps(each) and each.volume is not None]
     return np.asarray(np.max(others, axis=0) > linear + ALIKE) if others else np.ones(len(linear), np.bool_)
+
+
+def _helps(fared: Fared) -> bool:
+    return fared.method != "lbs" and not fared.unusable

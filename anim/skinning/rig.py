@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 from anim.model import Instance
-from anim.skinning.kernels.lanes import Held, Singles
+from anim.skinning.kernels.layout import Held, Singles
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Rig:
 
     nodes: (J,) node numbers. bind: (J, 3, 4) joint_from_mesh at bind time. above: (J,) the nearest joint above, or −1.
     points: (V, 3) m in mesh space. normals, tangents: (V, 3), or (0, 3) where they are not wanted.
-    start: (V + 1,); influences start[v] … start[v + 1] are vertex v's. joint: (E,) into nodes. weight: (E,) as stored.
+    start: (V + 1,); influences start[v] … start[v + 1] are vertex v's. joint: (E,) into nodes. weight: (E,).
     most: how many influences a vertex has at most. faces: (T, 3).
     """
 
@@ -38,7 +38,7 @@ class Rig:
     @property
     def held(self) -> Held:
         """What the vertices hang on, as kernels read it."""
-        return Held(self.weight, self.joint, self.start)
+        return Held(self.weight, self.joint, self.start, self.most)
 
 
 def rig(instance: Instance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> Rig:
@@ -85,13 +85,6 @@ def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], 
     start = np.zeros(len(joints) + 1, np.int64)
     np.cumsum(used.sum(axis=1), out=start[1:])
     return start, joints[used].astype(np.int32), weights[used].astype(np.float32)
-
-
-def whole_weights(rig: Rig) -> Singles:
-    """Return the weights (E,) as shares of each vertex's sum."""
-    owner = np.repeat(np.arange(len(rig.points)), np.diff(rig.start))
-    sums = np.bincount(owner, rig.weight, minlength=len(rig.points))
-    return (rig.weight / sums[owner]).astype(np.float32)
 
 
 def joints_above(nodes: Ints, parents: Ints) -> Ints:

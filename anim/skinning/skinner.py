@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from anim.arrays import Floats
-from anim.skinning.kernels.lanes import LANES, Shape, Singles, Target, aligned
+from anim.skinning.kernels.layout import LANES, Shape, Singles, Target, aligned
 
 
 class Skinner(Protocol):

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Ints
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.lanes import Singles
-from anim.skinning.kernels.normals_of_faces import normals_of_faces
+from anim.skinning.kernels.layout import Singles
 
 
 @dataclass(frozen=True)
@@ -25,4 +23,6 @@ class SmoothNormals:
 
     def of(self, positions: Singles, normals: Singles) -> None:
         """Write the normals of positions (n, V, 3) into `normals`."""
-        compiled(normals_of_faces)(self.faces, np.asarray(positions), normals)
+        from anim.skinning.kernels.vertex_normals import vertex_normals
+
+        vertex_normals(self.faces, np.asarray(positions), normals)

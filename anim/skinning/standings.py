@@ -16,11 +16,13 @@ class Standing:
     """What one method did to meshes at worst.
 
     volume: least against bind pose, None where no part is closed. bulge: greatest, against bind pose.
+    unusable: whether any is farther from linear blending than the model is large.
     """
 
     method: str
     volume: float | None
     bulge: float
+    unusable: bool = False
 
 
 def standings(meshes: Sequence[MeshCollapse]) -> tuple[Standing, ...]:
@@ -28,17 +30,18 @@ def standings(meshes: Sequence[MeshCollapse]) -> tuple[Standing, ...]:
     found = []
     for fared in zip(*(each.methods for each in meshes), strict=True):
         volumes = [float(each.volume.min()) for each in fared if each.volume is not None]
-        found.append(Standing(fared[0].method, min(volumes, default=None), max(each.bulge for each in fared)))
+        unusable = any(each.unusable for each in fared)
+        found.append(Standing(fared[0].method, min(volumes, default=None), max(each.bulge for each in fared), unusable))
     return tuple(found)
 
 
 def best(found: Sequence[Standing]) -> Standing | None:
-    """Return the method other than lbs that did best; None where only lbs was measured.
+    """Return the method other than lbs that did best; None where there is none that can be used.
 
     The one that keeps most of the volume (what is above bind pose is no gain); of those within 2 % of it the one that
     bulges least; of equal ones the first. Where nothing is closed, bulge alone decides.
     """
-    others = [each for each in found if each.method != "lbs"]
+    others = [each for each in found if each.method != "lbs" and not each.unusable]
     most = max((_held(each) for each in others), default=0.0)
     near = [each for each in others if _held(each) >= most - ALIKE]
     return min(near, key=lambda each: round(each.bulge, FINE), default=None)

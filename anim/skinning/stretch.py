@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats
 from anim.maths import quaternion
-from anim.skinning.compiled import compiled
-from anim.skinning.kernels.rigid_turns import rigid_turns
 from anim.skinning.rig import Rig
 
 RIGID = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what float32 bind matrices leave behind
@@ -17,38 +16,44 @@ RIGID = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what floa
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Joints' matrices as stretch first, then rotation (n, J, 4) xyzw and translation (n, J, 3).
+    """Joints' matrices as rotation (n, J, 4) xyzw and translation (n, J, 3), after a stretch and a scale.
 
-    stretch: (n, J, 3, 4), None where all are rigid and there is nothing to stretch.
+    stretch: (n, J, 3, 4), scale: (n, J); None where all are rigid and there is nothing to stretch.
     """
 
     rotation: Floats
     translation: Floats
-    stretch: Floats | None
+    stretch: Floats | None = None
+    scale: Floats | None = None
 
 
-def split(matrices: Floats, pivots: Floats, top: int = 0) -> Split:
-    """Return affine matrices (n, J, 3, 4) as A p + t = R (S p) + t′ with R a rotation.
+def split(matrices: Floats, pivots: Floats) -> Split:
+    """Return affine matrices (n, J, 3, 4) as A p + t = R (S p + c o) + t′ − c R o, whatever c is.
 
-    S is symmetric, about the joint's own place `pivots` (J, 3), so that a joint that grows or shears doesn't drag what
-    it shares with its neighbors; a mirrored joint has all three factors negative. The scale of joint `top`, and
-    whether it is mirrored, is taken to be common to all (units, a scaled root) and lies about the origin.
+    R is a rotation, o the joint's own place in bind space, `pivots` (J, 3), and t′ the place to which it goes. S is a
+    symmetric stretch about o; a mirrored joint has all three factors negative. `scale` is the joint's own, ∛det A.
+    A blend takes one c for all joints of a vertex (`carriers.scale_shares`). Where they all scale alike, that is their
+    scale: the blend is then the one without scale, made larger. A joint that alone grows or shears does so about its
+    own place, and doesn't drag what it shares with its neighbors.
+    split(2 · identity about (0, 1, 0)) → S p = 2 p − (0, 2, 0), c = 2, t′ = (0, 1, 0)
     Source: polar decomposition, Shoemake & Duff 1992.
     """
-    linear, moved = matrices[..., :3], matrices[..., 3]
-    turns: Floats = np.empty((*matrices.shape[:2], 4))
-    if compiled(rigid_turns)(matrices, RIGID, turns):
-        return Split(turns, moved, None)
-    common = np.cbrt(np.linalg.det(linear[:, top]))
-    common = np.where(common != 0, common, 1.0)[:, None]
-    square = np.swapaxes(linear, -1, -2) @ linear
-    scaled = linear / common[..., None, None]
-    turn, stretch = _polar(scaled, square / common[..., None, None] ** 2)
-    centers = common[..., None] * pivots
-    offset = centers - _times(stretch, centers)
-    translation = _times(scaled - turn, centers) + moved
-    whole = np.concatenate((stretch * common[..., None, None], offset[..., None]), axis=-1)
-    return Split(quaternion.from_matrix(turn), translation, whole)
+    linear = matrices[..., :3]
+    if _is_rotation(linear).all():
+        return Split(quaternion.from_matrix(linear), matrices[..., 3])
+    return _stretched(matrices, pivots)
+
+
+def split_after(matrices: Floats, pivots: Floats, shape: Floats) -> Split:
+    """Return matrices (n, J, 3, 4) in the same parts where all joints' stretches begin with one, `shape` (3, 3).
+
+    pivots: (J, 3) m, stretched by it.
+    """
+    bound = np.concatenate((matrices[..., :3] @ np.linalg.inv(shape), matrices[..., 3:]), axis=-1)
+    parts = _stretched(bound, pivots)
+    assert parts.stretch is not None
+    whole = np.concatenate((parts.stretch[..., :3] @ shape, parts.stretch[..., 3:]), axis=-1)
+    return replace(parts, stretch=whole)
 
 
 def pivots(rig: Rig) -> Floats:
@@ -60,9 +65,25 @@ def pivots(rig: Rig) -> Floats:
     return found
 
 
-def topmost(above: Ints) -> int:
-    """Return the first joint that hangs on no other."""
-    return int(np.argmax(above < 0))
+def _is_rotation(linear: Floats) -> Bools:
+    """Whether matrices (..., 3, 3) have no scale, shear or mirror; one that holds NaN has."""
+    x, y, z = np.ascontiguousarray(np.moveaxis(linear, (-1, -2), (0, 1)))  # by component: rows are fast
+    unit = [_dot(each, each) - 1 for each in (x, y, z)]
+    square = np.stack([*unit, _dot(x, y), _dot(y, z), _dot(z, x)])
+    normal = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+    return np.asarray((np.abs(square).max(axis=0) < RIGID) & (_dot(normal, z) > 0))
+
+
+def _dot(a: Sequence[Floats], b: Sequence[Floats]) -> Floats:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _stretched(matrices: Floats, pivots: Floats) -> Split:
+    linear, moved = matrices[..., :3], matrices[..., 3]
+    turn, stretch = _polar(linear, np.swapaxes(linear, -1, -2) @ linear)
+    whole = np.concatenate((stretch, -_times(stretch, pivots)[..., None]), axis=-1)
+    scale = np.cbrt(np.linalg.det(linear))
+    return Split(quaternion.from_matrix(turn), _times(linear, pivots) + moved, whole, scale)
 
 
 def _polar(linear: Floats, square: Floats) -> tuple[Floats, Floats]:

@@ -1,20 +1,16 @@
-"""Skin weights that don't add up: used as they are, and told."""
+"""Meshes whose skin weights don't add up to 1 in the file: they are taken as shares of their sum, and told."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from anim.model import Instance
-
-TOLERANCE = 1e-4  # of a sum; rounding to float32 or to 8 bits by a careful exporter stays far below
 
 
 @dataclass(frozen=True, slots=True)
 class BadSums:
-    """Vertices of one mesh whose weights don't add up to 1. mesh: its name, or the number of its node.
+    """Vertices of one mesh whose weights don't add up to 1 in the file. mesh: its name, or the number of its node.
 
     count: how many. none: how many of them have no weight at all.
     least, most: the sums farthest below and above 1 among the others.
@@ -26,19 +22,34 @@ class BadSums:
     least: float
     most: float
 
+    def in_words(self) -> Iterator[str]:
+        """Yield what is off, and what is made of it, a line each."""
+        start = f"mesh '{self.mesh}': skin weights of"
+        if some := self.count - self.none:
+            range_ = f"{self.least:.6g}" if self.least == self.most else f"{self.least:.6g} … {self.most:.6g}"
+            words = "don't add up to 1 ({}); they are divided by their sum, as players do"
+            yield f"{start} {_vertices(some)} {words.format(range_)}"
+        if self.none:
+            yield f"{start} {_vertices(self.none)} are all 0; they follow the first joint listed, as in three.js"
+
 
 def bad_sums(instances: Iterable[Instance]) -> list[BadSums]:
-    """Return the skinned meshes with vertices whose weights don't add up to 1, each mesh once."""
+    """Return the skinned meshes with vertices whose weights don't add up to 1, each mesh once.
+
+    Sums that only rounding moved off 1 don't count: 8 bits leave up to 4/255 of four weights.
+    """
     found: dict[int, BadSums] = {}
     for instance in instances:
         mesh = instance.mesh
-        if instance.skin is None or id(mesh) in found:
+        sums = mesh.weight_sums
+        if instance.skin is None or sums is None or id(mesh) in found:
             continue
-        sums = mesh.weights.sum(axis=1)
-        wrong = np.abs(sums - 1) > TOLERANCE
-        if wrong.any():
-            some = sums[wrong & (sums > 0)]
-            least, most = (float(some.min()), float(some.max())) if len(some) else (0.0, 0.0)
-            name = mesh.name or f"node {instance.node}"
-            found[id(mesh)] = BadSums(name, int(wrong.sum()), int((sums == 0).sum()), least, most)
+        some = sums[(sums != 1) & (sums > 0)]
+        least, most = (float(some.min()), float(some.max())) if len(some) else (0.0, 0.0)
+        name = mesh.name or f"node {instance.node}"
+        found[id(mesh)] = BadSums(name, int((sums != 1).sum()), int((sums == 0).sum()), least, most)
     return list(found.values())
+
+
+def _vertices(count: int) -> str:
+    return "1 vertex" if count == 1 else f"{count} vertices"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import PurePath
@@ -15,20 +16,22 @@ from anim.arrays import Floats, sorted_unique
 from anim.caches import axes, extent
 from anim.caches import order as orders
 from anim.gltf import read
-from anim.model import Clip, VertexCache
+from anim.model import Clip, Scene, VertexCache
 from anim.ops.selection import Selection
 from anim.sampling.times import grid
-from anim.skinning.bake import SPACES, baked, baker
+from anim.skinning.bake import SPACES, Baker, baked, baker
 from anim.skinning.between import Missed, between
-from cli import bake_notes, cache_files, cache_options, meshes, options, report, streams, units
+from anim.skinning.deviation import Deviation, deviation, linear_baker
+from cli import bake_notes, cache_files, cache_options, meshes, options, output_names, report, scenes, streams, units
 from cli.cache_files import Saved
 from cli.errors import UsageError
+from cli.first_run import announce_compiling
 from cli.progress import Progress
 from cli.report import Voice, plural
 from cli.skinning_methods import ABOUT, Method
 
-PLACE = "{clip}"  # in OUT: where the name of the clip goes
-FORBIDDEN = frozenset('/\\:*?"<>|')  # what some file system doesn't take in a name
+PLACEHOLDERS = ("mesh", "clip")
+LISTED = 8  # files in a note
 
 LBS = Method("lbs")
 Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc]
@@ -79,57 +82,90 @@ def bake(
 
     Vertices come in the order of the scene: nodes depth-first, primitives as in the file, vertices as in their
     accessors. Skinned meshes are in world space, where their own node doesn't count. Several clips need {clip} in OUT,
-    which is replaced by each name. Skin weights count as they are stored; dqs and cor take them as shares of their sum.
+    which is replaced by each name; {mesh} makes a file per mesh.
+    Skin weights that don't add up to 1 are divided by their sum, as players do.
     """
     voice = Voice(quiet, verbose)
     began = time.perf_counter()
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
-    ending = cache_files.check(output, None if format is None else f".{format}")
+    ending = cache_files.check(output, None if format is None else f".{format}", PLACEHOLDERS)
     given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
     cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
     cache_options.check_held(ending, normals=normals, tangents=tangents)
     done: list[_Done] = []
-    with streams.source(input) as source:
+    with streams.source(input, voice) as source:
         document = source.document
-        clips, scene = read.clips(document), read.scene(document, normals=normals or tangents, tangents=tangents)
-        numbers = Selection(clip or ()).chosen_clips(read.names(document))
-        files = _files(output, [(clips[i].name, i) for i in numbers])
-        nodes = meshes.nodes(scene, mesh)
-        bake_notes.weights(baked(scene, nodes=nodes), method.value, voice)
-        made = baker(
-            scene,
-            method=method.value,
-            blend=blend,
-            bulge_clamp=bulge_clamp,
-            space=space.value,
+        clips = read.clips(document)
+        scene = scenes.scene(
+            document,
+            source.name,
+            voice,
             normals=normals or tangents,
             tangents=tangents,
-            rigid=rigid,
-            nodes=nodes,
+            nodes=lambda scene: meshes.nodes(scene, mesh),
         )
-        if not rigid:
+        numbers = Selection(clip or ()).chosen_clips(read.names(document))
+        nodes = meshes.nodes(scene, mesh)
+        groups = _groups(scene, nodes, output, rigid=rigid)
+        jobs = _jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
+        announce_compiling(voice)
+        if not rigid and baked(scene, nodes=nodes):
             bake_notes.left_out(scene, nodes, voice)
         missed: list[tuple[str, Missed]] = []
-        for each, file in zip([clips[i] for i in numbers] or [Clip("", ())], files, strict=True):
-            times = _times(each, fps)
-            if fps is None and not quiet:
-                label = read.label(each.name, numbers[len(done)] if numbers else 0)
-                missed.append((label, between(made, each, times)))
-            progress = Progress(PurePath(file).name, len(times), shown=not quiet)
-            cache = _turned(made.bake(each, times=times, progress=progress), up, order)
+        made: dict[int, Baker] = {}
+        linear: Baker | None = None
+        deviations: list[tuple[str, Deviation]] = []
+        for job in jobs:
+            if job.group not in made:
+                made = {
+                    job.group: baker(
+                        scene,
+                        method=method.value,
+                        blend=blend,
+                        bulge_clamp=bulge_clamp,
+                        space=space.value,
+                        normals=normals or tangents,
+                        tangents=tangents,
+                        rigid=rigid,
+                        nodes=groups[job.group][1],
+                    )
+                }
+                linear = None if method is LBS else linear_baker(made[job.group], space=space.value)
+            each = Clip("", ()) if job.clip is None else clips[job.clip]
+            times, label = _times(each, fps), read.label(each.name, job.clip or 0)
+            if linear is not None:
+                deviations.append((label, deviation(made[job.group], linear, each, times)))
+            if fps is None:
+                missed.append((label, between(made[job.group], each, times)))
+            progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
+            cache = _turned(made[job.group].bake(each, times=times, progress=progress), up, order)
             try:
                 writing = cache_options.writing(ending, given | {"max_error": _meters(max_error, cache)})
-                saved = cache_files.save(cache, file, writing, ending=ending, dry_run=dry_run)
+                saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)
+            except BaseException:
+                _say_written(done, voice, dry_run=dry_run)
+                raise
             finally:
                 progress.close()
-            done.append(_Done(file, each.name, len(times), saved))
+            done.append(_Done(job.file, each.name, len(times), cache.vertex_count, saved))
             _say_notes(done, voice)
-            if len(files) > 1:
-                voice.detail(f"  {_summary(done[-1:], cache.vertex_count, method.value)}")
-    bake_notes.gaps(missed, made.rest, voice)
-    took = f"{time.perf_counter() - began:.1f} s" + (" (dry run: nothing written)" if dry_run else "")
-    voice.say(f"{_summary(done, made.vertices, method.value)}, {took}")
+            if len(jobs) > 1:
+                voice.detail(f"  {_summary(done[-1:], method.value)}")
+        at_rest = made[jobs[-1].group].rest
+    bake_notes.gaps(missed, at_rest, voice)
+    bake_notes.lost(deviations, method.value, voice)
+    took = report.took(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
+    voice.say(f"{_summary(done, method.value)}, {took}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """A file that is to be: which meshes and which clip go into it, by index; None where the file has no clip."""
+
+    file: str
+    group: int
+    clip: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,26 +175,44 @@ class _Done:
     file: str
     clip: str
     frames: int
+    vertices: int
     saved: Saved
 
 
-def _files(output: str, clips: list[tuple[str, int]]) -> list[str]:
-    """One output per clip, the clip's name in the place of {clip}; a name that is taken gets the clip's number."""
-    if PLACE not in output:
-        if len(clips) > 1:
-            raise UsageError(
-                f"{len(clips)} clips are chosen, but '{output}' holds one",
-                help=f"choose one with --clip, or put {PLACE} into OUT for a file per clip",
-            )
-        return [output]
-    names: list[str] = []
-    for name, number in clips or [("", 0)]:
-        plain = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ") or str(number)
-        taken = {each.casefold() for each in names}  # to some file systems "Walk" and "walk" are one name
-        while (file := output.replace(PLACE, plain)).casefold() in taken:
-            plain += f"-{number}"
-        names.append(file)
-    return names
+Group = tuple[str, Sequence[int] | None]  # what {mesh} becomes, and the nodes of the meshes; None for all
+
+
+def _groups(scene: Scene, nodes: Sequence[int] | None, output: str, *, rigid: bool) -> list[Group]:
+    """Meshes that go into a file together: each by itself where OUT says {mesh}."""
+    if "{mesh}" not in output:
+        return [("", nodes)]
+    chosen = {each.node: each.mesh.name for each in baked(scene, rigid=rigid, nodes=nodes)}
+    return [(name or scene.skeleton.names[node], [node]) for node, name in chosen.items()] or [("", nodes)]
+
+
+def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tuple[str, int]]) -> list[_Job]:
+    """All files that will be written, their names settled and checked. clips: name and index of each."""
+    if "{clip}" not in output and len(clips) > 1:
+        raise UsageError(
+            f"{len(clips)} clips are chosen, but '{output}' holds one",
+            help="choose one with --clip, or put {clip} into OUT for a file per clip",
+        )
+    each_clip: Sequence[tuple[str, int | None]] = clips or [("", None)]
+    pairs = [(i, name, clip) for i in range(len(groups)) for name, clip in each_clip]
+    rows = [{"mesh": groups[i][0], "clip": name} for i, name, _ in pairs]
+    by_clip = "{clip}" in output
+    files = output_names.expand(output, rows, [(clip or 0) if by_clip else i for i, _, clip in pairs])
+    for file in files if len(files) > 1 or "{" in output else ():
+        cache_files.check(file, ending)
+    return [_Job(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
+
+
+def _say_written(done: Sequence[_Done], voice: Voice, *, dry_run: bool) -> None:
+    """Say which files are there already where a later one fails."""
+    if done and not dry_run:
+        names = ", ".join(each.file for each in done[:LISTED])
+        more = f" and {len(done) - LISTED} more" if len(done) > LISTED else ""
+        voice.say(f"note: {plural(len(done), 'clip')} written before: {names}{more}")
 
 
 def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
@@ -179,13 +233,14 @@ def _say_notes(done: list[_Done], voice: Voice) -> None:
             voice.say(f"note: {note}")
 
 
-def _summary(done: list[_Done], vertices: int, method: str) -> str:
+def _summary(done: list[_Done], method: str) -> str:
     file = "stdout" if done[0].file == streams.PIPE else done[0].file
     name = file if len(done) == 1 else f"{plural(len(done), 'clip')}, {file} …"
     frames = plural(sum(each.frames for each in done), "frame")
     of = f" of '{done[0].clip}'" if len(done) == 1 and done[0].clip else ""
     parts = [f"{name}  {report.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
-    parts.append(f"{frames} of {vertices} vertices")
+    vertices = sorted({each.vertices for each in done})
+    parts.append(f"{frames} of {' to '.join(map(str, dict.fromkeys((vertices[0], vertices[-1]))))} vertices")
     errors = [each.saved.written.max_error for each in done if each.saved.written.max_error is not None]
     parts += [f"max {report.length(max(errors))} at frames"] if errors else []
     count = sum(len(each.saved.files) for each in done)

@@ -15,9 +15,10 @@ from anim.sampling.times import grid
 from anim.show.collapse import collapse as picture_of
 from anim.skinning.advice import Found
 from anim.skinning.collapse import Comparison
-from cli import collapses, meshes, options, streams
+from cli import collapses, meshes, options, scenes, streams
 from cli.collapses import Seen
 from cli.errors import UsageError
+from cli.first_run import announce_compiling
 from cli.options import Format
 from cli.progress import Progress
 from cli.report import Voice, size
@@ -54,25 +55,31 @@ def collapse(
     distance of a vertex from the links between its joints, against that in bind pose. Below: what to do.
     """
     _check(fps, plot)
+    voice = Voice(quiet)
     methods = tuple(dict.fromkeys(str(each) for each in method)) if method else USUAL
     found: list[Found] = []
-    with streams.source(input) as source:
+    with streams.source(input, voice) as source:
         document = source.document
-        clips, scene = read.clips(document), read.scene(document)
+        clips = read.clips(document)
+        scene = scenes.scene(document, source.name, voice, nodes=lambda scene: meshes.nodes(scene, mesh))
         numbers = Selection(clip or ()).chosen_clips(read.names(document))
         if plot is not None and not numbers:
             raise NotFoundError("there is no clip to draw")
+        announce_compiling(Voice(quiet))
         comparison = Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=meshes.nodes(scene, mesh))
         progress = Progress("collapse", len(numbers), shown=not quiet)
         for done, i in enumerate(numbers):
             times = grid(clips[i].start, clips[i].end, fps=fps)
-            found += [Found(i, clips[i].name or str(i), each) for each in comparison.of(clips[i], times=times)]
+            found += [Found(i, read.clip_name(clips[i].name, i), each) for each in comparison.of(clips[i], times=times)]
             progress(done + 1)
         progress.close()
-    seen = Seen(source.name, comparison.meshes, methods, bulge_clamp, fps, found)
+    seen = Seen(source.name, comparison.meshes, methods, bulge_clamp, fps, found, voice.warnings)
     if plot is not None:
-        _draw(seen, plot, Voice(quiet))
-    streams.write_text(collapses.as_json(seen) if format is Format.JSON else collapses.text(seen, every=verbose))
+        _draw(seen, plot, voice)
+    if format is Format.JSON:
+        streams.write_text(collapses.as_json(seen))
+    elif not quiet:
+        streams.write_text(collapses.text(seen, every=verbose))
 
 
 def _check(fps: float, plot: str | None) -> None:

@@ -16,6 +16,7 @@ from anim.caches.settings import Reading
 from anim.model import Chunk, VertexCache
 from cli import cache_files, cache_options, options, report, streams, units
 from cli.errors import UsageError
+from cli.first_run import announce_compiling
 from cli.progress import Progress
 
 Cache = Annotated[
@@ -70,6 +71,8 @@ def convert_cache(
     with cache_files.load(input, Reading(read_fps)) as loaded:
         if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
+        if loaded.ending == ".glb":
+            announce_compiling(voice)
         cache = _changed(loaded.cache, at, fps, up, order)
         if max_error is not None:
             given["max_error"] = units.meters(max_error, "--max-error", lambda: extent.diagonal(cache))
@@ -81,8 +84,10 @@ def convert_cache(
             progress.close()
         size = loaded.size
     if cache.chosen:
-        voice.say(f"note: {cache.chosen}; bake takes others by --clip")
-    for note in (*loaded.notes, *saved.written.notes):
+        voice.warn(f"{cache.chosen}; bake takes others by --clip")
+    for words in loaded.notes:
+        voice.warn(words)
+    for note in saved.written.notes:
         voice.say(f"note: {note}")
     name = loaded.name if output == streams.PIPE else output
     parts = [
@@ -93,7 +98,7 @@ def convert_cache(
         parts.append(f"max {report.length(saved.written.max_error)}")
     if len(saved.files) > 1:
         parts.append(f"{len(saved.files)} files")
-    parts.append(f"{time.perf_counter() - began:.1f} s")
+    parts.append(report.took(time.perf_counter() - began))
     voice.say(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated
@@ -10,22 +10,21 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.errors import AnimError
 from anim.gltf import read
 from anim.gltf.accessors import Accessors
 from anim.measure.diff import diff as compared
 from anim.measure.error import FPS, Ruler
 from anim.measure.footprint import Footprint, footprints
 from anim.measure.matching import by_name
-from anim.measure.players import PLAYERS
+from anim.measure.players import PLAYERS, pair
 from anim.measure.profile import profile
 from anim.measure.stored import stored
-from anim.measure.surface import diagonal
+from anim.measure.surface import diagonal, measured_at
 from anim.model import Clip, Scene
 from anim.ops.selection import Selection
 from anim.show import diff as picture
 from anim.show.sheet import FORMATS
-from cli import differences, options, streams, units
+from cli import differences, options, scenes, streams, units
 from cli.differences import File, Found
 from cli.errors import CheckError, UsageError
 from cli.options import Format
@@ -40,7 +39,10 @@ SPEC = Player("spec")
 
 def diff(
     old: Annotated[str, typer.Argument(metavar="A", help="A .glb or .gltf file, '-' for stdin.", show_default=False)],
-    new: Annotated[str, typer.Argument(metavar="B", help="What to hold against it.", show_default=False)],
+    new: Annotated[
+        str | None,
+        typer.Argument(metavar="[B]", help="What to hold against it; with --players none.", show_default=False),
+    ] = None,
     *,
     format: options.Report = Format.TEXT,
     plot: Annotated[
@@ -54,6 +56,10 @@ def diff(
         Player,
         typer.Option("--player", help="; ".join(f"{name}: {each.about}" for name, each in PLAYERS.items()) + "."),
     ] = SPEC,
+    players: Annotated[
+        str | None,
+        typer.Option("--players", metavar="P,Q", help="A as two players show it, spec,nlerp: one file, no B."),
+    ] = None,
     fps: Annotated[float, typer.Option("--fps", metavar="N", help="Look so often per second, besides at keys.")] = FPS,
     shell: Annotated[
         str, typer.Option("--shell", metavar="LENGTH", help="How far around nodes without vertices; 0: leave them out.")
@@ -70,31 +76,52 @@ def diff(
     Per clip, worst first: the largest distance with joint, vertex and time; p99 and mean over all vertices; the largest
     turn of a node against the world; the largest difference in speed (jitter), in morph weights, in pointers (of their
     range); ends that differ, and tracks that only A (−) or only B (+) has. --fail-above also says no where B lacks a
-    clip. --player plays rotations as others than glTF's own rule do; keys that are not of unit length show there.
+    clip, and where there are none to compare. --player plays rotations as others than glTF's own rule do; keys that
+    are not of unit length show there. --players spec,nlerp holds one file against itself as two players show it: slerp
+    against nlerp.
     """
     voice, selection = Voice(quiet), Selection(clip or ())
+    who = _players(new, str(player), players)
     if old == new == streams.PIPE:
         raise UsageError("A and B can't both be stdin")
     if fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     kind = "" if plot is None else _kind(plot)
-    one, other = _opened(old, voice), _opened(new, voice)
+    one = _opened(old, voice)
+    other = one if new is None else _opened(new, voice)
     scale = diagonal(one.scene)
     limit = None if fail_above is None else units.meters(fail_above, "--fail-above", lambda: scale)
     radius = 0.0 if shell.strip() in OFF else units.meters(shell, "--shell", lambda: scale)
     ruler = Ruler(one.scene, other.scene, shell=radius / scale if radius and scale else None)
     chosen = selection.chosen_clips(one.file.clips) if clip else None
-    found = compared(ruler, one.clips, other.clips, chosen=chosen, player=str(player), fps=fps)
-    report = Found(one.file, other.file, found, *_names(one, other), str(player), fps, radius)
+    found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
+    report = Found(one.file, other.file, found, *_names(one, other), who, fps, radius, measured_at(one.scene))
     if report.are_strangers:
-        voice.say(f"warning: {differences.STRANGERS}: are they two versions of one thing?")
-    streams.write_text(differences.as_json(report) if format is Format.JSON else differences.text(report))
+        voice.warn(f"{differences.STRANGERS}: are they two versions of one thing?")
+    if format is Format.JSON:
+        streams.write_text(differences.as_json(report, warnings=voice.warnings))
+    elif not quiet:
+        streams.write_text(differences.text(report))
     if plot is not None:
         drawn = _drawn(report, ruler, one, other, kind, limit)
         streams.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
         voice.say(f"{plot}  {size(len(drawn))}")
     if limit is not None:
         _check(report, limit)
+
+
+def _players(new: str | None, player: str, players: str | None) -> str:
+    """Who plays: one for both files, or two for one file."""
+    if players is None:
+        if new is None:
+            raise UsageError("B is missing (expected two files, or one and --players spec,nlerp)")
+        return player
+    if new is not None or player != SPEC:
+        raise UsageError("--players is about one file (expected neither B nor --player)")
+    first, second = pair(players)
+    if first == second:
+        raise UsageError(f"--players is '{players}' (expected two different ones of {', '.join(PLAYERS)})")
+    return players
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,15 +134,11 @@ class _Side:
 
 
 def _opened(path: str, voice: Voice) -> _Side:
-    with streams.source(path) as source:
+    with streams.source(path, voice) as source:
         document = source.document
         accessors = Accessors(document)
         clips = read.clips(document, accessors)
-        try:
-            scene = read.scene(document, accessors)
-        except AnimError as error:  # vertices that can't be read leave the nodes to be measured
-            voice.say(f"note: {source.name}: measured at nodes, not on the surface: {error}")
-            scene = Scene(read.skeleton(document), ())
+        scene = scenes.scene(document, source.name, voice, accessors=accessors)
         cost = Footprint(stored(document), footprints(document)[1].json)
         return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
 
@@ -136,21 +159,37 @@ def _kind(path: str) -> str:
 
 
 def _drawn(found: Found, ruler: Ruler, one: _Side, other: _Side, kind: str, limit: float | None) -> bytes:
-    worst = found.diff.clips[: picture.LIMIT]
+    apart = [each for each in found.diff.clips if each.error.max_error > 0]
     profiles = [
-        profile(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps) for each in worst
+        replace(
+            profile(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps),
+            name=read.clip_name(each.name, each.old),
+        )
+        for each in apart[: picture.LIMIT]
     ]
-    count = plural(len(found.diff.clips), "clip")
-    note = f"the worst {len(worst)} of {count}" if len(worst) < len(found.diff.clips) else count
+    note = _left_out(len(profiles), len(apart), len(found.diff.clips))
     title = f"{PurePath(found.old.name).name} → {PurePath(found.new.name).name}"
+    if "," in found.player:
+        title = f"{PurePath(found.old.name).name}: {found.player.replace(',', ' → ')}"
     return picture.diff(profiles, title=title, kind=kind, limit=limit, note=note)
 
 
+def _left_out(drawn: int, apart: int, count: int) -> str:
+    """How many clips a picture shows of those that are apart, and how many are not."""
+    shown = (
+        f"the worst {drawn} of {apart} clips that differ" if drawn < apart else f"{plural(apart, 'clip')} that differ"
+    )
+    shown = shown.replace("clip that differ", "clip that differs")
+    return f"{shown}, {count - apart} without difference" if count > apart else shown
+
+
 def _check(found: Found, limit: float) -> None:
-    """Raise CheckError where a clip is farther away than `limit`, in m, or missing."""
+    """Raise CheckError where a clip is farther away than `limit`, in m, or missing, or nothing was compared."""
     if found.diff.missing_clips:
         number = found.diff.missing_clips[0]
         raise CheckError(f"{found.new.name}: {read.label(found.old.clips[number], number)} is missing")
+    if not found.diff.clips:
+        raise CheckError(f"{found.old.name}, {found.new.name}: no clips to compare")
     above = [each for each in found.diff.clips if each.error.max_error > limit]
     if above:
         more = f" and {len(above) - 1} more" if len(above) > 1 else ""

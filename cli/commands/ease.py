@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from anim.curves.ease import Easing
 from anim.curves.easing import EASING_MAKERS, EASINGS, parse, sparkline
-from anim.model import Clip, Skeleton
+from anim.gltf import read
+from anim.model import Clip, Track
 from anim.ops import ease as by_segment
 from anim.ops import warp as by_range
 from anim.ops.selection import Selection
 from cli import options, streams, units
-from cli.edit import edit
+from cli.edit import Clips, edit
 from cli.errors import UsageError
 from cli.report import Voice
 
@@ -70,14 +73,13 @@ def ease(
     if list_eases:
         streams.write_text(_table())
         return
-    voice = Voice(quiet, verbose)
     easing = parse(ease)
     share, angle = units.share(tolerance, "--tolerance"), units.angle(angle_tolerance, "--angle-tolerance")
     if per is Per.RANGE and easing.stepped:
         raise UsageError(f"'{easing.name}' jumps, and time can't", help="--per segment makes STEP keys of it")
     tolerances = by_segment.Tolerances(share, angle)
 
-    def change(each: Clip, tracks: frozenset[int], _: Skeleton) -> Clip:
+    def change(each: Clip, tracks: frozenset[int], _: object) -> Clip:
         if per is Per.RANGE:
             eased = by_range.warp(
                 each,
@@ -99,33 +101,57 @@ def ease(
                 interpolation=interpolation.value,
                 tracks=tracks,
             )
-        _note(each, eased, easing, per, voice)
         return eased
 
-    edit(input, output, Selection(clip or (), node or (), path or ()), change, voice, dry_run=dry_run, measure=False)
+    selection = Selection(clip or (), node or (), path or ())
+    edit(
+        input,
+        output,
+        selection,
+        change,
+        Voice(quiet, verbose),
+        dry_run=dry_run,
+        measure=False,
+        notes=lambda before, after: _notes(before, after, easing, per),
+    )
 
 
 DENSE = 0.1  # s; keys nearer than this are samples of a motion rather than poses
 
 
-def _note(before: Clip, after: Clip, easing: Easing, per: Per, voice: Voice) -> None:
-    """Say what a user would want to know before playing it."""
-    changed = [old for old, new in zip(before.tracks, after.tracks, strict=True) if old is not new]
-    if per is Per.SEGMENT and changed:
-        gaps = sorted((float(t.times[-1] - t.times[0]) / (len(t.times) - 1)) for t in changed if len(t.times) > 1)
-        if gaps and gaps[len(gaps) // 2] < DENSE:
-            voice.say(
-                f"note: clip '{before.name}': keys are {1000 * gaps[len(gaps) // 2]:.0f} ms apart; easing each such "
-                "piece makes the motion stutter (--per range eases the whole)"
-            )
+def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[str]:
+    """What a user would want to know before playing it, once for all clips that it is true of."""
+    changed = {
+        i: [old for old, new in zip(clip.tracks, after[i].tracks, strict=True) if old is not new]
+        for i, clip in before.items()
+    }
+    steps = {i: found for i, tracks in changed.items() if (found := _usual_step(tracks)) is not None}
+    dense = {i: step for i, step in steps.items() if step < DENSE}
+    if per is Per.SEGMENT and dense:
+        yield (
+            f"{_labels(before, dense)}: most keys are {1000 * min(dense.values()):.0f} ms apart; easing each such "
+            "piece makes the motion stutter (--per range eases the whole clip once)"
+        )
     if easing.overshoots:
-        beyond = sorted({track.path for track in changed if track.path in ("scale", "weights")})
+        beyond = {i: {t.path for t in tracks} & {"scale", "weights"} for i, tracks in changed.items()}
+        beyond = {i: paths for i, paths in beyond.items() if paths}
         if beyond:
             low, high = easing.extent
-            voice.say(
-                f"note: clip '{before.name}': '{easing.name}' runs to {100 * low:.0f} … {100 * high:.0f} % of each "
-                f"piece, so values of {' and '.join(beyond)} leave the range of their keys"
+            yield (
+                f"{_labels(before, beyond)}: '{easing.name}' runs to {100 * low:.0f} … {100 * high:.0f} % of each "
+                f"piece, so values of {' and '.join(sorted(set.union(*beyond.values())))} leave the range of their keys"
             )
+
+
+def _usual_step(tracks: Iterable[Track]) -> float | None:
+    """The median time (s) from a key to the next, where the value changes between them; None without any."""
+    steps = [np.diff(t.times)[(np.diff(t.values, axis=0) != 0).any(axis=1)] for t in tracks]
+    every = np.concatenate([np.zeros(0), *steps])
+    return float(np.median(every)) if len(every) else None
+
+
+def _labels(clips: Clips, numbers: Iterable[int]) -> str:
+    return read.labels([(clips[i].name, i) for i in numbers])
 
 
 def _table() -> str:

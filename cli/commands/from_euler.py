@@ -27,7 +27,7 @@ from anim.exchange.units import guess_unit
 from anim.gltf import author
 from anim.maths.euler import Frame, check_order
 from cli import conversion, options, report, streams, units
-from cli.casting import Casting, cast, pairs, renamed
+from cli.casting import Casting, cast, index_of, named, pairs
 from cli.conversion import Conversion
 from cli.errors import UsageError
 from cli.options import Format
@@ -92,6 +92,9 @@ def from_euler(
         float | None, typer.Option("--rest-at", metavar="S", help="--onto: when the source stands in its rest pose.")
     ] = None,
     name: Annotated[str | None, typer.Option("--name", help="Name of the clip; else the file's.")] = None,
+    replace: Annotated[
+        str | None, typer.Option("--replace", metavar="CLIP", help="--onto: the clip that gives way, or '#3'.")
+    ] = None,
     format: Annotated[Format, typer.Option("--format", help="Report as text on stderr, or JSON.")] = Format.TEXT,
     dry_run: options.DryRun = False,
     quiet: options.Quiet = False,
@@ -109,20 +112,23 @@ def from_euler(
     voice = report.Voice(quiet, verbose)
     limit = units.angle(tolerance, "--tolerance")
     _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
-    if onto is None and (alias, fail_unmatched, rest_at, floor) != (None, None, None, Floor.CONTACT):
-        raise UsageError("--alias, --fail-unmatched, --floor and --rest-at are about a character (--onto names it)")
+    if onto is None and (alias, fail_unmatched, rest_at, replace, floor) != (*[None] * 4, Floor.CONTACT):
+        words = "--alias, --fail-unmatched, --floor, --replace and --rest-at"
+        raise UsageError(f"{words} are about a character (--onto names it)")
+    if replace is not None and name is not None:
+        raise UsageError("--replace keeps the name of the clip (leave --name out)")
     stated = Stated(_order(order), frame, unit)
     with streams.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = formats.of_path(source) or formats.of_content(data.tobytes())
         motion = kind.read(data.tobytes(), Reading(stated, bvh_position))
         motion = turned_up(motion) if up is Up.Z else motion
-        meters, words = _meters_per_unit(motion, scale, known=kind.has_units)
+        meters, words, is_guess = _meters_per_unit(motion, scale, known=kind.has_units)
         clip = name or (Path(source).stem if source != streams.PIPE else "motion")
         converted = converted_from(scaled(motion, meters), tolerance=limit, keys=keys, name=clip)
         if not converted.clip.tracks:
             raise FormatError("no curve has a key: there is no motion in it")
     rows = () if quiet and format is Format.TEXT else gimbal(motion, converted.clip)
-    made = Conversion(kind.suffix[1:], motion, converted, meters, words, rows)
+    made = Conversion(kind.suffix[1:], motion, converted, meters, words, rows, is_guess=is_guess)
     if onto is None:
         bones = converted.skeleton
         bodies = trees(bones, *sticks(bones, converted.ends)) if mesh is Mesh.STICKS else []
@@ -130,18 +136,21 @@ def from_euler(
         before, size = len(data), streams.write(document, output, None, dry_run=dry_run)
     else:
         names = pairs(alias)
-        with streams.source(onto) as character:
-            made = made if name else renamed(made, character.document)
-            casting = Casting(names, floor, rest_at, fail_unmatched)
-            made, document = cast(made, character.document, casting)
-            before, size = character.size, streams.write(document, output, character.folder, dry_run=dry_run)
+        with streams.source(onto, voice) as character:
+            taken = index_of(replace, character.document)
+            made = named(made, character.document, name=name, replaced=taken)
+            casting = Casting(names, floor, rest_at, fail_unmatched, taken)
+            made, document = cast(made, character, casting, voice)
+            before, size = character.size, streams.write(document, output, character, dry_run=dry_run)
+    for each in conversion.warnings(made):
+        voice.warn(each)
     if format is Format.JSON:
-        streams.write_text(conversion.as_json(made))
+        streams.write_text(conversion.as_json(made, warnings=voice.warnings))
     for line in conversion.lines(made, verbose=verbose):
         voice.say(line)
     parts = [f"{called if output == streams.PIPE else output}  {report.change(before, size)}", conversion.counts(made)]
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.say(f"{', '.join(parts)}, {time.perf_counter() - began:.1f} s{ending}")
+    voice.say(f"{', '.join(parts)}, {report.took(time.perf_counter() - began)}{ending}")
 
 
 def _order(order: str | None) -> str | None:
@@ -167,15 +176,16 @@ def _check(
         streams.check_output(output)
 
 
-def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str]:
-    """Meters per unit of the motion, and the words that say where that comes from."""
+def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str, bool]:
+    """Meters per unit of the motion, the words that say where that comes from, and whether it is uncertain."""
     height = extent(skeleton(motion))
     if scale is not None:
-        return scale, f"{scale:g} m per unit (--scale): the skeleton measures {report.length(height * scale)}"
+        return scale, f"{scale:g} m per unit (--scale): the skeleton measures {report.length(height * scale)}", False
     if known and height < TALL:
-        return 1.0, ""
+        return 1.0, "", False
     if known:
-        return 1.0, f"the skeleton measures {report.length(height)} (--scale 0.01 if its unit is centimeters)"
+        return 1.0, f"the skeleton measures {report.length(height)} (--scale 0.01 if its unit is centimeters)", True
     guess = guess_unit(height)
     measures = f"the skeleton then measures {report.length(guess.height)}"
-    return guess.scale, f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
+    words = f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
+    return guess.scale, words, True

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from copy import copy
 from dataclasses import asdict, replace
 from enum import StrEnum
 from typing import Annotated, Any
 
 import typer
 
-from anim.errors import AnimError
-from anim.gltf import read
-from anim.gltf.document import Document
+from anim.errors import AnimError, FormatError
+from anim.gltf import container, read
+from anim.gltf.accessors import Accessors
+from anim.gltf.broken import Broken, read_broken, unread_buffers
+from anim.gltf.document import Bytes, Document
+from anim.measure import findings
 from anim.measure.facts import Facts
 from anim.measure.findings import Finding, Severity
 from anim.measure.inspect import inspect as facts_of
@@ -19,6 +23,7 @@ from anim.ops.selection import Selection
 from cli import errors, inspection, options, streams, tables
 from cli.errors import CheckError
 from cli.inspected import Inspected, Smoothness
+from cli.report import Voice
 
 SCHEMA = 1
 LOST = "put it there, or mend the URI"
@@ -55,43 +60,79 @@ def inspect(
 
     Per clip: length, tracks by path (translation/rotation/scale/weights/pointer), keys, estimated frame rate, bytes,
     tracks that do nothing, keys that say nothing, the seam of a loop, the speed of the root. Per skin: joints,
-    influences, weights. Below: findings, with what to do. With several files a bad one is reported and the others go
-    on; the exit code is the worst. --fail-on makes it a gate.
+    influences, weights. Below: findings, with what to do. Of a broken file the parts that can be read are
+    shown, and what is wrong with the rest; the exit code is then 3, of several files the worst. --fail-on makes it a
+    gate; with -q the text is left out.
 
     --continuity counts, per track, the keys between its ends by what jumps there: the value (jump), the speed (C0, or
     G1 where the direction goes on), the acceleration (C1), or nothing (C2), and names the largest jump of each.
     """
-    del quiet
     selection = Selection(clip or ())
-    worst = 0
     done: list[Inspected] = []
     smooth: list[Smoothness] = []
+    refused: list[AnimError] = []
     for path in inputs or [streams.PIPE]:
         try:
             inspected, tracks_of_clips = _inspected(path, selection, tracks=tracks, continuity=continuity)
-            done.append(inspected)
-            smooth.append(tracks_of_clips)
         except AnimError as error:
-            if len(inputs or ()) < 2:
+            if len(inputs or ()) < 2 and (format is Format.TEXT or not isinstance(error, FormatError)):
                 raise
-            worst = max(worst, errors.reported(error))
+            inspected, tracks_of_clips = _unreadable(path, error), ()
+        done.append(inspected)
+        smooth.append(tracks_of_clips)
+        refused += [_named(fault, inspected[0]) for fault in inspected[2].faults[:1]]
     if format is Format.JSON:
         streams.write_text(_json(done, smooth))
     elif format is Format.CSV:
-        if continuity:
-            from cli import smoothness
-
-            header, rows = smoothness.rows(done, smooth)
-        else:
-            header, rows = inspection.track_rows(done) if tracks else inspection.clip_rows(done)
-        streams.write_text(tables.comma_separated(header, rows))
-    else:
+        streams.write_text(_csv(done, smooth, tracks=tracks, continuity=continuity))
+    elif not quiet:
         for i, (name, size, facts) in enumerate(done):
             page = inspection.page(name, size, facts, smooth[i], tracks=tracks)
             streams.write_text(("\n" if i else "") + page)
+    worst = max(map(errors.reported, refused), default=errors.DONE)
     if fail_on is not None:
         _check(done, fail_on)
     return worst
+
+
+def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, continuity: bool) -> str:
+    """One table: rows of clips or tracks, and a row for the first fault of each file that has one."""
+    if continuity:
+        from cli import smoothness
+
+        header, rows = smoothness.rows(done, smooth)
+    else:
+        header, rows = inspection.track_rows(done) if tracks else inspection.clip_rows(done)
+    filled: list[list[tables.Cell]] = [[*row, ""] for row in rows]
+    empty = [""] * (len(header) - 1)
+    filled += [[name, *empty, str(facts.faults[0])] for name, _, facts in done if facts.faults]
+    return tables.comma_separated([*header, "error"], filled)
+
+
+def _unreadable(path: str, error: AnimError) -> Inspected:
+    """What is known of a file of which nothing can be read."""
+    name = streams.called(path)
+    fault = copy(error)
+    fault.where = fault.where.removeprefix(name).removeprefix(": ")
+    facts = Facts(
+        generator="",
+        extensions_used=(),
+        nodes=0,
+        meshes=0,
+        vertices=None,
+        animation_data_bytes=0,
+        animation_stored_bytes=0,
+        animation_json_bytes=0,
+        clips=(),
+        skins=(),
+        findings=tuple(findings.of_faults([fault])),
+        faults=(fault,),
+    )
+    return name, 0, facts
+
+
+def _named(fault: AnimError, name: str) -> AnimError:
+    return copy(fault).at(name, ": ")
 
 
 def _check(done: list[Inspected], limit: Severity) -> None:
@@ -101,7 +142,7 @@ def _check(done: list[Inspected], limit: Severity) -> None:
         (name, each)
         for name, _, facts in done
         for each in facts.findings
-        if order.index(each.severity) <= order.index(limit)
+        if each.name != findings.INVALID and order.index(each.severity) <= order.index(limit)
     ]
     if bad:
         name, first = bad[0]
@@ -110,22 +151,44 @@ def _check(done: list[Inspected], limit: Severity) -> None:
 
 
 def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:
-    with streams.source(path) as source:
-        chosen = selection.chosen_clips(read.names(source.document)) if selection.clips else None
-        facts = facts_of(source.document, file_bytes=source.size, chosen=chosen, tracks=tracks)
+    opener = _Opener()
+    with streams.source(path, Voice(quiet=True), opener.open) as source:
+        document = source.document
+        chosen = selection.chosen_clips(read.names(document)) if selection.clips else None
+        facts = facts_of(document, file_bytes=source.size, chosen=chosen, tracks=tracks, broken=opener.broken)
         lost = (
-            Finding("missing-file", Severity.WARNING, *each, LOST)
-            for each in streams.missing(source.document, source.folder)
+            Finding("missing-file", Severity.WARNING, *each, LOST) for each in streams.missing(document, source.folder)
         )
         facts = replace(facts, findings=(*facts.findings, *lost))
-        smooth = _smooth(source.document, facts) if continuity else ()
+        smooth = _smooth(document, facts) if continuity else ()
         return (source.name, source.size, facts), smooth
+
+
+class _Opener:
+    """Opens a document, or what is left of one. broken: what is wrong with it."""
+
+    def __init__(self) -> None:
+        self.broken: Broken | None = None
+
+    def open(self, data: Bytes, resolve: container.Resolve | None) -> Document:
+        """Return the document in `data`, as far as it can be read."""
+        self.broken = None
+        try:
+            document = container.read(data, resolve)
+            read.skeleton(document)
+        except AnimError as refusal:
+            self.broken = read_broken(data, resolve, refusal)
+            return self.broken.document
+        if faults := unread_buffers(document):
+            self.broken = Broken(document, faults, frozenset(), frozenset())
+        return document
 
 
 def _smooth(document: Document, facts: Facts) -> Smoothness:
     from anim.measure.continuity import continuity
 
-    clips, skeleton = read.clips(document), read.skeleton(document)
+    clips, _ = read.readable_clips(document, Accessors(document))
+    skeleton = read.skeleton(document)
     return tuple(continuity(clips[each.index], skeleton) for each in facts.clips)
 
 
@@ -145,7 +208,9 @@ def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> No
 
 
 def _plain(facts: dict[str, Any]) -> dict[str, Any]:
-    """Facts as JSON holds them: a list of tracks only where one was asked for."""
+    """Facts as JSON holds them: a list of tracks only where one was asked for, and the first fault in words."""
+    faults = facts.pop("faults")
+    facts["error"] = str(faults[0]) if faults else None
     for clip in facts["clips"]:
         listed = clip.pop("track_list")
         if listed:

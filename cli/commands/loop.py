@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
+from anim.errors import AnimError
 from anim.gltf import read
-from anim.measure.loop import Loop, LoopKind, best_ranges
-from anim.measure.loop import loop as judged
+from anim.measure.loop import Loop, LoopKind, best_ranges, judge
+from anim.measure.loop_advice import advice
+from anim.measure.seam import SkinMotion
 from anim.measure.travel import traveling_root
-from anim.model import Clip, Skeleton
+from anim.model import Clip, Scene
 from anim.ops import loop as closing
 from anim.ops.selection import Selection
-from cli import options, streams, tables
+from cli import options, scenes, streams, tables
 from cli.edit import edit
 from cli.errors import UsageError
 from cli.options import Format
 from cli.report import Voice, length, speed
 
 SCHEMA = 1
+HELP = "--blend S closes over the last S seconds; --clip leaves others alone"
+MAX_NAMES = 3  # joints that a table or a message lists
 
 
 def loop(
@@ -47,64 +52,125 @@ def loop(
 ) -> None:
     """Say what kind of loop a clip is, and close it.
 
-    Without OUT and --blend: a report per clip: closed, open by one frame (its last frame is missing) or not a loop, and
-    the seam in pose and in speed, with the way of a traveling root taken off. With OUT: an open loop gets its missing
-    frame; --blend closes any seam in value and speed over the last seconds. --find looks for the best part: trim it.
+    Without OUT and --blend: a report per clip: closed; closed except some joints, which are named; open by one frame
+    (its last frame is missing); not a loop; or a single pose. The seam in pose and in speed is measured on the skin,
+    with the way of a traveling root taken off; nodes that move no vertex, like IK controls, don't count. "per frame"
+    and "inside" are the largest motion and the largest change of speed from one frame to the next inside the clip: a
+    seam that is much smaller is hardly seen. With OUT: an open loop gets its missing frame; --blend closes any seam in
+    value and speed over the last seconds; where only some joints stay open, it bends these and leaves all others as
+    they are. --find looks for the best part: trim it.
     """
     selection = Selection(clip or ())
+    voice = Voice(quiet, verbose)
     if output is None and blend is None:
-        _report(input, selection, find=find, shortest=shortest, format=format)
+        _report(input, selection, voice, find=find, shortest=shortest, format=format)
         return
     if find:
         raise UsageError("--find only reports", help="trim --from … --to … the part that it names")
-    edit(
-        input,
-        output or streams.PIPE,
-        selection,
-        lambda each, tracks, skeleton: _closed(each, tracks, skeleton, blend),
-        Voice(quiet, verbose),
-        dry_run=dry_run,
-    )
+    closing_of = _Closing(blend, input)
+    edit(input, output or streams.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
 
 
-def _closed(clip: Clip, tracks: frozenset[int], skeleton: Skeleton, blend: float | None) -> Clip:
-    root = traveling_root(skeleton, clip)
-    found = judged(skeleton, clip, root=root)
+class _Closing:
+    """Closes one clip after the other; blend: s, None to add a missing frame only. path: of the input, for messages.
+
+    Clips that can't be closed are collected, so that all of them are named before anything is written.
+    """
+
+    def __init__(self, blend: float | None, path: str) -> None:
+        self._blend = blend
+        self._path = "stdin" if path == streams.PIPE else path
+        self._skin: SkinMotion | None = None
+        self._problems: list[str] = []
+        self._poses: list[str] = []
+
+    def __call__(self, clip: Clip, tracks: frozenset[int], scene: Callable[[], Scene]) -> Clip:
+        name = f"clip '{clip.name}'" if clip.name else "a clip without a name"
+        if clip.end <= clip.start:
+            self._poses.append(name)
+            return clip
+        self._skin = self._skin or SkinMotion(scene())
+        try:
+            return _closed(clip, tracks, self._skin, self._blend)
+        except UsageError as error:
+            self._problems.append(f"{name} {error}")
+            return clip
+
+    def notes(self, before: Mapping[int, Clip], after: Mapping[int, Clip]) -> Iterator[str]:
+        """Yield what was left alone. Raises UsageError that names every clip that can't be closed."""
+        if self._problems:
+            raise UsageError(f"{self._path}: {'; '.join(self._problems)}", help=HELP)
+        if self._poses:
+            yield f"a single pose, with nothing to close: {', '.join(self._poses)}"
+
+
+def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float | None) -> Clip:
+    root = traveling_root(skin.skeleton, clip)
+    found = judge(skin, clip, root=root)
     if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
         clip = closing.with_last_frame(clip, fps=found.fps, tracks=tracks)
-    elif found.kind is LoopKind.NOT_A_LOOP and blend is None:
-        problem = f"is not a loop: its end is {length(found.seam)} from its start at '{found.node}'"
-        raise UsageError(problem, help="--blend S closes it over its last S seconds")
+    elif found.kind is not LoopKind.CLOSED and blend is None:
+        raise UsageError(_problem(found), help=HELP)
     if blend is None:
         return clip
+    if found.kind is LoopKind.CLOSED_EXCEPT:
+        tracks &= closing.open_tracks(clip)
     carried = {i for i, track in enumerate(clip.tracks) if track.node == root and track.path == "translation"}
     return closing.loop(clip, blend=blend, tracks=tracks - carried)
 
 
-def _report(path: str, selection: Selection, *, find: bool, shortest: float | None, format: Format) -> None:
-    with streams.source(path) as source:
-        clips, skeleton = read.clips(source.document), read.skeleton(source.document)
+def _problem(found: Loop) -> str:
+    if found.kind is LoopKind.CLOSED_EXCEPT:
+        return f"closes except at {_names(found, quote=True)}: its end is {length(found.seam)} from its start"
+    return f"is not a loop: its end is {length(found.seam)} from its start at '{found.node}'"
+
+
+def _report(
+    path: str, selection: Selection, voice: Voice, *, find: bool, shortest: float | None, format: Format
+) -> None:
+    with streams.source(path, voice) as source:
+        clips = read.clips(source.document)
+        chosen = selection.chosen_clips(read.names(source.document))
+        skin, is_nodes = _skin(source, voice)
         rows: list[tuple[str, Loop]] = []
-        for i in selection.chosen_clips(read.names(source.document)):
-            root = traveling_root(skeleton, clips[i])
-            name = clips[i].name or f"#{i}"
+        judged: list[tuple[int, Loop]] = []
+        for i in chosen:
+            root = traveling_root(skin.skeleton, clips[i])
+            name = read.clip_name(clips[i].name, i)
             if find:
-                rows += [(name, r) for r in best_ranges(skeleton, clips[i], root=root, shortest=shortest or 0.0)]
+                rows += [(name, r) for r in best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)]
             else:
-                rows.append((name, judged(skeleton, clips[i], root=root)))
-    streams.write_text(_json(rows) if format is Format.JSON else _text(rows))
+                judged.append((i, judge(skin, clips[i], root=root)))
+                rows.append((name, judged[-1][1]))
+    advised = list(advice(judged))
+    if format is Format.JSON:
+        streams.write_text(_json(rows, advised, is_nodes=is_nodes, warnings=voice.warnings))
+    elif not voice.quiet:
+        streams.write_text(_text(rows) + "".join(f"\n  {line}" for line in advised) + ("\n" if advised else ""))
+
+
+def _skin(source: streams.Source, voice: Voice) -> tuple[SkinMotion, bool]:
+    """Where seams are measured, and whether that is only at nodes: where vertices can't be read."""
+    try:
+        return SkinMotion(scenes.scene(source.document, source.name, voice)), False
+    except AnimError as error:
+        hint = f" ({error.help})" if error.help else ""
+        voice.warn(f"measured at nodes, not on the skin: {error}{hint}")
+        return SkinMotion(Scene(read.skeleton(source.document), ())), True
 
 
 def _text(rows: list[tuple[str, Loop]]) -> str:
-    header = ["clip", "seconds", "kind", "seam", "in speed", "at", "travel"]
+    header = ["clip", "seconds", "kind", "seam", "per frame", "in speed", "inside", "at", "travel"]
     cells: list[list[tables.Cell]] = [
         [
             name,
             f"{each.start:.4g}–{each.end:.4g}",
             str(each.kind),
             length(each.seam),
+            length(each.inside.largest),
             speed(each.speed_seam),
-            each.node,
+            speed(each.inside.speed),
+            _names(each) if each.kind is LoopKind.CLOSED_EXCEPT else each.node,
             length(each.travel) if each.travel else "",
         ]
         for name, each in rows
@@ -112,8 +178,24 @@ def _text(rows: list[tuple[str, Loop]]) -> str:
     return tables.text(header, cells, left=3, indent="")
 
 
-def _json(rows: list[tuple[str, Loop]]) -> str:
+def _names(found: Loop, *, quote: bool = False) -> str:
+    """The joints that stay open, the largest gap first."""
+    names = [f"'{each.joint}'" if quote else each.joint for each in found.joints]
+    more = len(names) - MAX_NAMES
+    return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _json(rows: list[tuple[str, Loop]], advised: list[str], *, is_nodes: bool, warnings: list[str]) -> str:
     units = {"start": "start_s", "end": "end_s", "seam": "seam_m", "speed_seam": "speed_seam_m_per_s"}
-    units |= {"frame": "frame_motion_m", "travel": "travel_m", "fps": "frame_rate_fps"}
-    loops = [{"clip": name, **{units.get(k, k): v for k, v in asdict(each).items()}} for name, each in rows]
-    return json.dumps({"schema": SCHEMA, "loops": loops}, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    units |= {"frame": "frame_motion_m", "travel": "travel_m", "fps": "frame_rate_fps", "joints": "open_joints"}
+    loops = []
+    for name, each in rows:
+        facts = asdict(each) | {"joints": [{"joint": one.joint, "gap_m": one.gap} for one in each.joints]}
+        facts["largest_frame_motion_m"] = each.inside.largest
+        facts["typical_frame_motion_m"] = each.inside.typical
+        facts["largest_speed_change_m_per_s"] = each.inside.speed
+        del facts["inside"]
+        loops.append({"clip": name, **{units.get(key, key): value for key, value in facts.items()}})
+    report: dict[str, object] = {"schema": SCHEMA, "measured_on": "nodes" if is_nodes else "skin", "loops": loops}
+    report |= {"advice": advised, "warnings": warnings}
+    return json.dumps(report, allow_nan=False, ensure_ascii=False, indent=1) + "\n"

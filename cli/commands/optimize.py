@@ -10,10 +10,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from anim.measure.surface import measured_at
 from anim.optimize.limits import EFFORTS, Drop, Objective, Packing, Policy, Reference
 from anim.optimize.optimize import Optimized
 from anim.optimize.request import Request
-from anim.optimize.tradeoff import curve
+from anim.optimize.tradeoff import MOST, SHARES, curve
 from anim.optimize.verify import PLAYERS
 from cli import optimization, optimize_request, options, streams
 from cli.edit import note_images
@@ -110,7 +111,11 @@ def optimize(
     ] = None,
     curve_file: Annotated[
         str | None,
-        typer.Option("--curve", metavar="FILE", help="Size against error as .csv, .png or .svg; writes no glTF then."),
+        typer.Option(
+            "--curve",
+            metavar="FILE",
+            help="Animation bytes of all clips against error as .csv, .png or .svg; writes no glTF then.",
+        ),
     ] = None,
     clip: options.Clips = None,
     dry_run: options.DryRun = False,
@@ -122,8 +127,9 @@ def optimize(
     The bound is kept on every skinned and morphed vertex at every time, in players that slerp and in those that mix
     quaternions by components, and it is measured on the bytes that are written. A clip for which no lossy way keeps all
     bounds is kept without loss. Exit 6, and nothing written: --max-bytes can't be met, or what would be written fails
-    its measurement. Start and end of each clip stay exact; every clip stays; STEP stays STEP. Channels that do nothing
-    go, constants become one key, equal data is shared, keys and time axes are chosen together, rotations become int16.
+    its measurement. Every clip stays, with its exact start and end time; its poses there are within the bound, as at
+    all times; loops that are closed stay closed, to the bit. STEP stays STEP. Channels that do nothing go, constants
+    become one key, equal data is shared, keys and time axes are chosen together, rotations become int16.
     The same command on its own output changes nothing; another bound counts from there, and errors add up.
     """
     began = time.perf_counter()
@@ -132,7 +138,7 @@ def optimize(
     _check_outputs(input, output, report, curve_file, dry_run=dry_run)
     if curve_file is not None and (max_bytes is not None or report is not None):
         raise UsageError("--curve goes with neither --max-bytes nor --report")
-    with streams.source(input) as source:
+    with streams.source(input, voice) as source:
         work = job(source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice)
         said = {
             "max_error": optimize_request.MAX_ERROR if max_error is None else max_error,
@@ -142,8 +148,8 @@ def optimize(
             "max_speed_error": max_speed_error,
         }
         bounds = optimize_request.bounds(work.scene, said)
-        for note in optimize_request.notes(said):
-            voice.say(note)
+        for words in optimize_request.notes(said):
+            voice.warn(words)
         request = Request(
             bounds,
             Policy(drop, reference, rebase_rest, drop_invisible, optimize_request.kept(keep_node or (), work.scene)),
@@ -171,21 +177,24 @@ def optimize(
 def _written(work: Job, request: Request, found: Optimized, began: float, *, dry_run: bool) -> optimization.About:
     """Write what was found, and return all there is to say of it."""
     source, result = work.source, work.smaller(found)
-    size = streams.write(result, work.output, source.folder, dry_run=dry_run)
+    size = streams.write(result, work.output, source, dry_run=dry_run)
     name = source.name if work.output == streams.PIPE else work.output
     seconds = time.perf_counter() - began
+    place = measured_at(work.scene)
     return optimization.About(
-        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds
+        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, place
     )
 
 
 def _say(about: optimization.About, voice: Voice, report: str | None, *, dry_run: bool) -> None:
     for line in optimization.lines(about, dry_run=dry_run):
         voice.say(line)
+    for words in optimization.warnings(about):
+        voice.warn(words)
     for line in optimization.details(about) if voice.verbose else ():
         voice.detail(line)
     if report is not None and (report == streams.PIPE or not dry_run):
-        streams.write_text(optimization.as_json(about), report)
+        streams.write_text(optimization.as_json(about, warnings=voice.warnings), report)
 
 
 def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
@@ -213,7 +222,8 @@ def _check_report(report: str, input: str, output: str) -> None:
 
 def _draw_curve(work: Job, request: Request, path: str, voice: Voice, *, dry_run: bool) -> None:
     sizes = []
-    for sized in curve(work.scale, lambda max_error: work.sized(request, max_error)):
+    bounds = (0.0, *SHARES, MOST)  # also what is kept without loss, and the least that any bound leaves
+    for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
         voice.say(optimization.curve_line(sized, work.scale))
         sizes.append(sized)
     if dry_run:
@@ -224,5 +234,6 @@ def _draw_curve(work: Job, request: Request, path: str, voice: Voice, *, dry_run
     else:
         from anim.show.tradeoff import tradeoff as picture
 
-        drawn = picture(sizes, work.scale, title=PurePath(work.source.name).name, kind=kind)
+        title, source = PurePath(work.source.name).name, optimization.cost(work.source.document)
+        drawn = picture(sizes, work.scale, title=title, kind=kind, source=source)
         streams.write_bytes([np.frombuffer(drawn, np.uint8)], path)

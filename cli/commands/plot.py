@@ -11,11 +11,13 @@ import typer
 
 from anim.arrays import Floats
 from anim.curves.easing import parse
+from anim.maths.euler import check_order
 from anim.ops.selection import Selection
 from anim.show import plot as tracks
 from anim.show.chosen import Chosen, choose
 from anim.show.chosen import compare as compared
 from anim.show.eases import eases
+from anim.show.rotations import COMPONENTS, FROM_REST
 from anim.show.through import through as curves_through
 from cli import options, streams
 from cli.errors import UsageError
@@ -56,6 +58,17 @@ def plot(
     format: Annotated[
         Format | None, typer.Option("--format", help="Default: by OUT's ending, else png.", show_default=False)
     ] = None,
+    euler: Annotated[
+        str | None,
+        typer.Option(
+            "--euler",
+            metavar="ORDER",
+            help="Rotations as Euler angles (XYZ, ZXY …, intrinsic), and how near gimbal lock is.",
+        ),
+    ] = None,
+    components: Annotated[
+        bool, typer.Option("--components", help="Rotations as x, y, z, w of their quaternions, with tangent handles.")
+    ] = False,
     limit: Annotated[int, typer.Option("--limit", metavar="N", help="At most so many tracks.")] = tracks.LIMIT,
     clip: options.Clips = None,
     node: options.Nodes = None,
@@ -64,9 +77,10 @@ def plot(
 ) -> None:
     """See the curves of tracks, of eases, and of tangent rules.
 
-    Tracks: values with their keys and tangent handles, and the speed below; a rotation also as the angle from its first
-    key. Tracks that never move are left out where others do. --compare draws a second file over the first, matched by
-    clip, node and path, and how far they are apart.
+    Tracks: values with their keys and tangent handles, and the speed below; rotations in degrees about the joint's own
+    axes from the rest pose, and the whole angle. --euler ZXY shows what an animator's curves of that order would be,
+    and the distance to gimbal lock: near 0 the first and third angle race. Tracks that never move are left out where
+    others do. --compare draws a second file over the first, matched by clip, node and path, and how far they are apart.
 
     --ease draws eases side by side: f(t), f′(t), and the tempo as evenly timed dots. --through draws curves through
     values, one second apart unless given as time:value, with their overshoot, and says how smooth each rule is.
@@ -78,8 +92,14 @@ def plot(
     if tangents and through is None:
         raise UsageError("--tangents needs --through (expected values for the curve to go through)")
     alone = bool(ease) or through is not None
-    if alone and (compare is not None or clip or node or path):
-        raise UsageError("--clip, --node, --path and --compare need tracks, but --ease and --through read no file")
+    if alone and (compare is not None or clip or node or path or euler or components):
+        raise UsageError(
+            "--clip, --node, --path, --compare, --euler and --components need tracks, "
+            "but --ease and --through read no file"
+        )
+    if euler is not None and components:
+        raise UsageError("--euler and --components exclude each other")
+    view = COMPONENTS if components else FROM_REST if euler is None else check_order(euler)
     source, output = _places(files or [], alone=alone)
     kind = _format(format, output)
     streams.check_output(output)
@@ -89,7 +109,7 @@ def plot(
         times, values = _keys(through)
         picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
     else:
-        picture = _tracks(source, Selection(clip or (), node or (), path or ()), compare, kind, limit, voice)
+        picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
     streams.write_bytes([np.frombuffer(picture, np.uint8)], output)
     if output != streams.PIPE:
         voice.say(f"{output}  {size(len(picture))}")
@@ -130,16 +150,18 @@ def _keys(text: str) -> tuple[Floats, Floats]:
     return times, values
 
 
-def _tracks(source: str, selection: Selection, other: str | None, kind: str, limit: int, voice: Voice) -> bytes:
+def _tracks(
+    source: str, selection: Selection, view: str, other: str | None, kind: str, limit: int, voice: Voice
+) -> bytes:
     if limit < 1:
         raise UsageError(f"--limit is {limit} (expected 1 or more)")
     if source == other == streams.PIPE:
         raise UsageError("IN and --compare can't both be stdin")
     names = None
-    with streams.source(source) as opened:
-        chosen, name = choose(opened.document, selection, limit=limit), opened.name
+    with streams.source(source, voice) as opened:
+        chosen, name = choose(opened.document, selection, limit=limit, view=view), opened.name
     if other is not None:
-        with streams.source(other) as opened:
+        with streams.source(other, voice) as opened:
             chosen, alone = compared(chosen, opened.document)
         names = tracks.Names(PurePath(name).name, PurePath(opened.name).name)
         if alone:

@@ -26,8 +26,9 @@ from anim.show import filmstrip, image_file, shots
 from anim.show.camera import AZIMUTH, ELEVATION
 from anim.show.filmstrip import HEIGHT, Look
 from anim.show.shots import Shot, When
-from cli import cache_files, options, report, streams
+from cli import cache_files, meshes, options, report, scenes, streams
 from cli.errors import UsageError
+from cli.first_run import announce_compiling
 from cli.skinning_methods import Method
 
 ENDINGS = (".png", *image_file.MOVING)
@@ -67,6 +68,21 @@ def render(
     heat: Annotated[
         bool, typer.Option("--heat", help="Color the distance to the first method; of one method, to the rest pose.")
     ] = False,
+    checker: Annotated[
+        bool,
+        typer.Option("--checker", help="Draw squares that are fixed to the rest pose: they show twist and stretch."),
+    ] = False,
+    wire: Annotated[bool, typer.Option("--wire", help="Draw the edges of the triangles.")] = False,
+    mesh: meshes.Meshes = None,
+    hide: meshes.Hidden = None,
+    follow: Annotated[
+        bool | None,
+        typer.Option(
+            "--follow/--no-follow",
+            help="Whether the camera goes with the figure. Default: where that travels farther than its own size.",
+            show_default=False,
+        ),
+    ] = None,
     size: Annotated[int, typer.Option("--size", metavar="PX", help="Height of a frame.", min=32, max=4096)] = HEIGHT,
     azimuth: Annotated[
         float, typer.Option("--azimuth", metavar="DEG", help="Camera: from the front (+Z) toward +X.")
@@ -78,9 +94,10 @@ def render(
 ) -> None:
     """Draw a clip as a filmstrip, or as a moving .webp, .gif or .apng.
 
-    Meshes are skinned and flat-shaded under one camera framed on the whole motion; a skeleton without a mesh is drawn
-    as sticks. Several methods come side by side, several clips in rows; without --clip it is the first one. .gif, .webp
-    and .apng need the extra plot; a .png needs nothing.
+    Meshes are skinned and flat-shaded under one camera framed on the whole motion, on a ground under the feet; a
+    skeleton without a mesh is drawn as sticks. Where a figure travels, the camera goes along, and the distance stands
+    beside the time. Several clips come one under the other, several methods in rows of each; side by side in a film.
+    Without --clip it is the first one. .gif, .webp and .apng need the extra plot; a .png needs nothing.
     """
     voice = report.Voice(quiet)
     began = time.perf_counter()
@@ -90,33 +107,34 @@ def render(
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
     when = When(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
-    notes: list[str] = []
-    with _opened(input, notes) as (seen, name):
+    with _opened(input, voice) as (seen, name):
         if isinstance(seen, VertexCache):
-            if clip or method:
-                raise UsageError(f"--{'clip' if clip else 'method'} means nothing to a vertex cache")
+            given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide}
+            if unknown := next((name for name, value in given.items() if value), None):
+                raise UsageError(f"--{unknown} means nothing to a vertex cache")
             found = shots.of_cache(seen, when)
         else:
             names = read.names(seen)
             numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
             if is_moving and count is not None and count > 1 and len(numbers) > 1:
                 when = _one_rate(seen, numbers, when)
-            found = shots.of_document(seen, numbers, [str(each) for each in method or ()], when)
-        rows, around = shots.rows(found, heated=heat)
+            announce_compiling(voice)
+            scene = scenes.scene(seen, name, voice, nodes=lambda scene: meshes.shown(scene, mesh, hide))
+            nodes = meshes.shown(scene, mesh, hide)
+            found = shots.of_document(seen, numbers, [str(each) for each in method or ()], when, nodes=nodes)
+        rows, extent = shots.rows(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
-        look = Look(size, azimuth, elevation)
+        look = Look(size, azimuth, elevation, checker, wire)
         if is_moving:
             times = filmstrip.film_times(rows)
-            pictures = filmstrip.moving(rows, around, title=title, look=look)
+            pictures = filmstrip.moving(rows, extent, title=title, look=look)
             drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(times))
         else:
-            drawn = image_file.png(filmstrip.filmstrip(rows, around, title=title, look=look))
+            drawn = image_file.png(filmstrip.filmstrip(rows, extent, title=title, look=look))
     streams.write_bytes([np.frombuffer(drawn, np.uint8)], output)
-    for note in notes:
-        voice.say(f"note: {note}")
     frames = report.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == streams.PIPE else output
-    voice.say(f"{called}  {report.size(len(drawn))}, {frames}, {time.perf_counter() - began:.1f} s")
+    voice.say(f"{called}  {report.size(len(drawn))}, {frames}, {report.took(time.perf_counter() - began)}")
 
 
 def _ending(output: str) -> str:
@@ -130,29 +148,31 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, notes: list[str]) -> Iterator[tuple[Document | VertexCache, str]]:
+def _opened(path: str, voice: report.Voice) -> Iterator[tuple[Document | VertexCache, str]]:
     """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes.
 
-    notes: gets what readers say.
+    voice: says what readers found.
     """
     if path != streams.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
         with cache_files.load(path, Reading()) as loaded:
-            notes += loaded.notes
+            for words in loaded.notes:
+                voice.warn(words)
             yield loaded.cache, loaded.name
     elif path != streams.PIPE:
-        with streams.source(path) as source:
+        with streams.source(path, voice) as source:
             yield glb.pages(source.document) or source.document, source.name
     else:
         with streams.content(path) as (data, name):
             head = data[:HEAD].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data)
+                streams.note_mended(document, name, voice)
                 yield glb.pages(document) or document, name
             else:
                 ending = ending_of(head, len(data))
                 cache_files.check_pipe(name, ending)
                 reader = reader_for(ending)
-                yield reader(Memory(name, {name: data.tobytes()}), Reading(note=notes.append)), name
+                yield reader(Memory(name, {name: data.tobytes()}), Reading(note=voice.warn)), name
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from anim.curves.easing import parse
-from anim.model import Clip, Skeleton
+from anim.model import Clip
 from anim.ops.retime import retime as retimed
 from anim.ops.selection import Selection
 from anim.ops.warp import warp
@@ -49,7 +49,7 @@ def retime(
         raise UsageError("nothing to do", help="give --speed, --duration, --reverse, --ping-pong, --warp or --offset")
     easing = parse(warp_ease) if warp_ease is not None else None
 
-    def change(each: Clip, tracks: frozenset[int], _: Skeleton) -> Clip:
+    def change(each: Clip, tracks: frozenset[int], _: object) -> Clip:
         if easing is not None and each.end > each.start:
             each = warp(each, easing=easing, tracks=tracks)
         return retimed(

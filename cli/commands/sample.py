@@ -21,6 +21,7 @@ from anim.sampling.sample import sample as sampled
 from anim.sampling.times import grid
 from cli import options, streams, tables
 from cli.errors import UsageError
+from cli.report import Voice
 
 SCHEMA = 1
 
@@ -59,6 +60,7 @@ def sample(
     ] = None,
     clip: options.Clips = None,
     node: options.Nodes = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Give the pose of every node at chosen times: for scripts and plots.
 
@@ -73,7 +75,7 @@ def sample(
     chosen_format = format or _format_of(output)
     if output != streams.PIPE:
         streams.check_file(output)
-    with streams.source(input) as source:
+    with streams.source(input, Voice(quiet)) as source:
         document = source.document
         selection = Selection(clip or (), node or ())
         clips, skeleton = read.clips(document), read.skeleton(document)
@@ -139,7 +141,9 @@ def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], _: Space) -> str:
     for number, clip, poses in taken:
         joined = np.concatenate((poses.translation, poses.rotation, poses.scale), axis=2)
         for f, time in enumerate(_short(poses.times)):
-            rows += [[clip.name or str(number), time, i, skeleton.names[i], *_short(joined[f, i])] for i in nodes]
+            rows += [
+                [read.clip_name(clip.name, number), time, i, skeleton.names[i], *_short(joined[f, i])] for i in nodes
+            ]
     return tables.comma_separated(header, rows)
 
 

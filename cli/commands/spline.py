@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated
 
 import typer
 
 from anim.curves.tangents import DEFAULT, TANGENT_MAKERS, TANGENTS, parse
-from anim.model import Clip, Skeleton
+from anim.gltf import read
+from anim.model import Clip
 from anim.ops.selection import Selection
 from anim.ops.spline import departure
 from anim.ops.spline import spline as splined
 from cli import options, streams
-from cli.edit import edit
+from cli.edit import Clips, edit
 from cli.report import Voice
 
 
@@ -44,17 +46,28 @@ def spline(
     if list_rules:
         streams.write_text(_table())
         return
-    voice = Voice(quiet, verbose)
     rule = parse(tangents)
 
-    def change(each: Clip, tracks: frozenset[int], _: Skeleton) -> Clip:
-        new = splined(each, tangents=rule, cyclic=cyclic, tracks=tracks)
-        moved, turned = departure(each, new)
-        if moved or turned > 1e-6:
-            voice.say(f"note: clip '{each.name}': keys move by up to {moved:.3g} and {math.degrees(turned):.2g}°")
-        return new
+    def change(each: Clip, tracks: frozenset[int], _: object) -> Clip:
+        return splined(each, tangents=rule, cyclic=cyclic, tracks=tracks)
 
-    edit(input, output, Selection(clip or (), node or (), path or ()), change, voice, dry_run=dry_run)
+    selection = Selection(clip or (), node or (), path or ())
+    edit(input, output, selection, change, Voice(quiet, verbose), dry_run=dry_run, notes=_notes)
+
+
+def _notes(before: Clips, after: Clips) -> Iterator[str]:
+    """How far the curve passes keys by."""
+    found = {i: departure(old, after[i]) for i, old in before.items()}
+    found = {i: each for i, each in found.items() if each[0] or each[1] > SEEN}
+    if found:
+        moved, turned = (max(each[k] for each in found.values()) for k in range(2))
+        far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SEEN else []
+        far += [f"other values by up to {moved:.3g}"] if moved else []
+        where = read.labels([(before[i].name, i) for i in found])
+        yield f"{where}: the curve passes keys by, {', '.join(far)}; --tangents natural goes through them"
+
+
+SEEN = 1e-6  # rad; turns below come from rounding
 
 
 _ABOUT = {

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from anim.errors import NotFoundError, RangeError
+from anim.exchange.bind_pose import bind_pose, completed
 from anim.exchange.formats import TRACK_FORMATS, TrackFormat, of_path
 from anim.exchange.motion import Convention, EulerMotion, Unit
 from anim.exchange.orders import BEST, USUAL, Orders, parse
@@ -24,6 +25,7 @@ from cli import options, report, streams, units
 from cli.errors import UsageError
 
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
+LEAST_DEG = 1e-6  # degrees; below is what rounding leaves
 NOTABLE = math.radians(0.5)  # that straight curves may leave the motion by before a way out is named
 CENTIMETERS = 0.01  # m per unit of a BVH, unless told
 
@@ -66,8 +68,8 @@ def to_euler(
     """Write a clip as Euler curves that run on without jumps: BVH, or CSV or JSON curves.
 
     Every key gets the equivalent angles nearest to the key before, also through gimbal lock. BVH holds the joints of
-    the skins (or all nodes) as they stand in the rest pose, angles seen from there, frames on an even grid. CSV and
-    JSON hold every node's own angles, with its rest and its parent, and are what from-euler reads.
+    the skins (or all nodes) as they were bound, angles seen from there, frames on an even grid. CSV and JSON hold every
+    node's own angles, with its rest and its parent, and are what from-euler reads.
     """
     began = time.perf_counter()
     voice = report.Voice(quiet)
@@ -78,19 +80,24 @@ def to_euler(
     if output != streams.PIPE and not dry_run:
         streams.check_file(output)
     convention = Convention(USUAL if orders.otherwise == BEST else orders.otherwise, frame, unit)
-    with streams.source(input) as source:
+    with streams.source(input, voice) as source:
         chosen = _only(read.clips(source.document), clip)
-        motion, words = _motion(source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS)
+        motion, words, num_bound = _motion(
+            source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS
+        )
         data = kind.write(motion, convention)
     if not dry_run:
         streams.write_text(data.decode(), output)
+    if num_bound:
+        resting = f"{report.plural(num_bound, 'joint')} rest elsewhere in the file than the skin was bound"
+        voice.warn(f"{resting}: the bind pose is the rest of these curves")
     for note in motion.notes:
-        voice.say(f"note: {note}")
+        voice.warn(note)
     name = source.name if output == streams.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     voice.say(
         f"{name}  {report.change(source.size, len(data))}, {report.plural(len(motion.nodes), 'node')}, "
-        f"{words}{time.perf_counter() - began:.1f} s{ending}"
+        f"{words}{report.took(time.perf_counter() - began)}{ending}"
     )
 
 
@@ -132,7 +139,7 @@ def _check(kind: TrackFormat, unit: Unit, frame: Frame, scale: float | None, lim
 def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
     chosen = Selection(globs or ()).chosen_clips([each.name for each in clips])
     if len(chosen) != 1:
-        names = ", ".join(f"'{clips[i].name or i}'" for i in chosen[:8])
+        names = ", ".join(f"'{read.clip_name(clips[i].name, i)}'" for i in chosen[:8])
         raise NotFoundError(
             f"{report.plural(len(chosen), 'clip')} to choose from (expected one)",
             help=f"--clip one of {names}" if chosen else "",
@@ -149,12 +156,15 @@ def _motion(
     fps: float | None,
     limit: float | None,
     scale: float,
-) -> tuple[EulerMotion, str]:
-    """The motion to write, and words on what it lost."""
-    skeleton = read.skeleton(document)
+) -> tuple[EulerMotion, str, int]:
+    """The motion to write, words on what it lost, and how many joints rest elsewhere in the file."""
+    nodes = read.skeleton(document)
+    bound = bind_pose(nodes, read.skins(document))
+    skeleton = bound.skeleton
+    clip = completed(clip, nodes, skeleton)
     if kind is TRACK_FORMATS["bvh"]:
         joints = {joint for skin in items(document.json, "skins") for joint in skin["joints"]}
-        return to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale), ""
+        return to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale), "", bound.num_joints
     holders = {i for i, node in enumerate(items(document.json, "nodes")) if "skin" in node}
     found = curves_of(
         skeleton,
@@ -165,7 +175,11 @@ def _motion(
         tolerance=limit,
         without=holders,
     )
-    words = f"between keys off by up to {math.degrees(found.deviation):.2g}°, " if found.deviation else ""
+    words = (
+        f"between keys off by up to {math.degrees(found.deviation):.2g}°, "
+        if math.degrees(found.deviation) > LEAST_DEG
+        else ""
+    )
     if limit is None and found.deviation > NOTABLE:
         words = f"{words[:-2]} (--tolerance adds keys), "
-    return found.motion, words
+    return found.motion, words, bound.num_joints

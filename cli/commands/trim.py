@@ -20,7 +20,7 @@ def trim(
     *,
     start: options.From = None,
     end: options.To = None,
-    rebase: Annotated[bool, typer.Option("--rebase", help="Move the part to start at 0 s.")] = False,
+    rebase: Annotated[bool, typer.Option("--rebase", help="Move what is kept to start at 0 s.")] = False,
     clip: options.Clips = None,
     dry_run: options.DryRun = False,
     quiet: options.Quiet = False,
@@ -29,10 +29,11 @@ def trim(
     """Keep the part of a clip from --from to --to seconds.
 
     Keys in between stay as they are; new keys at both ends have exactly the value and tangent that the motion has
-    there. Without --rebase the part stays at its seconds: players hold its first pose until then.
+    there. Without --rebase the part stays at its seconds: players hold its first pose until then. --rebase alone cuts
+    nothing and moves clips that start late to 0 s.
     """
-    if start is None and end is None:
-        raise UsageError("nothing to cut", help="give --from, --to or both, in seconds")
+    if start is None and end is None and not rebase:
+        raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")
     edit(
         input,
         output,

@@ -87,3 +87,16 @@ def test_read_only_leaves_the_callers_array_alone() -> None:
         theirs[0] = 1
     mine[0] = 1
     assert arrays.read_only(theirs) is theirs
+
+
+@pytest.mark.parametrize("gate", [lambda mine: arrays.floats(mine, "K"), arrays.times])
+def test_later_writes_of_the_owner_change_nothing(gate: Any) -> None:
+    mine = np.arange(3.0)
+    found = gate(mine)
+    mine[:] = 9
+    assert found.tolist() == [0, 1, 2]
+
+
+def test_what_is_read_only_already_is_shared() -> None:
+    mine = arrays.read_only(np.arange(3.0))
+    assert arrays.floats(mine, "K") is mine

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import traceback
+
 import pytest
 
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, ShapeError, UnsupportedError
@@ -23,3 +25,9 @@ def test_the_tree_is_flat(kind: type[AnimError]) -> None:
     assert kind.__bases__ == (AnimError,)
     assert isinstance(kind("x").at("here"), kind)
     assert kind.__name__ in AnimError.__module__ or kind.__doc__
+
+
+def test_tracebacks_show_the_help() -> None:
+    error = FormatError("times not increasing", help="sort them").at("track 3")
+    assert "help: sort them" in "".join(traceback.format_exception(error))
+    assert not hasattr(FormatError("times not increasing"), "__notes__")

@@ -144,9 +144,8 @@ def test_a_rest_mesh_of_another_cache_is_said(walk: Path, call: Call) -> None:
     call("convert-cache", walk, out).product()
     assert "note" not in call("convert-cache", out, back).err
     call("convert-cache", walk, out, "--up", "z", "--rest", "none").product()
-    assert (
-        "note: 'a.pc2-rest.ply' is the rest mesh of another cache: left out\n" in call("convert-cache", out, back).err
-    )
+    said = call("convert-cache", out, back).err
+    assert "warning: 'a.pc2-rest.ply' is the rest mesh of another cache: left out\n" in said
 
 
 def test_directions_that_are_lost_are_said(tmp_path: Path, call: Call) -> None:
@@ -157,7 +156,7 @@ def test_directions_that_are_lost_are_said(tmp_path: Path, call: Call) -> None:
     assert "note: tangents are left out: ply has no place" in call("convert-cache", source, tmp_path / "a.ply").err
     assert "left out" not in call("convert-cache", source, played).err
     run = call("convert-cache", played, tmp_path / "b.npz")
-    assert "note: normals and tangents are not played (bake --normals or --tangents does that)\n" in run.err
+    assert "warning: normals and tangents are not played (bake --normals or --tangents does that)\n" in run.err
 
 
 def test_one_frame_of_any_format_reads_the_same_by_name_and_pipe(tmp_path: Path, call: Call) -> None:

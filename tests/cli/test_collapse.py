@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pygltflib import GLTF2
 
+from anim.gltf import read
+from anim.skinning.advice import Found
+from anim.skinning.collapse import collapse
+from cli.collapses import Seen, text
+from tests.anim.show.reading import words
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, refusal, shell
+from tests.clips import clip, track
+from tests.files import opened_fixture
 
 
 def test_a_table_with_advice(call: Call, fixture: Fixture) -> None:
@@ -63,9 +72,9 @@ def test_a_quarter_twist_pinches_by_its_volume(call: Call, fixture: Fixture) -> 
 
 def test_advice_follows_what_was_measured(call: Call, fixture: Fixture, asset: object) -> None:
     man = call("collapse", asset("CesiumMan.glb"), "--method", "lbs", "--method", "dqs", "--method", "cor").text  # type: ignore[operator]
-    assert "bake it with --method cor (" in man
+    assert "to bake it with cor (" in man
     assert "dqs bulges" not in man
-    assert man.endswith("see what --bulge-clamp makes of it\n")
+    assert man.endswith("--method cor --bulge-clamp --clip '#0'\n")
     arm = call("collapse", fixture("arm")).text
     assert "good enough" not in arm
     assert "1 clip pinches; worst 0.71 in 'twist'" in arm
@@ -76,7 +85,7 @@ def test_the_clamp(call: Call, fixture: Fixture) -> None:
     free = call("collapse", fixture("tube"), "--clip", "bend90", "--format", "json").json
     run = call("collapse", fixture("tube"), "--clip", "bend90", "--bulge-clamp")
     assert run.text.splitlines()[0].endswith("tube.glb: 1 clip, 1 skinned mesh; dqs with --bulge-clamp")
-    assert "bake it with --method dqs --bulge-clamp" in run.text
+    assert "gltf-anim bake IN OUT --method dqs --bulge-clamp --clip '#2'" in run.text
     held = call("collapse", fixture("tube"), "--clip", "bend90", "--bulge-clamp", "--format", "json").json
     assert held["bulge_clamp"] is True
     lbs, dqs = zip(*(each["clips"][0]["meshes"][0]["methods"] for each in (free, held)), strict=True)
@@ -129,12 +138,31 @@ def test_a_picture(ending: str, start: bytes, call: Call, fixture: Fixture, tmp_
     assert out.read_bytes() == once
 
 
+def test_clips_of_a_picture_have_one_scale(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    """A quarter turn leaves 67 % of the tube, a half turn 33 %: the lines of both are to be compared."""
+    call("collapse", fixture("tube"), "--plot", tmp_path / "a.svg").product()
+    said = words((tmp_path / "a.svg").read_bytes())
+    percents = {text for text in said if text.isdecimal() and int(text) > 1}
+    assert len(percents) > 1
+    assert min(map(int, percents)) <= 40
+    assert {said.count(text) for text in percents} == {3}
+
+
+def test_the_whole_is_100_percent() -> None:
+    inside_out = clip(track("scale", [0], [[-1, 1, 1]]))
+    (found,) = collapse(read.scene(opened_fixture("tube")), inside_out, times=np.zeros(1))
+    table = text(Seen("tube.glb", 1, ("lbs", "dqs"), False, 30, [Found(0, "mirrored", found)]), every=True)
+    assert "  100 %     100 %  0.00 s" in table
+    assert "e+" not in table
+
+
 def test_every_mesh_on_request(call: Call, asset: object) -> None:
     path = asset("Knight.glb")  # type: ignore[operator]
     short = call("collapse", path, "--clip", "Throw", "--fps", "10").text
     long = call("collapse", path, "--clip", "Throw", "--fps", "10", "-v").text
     assert "the worst mesh of each clip (-v: all)" in short
     assert len(long.splitlines()) == len(short.splitlines()) + 5
+    assert re.search(r"head\.001 +1\.00 .* s +head ", long), "one joint: no other, and no turn between them"
     only = call("collapse", path, "--clip", "Throw", "--fps", "10", "--mesh", "Cube.126").text
     assert ": 1 clip, 1 skinned mesh\n" in only
 

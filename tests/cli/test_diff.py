@@ -13,7 +13,8 @@ import pytest
 from anim.gltf import read, write
 from anim.gltf.document import Document
 from anim.model import Clip
-from tests.cli.conftest import Call, Fixture
+from tests.anim.show.reading import words
+from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
 from tests.clips import about, clip, track
 from tests.files import glb_of, opened_fixture, opened_path
@@ -146,6 +147,18 @@ def test_a_picture(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> Non
     assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 2)
 
 
+def test_a_picture_counts_what_it_leaves_out(asset: Find, tmp_path: Path, call: Call) -> None:
+    """Of Fox's three clips one is another."""
+    document = opened_path(asset("Fox.glb"))
+    clips = read.clips(document)
+    other = write.replace_clips(document, {1: replace(clips[1], tracks=clips[1].tracks[:-3])})
+    changed = _saved(tmp_path / "b.glb", other)
+    call("diff", asset("Fox.glb"), changed, "--plot", tmp_path / "e.svg", "-q").product()
+    said = words((tmp_path / "e.svg").read_bytes())
+    assert "1 clip that differs, 2 without difference" in said
+    assert sum("largest distance" in text for text in said) == 1
+
+
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
@@ -173,6 +186,10 @@ def test_files_without_clips_can_be_held_against_each_other(tmp_path: Path, call
     bare = replace(document, json={key: value for key, value in document.json.items() if key != "animations"})
     path = _saved(tmp_path / "bare.glb", bare)
     assert "no clips to compare" in call("diff", path, path).text
+    run = call("diff", path, path, "--fail-above", "1m")
+    assert (run.code, run.err) == (6, f"gltf-anim: {path}, {path}: no clips to compare\n")
+    full = _saved(tmp_path / "full.glb", document)
+    assert call("diff", path, full, "--fail-above", "1m", "-q").code == 6
     found = call("diff", path, path, "--format", "json").json
     assert (found["clips"], found["max_error_m"]) == ([], 0)
 
@@ -185,7 +202,7 @@ def test_strangers_are_called_that_before_anything_else(tmp_path: Path, call: Ca
     assert run.code == 0
     assert run.err == f"warning: {problem}: are they two versions of one thing?\n"
     assert run.text.startswith(f"{problem}: ")
-    assert call("diff", *paths, "-q").err == ""
+    assert call("diff", *paths, "-q").err == run.err
     found = call("diff", *paths, "--format", "json").json
     assert (found["clips_matched_by_name"], found["nodes_matched_by_name"]) == (0, 0)
     assert call("diff", *paths, "--fail-above", "1%").code == 6
@@ -217,22 +234,6 @@ def test_files_without_names_are_no_strangers(tmp_path: Path, call: Call) -> Non
         run = call("diff", other, nameless)
         assert run.err == ""
         assert "3 clips compared, max 0 mm" in run.text
-
-
-def test_hidden_vertices_leave_the_nodes(tmp_path: Path, call: Call) -> None:
-    """Draco hides vertices; the motion of nodes can be held against each other all the same."""
-    document = opened_fixture("biped")
-    meshes = [
-        {**mesh, "primitives": [{**p, "extensions": {"KHR_draco_mesh_compression": {}}} for p in mesh["primitives"]]}
-        for mesh in document.json["meshes"]
-    ]
-    hidden = replace(
-        document, json={**document.json, "meshes": meshes, "extensionsUsed": ["KHR_draco_mesh_compression"]}
-    )
-    paths = _saved(tmp_path / "a.glb", hidden), _saved(tmp_path / "b.glb", _lifted(hidden))
-    run = call("diff", *paths, "--format", "json")
-    assert run.json["max_error_m"] == pytest.approx(LIFT, rel=2e-3)
-    assert "measured at nodes, not on the surface" in run.err
 
 
 def _lifted(document: Document) -> Document:
@@ -271,3 +272,36 @@ def test_the_moment_before_a_key_counts(tmp_path: Path, call: Call) -> None:
     (three,) = call("diff", *paths, *options, "three").json["clips"]
     assert 0.4999 < three["time_s"] < 0.5
     assert three["max_error_m"] <= three["certified_error_m"] <= 1.01 * three["max_error_m"]
+
+
+def test_one_file_as_two_players_show_it(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    """A quarter turn in one piece: nlerp lags behind slerp, most where sin(uθ)/(sin(uθ)+sin((1-u)θ)) does."""
+    arm = fixture("arm")
+    found = call("diff", arm, "--players", "spec,nlerp", "--format", "json").json
+    assert found["player"] == "spec,nlerp"
+    u, half = np.linspace(0, 1, 100_001), np.radians(45)
+    chord = np.arctan2(u * np.sin(half), 1 - u + u * np.cos(half))
+    lag = np.degrees(2 * np.abs(chord - u * half).max())
+    assert {each["clip"]: each["max_angle_deg"] for each in found["clips"]} == pytest.approx(
+        {"twist": lag, "bend": lag}, rel=1e-3
+    )
+    assert all(each["certified_error_m"] is None for each in found["clips"])
+    assert call("diff", arm, "--players", "nlerp,spec", "--format", "json").json["max_error_m"] == pytest.approx(
+        found["max_error_m"], rel=1e-4
+    )
+    run = call("diff", arm, "--players", "spec,nlerp", "--plot", tmp_path / "p.svg")
+    assert "arm.glb, as spec and as nlerp show it" in run.text
+    assert "arm.glb: spec → nlerp" in words((tmp_path / "p.svg").read_bytes())
+
+
+@pytest.mark.parametrize(
+    ("args", "problem"),
+    [
+        ([], "B is missing"),
+        (["arm.glb", "--players", "spec,nlerp"], "--players is about one file"),
+        (["--players", "spec"], "expected two different ones"),
+        (["--players", "spec,unity"], "players are 'spec,unity'"),
+    ],
+)
+def test_players_that_can_t_be_compared(args: list[str], problem: str, fixture: Fixture, call: Call) -> None:
+    assert problem in refusal(call("diff", fixture("arm"), *args), 2)

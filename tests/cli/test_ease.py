@@ -6,7 +6,7 @@ import pytest
 
 from anim.curves.easing import EASINGS
 from anim.model import Interpolation
-from tests.cli.conftest import Call, Fixture
+from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
 from tests.files import clips_of
 
@@ -66,3 +66,17 @@ def test_refusals(call: Call, fixture: Fixture, options: list[str], words: str, 
     run = call("ease", fixture("biped"), *options)
     assert words in refusal(run, 2)
     assert hint in help_line(run) + run.err
+
+
+def test_tracks_that_stand_still_do_not_hide_that_keys_are_dense(call: Call, asset: Find) -> None:
+    """Most tracks of Knight's clips are constant, with a key at each end: what moves has one per frame."""
+    run = call("ease", asset("Knight.glb"), "-", "--clip", "Walking_A", "--dry-run")
+    assert (
+        "note: clip 'Walking_A': most keys are 33 ms apart; easing each such piece makes the motion stutter" in run.err
+    )
+
+
+def test_notes_are_said_once_for_all_clips(call: Call, asset: Find) -> None:
+    run = call("ease", asset("Fox.glb"), "-", "--dry-run", "--ease", "back-out")
+    assert run.err.count("stutter") == 1
+    assert run.err.startswith("note: clips 'Survey', 'Walk', 'Run': most keys are ")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from anim.exchange import bvh
 from anim.gltf import read
+from anim.measure.error import Ruler
 from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import Run, help_line, refusal, shell
@@ -77,7 +80,8 @@ def test_it_says_what_it_guessed(call: Call) -> None:
     assert "frame time 0.033333 s is taken for 1/30 s" in err
     assert "guessed: centimeters" in err
     assert "gimbal: 1 of 2 joints within 5° of lock; nearest 'knee'" in err
-    assert call("from-euler", "-", "-", "-q", stdin=SMALL).err == ""
+    quiet = call("from-euler", "-", "-", "-q", stdin=SMALL).err.splitlines()
+    assert [line.split(":")[0] for line in quiet] == ["warning"] * 2
 
 
 def test_scale_and_up(call: Call) -> None:
@@ -111,7 +115,7 @@ def test_a_body_without_a_size(call: Call) -> None:
 def test_an_order_in_small_letters_and_keys_before_zero(call: Call) -> None:
     early = CURVES.replace(b"\n0,", b"\n-0.04,")
     run = call("from-euler", "-", "-", "--order", "xyz", *XYZ[2:], stdin=early)
-    assert "note: the first key is at -0.04 s: all are moved by 0.04 s, to begin at 0" in run.err
+    assert "warning: the first key is at -0.04 s: all are moved by 0.04 s, to begin at 0" in run.err
     assert read.clips(opened(run.product()))[0].end == pytest.approx(1.04)
 
 
@@ -139,15 +143,61 @@ def test_onto_a_character(call: Call, asset: Find, fixture: Fixture) -> None:
     assert "LeftUpLeg → left_upper_leg" in run.err
 
 
+def test_without_legs_and_feet_the_path_is_by_height_and_nothing_is_floored(
+    call: Call, asset: Find, tmp_path: Path
+) -> None:
+    """The recorded person is 1.47 m tall, the character's nodes 1.20 m."""
+    text = asset("bvh/cmu_01_01.bvh").read_text()
+    for name in ("Hips", "HipJoint", "UpLeg", "Leg", "Foot", "ToeBase", "LowerBack"):
+        text = re.sub(rf"(ROOT|JOINT) (\w*){name}\b", r"\1 \2Unknown" + str(len(name)), text)
+    (tmp_path / "upper.bvh").write_text(text)
+    run = call("from-euler", tmp_path / "upper.bvh", "-", "--onto", asset("BitmojiRun.glb"))
+    run.product()
+    assert "legs, feet; the path is scaled by the sizes of both figures" in run.err
+    assert "for the floor" not in run.err
+    assert float(run.err.split("onto: path × ")[1].split()[0]) == pytest.approx(1.20 / 1.47, abs=0.01)
+
+
 def test_a_name_that_is_taken_gets_a_number(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     (tmp_path / "walk.bvh").write_bytes(SMALL)
     (tmp_path / "names.csv").write_text("hip,hips\n")
     onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
     run = call("from-euler", *onto)
     assert [clip.name for clip in read.clips(opened(run.product()))] == ["walk", "wave", "jump", "walk 2"]
-    assert "note: the character has a clip 'walk': this one is called 'walk 2'" in run.err
+    assert "warning: the character has a clip 'walk': this one is called 'walk 2'" in run.err
     told = call("from-euler", *onto, "--name", "walk")
     assert [clip.name for clip in read.clips(opened(told.product()))] == ["walk", "wave", "jump", "walk"]
+    assert "warning: a second clip 'walk': #3 beside #0, which players and diff find first (--replace '#0'" in told.err
+
+
+def test_a_clip_gives_way(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    (tmp_path / "walk.bvh").write_bytes(SMALL)
+    (tmp_path / "names.csv").write_text("hip,hips\n")
+    onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
+    by_name = call("from-euler", *onto, "--replace", "wave")
+    document = opened(by_name.product())
+    assert [clip.name for clip in read.clips(document)] == ["walk", "wave", "jump"]
+    assert read.clips(document)[1].end == pytest.approx(1 / 30)
+    assert "the character has a clip" not in by_name.err
+    assert call("from-euler", *onto, "--replace", "#1").out == by_name.out
+    assert call("from-euler", *onto, "--replace", "w*").code == 5
+    missing = call("from-euler", *onto, "--replace", "wavy")
+    assert (missing.code, "did you mean 'wave'?" in missing.err) == (5, True)
+    assert call("from-euler", *onto, "--replace", "wave", "--name", "hello").code == 2
+
+
+def test_what_a_bvh_does_not_hold_stays_when_the_clip_gives_way(call: Call, asset: Find, tmp_path: Path) -> None:
+    character = asset("BitmojiRun.glb")
+    call("to-euler", character, tmp_path / "run.bvh")
+    run = call("from-euler", tmp_path / "run.bvh", "-", "--onto", character, "--replace", "#0")
+    before, after = (read.clips(opened(data))[0] for data in (character.read_bytes(), run.product()))
+    now = {(track.node, track.path) for track in after.tracks}
+    moved = {(t.node, t.path) for t in before.tracks if np.ptp(t.values, axis=0).max() > 1e-4 and t.path != "scale"}
+    assert moved <= now
+    assert Ruler(read.scene(opened(run.product()))).error(before, after).max_error < 1e-4
+    assert "tracks of 'lbr_run_normal_anm_default' that the motion has no node for stay" in run.err
+    other = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", character, "--replace", "#0")
+    assert "that the motion has no node for go with it" in other.err
 
 
 def test_strangers_are_shown_how_to_pair(call: Call, asset: Find) -> None:
@@ -209,6 +259,7 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         (("--scale", "0"), SMALL, 2, "--scale is 0"),
         (("--fail-unmatched", "0"), SMALL, 2, "are about a character (--onto names it)"),
         (("--rest-at", "0"), SMALL, 2, "are about a character (--onto names it)"),
+        (("--replace", "walk"), SMALL, 2, "are about a character (--onto names it)"),
         (("--format", "json"), SMALL, 2, "both want stdout"),
         (("--onto", "-"), SMALL, 2, "SOURCE and --onto can't both be stdin"),
         ((*XYZ, "--bvh-position", "add"), CURVES, 2, "--bvh-position is about BVH"),
@@ -223,12 +274,12 @@ def test_refusals(call: Call, args: tuple[str, ...], data: bytes, code: int, wor
 def test_a_folder_is_refused_with_a_way_out(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     run = call("from-euler", tmp_path, "--dry-run")
     assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
-    assert help_line(run) == f"name the files: {tmp_path}/*.bvh"
+    assert help_line(run) == "name a file (there is no .bvh in it)"
     run = call("from-euler", "-", "--onto", fixture("biped"), "--alias", tmp_path, "--dry-run", stdin=SMALL)
     assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
-    assert help_line(run) == f"name the files: {tmp_path}/*.csv"
+    assert help_line(run) == "name a file (there is no .csv in it)"
     run = call("from-euler", "-", "--onto", tmp_path, "--dry-run", stdin=SMALL)
-    assert help_line(run) == f"name the files: {tmp_path}/*.glb"
+    assert help_line(run) == f"name a file in it, such as {tmp_path / 'biped.glb'}"
 
 
 def test_a_rest_pose_must_be_in_the_motion(call: Call, fixture: Fixture, asset: Find) -> None:
@@ -260,3 +311,15 @@ def test_in_a_shell_pipe(tmp_path: Path) -> None:
     )
     assert run.code == 0, run.err
     assert int(run.text) > 500
+
+
+@khronos.needs_validator
+def test_a_joint_with_a_matrix_is_taken_apart_when_it_gets_keys(call: Call, asset: Find, tmp_path: Path) -> None:
+    character, out = asset("RiggedSimple.gltf"), tmp_path / "out.glb"
+    call("to-euler", character, tmp_path / "m.json", "--order", "XYZ", "--frame", "intrinsic").product()
+    call("from-euler", tmp_path / "m.json", out, "--onto", character).product()
+    assert khronos.errors(khronos.validate(out.read_bytes())) == []
+    assert call("inspect", out).code == 0
+    whole = [node for node in json.loads(character.read_text())["nodes"] if "matrix" in node]
+    animated = {n["name"] for n in opened_path(out).json["nodes"] if "matrix" not in n}
+    assert len(whole) > len([node for node in whole if node["name"] in animated]) > 0  # others keep theirs

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import fixtures
+from anim.gltf.text import dump
 from tests.cli.conftest import Call, Fixture
 from tests.cli.inspecting import by_name, only
 from tests.cli.running import built, refusal, table
+from tests.files import glb_of, opened_fixture
 
 
 def test_csv_is_one_table_with_the_numbers_of_the_json(noop: bytes, call: Call, tmp_path: Path) -> None:
@@ -50,8 +54,14 @@ def test_of_several_files_a_bad_one_is_reported_and_the_others_go_on(noop: bytes
     Path(bad).write_bytes(fixtures.BROKEN["truncated_glb"].data)
     run = call("inspect", bad, good, lost, "--format", "json")
     assert run.code == 3
-    assert [facts["file"] for facts in run.json["files"]] == [good]
+    assert [facts["file"] for facts in run.json["files"]] == [bad, good, lost]
+    assert [facts["error"] is None for facts in run.json["files"]] == [False, True, False]
+    assert run.json["files"][2]["error"] == "can't be read (no such file or directory)"
+    assert all(facts.keys() == run.json["files"][1].keys() for facts in run.json["files"])
     assert [line.split(": ")[1] for line in run.err.splitlines()] == [bad, lost]
+    rows = table(call("inspect", bad, good, lost, "--format", "csv").out)
+    assert [row["file"] for row in rows if row["error"]] == [bad, lost]
+    assert {row["file"] for row in rows if not row["error"]} == {good}
     clip = call("inspect", good, bad, "--clip", "nowhere")
     assert clip.code == 5  # the worst of 5 and 3
 
@@ -69,7 +79,50 @@ def test_codes_and_breaks_in_names_are_shown_not_obeyed(call: Call, fixture: Fix
 def test_a_folder_is_refused_with_a_way_out(call: Call, tmp_path: Path) -> None:
     run = call("inspect", tmp_path)
     assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
-    assert run.err.splitlines()[1] == f"help: name the files: {tmp_path}/*.glb"
+    assert run.err.splitlines()[1] == "help: name a file (there is no .glb in it)"
+    for name in ("b.glb", "a.glb"):
+        (tmp_path / name).write_bytes(built("noop"))
+    advised = call("convert", tmp_path, "-").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
+    assert advised == str(tmp_path / "a.glb")
+    assert call("convert", advised, "-").code == 0
+
+
+def test_of_a_broken_file_what_can_be_read_is_shown(call: Call, tmp_path: Path) -> None:
+    content = json.loads(dump(opened_fixture("biped").json))
+    content["animations"][1]["samplers"][0]["input"] = 999
+    content["skins"][0]["skeleton"] = 999
+    path = tmp_path / "biped.glb"
+    path.write_bytes(glb_of(replace(opened_fixture("biped"), json=content)))
+    run = call("inspect", path, "--format", "json")
+    assert run.code == 3
+    (file,) = run.json["files"]
+    assert [clip["name"] for clip in file["clips"]] == ["walk", "jump"]
+    assert file["clips"][0] == only(call, built("biped"))["clips"][0] | {"share": file["clips"][0]["share"]}
+    assert len(file["skins"]) == 1
+    faults = [each for each in file["findings"] if each["name"] == "invalid"]
+    assert [each["where"] for each in faults] == ["animations[1].samplers[0].input", "skins[0].skeleton"]
+    assert file["error"] == "animations[1].samplers[0].input: is 999 (the file has 91 accessors)"
+    assert run.err.splitlines()[0] == f"gltf-anim: {path}: {file['error']}"
+    assert call("inspect", path, "--fail-on", "error").code == 3  # broken, before anything is judged
+    assert "walk" in call("inspect", path, "--continuity", "--tracks").text
+
+
+def test_a_cut_off_file_shows_what_its_json_says(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "cut.glb"
+    path.write_bytes(built("biped")[:-1000])
+    run = call("inspect", path)
+    assert run.code == 3
+    assert "GLB is truncated" in run.text
+    assert "1 skin" in run.text
+
+
+def test_quiet_leaves_the_text_out_and_nothing_that_was_asked_for(call: Call, fixture: Fixture) -> None:
+    path = fixture("noop")
+    assert call("inspect", path, "-q") == (0, b"", "")
+    assert call("inspect", path, "-q", "--fail-on", "warning").code == 6
+    assert call("inspect", path, "-q", "--format", "json").json["files"]
+    assert call("diff", path, path, "-q") == (0, b"", "")
+    assert call("diff", path, path, "-q", "--format", "json").json["clips"]
 
 
 def test_fail_on_makes_it_a_gate(call: Call, fixture: Fixture) -> None:

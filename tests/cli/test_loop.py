@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from tests.cli.conftest import Call, Fixture
+from anim.gltf import read, write
+from anim.maths import quaternion
+from anim.model import Clip
+from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
+from tests.clips import about
+from tests.files import clips_of, glb_of, opened
 
 
 def test_report_names_the_kind(call: Call, fixture: Fixture) -> None:
@@ -42,3 +51,83 @@ def test_no_loop_needs_a_blend(call: Call, fixture: Fixture) -> None:
     assert "--blend" in help_line(run)
     closed = call("loop", "-", "--clip", "walk", "--blend", "0.2", "-q", stdin=half).product()
     assert call("loop", "--clip", "walk", "--format", "json", stdin=closed).json["loops"][0]["kind"] == "closed"
+
+
+def test_all_that_cannot_be_closed_is_named_and_nothing_is_written(call: Call, asset: Find, tmp_path: Path) -> None:
+    path = asset("Knight.glb")
+    run = call("loop", path, tmp_path / "out.glb", "--clip", "Death_B", "--clip", "T-Pose", "--clip", "Death_A")
+    said = refusal(run, 2)
+    assert "Knight.glb: clip" in said
+    assert "'Death_B' is not a loop" in said
+    assert "'Death_A' is not a loop" in said
+    assert "T-Pose" not in said
+    assert not (tmp_path / "out.glb").exists()
+
+
+def test_a_single_pose_is_called_so(call: Call, asset: Find, tmp_path: Path) -> None:
+    path = asset("Knight.glb")
+    found = call("loop", path, "--clip", "T-Pose", "--format", "json").json["loops"][0]
+    assert found["kind"] == "a single pose"
+    run = call("loop", path, tmp_path / "out.glb", "--clip", "T-Pose", "--blend", "0.1")
+    assert run.code == 0
+    assert "a single pose, with nothing to close: clip 'T-Pose'" in run.err
+
+
+def _limping(walk: Path) -> bytes:
+    """The biped's walk, whose left leg drifts away by 4° until the end: as a .glb."""
+    document = opened(walk.read_bytes())
+    number = next(i for i, clip in enumerate(read.clips(document)) if clip.name == "walk")
+    clip, names = read.clips(document)[number], read.skeleton(document).names
+    tracks = []
+    for each in clip.tracks:
+        if each.path == "rotation" and each.node is not None and names[each.node] == "left_upper_leg":
+            drift = about("x", np.linspace(0, 4, len(each.times)))
+            each = replace(each, values=quaternion.multiply(each.values, drift))
+        tracks.append(each)
+    return glb_of(write.replace_clips(document, {number: Clip(clip.name, tuple(tracks))}))
+
+
+def test_a_joint_that_stays_open_is_named_and_alone_is_bent(call: Call, walk: Path) -> None:
+    limping = _limping(walk)
+    (found,) = call("loop", "--clip", "walk", "--format", "json", stdin=limping).json["loops"]
+    assert found["kind"] == "closed except some joints"
+    assert [each["joint"] for each in found["open_joints"]] == ["left_upper_leg"]
+    assert found["open_joints"][0]["gap_m"] == pytest.approx(found["seam_m"], rel=0.1)
+    assert found["seam_m"] < found["largest_frame_motion_m"]
+    assert "left_upper_leg" in call("loop", "--clip", "walk", stdin=limping).text
+    run = call("loop", "-", "-", "--clip", "walk", stdin=limping)
+    assert "closes except at 'left_upper_leg'" in refusal(run, 2)
+    assert "--blend" in help_line(run)
+    closed = call("loop", "-", "--clip", "walk", "--blend", "0.3", "-q", stdin=limping).product()
+    (now,) = call("loop", "--clip", "walk", "--format", "json", stdin=closed).json["loops"]
+    assert (now["kind"], now["open_joints"]) == ("closed", [])
+    before, after = (next(clip for clip in clips_of(data) if clip.name == "walk") for data in (limping, closed))
+    assert after.end == before.end
+    changed = [
+        old.target
+        for old, new in zip(before.tracks, after.tracks, strict=True)
+        if not (np.array_equal(old.times, new.times) and np.array_equal(old.values, new.values))
+    ]
+    assert len(changed) == 1
+
+
+@pytest.mark.slow
+def test_verdicts_on_real_clips(call: Call, asset: Find) -> None:
+    """As an artist calls them."""
+    kinds = {}
+    for name in ("Knight", "Robot", "Fox", "CesiumMan", "BitmojiRun"):
+        for each in call("loop", asset(f"{name}.glb"), "--format", "json").json["loops"]:
+            clip = "" if name == "CesiumMan" else each["clip"]  # its only clip has no name
+            kinds[name, clip] = each["kind"], [one["joint"] for one in each["open_joints"]]
+    kept = {key: value for key, value in kinds.items() if value[0] not in ("closed", "not a loop")}
+    assert {key: kind for key, (kind, _) in kept.items()} == {
+        ("Knight", "Walking_C"): "closed except some joints",
+        ("Robot", "Robot_Dance"): "closed except some joints",
+        ("CesiumMan", ""): "open by one frame",
+    }
+    assert kept["Knight", "Walking_C"][1] == ["upperleg.r", "lowerleg.r", "foot.r"]
+    assert kept["Robot", "Robot_Dance"][1] == ["Head"]
+    names = ("Idle", "Running_A", "Walking_A", "Cheer", "Jump_Full_Short")
+    assert {kinds["Knight", name][0] for name in names} == {"closed"}
+    names = ("Death_A", "Jump_Start", "Lie_Down", "Sit_Chair_Down", "Block")
+    assert {kinds["Knight", name][0] for name in names} == {"not a loop"}

@@ -21,6 +21,7 @@ from tests.cli.running import built, help_line, refusal
         (RangeError("x"), 2),
         (errors.UsageError("x"), 2),
         (FormatError("x"), 3),
+        (errors.OutputError("x"), 3),
         (UnsupportedError("x"), 4),
         (NotFoundError("x"), 5),
         (errors.CheckError("x"), 6),
@@ -189,7 +190,7 @@ def test_read_only_files_are_not_replaced(call: Call, tmp_path: Path, monkeypatc
     out = tmp_path / "out.glb"
     out.write_bytes(b"precious")
     monkeypatch.setattr("os.access", lambda *_: False)  # tests may run as root, who may write everything
-    assert f"{out}: is read-only" in refusal(call("convert", "-", out, stdin=built("arm")), 2)
+    assert f"{out}: is read-only" in refusal(call("convert", "-", out, stdin=built("arm")), 3)
     assert out.read_bytes() == b"precious"
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from anim.gltf.document import Document
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal
 from tests.files import glb_of, opened, opened_fixture
@@ -73,21 +72,6 @@ def test_a_file_without_clips(tmp_path: Path, call: Call) -> None:
     source.write_bytes(glb_of(bare))
     assert call("optimize", source, output).code == 0
     assert output.read_bytes() == source.read_bytes()
-
-
-def test_hidden_vertices_leave_the_nodes(tmp_path: Path, call: Call) -> None:
-    """Draco hides vertices; the bound is then kept at the nodes."""
-    document = opened_fixture("noop")
-    meshes = [
-        {**mesh, "primitives": [{**p, "extensions": {"KHR_draco_mesh_compression": {}}} for p in mesh["primitives"]]}
-        for mesh in document.json["meshes"]
-    ]
-    used = {"meshes": meshes, "extensionsUsed": ["KHR_draco_mesh_compression"]}
-    source = tmp_path / "hidden.glb"
-    source.write_bytes(glb_of(Document({**document.json, **used}, document.buffers)))
-    run = call("optimize", source, tmp_path / "out.glb", *FAST)
-    assert run.code == 0
-    assert "measured at nodes, not on the surface" in run.err
 
 
 @needs_validator

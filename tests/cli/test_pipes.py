@@ -97,10 +97,16 @@ def test_the_null_device_stays_one(walk: Path, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
 @pytest.mark.parametrize(
-    "line", ["convert walk.glb > /dev/full", "inspect walk.glb > /dev/full", "convert walk.glb /dev/full"]
+    "line",
+    [
+        "convert walk.glb > /dev/full",
+        "inspect walk.glb > /dev/full",
+        "convert walk.glb /dev/full",
+        "bake walk.glb /dev/full --format npz --clip walk --fps 4",
+    ],
 )
 def test_a_full_disk_is_said_in_one_line(line: str, walk: Path, tmp_path: Path) -> None:
-    assert "can't be written (no space left on device)" in refusal(shell(f"gltf-anim {line}", tmp_path), 2)
+    assert "can't be written (no space left on device)" in refusal(shell(f"gltf-anim {line}", tmp_path), 3)
 
 
 def test_closed_stdin_is_said_in_one_line(walk: Path, tmp_path: Path) -> None:
@@ -109,6 +115,24 @@ def test_closed_stdin_is_said_in_one_line(walk: Path, tmp_path: Path) -> None:
 
 def test_closed_stdout_is_said_in_one_line(walk: Path, tmp_path: Path) -> None:
     assert "stdout is closed" in refusal(shell("gltf-anim inspect walk.glb >&-", tmp_path), 2)
+
+
+FAILURES = {
+    "resample walk.glb out.glb --fsp 3": 2,
+    "convert nowhere.glb out.glb": 3,
+    "convert unknown.glb out.glb": 4,
+    "trim walk.glb out.glb --clip nothing --to 1": 5,
+    "inspect walk.glb -q --fail-on info": 6,
+    "convert walk.glb out.glb": 0,
+}
+
+
+@pytest.mark.parametrize("stderr", ["2>&-", "2>/dev/full"])
+def test_exit_codes_are_the_same_where_nobody_reads_the_words(stderr: str, walk: Path, tmp_path: Path) -> None:
+    walk.write_bytes(built("noop"))
+    (tmp_path / "unknown.glb").write_text('{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 1}]}')
+    line = "; ".join(f"gltf-anim {each} {stderr}; echo $?" for each in FAILURES)
+    assert shell(line, tmp_path).text.split() == [str(code) for code in FAILURES.values()]
 
 
 # Terminals.

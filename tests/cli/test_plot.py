@@ -47,8 +47,8 @@ def test_continuity_says_exactly_that(call: Call, book: bytes) -> None:
 def test_continuity_as_text(call: Call, book: bytes) -> None:
     text = call("inspect", "--continuity", stdin=book).product().decode()
     line, steps = (row for row in text.splitlines() if row.split()[1:2] == ["translation"])
-    assert line.split() == [*["0", "translation", "linear", "2", "2", "1.6", "m/s", "at", "1", "s", "open,", "1", "m"]]
-    assert steps.split() == [*["1", "translation", "step", "2", "2", "90", "cm", "at", "1", "s", "open,", "1", "m"]]
+    assert line.split() == [*["0", "translation", "linear", "2", "2", "1.6", "m/s", "at", "1", "s", "jump,", "1", "m"]]
+    assert steps.split() == [*["1", "translation", "step", "2", "2", "90", "cm", "at", "1", "s", "jump,", "1", "m"]]
 
 
 def test_continuity_as_csv_and_json(call: Call, book: bytes) -> None:
@@ -154,6 +154,10 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
         (["--through", "0:1,0:2", "out.png"], 2, "not increasing"),
         (["--through", "0,nan", "out.png"], 2, "nan"),
         (["--through", "0,1", "--tangents", "natrual", "out.png"], 2, "natrual"),
+        (["biped.glb", "out.png", "--euler", "XYW"], 2, "order is 'XYW'"),
+        (["biped.glb", "out.png", "--euler", "XYZ", "--components"], 2, "exclude each other"),
+        (["biped.glb", "out.png", "--euler", "XYZ", "--path", "translation"], 5, "no track is selected"),
+        (["--ease", "linear", "--euler", "XYZ", "out.png"], 2, "read no file"),
         (["biped.glb", "out.png", "--format", "pdf"], 2, "'pdf' is none of png, svg"),
     ],
 )

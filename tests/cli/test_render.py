@@ -170,8 +170,40 @@ def test_what_a_reader_says_is_said(call: Call, tmp_path: Path) -> None:
     (tmp_path / "a.pc2-rest.ply").unlink()
     (tmp_path / "a-rest.ply").write_bytes(rest.replace(b" of=", b" by="))  # as earlier versions wrote it
     run = call("render", tmp_path / "a.pc2", tmp_path / "a.png", *SMALL)
-    assert "note: faces and axes are those of 'a-rest.ply'" in run.err
+    assert "warning: faces and axes are those of 'a-rest.ply'" in run.err
 
 
 def _npz() -> bytes:
     return written(cache(), "a.npz")[0].files["a.npz"]
+
+
+def test_meshes_are_chosen_and_hidden(asset: Find, call: Call) -> None:
+    def drawn(*args: str) -> bytes:
+        run = call("render", asset("Knight.glb"), "-", "--clip", "Idle", "--frames", "1", *SMALL, *args)
+        return bytes(run.product())
+
+    shields = ("--hide", "*Shield*")
+    assert drawn() != drawn(*shields)
+    legs = drawn("--mesh", "Knight_Leg*")
+    assert legs == drawn("--mesh", "Knight_*", "--hide", "*Arm*", "--hide", "*_[BHC]*")
+    assert drawn("--hide", "handslot*") == drawn("--hide", "1H_*", "--hide", "2H_*", *shields)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["--hide", "Rectangel*"], "no mesh or node matches 'Rectangel*'"),
+        (["--mesh", "nobody"], "no mesh matches 'nobody'"),
+        (["--hide", "*"], "no mesh is left to draw"),
+    ],
+)
+def test_what_nothing_is_left_of(args: list[str], words: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    assert words in refusal(call("render", fixture("arm"), tmp_path / "a.png", *args), 5)
+
+
+@pytest.mark.parametrize("option", ["--checker", "--wire", "--follow", "--heat"])
+def test_what_is_drawn_on_the_surface(option: str, fixture: Fixture, call: Call) -> None:
+    args = ("render", fixture("tube"), "-", "--clip", "twist180", "--frames", "3", *SMALL)
+    plain, marked = call(*args).product(), call(*args, option).product()
+    assert plain != marked
+    assert call(*args, option).product() == marked

@@ -142,7 +142,7 @@ def test_globs_choose_clips_and_nodes(call: Call) -> None:
 
 def test_an_unnamed_clip_is_called_by_its_number(call: Call, asset: Find) -> None:
     rows = table(call("sample", asset("CesiumMan.glb"), "--clip", "0", "--at", "1", "--format", "csv").product())
-    assert {row["clip"] for row in rows} == {"0"}
+    assert {row["clip"] for row in rows} == {"#0"}
 
 
 def test_names_that_utf8_cannot_hold_do_not_stop_it(call: Call, fixture: Fixture) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from anim.exchange import bvh
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
+from tests.files import glb_of, opened
 
 
 @pytest.mark.parametrize("suffix", ["bvh", "csv", "json"])
@@ -97,3 +99,17 @@ def test_dry_run_writes_nothing(call: Call, fixture: Fixture, tmp_path: Path) ->
 def test_real_characters(call: Call, asset: Find) -> None:
     run = call("to-euler", asset("Fox.glb"), "-", "--clip", "Run", "--fps", "24")
     assert len(bvh.read(run.product()).nodes) >= 24
+
+
+@pytest.mark.parametrize("kind", ["bvh", "json"])
+def test_the_bind_pose_is_said_to_be_the_rest(kind: str, call: Call, biped: bytes) -> None:
+    """Even where quiet: it changes what angles and rests in the file mean."""
+    document = opened(biped)
+    nodes = [dict(node) for node in document.json["nodes"]]
+    arm = next(node for node in nodes if node["name"] == "left_upper_arm")
+    args = ("to-euler", "-", "-", "--clip", "walk", "--fps", "24", "--format", kind, "--quiet")
+    assert call(*args, stdin=biped).err == ""
+    arm["rotation"] = [0, 0, 0.6, 0.8]
+    run = call(*args, stdin=glb_of(replace(document, json={**document.json, "nodes": nodes})))
+    assert run.product()
+    assert "3 joints rest elsewhere in the file than the skin was bound: the bind pose is the rest" in run.err

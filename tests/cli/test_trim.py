@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.cli.conftest import Call, Fixture
-from tests.cli.running import refusal
+from tests.cli.running import built, refusal
 from tests.files import clips_of
 
 
@@ -23,6 +23,18 @@ def test_seconds(call: Call, fixture: Fixture, options: list[str], start: float,
     assert (clip.start, clip.end) == pytest.approx((start, end), abs=1e-6)
 
 
-@pytest.mark.parametrize(("options", "words"), [([], "nothing to cut"), (["--from", "8"], "nothing between")])
+def test_rebase_alone_moves_a_late_start_to_0(call: Call, fixture: Fixture) -> None:
+    before = clips_of(built("noop"))
+    after = clips_of(call("trim", fixture("noop"), "--rebase", "-q").product())
+    late = [clip.name for clip in before].index("late")
+    assert (before[late].start, after[late].start, after[late].end) == (0.5, 0, 1)
+    assert [clip.end for i, clip in enumerate(after) if i != late] == [
+        clip.end for i, clip in enumerate(before) if i != late
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"), [([], "nothing to do"), (["--from", "8"], "nothing is left from 8 s on")]
+)
 def test_refusals(call: Call, fixture: Fixture, options: list[str], words: str) -> None:
     assert words in refusal(call("trim", fixture("biped"), *options), 2)

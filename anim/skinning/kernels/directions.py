@@ -1,54 +1,43 @@
-"""What all methods do with a vertex's normal and tangent, and with a whole tile when it is full."""
+"""Normals and tangents of a vertex: along with a matrix, or with a stretch and a rotation."""
 
 from __future__ import annotations
 
-from anim.skinning.kernels.lanes import Room, Shape, Singles, Target
-from anim.skinning.kernels.rows import clear, load, make_unit, store, transform_normal, transform_tangent, turn
+from anim.skinning.kernels.jit import inline
+from anim.skinning.kernels.lane_math import load, make_unit, rotate, transform_normal, transform_tangent
+from anim.skinning.kernels.layout import Singles, Wanted
 
 
-def move_directions(room: Room, v: int, shape: Shape, at: int, m: Singles) -> None:
-    """Set number v of the tile to vertex `at`'s normal and tangent, moved by matrices."""
-    if len(shape.normals):
-        normal = room.normals[v]
-        load(normal, shape.normals[at])
-        transform_normal(normal, m)
-        make_unit(normal)
-    if len(shape.tangents):
-        tangent = room.tangents[v]
-        load(tangent, shape.tangents[at])
-        transform_tangent(tangent, m)
-        make_unit(tangent)
+@inline
+def move_normal(normal: Singles, source: Singles, matrix: Singles) -> None:
+    """Set normal (3, L) to a vertex's own (3, m), moved by matrices (12, L)."""
+    load(normal, source)
+    transform_normal(normal, matrix)
+    make_unit(normal)
 
 
-def turn_directions(room: Room, v: int, shape: Shape, at: int, stretched: bool) -> None:
-    """Set number v of the tile to vertex `at`'s normal and tangent, stretched if need be, and turned."""
-    if len(shape.normals):
-        normal = room.normals[v]
-        load(normal, shape.normals[at])
-        if stretched:
-            transform_normal(normal, room.stretch)
-        turn(normal, room.turns)
-        make_unit(normal)
-    if len(shape.tangents):
-        tangent = room.tangents[v]
-        load(tangent, shape.tangents[at])
-        if stretched:
-            transform_tangent(tangent, room.stretch)
-        turn(tangent, room.turns)
-        make_unit(tangent)
+@inline
+def move_tangent(tangent: Singles, source: Singles, matrix: Singles) -> None:
+    """Set tangent (3, L) to a vertex's own (3, m), moved by matrices (12, L)."""
+    load(tangent, source)
+    transform_tangent(tangent, matrix)
+    make_unit(tangent)
 
 
-def clear_vertex(room: Room, v: int) -> None:
-    """Set number v of the tile to the origin, without a direction."""
-    clear(room.points[v])
-    clear(room.normals[v])
-    clear(room.tangents[v])
+@inline
+def rotate_normal(normal: Singles, source: Singles, stretch: Wanted, rotation: Singles) -> None:
+    """Set normal (3, L) to a vertex's own (3, m), after a stretch (12, L) if there is one, rotated by (4, L)."""
+    load(normal, source)
+    if stretch is not None:
+        transform_normal(normal, stretch)
+    rotate(normal, rotation)
+    make_unit(normal)
 
 
-def store_tile(room: Room, count: int, first: int, target: Target) -> None:
-    """Write the first `count` vertices of the tile, from column at + first on."""
-    store(room.points, count, target.at + first, target.positions)
-    if len(target.normals):
-        store(room.normals, count, target.at + first, target.normals)
-    if len(target.tangents):
-        store(room.tangents, count, target.at + first, target.tangents)
+@inline
+def rotate_tangent(tangent: Singles, source: Singles, stretch: Wanted, rotation: Singles) -> None:
+    """Set tangent (3, L) to a vertex's own (3, m), after a stretch (12, L) if there is one, rotated by (4, L)."""
+    load(tangent, source)
+    if stretch is not None:
+        transform_tangent(tangent, stretch)
+    rotate(tangent, rotation)
+    make_unit(tangent)

@@ -67,6 +67,15 @@ def test_what_a_longer_sequence_left_behind_is_no_part_of_a_shorter_one(ending: 
     assert len(positions_of(back)) == 3
 
 
+@pytest.mark.parametrize("gone", [1, 4, 7])
+def test_a_sequence_of_which_a_frame_is_missing_is_refused(gone: int) -> None:
+    """A write that is killed leaves some frames; they must not pass for a shorter sequence."""
+    files, _ = written(cache(), "walk.ply")
+    del files.files[f"walk_{gone:05d}.ply"]
+    with pytest.raises(FormatError, match=rf"'walk_0000{gone}.ply' is not there \(the sequence has 7 frames\)"):
+        opened(files)
+
+
 def test_one_frame_is_the_file_itself() -> None:
     files, _ = written(at_time(cache(), 2 / 30), "walk.ply")
     assert list(files.files) == ["walk.ply"]

@@ -18,7 +18,8 @@ from anim.exchange.turns import world_rotations
 from anim.maths import quaternion
 from anim.maths.euler import Frame
 from anim.model import Interpolation, Scene, Track
-from anim.sampling import pose, world_matrices
+from anim.sampling import grid, pose, world_matrices
+from anim.sampling.times import key_times
 from anim.sampling.track import sample
 from tests.anim.exchange.figures import tail
 
@@ -95,6 +96,21 @@ def test_steps_stay_steps() -> None:
     before, after = sample(turn, np.array((1.999, 2.001)))
     assert quaternion.angle_between(before, np.array((0, 0, 0, 1.0))) < 1e-6
     assert quaternion.angle_between(before, after) == pytest.approx(np.radians(80), abs=1e-6)
+
+
+@pytest.mark.parametrize("fps", [24, 30, 60])
+def test_steps_are_exact_at_frames(fps: int) -> None:
+    """At times as files hold them."""
+    times, figure = np.arange(7) / 24, tail(np.array((0, 0, 0, 1.0)))
+    steps = linear(times, np.radians((0, 80, -40, 10, 10, 90, 0)))
+    steps = replace(steps, modes=uniform_modes(len(times), Mode.STEP))
+    node = replace(_keyed("tail1", -1), rotation=(steps, *[linear(times[:1], np.zeros(1))] * 2))
+    source = from_euler(EulerMotion((node,)), tolerance=1e-3)
+    clip = onto(source, Scene(figure, ()), aliases={}, nested=True, floor=Floor.KEEP).clip
+    (before,), (after,) = ([t for t in each.tracks if t.path == "rotation"] for each in (source.clip, clip))
+    assert before.interpolation is after.interpolation is Interpolation.STEP
+    frames = key_times(grid(clip.start, clip.end, fps=fps))
+    assert quaternion.angle_between(sample(before, frames), sample(after, frames)).max() < 1e-7
 
 
 def test_the_path_begins_from_where_the_character_stands() -> None:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import fixtures
-from anim.errors import FormatError, UnsupportedError
-from anim.gltf import container
+from anim.errors import FormatError, ShapeError, UnsupportedError
+from anim.gltf import container, read
 from anim.gltf.document import Buffer, Document
 from fixtures.broken.pieces import data_uri, text
 from tests.files import REAL, glb_of, joined, opened, opened_fixture, opened_path
@@ -228,3 +228,47 @@ def _glb(*chunks: tuple[bytes, bytes]) -> bytes:
         content += b" " * (-len(content) % 4)
         body += struct.pack("<I4s", len(content), kind) + content
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def test_bytes_are_taken_as_they_are() -> None:
+    data = fixtures.build("arm")
+    for given in (data, bytearray(data), memoryview(data)):
+        assert container.read(given).json == container.read(np.frombuffer(data, np.uint8)).json
+
+
+@pytest.mark.parametrize("given", ["walk.glb", Path("walk.glb"), None, np.zeros(3), np.zeros((2, 2), np.uint8)])
+def test_a_path_is_no_bytes_and_the_error_says_what_to_do(given: Any) -> None:
+    with pytest.raises(ShapeError, match="expected a uint8 array or bytes") as caught:
+        container.read(given)
+    assert "np.fromfile" in caught.value.help
+
+
+def test_an_array_that_is_no_bytes_is_named_by_type_and_shape() -> None:
+    with pytest.raises(ShapeError, match=r"got an array of float64 with shape \(2, 3\)"):
+        container.read(np.zeros((2, 3)))  # type: ignore[arg-type]
+
+
+def test_without_resolve_the_error_names_it_all_the_way_up() -> None:
+    data = fixtures.build("gltf_external")
+    with pytest.raises(FormatError, match="are not given") as caught:
+        read.clips(container.read(data))
+    assert "resolve=" in caught.value.help
+
+
+@pytest.mark.parametrize(
+    ("resolve", "message"),
+    [("folder", "resolve is str"), (lambda _: None, "resolve gives None for 'walk data.bin'")],
+)
+def test_what_does_not_resolve_is_refused(resolve: Any, message: str) -> None:
+    with pytest.raises(ShapeError, match=message):
+        _ = container.read(fixtures.build("gltf_external"), resolve).buffers[0].data
+
+
+def test_resolve_may_give_plain_bytes() -> None:
+    document = container.read(fixtures.build("gltf_external"), lambda _: bytes(968))
+    assert document.buffers[0].data.tobytes() == bytes(968)
+
+
+def test_a_path_is_no_document() -> None:
+    with pytest.raises(ShapeError, match="document is str"):
+        read.clips("walk.glb")  # type: ignore[arg-type]

@@ -64,3 +64,10 @@ def test_draco_names_a_view() -> None:
 )
 def test_views_of(accessor: Json, views: list[int]) -> None:
     assert references.views_of(accessor) == views
+
+
+def test_ids_inside_draco_data_name_no_views() -> None:
+    """Or the keys of old clips stay in the file, in views that have the same number as an attribute."""
+    draco = {"KHR_draco_mesh_compression": {"bufferView": 3, "attributes": {"POSITION": 0, "JOINTS_0": 1}}}
+    json = {"meshes": [{"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1}, "extensions": draco}]}]}
+    assert references.outside(json, ()).views == {3}

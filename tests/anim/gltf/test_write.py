@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.errors import RangeError
+from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
 from anim.gltf import read, write
 from anim.gltf.accessors import Accessors
-from anim.model import Clip, Storage
+from anim.model import Clip, Storage, Track
 from fixtures.broken.pieces import animated, text
 from tests.anim.gltf.writing import check_same, rewritten, viewed
 from tests.clips import STEP, track
@@ -248,3 +248,30 @@ def test_numbers_in_known_places_pin_nothing() -> None:
     }
     document = opened(text(animated() | harmless))
     assert len(rewritten(document).json["accessors"]) == 2
+
+
+@pytest.mark.parametrize("number", [-1, 1, 99])
+def test_a_clip_that_is_not_there_is_said(number: int) -> None:
+    new = track("translation", [0.0, 1.5], [[0, 0, 0], [1, 2, 3]])
+    with pytest.raises(NotFoundError, match=f"no clip #{number} .the file has 1, from #0 on"):
+        write.replace_clips(opened(text(animated())), {number: Clip("run", (new,))})
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (track("scale", [0], [[1, 1, 1]], node=999), "scale of node 999: there is no node 999"),
+        (track("weights", [0], [[1]], node=0), "weights of node 0: has 1 weights for 0 morph targets"),
+    ],
+)
+def test_targets_that_the_file_lacks_are_refused(made: Track, message: str) -> None:
+    document = opened_fixture("interpolations")
+    (clip,) = read.clips(document)
+    with pytest.raises(AnimError, match=message):
+        write.replace_clips(document, {0: Clip(clip.name, (made,))})
+
+
+def test_clips_are_replaced_by_number() -> None:
+    document = opened_fixture("interpolations")
+    with pytest.raises(ShapeError, match="key 'walk'"):
+        write.replace_clips(document, {"walk": read.clips(document)[0]})  # type: ignore[dict-item]

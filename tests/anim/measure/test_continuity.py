@@ -15,7 +15,7 @@ from anim.curves.tangents import TANGENTS, rotation_keys, spline_keys
 from anim.gltf import read
 from anim.maths import quaternion
 from anim.measure import joints
-from anim.measure.continuity import Grade, TrackContinuity, at_keys, continuity, seam
+from anim.measure.continuity import Grade, Seam, TrackContinuity, at_keys, continuity, seam
 from anim.model import Storage, Track
 from anim.sampling import slopes
 from tests import clips
@@ -236,6 +236,22 @@ def test_seams() -> None:
     found = seam(away, start=0, end=2)
     assert found.grade is Grade.JUMP
     assert found.value_jump == 2
+
+
+def test_a_step_track_steps_at_the_seam_too() -> None:
+    """In a loop its last value but one is followed by the first one: 0 0 3 0 jumps by 3 at its end."""
+
+    def stepped(*values: float) -> Seam:
+        keys = np.outer(values, [1.0, 0, 0])
+        return seam(clips.track("translation", range(len(keys)), keys, STEP), start=0, end=len(keys) - 1)
+
+    assert stepped(0, 0, 3, 0) == Seam(Grade.JUMP, 3, 0, 0)
+    assert stepped(0, 3, 0, 2) == Seam(Grade.JUMP, 2, 0, 0)  # shown by players that stop at the end
+    assert stepped(0, 3, 0, 0) == Seam(Grade.C2, 0, 0, 0)
+    late = clips.track("translation", [0, 1, 2], np.outer([0, 3, 0], [1.0, 0, 0]), STEP)
+    assert seam(late, start=0, end=3).grade is Grade.C2  # the track ends before the clip does
+    turned = clips.track("rotation", [0, 1, 2], clips.about("z", [0, 90, 360]), STEP)
+    assert seam(turned, start=0, end=2).value_jump == pytest.approx(np.pi / 2)
 
 
 def test_a_track_that_ends_before_its_clip_rests_at_the_seam() -> None:

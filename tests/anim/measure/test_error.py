@@ -10,7 +10,7 @@ import pytest
 from anim.arrays import Floats
 from anim.gltf import read
 from anim.measure.error import MotionError, Ruler, check_times
-from anim.model import Clip, Scene
+from anim.model import Scene
 from tests.anim.measure.brute import clip_of, points_on_a_node, with_track
 from tests.clips import STEP, about, clip, skeleton, track
 from tests.files import opened_fixture
@@ -95,17 +95,6 @@ def test_a_scene_of_no_size_and_one_of_nothing() -> None:
     nothing = Scene(skeleton([]), ())
     assert Ruler(nothing).error(clip(), clip()).max_error == 0
     assert Ruler(nothing).diagonal == 0
-
-
-def test_a_skin_whose_weights_are_all_zero_moves_nothing() -> None:
-    document = opened_fixture("arm")
-    scene = read.scene(document)
-    (instance,) = scene.instances
-    limp = replace(instance.mesh, weights=np.zeros_like(instance.mesh.weights))
-    before = read.clips(document)[0]
-    nothing = Clip("", ())
-    found = Ruler(Scene(scene.skeleton, (replace(instance, mesh=limp),))).error(before, nothing)
-    assert found.max_error == 0
 
 
 def test_times_that_are_looked_at() -> None:

@@ -36,6 +36,10 @@ def test_still_tracks_and_those_that_only_rest() -> None:
     assert found.flips.tolist() == [0, 0, 0, 1]
 
 
+def test_no_tracks_have_no_facts() -> None:
+    assert len(of().redundant) == 0
+
+
 def test_tangents_move_a_track_whose_values_stand() -> None:
     values, still = np.ones((2, 3)), np.zeros((2, 3))
     inner, outer = np.array([[0, 0, 0], [1, 0, 0]]), np.array([[1, 0, 0], [0, 0, 0]])  # at the second key, at the first

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anim.errors import RangeError, ShapeError
-from anim.model import FLOAT32, Kind, Storage, Track
+from anim.model import FLOAT32, Clip, Interpolation, Kind, Storage, Track
 from tests.clips import CUBICSPLINE, LINEAR, STEP, track
 
 BYTES = Storage(5121, False, "SCALAR")
@@ -89,3 +89,47 @@ def test_kinds(path: str, width: int, mode: Any, storage: Storage, kind: Kind) -
 def test_targets() -> None:
     assert track("scale", [0], [[1, 1, 1]], node=3).target == (3, "scale")
     assert track("/materials/0/alphaCutoff", [0], [[1]]).target == (None, "/materials/0/alphaCutoff")
+
+
+@pytest.mark.parametrize("word", Interpolation)
+def test_an_interpolation_may_be_its_word(word: str) -> None:
+    sides = (np.zeros((2, 3)),) * 2 if word == "CUBICSPLINE" else ()
+    made = Track(0, "translation", str(word), [0, 1], [[0, 0, 0], [2, 4, 6]], *sides)  # type: ignore[arg-type]
+    assert made.interpolation is Interpolation(word)
+
+
+@pytest.mark.parametrize("word", ["linear", "foo", None])
+def test_other_interpolations_are_refused(word: Any) -> None:
+    with pytest.raises(RangeError, match=r"interpolation is .* \(expected STEP, LINEAR, CUBICSPLINE\)"):
+        track("weights", [0], [[1]], word)
+
+
+@pytest.mark.parametrize(
+    ("node", "path", "error", "message"),
+    [
+        (-1, "scale", RangeError, "node is -1"),
+        ("hips", "scale", ShapeError, "node is 'hips'"),
+        (0.0, "scale", ShapeError, "node is 0.0"),
+        (None, "scale", RangeError, "node is None with path 'scale'"),
+        (0, "pointer", RangeError, "node is 0 with path 'pointer'"),
+        (0, "position", RangeError, "path is 'position' .expected translation, rotation, scale, weights or pointer"),
+    ],
+)
+def test_targets_that_can_not_be_are_refused(node: Any, path: str, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        track(path, [0], [[1, 1, 1]], node=node)
+
+
+def test_a_node_is_a_plain_integer() -> None:
+    assert type(track("scale", [0], [[1, 1, 1]], node=np.int64(3)).node) is int  # type: ignore[arg-type]
+
+
+def test_tracks_and_clips_are_equal_by_their_numbers() -> None:
+    one, same = (track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]]) for _ in range(2))
+    other = track("scale", [0, 1], [[1, 1, 1], [2, 2, 3]])
+    assert one == same
+    assert one != other
+    assert one != 3
+    assert len({one, same, other}) == 2
+    assert Clip("a", (one,)) == Clip("a", (same,))
+    assert len({Clip("a", (one,)), Clip("a", (same,)), Clip("a", (other,))}) == 2

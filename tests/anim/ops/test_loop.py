@@ -12,8 +12,9 @@ from anim.gltf import read
 from anim.maths import quaternion
 from anim.measure.loop import LoopKind, best_ranges
 from anim.measure.loop import loop as judged
-from anim.measure.travel import traveling_root, travels
-from anim.model import Clip, Skeleton, Track
+from anim.measure.seam import SkinMotion
+from anim.measure.travel import traveling_root
+from anim.model import Clip, Scene, Track
 from anim.ops.loop import loop, with_last_frame
 from anim.ops.spline import spline
 from anim.ops.trim import trim
@@ -23,36 +24,38 @@ from tests.anim.ops.tracks import TRACKS
 from tests.files import opened
 
 
-def _walk() -> tuple[Skeleton, Clip]:
+def _walk() -> tuple[Scene, Clip]:
     document = opened(fixtures.build("biped"))
-    return read.skeleton(document), next(clip for clip in read.clips(document) if clip.name == "walk")
+    return read.scene(document), next(clip for clip in read.clips(document) if clip.name == "walk")
 
 
-SKELETON, WALK = _walk()
+SCENE, WALK = _walk()
+SKELETON = SCENE.skeleton
+SKIN = SkinMotion(SCENE)
 
 
 def test_the_walk_is_closed() -> None:
-    assert judged(SKELETON, WALK).kind is LoopKind.CLOSED
+    assert judged(SCENE, WALK).kind is LoopKind.CLOSED
 
 
 def test_without_its_last_frame_it_is_open_by_one() -> None:
     cut = trim(WALK, end=23 / 24)
-    found = judged(SKELETON, cut)
+    found = judged(SCENE, cut)
     assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
     closed = with_last_frame(cut, fps=found.fps)
     assert closed.end == pytest.approx(1.0, abs=1e-6)
-    assert judged(SKELETON, closed).kind is LoopKind.CLOSED
-    assert judged(SKELETON, closed).seam < 1e-6
+    assert judged(SCENE, closed).kind is LoopKind.CLOSED
+    assert judged(SCENE, closed).seam < 1e-6
 
 
 def test_half_a_walk_is_no_loop() -> None:
-    assert judged(SKELETON, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
+    assert judged(SCENE, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
 
 
 def test_blend_closes_it() -> None:
     half = trim(WALK, end=0.5)
     closed = loop(half, blend=0.25)
-    assert judged(SKELETON, closed).seam < 1e-9
+    assert judged(SCENE, closed).seam < 1e-9
     early = np.linspace(0, 0.24, 50)
     for old, new in zip(half.tracks, closed.tracks, strict=True):
         np.testing.assert_allclose(sample(new, early), sample(old, early), atol=1e-9)
@@ -75,7 +78,7 @@ def test_blend_longer_than_the_clip_is_refused() -> None:
 
 def test_the_best_part_of_two_walks_is_one_walk() -> None:
     twice = Clip("", tuple(Track(t.node, t.path, t.interpolation, _lap(t.times), _again(t)) for t in WALK.tracks))
-    best = best_ranges(SKELETON, twice, shortest=0.8)[0]
+    best = best_ranges(SKIN, twice, shortest=0.8)[0]
     assert best.end - best.start == pytest.approx(1.0, abs=1e-3)
     assert best.seam < 1e-4
 
@@ -89,7 +92,7 @@ def test_a_root_that_walks_on_travels_and_one_that_sways_does_not() -> None:
     walking = Clip("", (*WALK.tracks[:hips], moved, *WALK.tracks[hips + 1 :]))
     root = traveling_root(SKELETON, walking)
     assert root == track.node
-    found = judged(SKELETON, walking, root=root)
+    found = judged(SCENE, walking, root=root)
     assert found.kind is LoopKind.CLOSED
     assert found.travel == pytest.approx(1.4, abs=1e-6)
 
@@ -105,6 +108,5 @@ def _again(track: Track) -> np.ndarray:
 
 def test_a_seam_without_a_corner_has_no_speed() -> None:
     smooth = spline(WALK, tangents=TANGENTS["natural"], cyclic=True)
-    assert judged(SKELETON, WALK).speed_seam > 0.1
-    assert judged(SKELETON, smooth).speed_seam < 0.01
-    assert travels(SKELETON, [smooth])[0].speed_seam < 0.01
+    assert judged(SCENE, WALK).speed_seam > 0.1
+    assert judged(SCENE, smooth).speed_seam < 0.01

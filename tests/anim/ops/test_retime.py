@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_reversed_lines_are_reversed_to_the_bit() -> None:
     ("options", "words"),
     [
         ({"speed": 0.0}, "speed is 0"),
-        ({"speed": -1.0}, "--reverse"),
+        ({"speed": -1.0}, "reverse it"),
         ({"duration": 0.0}, "duration is 0"),
         ({"offset": -1.0}, "leads to -1 s"),
         ({"speed": 1.0, "duration": 1.0}, "exclude"),
@@ -83,6 +84,19 @@ def test_reversed_lines_are_reversed_to_the_bit() -> None:
 def test_refusals(options: dict[str, float], words: str) -> None:
     with pytest.raises(RangeError, match=words):
         changed(TRACKS["linear"], **options)
+
+
+@pytest.mark.parametrize("printed", ["-0.0416667", "-0.04166667", "-0.0417", "-0.042", "-0.04166", "-0.041666668"])
+def test_an_offset_by_a_start_as_it_is_printed_leads_to_0(printed: str) -> None:
+    start = float(np.float32(1 / 24))
+    track = replace(TRACKS["linear"], times=TRACKS["linear"].times + start)
+    new = retime(Clip("", (track,)), offset=float(printed)).tracks[0]
+    np.testing.assert_allclose(new.times, TRACKS["linear"].times, atol=1e-15)
+    assert new.times[0] == 0
+
+
+def test_a_small_offset_to_later_stays() -> None:
+    assert changed(TRACKS["linear"], offset=1e-4).times[0] == 1e-4
 
 
 @pytest.mark.parametrize("name", ["smoothstep", "quad-in", "bounce-out", "back-out", "sine-in-out", "ease", "circ-out"])

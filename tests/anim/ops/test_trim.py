@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,5 +73,25 @@ def test_a_clip_of_one_moment_stays() -> None:
 
 
 def test_nothing_left_is_refused() -> None:
-    with pytest.raises(RangeError, match="nothing between"):
+    with pytest.raises(RangeError, match="nothing is left from 4 s on"):
         cut(TRACKS["linear"], start=4.0, end=5.0)
+
+
+@pytest.mark.parametrize("track", TRACKS.values(), ids=TRACKS)
+def test_rebase_alone_moves_all_keys_and_cuts_none(track: Track) -> None:
+    late = np.float64(np.float32(1 / 24))
+    clip = Clip("", (replace(track, times=track.times + late), replace(ANCHOR, times=ANCHOR.times + late)))
+    new = trim(clip, rebase=True)
+    assert new.start == 0
+    np.testing.assert_allclose(new.tracks[0].times, track.times, atol=1e-15)
+    np.testing.assert_array_equal(new.tracks[0].values, track.values)
+
+
+def test_rebase_moves_a_clip_of_one_moment_too() -> None:
+    still = Clip("", (Track(0, "scale", ANCHOR.interpolation, np.full(1, 0.5), np.ones((1, 3))),))
+    assert trim(still, rebase=True).end == 0
+
+
+def test_rebase_leaves_what_starts_at_0() -> None:
+    clip = Clip("", (TRACKS["short"], ANCHOR))
+    assert trim(clip, rebase=True) is clip

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats
+from anim.measure.points import Points, of_scene
 from anim.model import Clip, Scene
 from anim.optimize.coding import PRICES, Coding
 from anim.optimize.limits import EFFORTS, Bounds, Objective, Packing, Policy, Reference
-from anim.optimize.points import Points, of_scene
 from anim.optimize.setting import Setting, setting
 from anim.optimize.truth import Truth, truth
 from tests.anim.skinning.scenes import random_scene
@@ -27,8 +27,9 @@ def scene(seed: int = 1, **more: float) -> Scene:
 
 
 def turning(amount: float, axis: Sequence[float] = (0, 0, 1), times: Floats = TIMES) -> Floats:
-    """Quaternions (K, 4) that swing by `amount` rad about an axis, once there and back."""
+    """Quaternions (K, 4) that swing by `amount` rad about an axis, once there and back, to the bit."""
     half = amount * np.sin(np.pi * times / times[-1]) / 2
+    half[-1] = half[0]
     direction = np.asarray(axis, float) / np.linalg.norm(axis)
     return np.concatenate((np.sin(half)[:, None] * direction, np.cos(half)[:, None]), axis=1)
 

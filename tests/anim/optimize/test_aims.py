@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Bools, Floats
+from anim.measure.points import Points
 from anim.model import Scene
 from anim.optimize.aims import Aims, leeway
 from anim.optimize.axes import Axis
 from anim.optimize.candidates import Candidates
 from anim.optimize.limits import Packing
-from anim.optimize.points import Points
 from anim.optimize.truth import Truth
 from tests.anim.optimize.making import TIMES, truth_of, turning
 from tests.clips import clip, skeleton, track

@@ -118,6 +118,15 @@ def test_sizes_of_codecs_are_those_of_streams(packing: Packing, name: str) -> No
     assert _coding(packing).size([turns[0], *moves, *weights, turns[1]]) == expected
 
 
+@pytest.mark.parametrize(("count", "row"), [(64, 256), (65, 4), (128, 4)])
+@pytest.mark.parametrize("packing", [Packing.EXT, Packing.KHR])
+def test_rows_of_many_weights_are_split(packing: Packing, count: int, row: int) -> None:
+    """The codec takes rows of up to 256 bytes; longer keys go element by element, as `anim.gltf` writes them."""
+    keys = coding.stored(np.cumsum(RNG.normal(size=(30, count)), axis=0), ("exponent", -9))
+    rows = np.frombuffer(keys.codes, np.uint8).reshape(-1, row)
+    assert _coding(packing).size([keys]) == len(meshopt.encode(rows, f"{packing.name}_meshopt_compression"))
+
+
 def test_codes_decode_to_as_many_bytes() -> None:
     stored = coding.stored(TURNS, ("quaternion", 12))
     assert len(stored.codes) == len(decoded_bytes(Filtered("QUATERNION", stored.codes))) == 8 * 200

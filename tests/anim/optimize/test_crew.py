@@ -21,14 +21,14 @@ def _refused(shared: int, task: int) -> int:
 
 def test_one_process_is_this_one() -> None:
     with crew(1, 10) as workforce:
-        found = list(workforce.each(_product, range(4)))
+        found = list(workforce.each(_product, range(4), label=str))
     assert found == [(10 * i, os.getpid()) for i in range(4)]
 
 
 def test_two_processes_keep_the_order() -> None:
     with crew(2, 10) as workforce:
-        found = list(workforce.each(_product, range(6)))
-        again = list(workforce.each(_product, [7]))  # on the same processes
+        found = list(workforce.each(_product, range(6), label=str))
+        again = list(workforce.each(_product, [7], label=str))  # on the same processes
     assert [product for product, _ in [*found, *again]] == [0, 10, 20, 30, 40, 50, 70]
     assert os.getpid() not in {number for _, number in found}
 
@@ -36,9 +36,9 @@ def test_two_processes_keep_the_order() -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_error_is_the_callers(workers: int) -> None:
     with crew(workers, 0) as workforce, pytest.raises(ValueError, match="task 2"):
-        list(workforce.each(_refused, range(5)))
+        list(workforce.each(_refused, range(5), label=str))
 
 
 def test_none_where_there_is_nothing_to_do() -> None:
     with crew(0, None) as workforce:
-        assert list(workforce.each(_product, [])) == []
+        assert list(workforce.each(_product, [], label=str)) == []

@@ -11,12 +11,12 @@ import pytest
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.measure.error import Ruler
+from anim.measure.points import Points
 from anim.model import Clip, Scene
 from anim.optimize import layouts
 from anim.optimize.layouts import LAYOUTS
 from anim.optimize.limits import Bounds
 from anim.optimize.outcome import Fate, Outcome, Plan
-from anim.optimize.points import Points
 from anim.optimize.strains import Strains
 from anim.optimize.trial import Bench
 from anim.optimize.truth import Truth

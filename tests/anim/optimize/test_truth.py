@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
 from anim.maths import quaternion
+from anim.measure.points import Points, stacked
 from anim.model import Scene
 from anim.optimize.limits import Reference
-from anim.optimize.points import Points, stacked
 from anim.optimize.truth import PATHS, key_grid, moments
 from anim.optimize.worlds import needed_levels, worlds
 from anim.sampling import pose, world_matrices

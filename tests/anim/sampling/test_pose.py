@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from anim import arrays
 from anim.arrays import Floats
+from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
 from anim.gltf import read
 from anim.measure.players import PLAYERS, sampler
 from anim.model import Clip, Skeleton
@@ -166,3 +169,19 @@ def test_keys_are_stacked_where_they_are_needed_and_all_in_the_end() -> None:
     assert (seen[0], seen[-1]) == (2, 100)
     (fresh,) = stacks(moving)
     assert len(fresh.at(locate(times, times[:60]))[0].times) == 100, "half of them at once"
+
+
+def test_a_node_that_the_skeleton_lacks_is_refused() -> None:
+    with pytest.raises(NotFoundError, match="there is no node 999"):
+        pose(skeleton([-1]), clip(track("scale", [0], [[1, 1, 1]], node=999)), np.zeros(1))
+
+
+@pytest.mark.parametrize(
+    ("at", "error"), [(np.array([np.nan]), RangeError), (0.5, ShapeError), (np.zeros((1, 2)), ShapeError)]
+)
+def test_times_that_are_none_are_refused(at: Any, error: type[AnimError]) -> None:
+    moving = track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]])
+    with pytest.raises(error, match="times"):
+        pose(skeleton([-1]), clip(moving), at)
+    with pytest.raises(error, match="times"):
+        sample(moving, at)

@@ -35,6 +35,15 @@ def test_as_many_clips_as_fit() -> None:
     assert f"clip {LIMIT}" not in said
 
 
+def test_clips_that_do_not_differ_have_no_panel() -> None:
+    still = [_profile(f"still {i}", 0.0) for i in range(75)]
+    said = words(diff([*still, _profile("walk", 0.004, "hand")], title="t", kind="svg"))
+    assert sum("largest distance" in text for text in said) == 1
+    assert "walk" in said
+    assert not any(text.startswith("still") for text in said)
+    assert "no difference" in words(diff(still, title="t", kind="svg"))
+
+
 @pytest.mark.parametrize("profiles", [[], [_profile("still", 0.0)], [Profile("pose", np.zeros(1), np.ones(1), ())]])
 def test_nothing_to_see_is_drawn_all_the_same(profiles: list[Profile]) -> None:
     assert min(png_size(diff(profiles, title="t", kind="png", limit=0.5))) > 50

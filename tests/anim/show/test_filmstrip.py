@@ -14,7 +14,7 @@ from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
 from anim.show import filmstrip as filmstrip_module
 from anim.show import shots, stage
-from anim.show.filmstrip import Look, Row, filmstrip, moving
+from anim.show.filmstrip import Extent, Look, Row, filmstrip, moving
 from anim.show.shots import When
 from tests.clips import skeleton
 from tests.files import opened_fixture
@@ -26,8 +26,8 @@ FACE = np.array([[0, 1, 2]])
 def strip(name: str, *, methods: tuple[str, ...] = (), heated: bool = False, clip: int = 0, **when: Any) -> Any:
     """The rows of a fixture, and its picture."""
     found = shots.of_document(opened_fixture(name), [clip], methods, When(**when))
-    rows, around = shots.rows(found, heated=heated)
-    return rows, filmstrip(rows, around, title=name, look=SMALL)
+    rows, extent = shots.rows(found, heated=heated)
+    return rows, filmstrip(rows, extent, title=name, look=SMALL)
 
 
 def test_frames_lie_beside_each_other_and_move() -> None:
@@ -80,15 +80,15 @@ def test_a_skeleton_without_a_mesh_is_drawn_as_sticks() -> None:
     document = opened_fixture("biped")
     nodes = [{k: v for k, v in node.items() if k not in ("mesh", "skin")} for node in document.json["nodes"]]
     bare = replace(document, json={**document.json, "nodes": nodes})
-    rows, around = shots.rows(shots.of_document(bare, [0], (), When(count=2)))
+    rows, extent = shots.rows(shots.of_document(bare, [0], (), When(count=2)))
     assert len(rows[0].faces) >= 8 * 10
-    assert np.ptp(around[:, 1]) > 1
-    assert filmstrip(rows, around, look=SMALL).std() > 5
+    assert np.ptp(extent.points[:, 1]) > 1
+    assert filmstrip(rows, extent, look=SMALL).std() > 5
 
 
 def test_a_long_stick_is_no_wider_than_half_more_than_the_middle_one() -> None:
     joints = skeleton([-1, 0, 1, 2, 0], translation=[[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0], [0, 0.1, 0], [1, 0, 0]])
-    (instance,) = shots._visible(Scene(joints, ())).instances
+    (instance,) = shots._visible(Scene(joints, ()), None).instances
     bodies = instance.mesh.positions.reshape(-1, 24, 3)
     assert np.ptp(bodies, axis=1).max() == pytest.approx(1)
     widths = np.linalg.norm(bodies[:, 1] - bodies[:, 13], axis=1)
@@ -109,18 +109,20 @@ def test_nearer_faces_hide_others() -> None:
     faces = np.array([[0, 1, 2], [3, 4, 5]])
     positions = np.concatenate((near, far))[None]
     look = Look(height=64, azimuth=0, elevation=0)
-    image = filmstrip([Row("", np.zeros(1), positions, faces, colors)], positions[0], look=look).astype(int)
+    image = filmstrip([Row("", np.zeros(1), positions, faces, colors)], Extent(positions[0], 0.0), look=look).astype(
+        int
+    )
     is_red, is_blue = image[..., 0] > image[..., 2] + 60, image[..., 2] > image[..., 0] + 60
     assert is_red.sum() > 10 * is_blue.sum()
 
 
 def test_moving_pictures_have_their_rows_side_by_side() -> None:
     found = shots.of_document(opened_fixture("arm"), [0], ("lbs", "dqs"), When(count=3))
-    rows, around = shots.rows(found)
-    one, *others = moving(rows, around, title="arm", look=SMALL)
+    rows, extent = shots.rows(found)
+    one, *others = moving(rows, extent, title="arm", look=SMALL)
     assert len(others) == 2
     assert all(image.shape == one.shape for image in others)
-    alone = next(moving(rows[:1], around, look=SMALL))
+    alone = next(moving(rows[:1], extent, look=SMALL))
     assert one.shape[1] > alone.shape[1]
 
 
@@ -134,7 +136,7 @@ def _turning(times: list[float], *, back: bool) -> Row:
 
 def test_the_shorter_rows_of_a_film_wait_for_the_longest() -> None:
     short, long = _turning([0, 0.1], back=False), _turning([0, 0.1, 0.2, 0.3], back=False)
-    pictures = list(moving([short, long], long.positions[[0, -1]], look=SMALL))
+    pictures = list(moving([short, long], Extent(long.positions[[0, -1]], 0.0), look=SMALL))
     assert len(pictures) == 4
     half = pictures[0].shape[1] // 2
     assert not (pictures[0][:, :half] == pictures[1][:, :half]).all()
@@ -145,9 +147,11 @@ def test_the_shorter_rows_of_a_film_wait_for_the_longest() -> None:
 @pytest.mark.parametrize(("back", "frames"), [(True, 4), (False, 5)])
 def test_a_loop_shows_its_first_frame_once(back: bool, frames: int) -> None:
     row = _turning([0, 0.25, 0.5, 0.75, 1], back=back)
-    assert len(list(moving([row], row.positions[[0, -1]], look=SMALL))) == frames
+    assert len(list(moving([row], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == frames
     still = Row("", row.times, row.positions[[0] * 5], FACE, row.colors)
-    assert len(list(moving([still], row.positions[[0, -1]], look=SMALL))) == 5, "what doesn't move is no loop"
+    assert len(list(moving([still], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == 5, (
+        "what doesn't move is no loop"
+    )
 
 
 def test_pictures_are_drawn_in_bands_where_they_are_large(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,9 +165,9 @@ def test_more_pixels_than_memory_should_hold_are_refused(monkeypatch: pytest.Mon
     row = _turning([0, 0.25, 0.5], back=False)
     monkeypatch.setattr(filmstrip_module, "MOST_PIXELS", 10_000)
     with pytest.raises(RangeError, match=r"the picture has \d+ × \d+ pixels, too many"):
-        filmstrip([row], row.positions[0], look=SMALL)
+        filmstrip([row], Extent(row.positions[0], 0.0), look=SMALL)
     with pytest.raises(RangeError, match=r"3 frames have \d+ × \d+ pixels, too many"):
-        next(moving([row], row.positions[0], look=SMALL))
+        next(moving([row], Extent(row.positions[0], 0.0), look=SMALL))
 
 
 @pytest.mark.parametrize(
@@ -192,4 +196,4 @@ def test_what_can_t_be_shown_is_refused() -> None:
     with pytest.raises(RangeError, match="expected lbs"):
         shots.of_document(opened_fixture("arm"), [0], ("foo",), When())
     with pytest.raises(RangeError, match="32"):
-        filmstrip([], np.zeros((1, 3)), look=Look(height=3))
+        filmstrip([], Extent(np.zeros((1, 3)), 0.0), look=Look(height=3))

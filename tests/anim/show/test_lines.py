@@ -73,8 +73,8 @@ def test_a_jump_between_two_keys_breaks_the_speed() -> None:
     assert np.isnan(line.values).sum() == 2
 
 
-def test_angle_from_the_first_key() -> None:
-    line = lines.angle_line(clips.track("rotation", TIMES, about("z", [10, 130, 10])))
+def test_angle_from_a_rotation() -> None:
+    line = lines.angle_line(clips.track("rotation", TIMES, about("z", [10, 130, 10])), about("z", [10])[0])
     assert np.degrees(line.values.max()) == pytest.approx(120)
     assert line.values[0] == line.values[-1] == 0
 

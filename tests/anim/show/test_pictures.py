@@ -122,3 +122,8 @@ def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UnsupportedError, match="need matplotlib") as caught:
         eases([parse("linear")], kind="png")
     assert caught.value.help == "pip install 'gltf-anim[plot]'"
+
+
+def test_keys_of_each_grade_are_counted_as_keys() -> None:
+    said = words(through(range(5), [0, 1, 1, 1, 3], ["linear"], kind="svg"))
+    assert "C0 at 2 keys, C2 at 1 key; no overshoot" in said

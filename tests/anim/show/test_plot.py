@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,11 +51,11 @@ def test_words_of_each_kind_of_track() -> None:
             limit=LIMIT,
         )
     )
-    for expected in ("title", "0", "1", "2", "x", "y", "z", "w", "2 s", "speed, m/s", "turning speed, °/s",
-                     "angle from the first key, °"):  # fmt: skip
+    for expected in ("title", "0", "1", "2", "x", "y", "z", "2 s", "speed, m/s", "turning speed, °/s",
+                     "angle from rest, °"):  # fmt: skip
         assert expected in said, expected
     assert "translation, m  ·  linear, 3 keys" in said
-    assert "rotation  ·  linear, 3 keys" in said
+    assert "rotation from rest, °  ·  linear, 3 keys" in said
     assert "scale, factor  ·  step, 2 keys" in said
     assert "translation, m  ·  cubicspline, 3 keys" in said
     assert said.count("speed, per second") == 0  # STEP has none
@@ -115,6 +116,24 @@ def test_the_difference_is_named_with_its_place() -> None:
     assert "difference: at most 10 mm at 1 s" in said
     assert "translation, m, from its first key  ·  linear, 3 → 2 keys" not in said
     assert "translation, m  ·  linear, 3 → 2 keys" in said
+
+
+@pytest.mark.parametrize(
+    ("names", "shown"),
+    [
+        (["face_smile", "face_blink", "face_jaw"], ["smile", "blink", "jaw"]),
+        (["Key 1", "Key 2", "Key 3"], ["Key 1", "Key 2", "Key 3"]),
+        (["one"], ["target 0", "target 1", "target 2"]),
+        (None, ["target 0", "target 1", "target 2"]),
+    ],
+)
+def test_weights_are_called_by_their_targets(names: list[str] | None, shown: list[str]) -> None:
+    file = opened_fixture("morph_cube")
+    extras = {"extras": {"targetNames": names}} if names else {}
+    meshes = [{k: v for k, v in each.items() if k != "extras"} | extras for each in file.json["meshes"]]
+    named = replace(file, json={**file.json, "meshes": meshes})
+    found = choose(named, Selection(paths=("weights",)), limit=1).shown[0].labels
+    assert list(found) == shown
 
 
 def test_partners_are_found_by_name_not_by_number() -> None:

@@ -9,12 +9,17 @@ from anim.optimize.tradeoff import Sized
 from anim.show.tradeoff import tradeoff
 from tests.anim.show.reading import png_size, words
 
-SIZES = [Sized(2e-4, 41_234, 1.9e-4), Sized(2e-3, 30_000, 1.9e-3), Sized(2e-2, 12_500, 1e-2)]
+SIZES = [
+    Sized(0, 160_000, 0, 60_400),
+    Sized(2e-4, 141_234, 1.9e-4, 41_234),
+    Sized(2e-3, 130_000, 1.9e-3, 30_000),
+    Sized(2e-2, 112_500, 1e-2, 12_500),
+]
 
 
 def test_every_size_and_bound_is_written_out() -> None:
     said = words(tradeoff(SIZES, 2.0, title="Fox", kind="svg"))
-    for expected in ("Fox", "41.23", "30", "12.5", "0.01", "0.1", "1"):
+    for expected in ("Fox", "41.2 kB", "30 kB", "12.5 kB", "0.01 %", "0.1 %", "1 %"):
         assert expected in said, expected
 
 
@@ -26,7 +31,15 @@ def test_the_same_picture_twice_and_another_for_other_sizes() -> None:
 
 
 def test_one_size() -> None:
-    assert "41.23" in words(tradeoff(SIZES[:1], 2.0, title="", kind="svg"))
+    assert "41.2 kB" in words(tradeoff(SIZES[1:2], 2.0, title="", kind="svg"))
+
+
+def test_source_and_floor_are_marked() -> None:
+    said = words(tradeoff(SIZES, 2.0, title="Fox", kind="svg", source=250_000))
+    for expected in ("source  250 kB", "without loss  60.4 kB", "floor  12.5 kB"):
+        assert expected in said, expected
+    plain = words(tradeoff(SIZES[1:], 2.0, title="Fox", kind="svg"))
+    assert not any(text.startswith(("source", "without")) for text in plain)
 
 
 def test_other_kinds_are_refused() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,14 @@ import pytest
 from anim.arrays import Floats
 from anim.gltf import read
 from anim.measure.surface import diagonal
+from anim.model import Clip, Scene
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import grid
 from anim.skinning.bake import baker
 from anim.skinning.frames import Frames
 from anim.skinning.layer import Layer
+from tests.anim.skinning.odd_rigs import with_root_without_weight
 from tests.files import opened_path
 
 pxr = pytest.importorskip("pxr")
@@ -28,10 +30,20 @@ Find = Callable[[str], Path]
 @pytest.mark.parametrize("method", ["lbs", "dqs"])
 def test_usd_agrees(name: str, method: str, asset: Find) -> None:
     document = opened_path(asset(name))
-    of = read.scene(document)
+    assert _compared(read.scene(document), read.clips(document)[::9], method) > 5
+
+
+@pytest.mark.parametrize("method", ["lbs", "dqs"])
+def test_usd_agrees_under_a_joint_without_weight_and_in_another_unit(method: str, asset: Find) -> None:
+    document = opened_path(asset("CesiumMan.glb"))
+    assert _compared(with_root_without_weight(read.scene(document)), read.clips(document), method) > 5
+
+
+def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
+    """How many frames were compared of skinned meshes, all of them alike."""
     made = baker(of, method=method)
     compared = 0
-    for played in read.clips(document)[::9]:
+    for played in clips:
         times = grid(played.start, played.end, fps=6)
         whole = made.bake(played, times=times).whole().positions
         local = pose(of.skeleton, played, times)
@@ -43,7 +55,7 @@ def test_usd_agrees(name: str, method: str, asset: Find) -> None:
             wanted = _skinned(layer, layer.matrices(frames, slice(None)), method)
             assert np.abs(found - wanted).max() < 1e-5 * diagonal(of)
             compared += len(times)
-    assert compared > 5
+    return compared
 
 
 def _skinned(layer: Layer, matrices: Floats, method: str) -> Floats:

@@ -116,10 +116,37 @@ def test_an_open_mesh_has_no_volume_but_an_index() -> None:
     assert found.worst.index == pytest.approx(np.sqrt(0.5), abs=1e-6)
 
 
-def test_vertices_without_weights_and_flat_joints_do_not_collapse() -> None:
-    body = mesh([[1, 0, 0]] * 2, [[0, 1]] * 2, [[0, 0], [0.5, 0.5]])
+def test_flat_joints_do_not_collapse() -> None:
+    body = mesh([[1, 0, 0]], [[0, 1]], [[0.5, 0.5]])
     (found,) = collapse(scene(body, [-1, 0], scale=[[1, 1, 1], [0, 0, 0]]), clip(), times=np.zeros(1))
     assert found.worst.index == 1
+
+
+@pytest.mark.parametrize("angle", [90.0, 170.0])
+def test_a_mirrored_character_has_the_numbers_of_the_one_in_the_mirror(angle: float) -> None:
+    """One root above all joints mirrors and doubles: nothing collapses that does not without it."""
+    plain = tube()
+    above = replace(
+        plain.skeleton,
+        names=(*plain.skeleton.names, "mirror"),
+        parents=np.append(np.where(plain.skeleton.parents < 0, len(plain.skeleton), plain.skeleton.parents), -1),
+        translation=np.vstack((plain.skeleton.translation, [0, 0, 0])),
+        rotation=np.vstack((plain.skeleton.rotation, [0, 0, 0, 1])),
+        scale=np.vstack((plain.skeleton.scale, [-2, 2, 2])),
+    )
+    (wanted,) = collapse(plain, turned("y", 0, angle), times=np.linspace(0, 1, 4))
+    (found,) = collapse(replace(plain, skeleton=above), turned("y", 0, angle), times=np.linspace(0, 1, 4))
+    assert found.indices == pytest.approx(wanted.indices, abs=1e-5)
+    assert (found.low, found.inverted) == (wanted.low, wanted.inverted)
+    for one, other in zip(found.methods, wanted.methods, strict=True):
+        assert one.volume == pytest.approx(other.volume, abs=1e-4)
+        assert one.bulge == pytest.approx(other.bulge, abs=1e-4)
+
+
+def test_what_a_clip_alone_mirrors_is_inside_out() -> None:
+    (found,) = collapse(tube(), clip(track("scale", [0], [[-1, 1, 1]])), times=np.zeros(1))
+    assert (found.worst.index, found.inverted) == (0, 1)
+    assert found.methods[0].volume == pytest.approx([-1], abs=1e-5)
 
 
 def test_without_a_skin_there_is_nothing_to_say() -> None:
@@ -150,11 +177,14 @@ def test_advice() -> None:
     assert fine.startswith("linear blending is good enough: no vertex falls below 0.7 (least 1.000), 100 %")
     pinched, bake_it, share = told("y", 120)
     assert pinched.startswith("1 clip pinches; worst 0.50 in 'turn': 'lower' against 'upper', 120° at 1.00 s")
-    assert "--method dqs (lbs keeps 50 %, dqs keeps 100 % of the volume)" in bake_it
+    assert bake_it == (
+        "to bake it with dqs (lbs keeps 50 %, dqs keeps 100 % of the volume): "
+        "gltf-anim bake IN OUT --method dqs --clip '#0'"
+    )
     assert share.startswith("or share the twist among 4 joints between 'lower' and 'upper' (97 %")
     bent = told("x", 120)
     assert not any("twist" in line for line in bent)
-    assert bent[-1].startswith("dqs bulges up to ")
+    assert bent[-3].startswith("dqs bulges up to ")
     assert list(advice([])) == ["there is no clip to look at"]
 
 
@@ -188,11 +218,12 @@ def test_what_every_method_loses_is_no_pinching() -> None:
 def test_of_what_was_measured_the_best_is_recommended() -> None:
     """CesiumMan's figures: cor keeps more and bulges less, so nobody is told to bake dqs or to try cor."""
     lines = list(advice([made_up(0.68, lbs=(0.94, 1.46), dqs=(0.96, 1.78), cor=(0.97, 1.57))]))
-    assert lines[1] == "bake it with --method cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume)"
-    assert (
-        lines[2] == "cor bulges up to 1.57× at 'arm' (turn, 0.50 s): look at it, and see what --bulge-clamp makes of it"
-    )
-    assert len(lines) == 3
+    assert lines[1].startswith("to bake it with cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume): ")
+    assert lines[2:] == [
+        "cor bulges up to 1.57× at 'arm' (turn, 0.50 s)",
+        "to see what a clamp makes of the bulge: gltf-anim collapse IN --method lbs --method dqs --method cor "
+        "--bulge-clamp --clip '#0'",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -220,15 +251,20 @@ def test_standings_are_the_worst_over_all_meshes() -> None:
 
 
 def test_only_what_was_not_measured_is_to_be_tried() -> None:
-    assert told("x", 120)[-1].endswith("see what --bulge-clamp or --method cor makes of it")
-    assert told("x", 120, "lbs", "dqs", "cor")[-1].endswith("see what --bulge-clamp makes of it")
-    assert told("y", 120, "lbs")[1] == (
-        "bake it with another method: see first what --method dqs or --method cor makes of it"
+    clamp, other = told("x", 120)[-2:]
+    assert clamp.endswith(": gltf-anim collapse IN --method lbs --method dqs --bulge-clamp --clip '#0'")
+    assert other == (
+        "to see what cor makes of it: gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'"
     )
-    assert told("y", 120, "cor")[1] == "bake it with --method cor (cor keeps 100 % of the volume)"
+    assert told("x", 120, "lbs", "dqs", "cor")[-1].endswith("--method cor --bulge-clamp --clip '#0'")
+    assert told("y", 120, "lbs")[1] == (
+        "bake it with another method; to see first what dqs and cor would keep: "
+        "gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'"
+    )
+    assert told("y", 120, "cor")[1].startswith("to bake it with cor (cor keeps 100 % of the volume): ")
     clamped = told("x", 120, "lbs", "dqs", clamped=True)
-    assert clamped[1].startswith("bake it with --method dqs --bulge-clamp (")
-    assert not any("see what --bulge-clamp" in line for line in clamped)
+    assert clamped[1].endswith("gltf-anim bake IN OUT --method dqs --bulge-clamp --clip '#0'")
+    assert not any("a clamp" in line for line in clamped)
 
 
 def test_nobody_is_warned_of_a_bulge_that_nobody_needs() -> None:
@@ -247,9 +283,9 @@ def test_a_method_that_loses_more_than_lbs_is_not_recommended() -> None:
 
 def test_without_lbs_nothing_is_said_of_its_volume() -> None:
     (line,) = told("y", 90, "cor")
-    assert (
-        line
-        == "no vertex falls below 0.7 (least 0.707); add --method lbs to see what linear blending leaves of the volume"
+    assert line == (
+        "no vertex falls below 0.7 (least 0.707); to see what linear blending leaves of the volume: "
+        "gltf-anim collapse IN --method cor --method lbs --clip '#0'"
     )
     (line,) = advice([made_up(0.8, closed=False, dqs=(None, 1.0))])
     assert line == "linear blending is good enough: no vertex falls below 0.7 (least 0.800)"

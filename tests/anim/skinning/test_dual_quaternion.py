@@ -12,7 +12,7 @@ from anim.model import Scene
 from anim.skinning.bake import bake
 from anim.skinning.closed import volumes
 from anim.skinning.methods import SKINNING_METHODS
-from anim.skinning.stretch import pivots, split, topmost
+from anim.skinning.stretch import pivots, split
 from fixtures.tube import TUBE_RINGS, TUBE_SIDES
 from tests.anim.skinning.scenes import mesh, random_scene, scene, skinning_matrices
 from tests.anim.skinning.test_linear_blend import TIMES, baked, moving
@@ -78,10 +78,12 @@ def test_a_split_gives_the_matrix_back() -> None:
     centers = np.random.default_rng(0).normal(size=(matrices.shape[1], 3))
     parts = split(matrices, centers)
     assert parts.stretch is not None
+    assert parts.scale is not None
     assert quaternion.dot(parts.rotation, parts.rotation) == pytest.approx(1)
     linear = quaternion.to_matrix(parts.rotation) @ parts.stretch
     linear[..., 3] += parts.translation
     assert np.abs(linear - matrices).max() < 1e-12 * np.abs(matrices).max()
+    assert parts.scale**3 == pytest.approx(np.linalg.det(matrices[..., :3]))
     square = parts.stretch[..., :3]
     assert np.abs(square - np.swapaxes(square, -1, -2)).max() < 1e-12 * np.abs(square).max()
 
@@ -129,22 +131,6 @@ def test_a_mirrored_rig_moves_as_the_mirror_image(method: str) -> None:
     plain, mirrored = baked(of, played, method=method), baked(scene(body, parents, inverse_bind=binds, **rest), played)
     mirrored = baked(scene(body, parents, inverse_bind=binds, **rest), played, method=method)
     assert np.abs(mirrored - plain * [-1, 1, 1]).max() < 1e-5 * np.abs(plain).max()
-
-
-@pytest.mark.parametrize("method", TURNING)
-def test_weights_count_as_shares(method: str) -> None:
-    of = random_scene(2, stretch=0.3)
-    body = of.instances[0].mesh
-    double = mesh(body.positions, body.joints, 2 * body.weights, faces=body.faces)
-    nodes, skin = of.skeleton, of.instances[0].skin
-    assert skin is not None
-    rest = {"translation": nodes.translation, "rotation": nodes.rotation, "scale": nodes.scale}
-    other = scene(double, nodes.parents[:-1].tolist(), inverse_bind=skin.inverse_bind, **rest)
-    played = moving(of, 1)
-    # centers look at weights of triangles too, of which twice as many make the same shape with a wider σ
-    tolerance = 1e-5 if method == "dqs" else 0.2
-    one, two = baked(of, played, method=method), baked(other, played, method=method)
-    assert np.abs(one - two).max() < tolerance * np.abs(one).max()
 
 
 @pytest.mark.parametrize("angle", [45.0, 90.0, 135.0, 170.0])
@@ -224,5 +210,4 @@ def test_a_pivot_is_where_the_joint_was_bound() -> None:
 
     made = rig(of.instances[0], of.skeleton.parents)
     assert pivots(made).tolist() == [[0, 0, 0], [0, 0.5, 0]]
-    assert topmost(made.above) == 0
     assert made.above.tolist() == [-1, 0]

@@ -69,13 +69,6 @@ def test_moving_every_joint_moves_every_vertex() -> None:
     assert baked(of, everything, np.zeros(1))[0] == pytest.approx(wanted, abs=1e-5)
 
 
-def test_weights_count_as_stored() -> None:
-    """Sums of 0.5 and 2 pull the point towards the origin and away from it; no weight puts it there."""
-    body = mesh([[1, 0, 0]] * 3, [[0, 0]] * 3, [[0.5, 0], [2, 0], [0, 0]])
-    found = baked(scene(body, [-1]), clip(), np.zeros(1))[0]
-    assert found.tolist() == [[0.5, 0, 0], [2, 0, 0], [0, 0, 0]]
-
-
 def test_many_influences() -> None:
     """Twelve joints, each moved to its own place, hold a point at the mean of them."""
     places = np.random.default_rng(1).normal(size=(12, 3))

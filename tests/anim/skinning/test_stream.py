@@ -1,7 +1,8 @@
-"""Chunks, stretches and threads: none of them changes a bit, and memory doesn't grow with the length of a clip."""
+"""Chunks and threads: neither changes a bit, and memory doesn't grow with the length of a clip."""
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +15,11 @@ from anim.skinning import stream
 from anim.skinning.bake import bake, baker
 from anim.skinning.frames import Playback
 from anim.skinning.methods import SKINNING_METHODS
-from anim.skinning.stream import stretches
 from tests.anim.skinning.scenes import TRIANGLE, mesh, random_scene
 from tests.anim.skinning.test_linear_blend import moving
 from tests.clips import clip, track
 
-FRAMES = 231  # eight chunks of 32, the last one shorter: stretches of 1, 2, 4 and 1 of them
+FRAMES = 231  # eight chunks of 32, the last one shorter
 
 
 def _scene(method: str) -> tuple[Scene, Clip]:
@@ -36,9 +36,9 @@ def _baked(of: Scene, played: Clip, **how: Any) -> AnyArray:
     return bake(of, played, times=np.linspace(0, 2, FRAMES), rigid=True, **how).whole().positions
 
 
-@pytest.mark.parametrize("packed", [1, 20_000, 1 << 40], ids=["one chunk", "few chunks", "any number"])
+@pytest.mark.parametrize("packed", [1, 700_000, 1 << 40], ids=["one block", "few blocks", "any number"])
 @pytest.mark.parametrize("method", SKINNING_METHODS)
-def test_same_bytes_for_any_stretch_and_number_of_threads(
+def test_same_bytes_for_any_chunk_and_number_of_threads(
     method: str, packed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     of, played = _scene(method)
@@ -48,9 +48,8 @@ def test_same_bytes_for_any_stretch_and_number_of_threads(
     ]
     for frame, one in zip((40, 130, 230), alone, strict=True):
         assert np.array_equal(once[frame], one.whole().positions[0]), "a frame doesn't depend on the others"
-    monkeypatch.setattr(stream, "CHUNK", 1)
-    monkeypatch.setattr(stream, "PIECE", 7)
-    monkeypatch.setattr(stream, "PACKED", packed)
+    monkeypatch.setattr(stream, "MIN_VERTICES", 7)
+    monkeypatch.setattr(stream, "PACKED_BYTES", packed)
     for threads in (1, 2, 5):
         assert np.array_equal(_baked(of, played, method=method, threads=threads), once)
 
@@ -67,22 +66,31 @@ def test_parts_of_frames_are_the_frames_at_those_times() -> None:
         assert np.ptp(weights) > 0
 
 
-@pytest.mark.parametrize(
-    ("frames", "step", "most", "lengths"),
-    [
-        (231, 32, 10_000, [32, 64, 128, 256]),
-        (231, 32, 100, [32, 64, 96, 96]),
-        (231, 32, 1, [32] * 8),
-        (32, 32, 10_000, [32]),
-        (33, 32, 10_000, [32, 64]),
-        (0, 32, 10_000, []),
-    ],
-)
-def test_stretches_double_as_far_as_they_may(frames: int, step: int, most: int, lengths: list[int]) -> None:
-    found = list(stretches(frames, step, most))
-    assert [each.stop - each.start for each in found] == lengths
-    assert [each.start for each in found] == np.cumsum([0, *lengths])[:-1].tolist()
-    assert sum(lengths) >= frames
+def test_chunks_that_are_kept_stay_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream, "CHUNK_BYTES", 1)
+    of, played = _scene("lbs")
+    chunks, copies = [], []
+    for chunk in baker(of, rigid=True).bake(played, times=np.linspace(0, 2, FRAMES)).chunks():
+        chunks.append(chunk)
+        copies.append(chunk.positions.copy())
+    assert len(chunks) == 8
+    assert all(np.array_equal(chunk.positions, copy) for chunk, copy in zip(chunks, copies, strict=True))
+
+
+def test_memory_does_not_grow_with_the_number_of_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The caller's chunk, the one that is skinned and the one that follows, with what they are made of."""
+    monkeypatch.setattr(stream, "CHUNK_BYTES", 1)
+    made = baker(random_scene(2, vertices=3000))
+    for _ in made.bake(Clip("", ()), times=np.zeros(1)).chunks():  # what is made once
+        pass
+    tracemalloc.start()
+    try:
+        count = sum(1 for _ in made.bake(Clip("", ()), times=np.linspace(0, 40, 1200)).chunks())
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert count == 38
+    assert peak < 5 * 32 * 3000 * 12
 
 
 def test_what_is_packed_at_a_time_is_bounded_for_shapes_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,8 +105,7 @@ def test_what_is_packed_at_a_time_is_bounded_for_shapes_too(monkeypatch: pytest.
 
     made = baker(of, rigid=True)
     monkeypatch.setattr(Playback, "at", counted)
-    monkeypatch.setattr(stream, "CHUNK", 1)
-    monkeypatch.setattr(stream, "PACKED", 64 * 36 * 150 + 64 * 96 * 30)
+    monkeypatch.setattr(stream, "PACKED_BYTES", 64 * 36 * 150 + 64 * 96 * 40)
     for _ in made.bake(played, times=np.linspace(0, 2, FRAMES)).chunks():
         pass
-    assert seen == [32, 64, 64, 64, 7]
+    assert seen == [64, 64, 64, 39]

@@ -1,0 +1,61 @@
+"""The joint that each matched joint is placed from, and the order in which joints can be placed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+from anim.model import Skeleton
+
+Pair: TypeAlias = tuple[int, int]  # a source node and a target node
+NONE: Pair = (-1, -1)
+
+
+def anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -> dict[int, Pair]:
+    """Return the matched pair that each matched target node is placed from; (−1, −1) for those that carry the path.
+
+    It is the nearest matched joint above, in the skeleton that has the nearer one: a foot of an IK rig, which descends
+    from the root, is placed from the lower leg where the other skeleton has it there.
+    """
+    back = {b: a for a, b in pairs.items()}
+    found: dict[int, Pair] = {}
+    for a, b in pairs.items():
+        in_source = next(((up, pairs[up]) for up in above(source, a) if up in pairs), NONE)
+        in_target = next(((back[up], up) for up in above(target, b) if up in back), NONE)
+        is_nearer = in_target == NONE or in_source[1] not in above(target, in_target[1])
+        depends = in_source[1] == b or b in above(target, in_source[1])
+        found[b] = in_source if in_source != NONE and is_nearer and not depends else in_target
+    return found
+
+
+def placing_order(target: Skeleton, chosen: dict[int, Pair], pairs: Mapping[int, int]) -> list[int]:
+    """Return all target nodes, each behind its parent and its anchor.
+
+    Where anchors wait for each other, one is replaced in `chosen` by the nearest matched joint above.
+    """
+    back = {b: a for a, b in pairs.items()}
+    waiting = [node for level in target.levels() for node in level.tolist()]
+    done: dict[int, None] = {-1: None}
+    while waiting:
+        before = len(waiting)
+        waiting = [node for node in waiting if not _is_ready(target, node, chosen, done)]
+        if len(waiting) == before:
+            node = next(n for n in waiting if int(target.parents[n]) in done)
+            chosen[node] = next(((back[up], up) for up in above(target, node) if up in back), NONE)
+    return [node for node in done if node >= 0]
+
+
+def above(skeleton: Skeleton, node: int) -> list[int]:
+    """Return the ancestors of a node, the nearest first; none of −1."""
+    found = []
+    while node >= 0 and (node := int(skeleton.parents[node])) >= 0:
+        found.append(node)
+    return found
+
+
+def _is_ready(target: Skeleton, node: int, chosen: Mapping[int, Pair], done: dict[int, None]) -> bool:
+    """Whether a node can be placed now; it then is done."""
+    ready = int(target.parents[node]) in done and chosen.get(node, NONE)[1] in done
+    if ready:
+        done[node] = None
+    return ready

@@ -1,0 +1,116 @@
+"""The rest pose that skins were bound in, where the nodes of a file rest in another: a pose of some dance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.maths import matrix, quaternion
+from anim.model import Clip, Interpolation, Skeleton, Skin, Track
+from anim.sampling import rest, world_matrices
+
+MIN_DISTANCE = 1e-3  # of the joints' size, by which a joint must be off its place when bound
+MIN_ANGLE = np.radians(1)
+SAME_SCALE = 0.01  # fraction by which two scales may differ; a joint of another one has no matrix that means anything
+
+
+@dataclass(frozen=True, slots=True)
+class BindPose:
+    """A skeleton that rests as its skins were bound. num_joints: how many rest elsewhere in the file."""
+
+    skeleton: Skeleton
+    num_joints: int
+
+
+def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose:
+    """Return the skeleton at rest as the inverse bind matrices have it; unchanged where the nodes' pose agrees.
+
+    The matrices give the joints to each other, not where the whole is: it is put where the mesh's node, a node above
+    the joints, or the world has it, whichever leaves the joints nearest to the nodes' pose, and keeps its size. Nodes
+    that are no joints, and joints whose matrix has another scale than the others', keep their place in their parent.
+    skins: by the node of the mesh, see `read.skins`.
+    """
+    world = world_matrices(skeleton, rest(skeleton))[0]
+    bound: dict[int, Floats] = {}
+    for holder, skin in skins:
+        for node, place in _bound(skeleton, world, (holder, skin), bound).items():
+            bound.setdefault(node, place)
+    if not any(_differs(bound[node], world[node], _size(world, bound)) for node in bound):
+        return BindPose(skeleton, 0)
+    return _resting(skeleton, world, bound)
+
+
+def completed(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
+    """Return the clip with a key for whatever rests otherwise in `skeleton` than in `other` and is not animated.
+
+    So the clip plays alike on both: what it left at the rest of `skeleton` it now says.
+    """
+    animated = {(track.node, track.path) for track in clip.tracks}
+    times, tracks = np.array([clip.start]), list(clip.tracks)
+    for path in ("translation", "rotation", "scale"):
+        here, there = getattr(skeleton, path), getattr(other, path)
+        for node in np.flatnonzero((here != there).any(axis=1)).tolist():
+            if (node, path) not in animated:
+                tracks.append(Track(node, path, Interpolation.LINEAR, times, here[node][None]))
+    return Clip(clip.name, tuple(tracks))
+
+
+def _bound(skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]) -> dict[int, Floats]:
+    """World matrices (3, 4) by joint of a skin, as it was bound."""
+    joints, inverse = held[1].joints, held[1].inverse_bind
+    in_mesh = matrix.inverse(inverse)
+    moves = matrix.multiply(world[joints], inverse)
+    volumes = np.abs(np.linalg.det(moves[:, :, :3]))
+    usual = float(np.median(volumes))
+    sound = np.flatnonzero(np.abs(volumes - usual) <= 3 * SAME_SCALE * usual)
+    if not usual > 0 or not len(sound):
+        return {}
+    shared = [j for j in sound.tolist() if int(joints[j]) in known]
+    if shared:
+        placed = matrix.multiply(known[int(joints[shared[0]])], inverse[shared[0]])
+    else:
+        placed = _placed(skeleton, world, held[0], joints[sound], in_mesh[sound], usual)
+    return {int(joints[j]): matrix.multiply(placed, in_mesh[j]) for j in sound.tolist()}
+
+
+def _placed(skeleton: Skeleton, world: Floats, holder: int, joints: Ints, in_mesh: Floats, volume: float) -> Floats:
+    """world_from_mesh (3, 4) when the skin was bound, of the scale that gives `volume`.
+
+    The scale is the joints' own: vertices may be in centimeters where nodes are in meters.
+    """
+    nodes = {holder, *(int(node) for node in skeleton.parents[joints] if node >= 0)} - set(joints.tolist())
+    choices = np.stack([np.eye(4)[:3], *(world[node] for node in sorted(nodes))])
+    volumes = np.abs(np.linalg.det(choices[:, :, :3]))
+    choices, volumes = choices[volumes > 0], volumes[volumes > 0]
+    choices[:, :, :3] *= np.cbrt(volume / volumes)[:, None, None]
+    far = [np.linalg.norm(matrix.multiply(m, in_mesh)[:, :, 3] - world[joints, :, 3], axis=1).sum() for m in choices]
+    return np.asarray(choices[int(np.argmin(far))])
+
+
+def _differs(bound: Floats, world: Floats, size: float) -> bool:
+    far = float(np.linalg.norm(bound[:, 3] - world[:, 3])) > MIN_DISTANCE * size
+    one, two = (matrix.decompose(each)[1] for each in (bound, world))
+    return far or bool(quaternion.angle_between(one, two) > MIN_ANGLE)
+
+
+def _size(world: Floats, joints: dict[int, Floats]) -> float:
+    return float(np.ptp(world[[*joints], :, 3], axis=0).max())
+
+
+def _resting(skeleton: Skeleton, world: Floats, bound: dict[int, Floats]) -> BindPose:
+    """The skeleton with its joints where they were bound, and how many of them that moves."""
+    parts = {path: getattr(skeleton, path).copy() for path in ("translation", "rotation", "scale")}
+    found, size = world.copy(), _size(world, bound)
+    for level in skeleton.levels():
+        for node in level.tolist():
+            parent = int(skeleton.parents[node])
+            local = world[node] if parent < 0 else matrix.multiply(matrix.inverse(world[parent]), world[node])
+            if node in bound:
+                local = bound[node] if parent < 0 else matrix.multiply(matrix.inverse(found[parent]), bound[node])
+                for path, value in zip(parts, matrix.decompose(local)[:3], strict=True):
+                    parts[path][node] = value
+            found[node] = local if parent < 0 else matrix.multiply(found[parent], local)
+    return BindPose(replace(skeleton, **parts), sum(_differs(bound[n], world[n], size) for n in bound))

@@ -1,0 +1,44 @@
+"""The joints of a person that a VRM file states: VRM 0.x, VRM 1.0 and VRM animations."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from anim.gltf.document import Json, items
+
+EXTENSIONS = ("VRMC_vrm", "VRMC_vrm_animation", "VRM")
+ROLES = {"left_toes": "left_toe", "right_toes": "right_toe"}  # where VRM has another word
+
+
+def stated_roles(json: Json) -> dict[str, int]:
+    """Return the nodes by role ("left_upper_arm", see `roles`), as a file's extensions state them; none for others.
+
+    Of VRM 1.0 and animations humanBones is an object of {"node": 3} by bone; of VRM 0.x a list of {"bone", "node"}.
+    An upper chest is the chest where no chest is stated. What is not as the specifications say is left out.
+    {"leftToes": {"node": 7}} → {"left_toe": 7}
+    """
+    count = len(items(json, "nodes"))
+    extensions = json.get("extensions")
+    for name in EXTENSIONS:
+        bones = _inside(_inside(_inside(extensions, name), "humanoid"), "humanBones")
+        each = (
+            bones.items()
+            if isinstance(bones, dict)
+            else ((_inside(b, "bone"), b) for b in (bones if isinstance(bones, list) else ()))
+        )
+        found = {_role(bone): _inside(about, "node") for bone, about in each if isinstance(bone, str)}
+        nodes = {role: node for role, node in found.items() if type(node) is int and 0 <= node < count}
+        if nodes:
+            upper = nodes.pop("upper_chest", None)
+            return nodes if upper is None or "chest" in nodes else {**nodes, "chest": upper}
+    return {}
+
+
+def _inside(value: Any, key: str) -> Any:
+    return value.get(key) if isinstance(value, dict) else None
+
+
+def _role(bone: str) -> str:
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bone).lower()
+    return ROLES.get(words, words)

@@ -1,0 +1,55 @@
+"""Tracks that end where they start: the first and the last key of such a track stay equal, to the bit.
+
+q and −q are the same rotation; where a turn comes back as −q, the last key is the first with all signs changed, so that
+neighboring keys keep their signs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.model import Clip, Kind, Track
+from anim.sampling.track import sample
+
+
+def closure_sign(values: Floats, tolerance: float) -> float:
+    """Return s where the last of the values (K, C) is s · the first within `tolerance`, in their units, 0 for none.
+
+    s is −1 for rotations that come back with the other sign only; callers pass no other values that change sign.
+    ([0 0 0 1] … [0 0 0 −1], 0) → −1
+    """
+    signs = (1.0, -1.0) if values.shape[1] == 4 else (1.0,)
+    return next((sign for sign in signs if np.linalg.norm(values[-1] - sign * values[0]) <= tolerance), 0.0)
+
+
+def close_ends(keys: Floats, signs: Floats) -> Floats:
+    """Return keys (K, G, C) whose ends are equal where `signs` (G,) is not 0: both become their mean.
+
+    Rotations stay unit.
+    """
+    tied = np.flatnonzero(signs)
+    if not len(tied):
+        return keys
+    keys, sign = keys.copy(), signs[tied, None]
+    ends = (keys[0, tied] + sign * keys[-1, tied]) / 2
+    if keys.shape[2] == 4:
+        ends = quaternion.normalize(ends)
+    keys[0, tied], keys[-1, tied] = ends, sign * ends
+    return keys
+
+
+def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:
+    """Return the targets that end `before` in the very value they start with, and `after` in another.
+
+    Tracks that `after` lacks are at rest, and so closed.
+    """
+    closed = {track.target for track in before.tracks if _is_closed(track, before)}
+    return [track.target for track in after.tracks if track.target in closed and not _is_closed(track, after)]
+
+
+def _is_closed(track: Track, clip: Clip) -> bool:
+    """Whether a track has the same value at both ends of its clip, to the bit; q and −q are the same."""
+    first, last = (sample(track, np.array([time])) for time in (clip.start, clip.end))
+    return bool((first == last).all() or (track.kind is Kind.ROTATION and (first == -last).all()))

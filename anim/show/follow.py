@@ -1,0 +1,79 @@
+"""The way that a figure travels over the ground, for a camera that goes with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import VertexCache
+
+FAR = 1.0  # diagonals of the figure; a camera that stands still has what travels less in its picture
+SMOOTH = 5  # frames before and after that a place is the mean of: the camera doesn't sway with each step
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Where a figure has got to. times: (P,) s. places: (P, 2) m of x and z, from where it began: start (2,)."""
+
+    times: Floats
+    places: Floats
+    start: Floats
+
+    def at(self, times: float | Floats) -> Floats:
+        """Return the places (..., 2) m at times (...) s."""
+        return np.stack([np.interp(times, self.times, self.places[:, i]) for i in (0, 1)], axis=-1)
+
+    def distance(self, times: float | Floats) -> Floats:
+        """Return how far along its way (...) m the figure is at times (...) s."""
+        return np.asarray(np.interp(times, self.times, self._distances()))
+
+    def milestones(self, time: float, spacing: float) -> Floats:
+        """Return the places (M, 2), m in x and z, every `spacing` m along the way, up to that at `time`."""
+        along = np.arange(0, float(self.distance(time)) + 1e-9, spacing)
+        distances = self._distances()
+        places = np.stack([np.interp(along, distances, self.places[:, i]) for i in (0, 1)], axis=-1)
+        return np.asarray(self.start + places)
+
+    def _distances(self) -> Floats:
+        steps = np.linalg.norm(np.diff(self.places, axis=0), axis=1)
+        return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def travels(cache: VertexCache) -> bool:
+    """Return whether a figure leaves the place where it began by more than its own size."""
+    return _extent(_centers(cache)) > FAR * _size(cache)
+
+
+def way(cache: VertexCache) -> Way:
+    """Return the way of the middle of all vertices over the ground, without the sway of single steps."""
+    centers = _centers(cache)
+    smooth = _smoothed(centers)
+    return Way(cache.times, smooth - smooth[0], smooth[0])
+
+
+def _centers(cache: VertexCache) -> Floats:
+    """Mean of all vertices (P, 2), x and z."""
+    means = [chunk.positions[..., [0, 2]].mean(axis=1, dtype=np.float64) for chunk in cache.chunks()]
+    return np.concatenate(means)
+
+
+def _size(cache: VertexCache) -> float:
+    """Diagonal of the figure in m, the median over all frames."""
+    corners = [np.ptp(chunk.positions, axis=1).astype(np.float64) for chunk in cache.chunks()]
+    return float(np.median(np.linalg.norm(np.concatenate(corners), axis=1)))
+
+
+def _extent(places: Floats) -> float:
+    return float(np.linalg.norm(np.ptp(places, axis=0)))
+
+
+def _smoothed(places: Floats) -> Floats:
+    """A running mean (P, 2) that keeps both ends, and straight ways as they are."""
+    half = min(SMOOTH, len(places) - 1)
+    before, after = 2 * places[0] - places[half:0:-1], 2 * places[-1] - places[-2 : -half - 2 : -1]
+    padded = np.concatenate((before, places, after))
+    total = np.cumsum(np.concatenate((np.zeros((1, 2)), padded)), axis=0)
+    size = 2 * half + 1
+    return np.asarray((total[size:] - total[:-size]) / size)

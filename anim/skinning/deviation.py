@@ -1,0 +1,51 @@
+"""How far a method places vertices from where linear blending, and so every player, has them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.model import Clip
+from anim.skinning.bake import Baker, baker
+
+MAX_FRAMES = 64  # that are compared in a bake, evenly over its own
+
+
+class Deviation(NamedTuple):
+    """The largest distance (m) of a vertex from its place by linear blending, and when (s). size: m, of the model."""
+
+    distance: float
+    time: float
+    size: float
+
+
+def linear_baker(made: Baker, *, space: str) -> Baker:
+    """Return what bakes the same meshes by linear blending, positions only. space: as `made` has it."""
+    nodes = sorted({layer.instance.node for layer in made.layers})
+    return baker(made.scene, space=space, rigid=True, nodes=nodes, threads=made.threads)
+
+
+def deviation(made: Baker, linear: Baker, clip: Clip, times: Floats) -> Deviation:
+    """Return how far `made` is from `linear`, bakers of the same meshes, in up to 64 of the frames at `times` (F,)."""
+    chosen = times[np.unique(np.linspace(0, len(times) - 1, min(len(times), MAX_FRAMES)).round().astype(np.int64))]
+    size = model_size(made)
+    most = Deviation(0.0, 0.0, size)
+    both = (each.bake(clip, times=chosen).chunks() for each in (made, linear))
+    for ours, theirs in zip(*both, strict=True):
+        found = farthest(ours.positions, theirs.positions)
+        at = int(found.argmax())
+        most = max(most, Deviation(float(found[at]), float(chosen[ours.first + at]), size))
+    return most
+
+
+def farthest(positions: AnyArray, others: AnyArray) -> Floats:
+    """Return the largest distance (F,) in each frame between positions and others (F, V, 3)."""
+    apart = positions - others
+    return np.asarray(np.sqrt(np.einsum("fvi,fvi->fv", apart, apart).max(axis=1, initial=0.0)), float)
+
+
+def model_size(made: Baker) -> float:
+    """Return the diagonal in metres of the box around all vertices at rest; infinity where they have no extent."""
+    return float(np.linalg.norm(np.ptp(made.rest, axis=0))) or np.inf

@@ -1,0 +1,85 @@
+"""Distance of vertices from the links between their joints, and a clamp of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Ints
+from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.layout import Singles
+
+
+@jit
+def squared_bone_distance(
+    positions: Singles,
+    at: int,
+    start: Ints,
+    joint: NDArray[np.int32],
+    link_start: Ints,
+    tips: Ints,
+    joints: Singles,
+    squared: Singles,
+) -> None:
+    """Write the squared distance (n, V) of vertices, columns `at` + v of positions, from the nearest of their links."""
+    for f in range(len(positions)):
+        for v in range(squared.shape[1]):
+            p = positions[f, at + v]
+            squared[f, v] = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)[0]
+
+
+@jit
+def clamp_to_bones(
+    positions: Singles,
+    at: int,
+    start: Ints,
+    joint: NDArray[np.int32],
+    link_start: Ints,
+    tips: Ints,
+    joints: Singles,
+    scales: Singles,
+    distance: Singles,
+    share: Singles,
+    first: int,
+    last: int,
+) -> None:
+    """Move vertices first … last towards their nearest link where they are farther from it than at rest."""
+    for f in range(len(positions)):
+        for v in range(first, last):
+            if share[v] == 0:
+                continue
+            p = positions[f, at + v]
+            squared, x, y, z = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)
+            allowed = distance[v] * scales[f, joint[start[v]]]
+            if squared <= allowed * allowed:
+                continue
+            pull = share[v] * (np.float32(1) - allowed / np.sqrt(squared))
+            p[0] += pull * (x - p[0])
+            p[1] += pull * (y - p[1])
+            p[2] += pull * (z - p[2])
+
+
+@jit
+def _nearest(
+    p: Singles, joints: Singles, joint: NDArray[np.int32], begin: int, end: int, link_start: Ints, tips: Ints
+) -> tuple[Any, Any, Any, Any]:
+    """Squared distance to the nearest link of influences begin … end, and the point on it."""
+    best = np.float32(np.inf)
+    nx, ny, nz = p[0], p[1], p[2]
+    for e in range(begin, end):
+        j = joint[e]
+        ax, ay, az = joints[j, 0], joints[j, 1], joints[j, 2]
+        for b in range(link_start[j], link_start[j + 1]):
+            t = tips[b]
+            dx, dy, dz = joints[t, 0] - ax, joints[t, 1] - ay, joints[t, 2] - az
+            length = dx * dx + dy * dy + dz * dz
+            along = (p[0] - ax) * dx + (p[1] - ay) * dy + (p[2] - az) * dz
+            u = min(max(along / length, np.float32(0)), np.float32(1)) if length > 0 else np.float32(0)
+            x, y, z = ax + u * dx, ay + u * dy, az + u * dz
+            squared = (p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2
+            if squared < best:
+                best = squared
+                nx, ny, nz = x, y, z
+    return best, nx, ny, nz

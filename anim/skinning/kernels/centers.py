@@ -1,0 +1,80 @@
+"""Skinning about centers of rotation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.skinning.kernels.directions import rotate_normal, rotate_tangent
+from anim.skinning.kernels.jit import inline, jit
+from anim.skinning.kernels.lane_math import add_scaled, load, rotate, store, transform
+from anim.skinning.kernels.layout import LANES, TILE, Held, Singles, Stretches, Wanted
+from anim.skinning.kernels.weighted_sum import blend, blend_quaternions
+
+
+@jit
+def skin_centers(
+    points: Singles,
+    normals: Wanted,
+    tangents: Wanted,
+    centers: Singles,
+    held: Held,
+    rotations: Singles,
+    rigids: Singles,
+    stretches: Stretches | None,
+    first: int,
+    last: int,
+    at: int,
+    out: tuple[Singles, Wanted, Wanted],
+) -> None:
+    """Write points rotated about centers (V, 3, 1), which move by linear blending; NaN: the point is its own center.
+
+    rotations: (J, 4, L) quaternions. rigids: (J, 12, L), the same motions as matrices; with stretches (J, 15, L), where
+    the vertex's scale times the last three is added to the translations. The rest as in skin_dual_quaternion.
+    """
+    tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((held.most, LANES), np.float32)
+    rotation, matrix = np.empty((4, LANES), np.float32), np.empty((15, LANES), np.float32)
+    stretch: Wanted = None if stretches is None else np.empty((15, LANES), np.float32)
+    center, scale = np.empty((3, LANES), np.float32), np.empty((1, LANES), np.float32)
+    for low in range(first, last, TILE):
+        count = min(TILE, last - low)
+        for v in range(count):
+            if held.start[low + v] == held.start[low + v + 1]:
+                tiles[:, v] = 0
+                continue
+            blend_quaternions(rotation, rotations, held, low + v, 4, signed)
+            blend(matrix, rigids, held, low + v, 12 if stretches is None else 15)
+            point = tiles[0, v]
+            load(point, points[low + v])
+            load(center, points[low + v] if np.isnan(centers[low + v, 0, 0]) else centers[low + v])
+            if stretches is not None:
+                blend(stretch, stretches.matrices, held, low + v, 15)
+                blend(scale, stretches.scales, stretches.ruling, low + v, 1)
+                transform(point, stretch)
+                transform(center, stretch)
+                add_scaled(point, stretch[12:], scale)
+                add_scaled(center, stretch[12:], scale)
+                for i in range(3):
+                    add_scaled(matrix[4 * i + 3 : 4 * i + 4], matrix[12 + i : 13 + i], scale)
+            _move_about(point, center, rotation, matrix)
+            if normals is not None:
+                rotate_normal(tiles[1, v], normals[low + v], stretch, rotation)
+            if tangents is not None:
+                rotate_tangent(tiles[2, v], tangents[low + v], stretch, rotation)
+        store(tiles[0], count, at + low, out[0])
+        if normals is not None:
+            store(tiles[1], count, at + low, out[1])
+        if tangents is not None:
+            store(tiles[2], count, at + low, out[2])
+
+
+@inline
+def _move_about(p: Singles, center: Singles, rotation: Singles, matrix: Singles) -> None:
+    """Rotate points about a center that moves by matrices."""
+    for i in range(3):
+        for f in range(LANES):
+            p[i, f] -= center[i, f]
+    rotate(p, rotation)
+    transform(center, matrix)
+    for i in range(3):
+        for f in range(LANES):
+            p[i, f] += center[i, f]

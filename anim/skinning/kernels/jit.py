@@ -1,0 +1,63 @@
+"""Compilation of kernels by numba; machine code is cached in the user's cache folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+import anim
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def jit(function: Function) -> Function:
+    """Return a function that is compiled for the types of its arguments when it is first called with them.
+
+    It runs without the GIL, divides as IEEE 754 says, and has no fast-math: the same numbers on every machine.
+    """
+    return cast(Function, numba.njit(nogil=True, error_model="numpy", cache=True)(function))
+
+
+def inline(function: Function) -> Function:
+    """Return a function that becomes part of each kernel that calls it."""
+    return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
+
+
+def is_compiled() -> bool:
+    """Return whether any kernel is in the cache, so that a first run can be announced."""
+    return any(Path(numba.config.CACHE_DIR).glob("**/*.nbc"))
+
+
+def _cache_folder() -> str:
+    """The user's own folder for this version and these sources; "" where there is none, and numba chooses.
+
+    Numba looks for changes in the file of a function and not in those of the functions that it calls.
+    """
+    stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in Path(__file__).parent.glob("*.py")]
+    sources = hashlib.sha256(repr(sorted(stamps)).encode()).hexdigest()[:12]
+    base = _user_caches()
+    return "" if base is None else str(base / "gltf-anim" / f"{anim.__version__}-{sources}")
+
+
+def _user_caches() -> Path | None:
+    """Where programs of this user keep what can be made again."""
+    given = Path(os.getenv("LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME") or "")
+    if given.is_absolute():  # the XDG standard ignores relative ones
+        return given
+    try:
+        home = Path.home()
+    except RuntimeError:  # a container's user may have no home
+        return None
+    if not home.is_dir():
+        return None
+    return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+
+
+if not numba.config.CACHE_DIR:  # $NUMBA_CACHE_DIR
+    numba.config.CACHE_DIR = _cache_folder()

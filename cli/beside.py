@@ -1,0 +1,80 @@
+"""Bytes of files, by path or beside another file by relative address: mapped, and never from outside its folder."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from anim.errors import FormatError
+from anim.gltf.document import Bytes
+
+
+class Beside:
+    """Files in or below a folder, opened once."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files: dict[str, Bytes] = {}
+
+    def open(self, address: str) -> Bytes:
+        """Return the bytes of a file. Raises FormatError for one that is not there, or not below the folder."""
+        if address not in self._files:
+            self._files[address] = opened(self._folder, address)
+        return self._files[address]
+
+
+def mapped(path: Path, ending: str = ".glb") -> Bytes:
+    """Return the bytes of a file. ending: of the files that are meant, for the hint where `path` is a folder."""
+    try:
+        if path.is_dir():
+            raise FormatError("is a folder", help=_in_folder(path, ending))
+        with path.open("rb") as file:
+            is_plain = path.is_file() and os.fstat(file.fileno()).st_size > 0
+            if not is_plain or sys.platform == "win32":  # where a mapped file can't be replaced by its output
+                return np.frombuffer(file.read(), np.uint8)
+            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
+    except OSError as error:
+        raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
+
+
+def _in_folder(folder: Path, ending: str) -> str:
+    """What to name instead of a folder: a file that is there, since most commands take one."""
+    found = min(folder.glob(f"*{ending}"), default=None)
+    return f"name a file in it, such as {found}" if found else f"name a file (there is no {ending} in it)"
+
+
+def opened(folder: Path, address: str) -> Bytes:
+    """Return the bytes of a file in or below the folder. Raises FormatError."""
+    path = place(folder, address)
+    try:
+        return mapped(path)
+    except FormatError as error:
+        raise error.at(f"'{address}'", " ") from None
+
+
+def missing(address: str) -> Bytes:
+    """Raise FormatError: an input that comes through a pipe has no files beside it."""
+    raise FormatError(
+        f"'{address}' lies beside the file, but the input is a pipe", help="give the file's path, or pipe a GLB"
+    )
+
+
+def place(folder: Path, address: str) -> Path:
+    """Return where a file in or below the folder lies; links that lead out of it are refused. Raises FormatError."""
+    path = folder / address
+    try:
+        outside = folder.resolve() not in path.resolve().parents
+        there, regular = path.exists(), path.is_file()
+    except (OSError, RuntimeError, ValueError) as error:  # a name too long, a loop of links, half a character
+        raise FormatError(f"'{address[:60]}' can't be looked up ({str(error).lower()[:60]})") from None
+    if outside:
+        raise FormatError(f"'{address}' leads out of the file's folder (only files beside it are read)")
+    if not there:
+        raise FormatError(f"'{address}' is not beside the file", help=f"put it into '{folder}'")
+    if not regular:
+        raise FormatError(f"'{address}' is no file")
+    return path

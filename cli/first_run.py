@@ -1,0 +1,17 @@
+"""The line that explains why a first run takes seconds longer."""
+
+from __future__ import annotations
+
+import sys
+
+from cli.report import Voice
+
+
+def announce_compiling(voice: Voice) -> None:
+    """Write to a terminal that kernels are compiled, where none is in the user's cache folder yet."""
+    if voice.quiet or sys.stderr is None or not sys.stderr.isatty():
+        return
+    from anim.skinning.kernels.jit import is_compiled
+
+    if not is_compiled():
+        voice.say("compiling kernels (first run only)")

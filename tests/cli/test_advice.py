@@ -1,0 +1,275 @@
+"""What `inspect` advises is a command line that runs, and after it the finding is gone."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.gltf import write
+from tests import clips
+from tests.cli.conftest import Call, Find
+from tests.cli.inspecting import Json, only
+from tests.cli.running import built
+from tests.files import glb_of, opened, opened_path
+
+COMMAND = re.compile(r"gltf-anim (\S+) IN OUT\b(.*)$")
+NO_COMMAND = {"missing-file", "unknown-extension", "ignored-channels", "duplicate-clip-names"}  # say why, or what else
+REDUNDANT = "redundant-keys"  # fewer then; what a bound on vertices needs stays
+QUICK = {"optimize": ["--effort", "fast"]}  # the same result where channels go; only the search is shorter
+
+
+def follow(call: Call, path: Path) -> set[str]:
+    """Run every command line that the findings on a file advise; return the names of those that had one.
+
+    After each the file is inspected again: the finding must be gone. Findings without a line must say where to act.
+    """
+    followed: set[str] = set()
+    output = path.with_name("advised.glb")
+    for finding in only(call, path)["findings"]:
+        line = COMMAND.search(finding["advice"])
+        if line is None:
+            assert finding["name"] in NO_COMMAND or "made" in finding["advice"], finding
+            continue
+        command, options = line.group(1), shlex.split(line.group(2))
+        call(command, path, output, *options, *QUICK.get(command, [])).product()
+        left = {each["name"] for each in only(call, output)["findings"]}
+        assert finding["name"] not in left - {REDUNDANT}, finding
+        followed.add(finding["name"])
+    return followed
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        (
+            "noop",
+            {"non-unit-rotations", "wide-steps", "sign-flips", "no-effect-tracks", "late-start"},
+        ),
+        ("biped", {"no-effect-tracks", "constant-tracks"}),
+        ("tube", set()),
+    ],
+)
+def test_fixtures(name: str, expected: set[str], call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.glb"
+    path.write_bytes(built(name))
+    assert follow(call, path) - {REDUNDANT} == expected
+
+
+def _without_bounds(json: Json) -> None:
+    for animation in json["animations"]:
+        for sampler in animation["samplers"]:
+            for key in ("min", "max"):
+                json["accessors"][sampler["input"]].pop(key, None)
+
+
+def _with_idle_samplers(json: Json) -> None:
+    for animation in json["animations"]:
+        animation["samplers"].append(dict(animation["samplers"][0]))
+
+
+def _with_strides(json: Json) -> None:
+    sizes = {"SCALAR": 4, "VEC3": 12, "VEC4": 16}
+    for animation in json["animations"]:
+        for sampler in animation["samplers"]:
+            output = json["accessors"][sampler["output"]]
+            if output["componentType"] == 5126:
+                json["bufferViews"][output["bufferView"]]["byteStride"] = sizes[output["type"]]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "finding"),
+    [
+        (_without_bounds, "missing-bounds"),
+        (_with_idle_samplers, "unused-samplers"),
+        (_with_strides, "strided-animation"),
+    ],
+)
+def test_badly_stored_keys_are_written_anew(
+    spoil: Callable[[Any], None], finding: str, call: Call, tmp_path: Path
+) -> None:
+    document = opened(built("interpolations"))
+    spoil(document.json)
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(document))
+    assert finding in follow(call, path)
+
+
+def test_splines_that_turn_the_long_way(call: Call, tmp_path: Path) -> None:
+    values = np.array([[0, 0, 0, 1], [0, 0.1, 0, -0.995], [0, 0.2, 0, 0.98]])
+    zero = np.zeros((3, 4))
+    turning = clips.track("rotation", [0, 1, 2], values, clips.CUBICSPLINE, tangents=(zero, zero))
+    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(turning, name="slide")})
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(document))
+    assert follow(call, path) >= {"sign-flips-in-splines"}
+
+
+def _still(count: int) -> Any:
+    return clips.track("scale", np.arange(count), np.full((count, 3), 2.0))
+
+
+@pytest.mark.parametrize(("count", "found"), [(1, False), (5, True)])
+def test_constant_tracks_are_those_of_several_keys(count: int, found: bool, call: Call, tmp_path: Path) -> None:
+    moving = clips.track("translation", [0, 1, 5], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(moving, _still(count), name="slide")})
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(document))
+    assert ("constant-tracks" in follow(call, path)) is found
+
+
+def test_a_track_that_holds_the_end_of_its_clip_is_needed(call: Call, tmp_path: Path) -> None:
+    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(_still(2), name="slide")})
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(document))
+    assert "constant-tracks" not in {each["name"] for each in only(call, path)["findings"]}
+
+
+def test_keys_that_hold_are_never_on_the_way(call: Call, tmp_path: Path) -> None:
+    """A STEP track jumps from pose to pose: no player looks for a way between, however signs and angles lie."""
+    values = np.array([[0, 0, 0, 1], [0, 1, 0, -1e-3], [0, 0, 0, -1]])
+    jumping = clips.track("rotation", [0, 1, 2], values, clips.STEP)
+    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(jumping, name="slide")})
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(document))
+    assert not {each["name"] for each in only(call, path)["findings"]} & {"wide-steps", "sign-flips"}
+
+
+ASSETS = (
+    "BitmojiRun.glb",
+    "BoxAnimated.gltf",
+    "CesiumMan.glb",
+    "InterpolationTest.gltf",
+    "MorphStressTest.glb",
+    "RiggedSimple.gltf",
+    "AnimationPointer/24_animation_pointer.gltf",
+)
+LARGE = ("BusterDrone/busterDrone.gltf", "Knight.glb", "Robot.glb")  # half a minute each
+
+
+@pytest.mark.parametrize("name", [*ASSETS, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)])
+def test_assets(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(opened_path(asset(name))))
+    assert follow(call, path) or name == "none"
+
+
+def test_late_starts_are_one_finding(call: Call, asset: Find) -> None:
+    found = [each for each in only(call, asset("MorphStressTest.glb"))["findings"] if each["name"] == "late-start"]
+    assert [each["where"] for each in found] == ["clips 'Individuals', 'TheWave', 'Pulse'"]
+    assert "first key at 0.0333 s" in found[0]["problem"]
+
+
+def test_what_players_ignore_is_no_error(call: Call, asset: Find) -> None:
+    path = asset("BitmojiRun.glb")
+    severities = {each["name"]: each["severity"] for each in only(call, path)["findings"]}
+    assert severities["skeleton-hint"] == "warning"
+    assert call("inspect", path, "--fail-on", "error").code == 0
+
+
+@pytest.mark.parametrize(
+    ("line", "word", "option"),
+    [
+        (("ease", "--clip", "walk"), "stutter", ["--per", "range"]),
+        (("spline", "--tangents", "bspline"), "passes keys by", ["--tangents", "natural"]),
+        (("bake", "--clip", "jump"), "between frames", ["--fps", "120"]),
+    ],
+)
+def test_notes_name_the_option_that_ends_them(
+    line: tuple[str, ...], word: str, option: list[str], call: Call, tmp_path: Path
+) -> None:
+    path, (command, *options) = tmp_path / "in.glb", line
+    path.write_bytes(built("biped"))
+    noted = call(command, path, "-", *options)
+    assert word in noted.err
+    assert option[0] in noted.err
+    followed = call(command, path, "-", *options, *option)
+    assert followed.code == 0
+    assert word not in followed.err
+
+
+def lines_of(advised: list[str]) -> list[list[str]]:
+    """The command lines in advice, as words without the name of the program."""
+    return [shlex.split(line.partition("gltf-anim ")[2]) for line in advised if "gltf-anim " in line]
+
+
+def placed(line: list[str], path: Path, output: Path) -> list[str]:
+    """A line with files for IN and OUT; an OUT for several clips goes beside it."""
+    files = {"IN": str(path), "OUT": str(output), "OUT-{clip}.glb": str(output.with_name("{clip}.glb"))}
+    return [files.get(word, word) for word in line]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "commands"),
+    [
+        ("biped", [], ["bake"]),
+        ("arm", [], ["bake"]),
+        ("tube", [], ["bake", "collapse", "collapse"]),
+        ("tube", ["--method", "lbs"], ["collapse"]),
+        ("tube", ["--bulge-clamp"], ["bake"]),
+        ("arm", ["--method", "dqs", "--clip", "bend"], ["collapse"]),
+    ],
+)
+def test_what_collapse_advises(name: str, options: list[str], commands: list[str], call: Call, tmp_path: Path) -> None:
+    """Each line runs: a bake is written per clip that pinches; another look measures what was not measured yet."""
+    path, seen = tmp_path / "in.glb", tmp_path / "baked"
+    path.write_bytes(built(name))
+    seen.mkdir()
+    before = call("collapse", path, *options, "--format", "json").json
+    lines = lines_of(before["advice"])
+    assert [line[0] for line in lines] == commands
+    for line in lines:
+        run = call(*placed(line, path, seen / "out.glb"), *(["--format", "json"] if line[0] == "collapse" else []))
+        assert run.code == 0, run.err
+        if line[0] == "bake":
+            pinched = [each for each in before["clips"] if any(mesh["pinches"] for mesh in each["meshes"])]
+            assert len(list(seen.iterdir())) == len(pinched)
+        else:
+            assert (run.json["methods"], run.json["bulge_clamp"]) != (before["methods"], before["bulge_clamp"])
+            if before["methods"] == ["lbs", "dqs"]:
+                assert _worst_bulge(run.json) < _worst_bulge(before)
+
+
+def _worst_bulge(report: Json) -> float:
+    """What the better one of the methods other than lbs bulges at worst."""
+    worst: dict[str, float] = {}
+    for fared in (fared for each in report["clips"] for mesh in each["meshes"] for fared in mesh["methods"]):
+        worst[fared["method"]] = max(worst.get(fared["method"], 0.0), fared["bulge_max"])
+    return min(value for method, value in worst.items() if method != "lbs")
+
+
+@pytest.mark.parametrize("name", ["arm", "tube"])
+def test_what_loop_advises_closes_the_clips(name: str, call: Call, tmp_path: Path) -> None:
+    path, output = tmp_path / "in.glb", tmp_path / "out.glb"
+    path.write_bytes(built(name))
+    (line,) = lines_of(call("loop", path, "--format", "json").json["advice"])
+    call(*placed(line, path, output)).product()
+    closed = call("loop", output, "--format", "json").json
+    assert {each["kind"] for each in closed["loops"]} == {"closed"}
+    assert closed["advice"] == []
+
+
+def test_what_loop_advises_adds_the_missing_frame(call: Call, tmp_path: Path) -> None:
+    path, output, cut = tmp_path / "in.glb", tmp_path / "out.glb", ["--clip", "walk", "--to", "0.9583333"]
+    path.write_bytes(built("biped"))
+    path.write_bytes(call("trim", path, "-", *cut, "-q").product())
+    (line,) = lines_of(call("loop", path, "--format", "json").json["advice"])
+    assert "--blend" not in line
+    call(*placed(line, path, output)).product()
+    assert {each["kind"] for each in call("loop", output, "--format", "json").json["loops"]} == {"closed"}
+
+
+@pytest.mark.parametrize("options", [[], ["--max-error", "1%"]])
+def test_what_optimize_advises_fits(options: list[str], call: Call, tmp_path: Path) -> None:
+    path, output, fast = tmp_path / "in.glb", tmp_path / "out.glb", [*options, "--effort", "fast"]
+    path.write_bytes(built("arm"))
+    run = call("optimize", path, output, "--max-bytes", "1", *fast)
+    assert run.code == 6
+    (line,) = lines_of(run.err.splitlines())
+    call(*placed(line, path, output), *fast).product()
+    assert output.stat().st_size <= int(line[-1])

@@ -1,0 +1,24 @@
+"""Outputs that can't be written are refused before any work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli import links, streams
+from cli.errors import OutputError, UsageError
+
+
+def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(path: Path) -> Path:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(links, "followed", refused)
+    with pytest.raises(OutputError, match="permission denied"):
+        streams.check_file("closed/out.glb")
+
+
+def test_a_folder_that_is_not_there_is_one(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="there is no folder"):
+        streams.check_file(str(tmp_path / "missing" / "out.glb"))

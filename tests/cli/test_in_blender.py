@@ -1,0 +1,109 @@
+"""What Blender makes of files that we write: its vertices against our own cache, frame by frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anim.arrays import AnyArray, Floats
+from anim.caches import extent, glb, play
+from anim.caches.order import ordered
+from anim.gltf import read
+from anim.gltf.document import Document
+from anim.model import Clip, VertexCache
+from anim.sampling import grid
+from anim.skinning.bake import bake
+from tests.blender import needs_blender, vertices
+from tests.cli.conftest import Call, Find
+from tests.files import opened_path
+
+pytestmark = [pytest.mark.slow, needs_blender]
+
+BOUND = 1e-5  # of the diagonal
+BAKES = [("Knight.glb", "Walking_A", ()), ("Knight.glb", "Cheer", ("--rigid",)), ("Fox.glb", "Survey", ())]
+WRITERS = {
+    "convert": (),
+    "resample": ("--fps", "25"),
+    "optimize": ("--max-error", "0.001%", "--effort", "fast"),
+}
+
+
+@pytest.mark.parametrize(("name", "clip", "options"), BAKES)
+def test_morph_targets_are_the_bake(
+    call: Call, asset: Find, tmp_path: Path, name: str, clip: str, options: tuple[str, ...]
+) -> None:
+    """At a small --max-error Blender shows the skinned vertices themselves."""
+    source, out = asset(name), tmp_path / "out.glb"
+    run = call("bake", source, out, "--clip", clip, "--fps", 48, "--max-error", "0.0005%", *options)
+    assert run.code == 0, run.err
+    document = opened_path(source)
+    (chosen,) = (each for each in read.clips(document) if each.name == clip)
+    times = grid(chosen.start, chosen.end, fps=48)
+    truth = bake(read.scene(document), chosen, times=times, rigid=bool(options))
+    assert _error(out, ordered(truth, "blender")) < BOUND
+
+
+@pytest.mark.parametrize(("name", "clip", "options"), BAKES)
+@pytest.mark.parametrize("more", [(), ("--quantize",)], ids=["float", "integers"])
+def test_morph_targets_play_as_we_play_them(
+    call: Call, asset: Find, tmp_path: Path, name: str, clip: str, options: tuple[str, ...], more: tuple[str, ...]
+) -> None:
+    out = tmp_path / "out.glb"
+    assert call("bake", asset(name), out, "--clip", clip, "--fps", 24, *options, *more).code == 0
+    assert _error(out, ordered(play.play(opened_path(out)), "blender")) < BOUND
+
+
+def test_a_flip_book(call: Call, asset: Find, tmp_path: Path) -> None:
+    """All pages but one are scaled to a point at the origin, so their sum is that one."""
+    out = tmp_path / "out.glb"
+    assert call("bake", asset("Fox.glb"), out, "--clip", "Walk", "--fps", 24, "--layout", "flip-scale").code == 0
+    frames = glb.pages(opened_path(out))
+    assert frames is not None
+    ours = ordered(frames, "blender")
+    pages = vertices(out, (ours.times + 1e-3).tolist())  # not at the very instant of turning over
+    assert len(pages) == ours.frame_count
+    assert _apart(sum(pages.values(), np.zeros(())), ours.whole().positions) < BOUND * extent.diagonal(ours)
+
+
+def test_a_point_cache_made_into_morph_targets(call: Call, asset: Find, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    assert call("bake", asset("Fox.glb"), tmp_path / "fox.npz", "--clip", "Walk", "--fps", 30).code == 0
+    assert call("convert-cache", tmp_path / "fox.npz", out, "--max-error", "0.0005%").code == 0
+    with np.load(tmp_path / "fox.npz") as found:
+        frames, times, used = found["positions"], found["times"], np.unique(found["faces"])
+    (seen,) = vertices(out, times).values()
+    assert np.linalg.norm(seen - frames[:, used], axis=-1).max() < BOUND * _diagonal(frames)
+
+
+@pytest.mark.parametrize("command", WRITERS)
+@pytest.mark.parametrize("name", ["Fox.glb", "CesiumMan.glb"])
+def test_skinned_files(call: Call, asset: Find, tmp_path: Path, name: str, command: str) -> None:
+    """Blender moves the rest pose into its bones, and mixes rotations by components: neither is seen at keys."""
+    out = tmp_path / "out.glb"
+    assert call(command, asset(name), out, *WRITERS[command]).code == 0
+    document = opened_path(out)
+    clip = read.clips(document)[0]
+    assert _error(out, _at_keys(document, clip), clip.name or None) < BOUND
+
+
+def _at_keys(document: Document, clip: Clip) -> VertexCache:
+    times = np.unique(np.concatenate(clip.axes))
+    return ordered(bake(read.scene(document), clip, times=times, rigid=True), "blender")
+
+
+def _error(path: Path, ours: VertexCache, clip: str | None = None) -> float:
+    """How far Blender's vertices are from ours at most, as a share of the diagonal; one object is in the file."""
+    (seen,) = vertices(path, ours.times.tolist(), clip=clip).values()
+    return _apart(seen, ours.whole().positions) / extent.diagonal(ours)
+
+
+def _apart(a: Floats, b: AnyArray) -> float:
+    assert a.shape == b.shape
+    return float(np.linalg.norm(a - b, axis=-1).max())
+
+
+def _diagonal(frames: AnyArray) -> float:
+    points = frames.reshape(-1, 3)
+    return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))

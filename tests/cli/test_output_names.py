@@ -1,0 +1,90 @@
+"""Names of outputs with places in them: settled before any work, and none stands for nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.output_names import expand
+from tests.cli.conftest import Call
+from tests.cli.running import help_line, refusal
+from tests.fixtures.reading import split
+
+
+def test_names_are_told_apart() -> None:
+    clips = [{"clip": "walk"}, {"clip": "Walk"}, {"clip": "a/b"}, {"clip": ""}]
+    assert expand("x/{clip}.npz", clips, [0, 3, 4, 5]) == ["x/walk.npz", "x/Walk-3.npz", "x/a_b.npz", "x/5.npz"]
+    assert expand("{mesh}-{clip}.npz", [{"mesh": "{clip}", "clip": "a"}], [0]) == ["{clip}-a.npz"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ["bake", "{clip}-{foo}.npz"],
+        ["convert", "{foo}.glb"],
+        ["resample", "--fps=4", "{clip}.glb"],
+        ["render", "{clip}.png"],
+        ["sample", "--at=0", "{foo}.csv"],
+    ],
+)
+def test_a_place_for_nothing_is_refused(line: list[str], call: Call, walk: Path, tmp_path: Path) -> None:
+    command, *options, out = line
+    run = call(command, walk, tmp_path / out, *options)
+    assert "stands for nothing" in refusal(run, 2)
+    assert list(tmp_path.iterdir()) == [walk]
+
+
+def test_braces_that_are_no_place_are_a_name(call: Call, walk: Path, tmp_path: Path) -> None:
+    call("convert", walk, tmp_path / "{1234-ab}.glb").product()
+    assert (tmp_path / "{1234-ab}.glb").is_file()
+
+
+def test_a_file_per_mesh(call: Call, walk: Path, tmp_path: Path) -> None:
+    """Split by mesh or not, all vertices are there, in the order of the scene."""
+    options = ("--fps", "4", "--clip", "walk", "--rigid")
+    call("bake", walk, tmp_path / "all.npz", *options).product()
+    call("bake", walk, tmp_path / "{mesh}-{clip}.npz", *options).product()
+    names = {each["name"] for each in split(walk.read_bytes())[0]["meshes"]}
+    files = sorted(tmp_path.glob("*-walk.npz"))
+    assert {path.name.removesuffix("-walk.npz") for path in files} <= names
+    whole = np.load(tmp_path / "all.npz")["positions"]
+    parts = [np.load(path)["positions"] for path in files]
+    assert sum(part.shape[1] for part in parts) == whole.shape[1]
+    for part in parts:
+        at = [i for i in range(whole.shape[1]) if np.array_equal(whole[:, i : i + part.shape[1]], part)]
+        assert at
+
+
+def test_all_names_are_settled_before_the_first_file_is_written(call: Call, walk: Path, tmp_path: Path) -> None:
+    (tmp_path / "wave.npz").mkdir()
+    assert "is a folder" in refusal(call("bake", walk, tmp_path / "{clip}.npz", "--fps", "4"), 2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["walk.glb", "wave.npz"]
+
+
+def test_what_was_written_before_a_failure_is_said(
+    call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from cli import cache_files
+    from cli.errors import OutputError
+
+    real = cache_files.save
+
+    def save(*args: object, **options: object) -> object:
+        if list(tmp_path.glob("*.npz")):
+            raise OutputError("no space left")
+        return real(*args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(cache_files, "save", save)
+    run = call("bake", walk, tmp_path / "{clip}.npz", "--fps", "4")
+    written = list(tmp_path.glob("*.npz"))
+    assert run.code == 3
+    assert f"note: 1 clip written before: {written[0]}\n" in run.err
+
+
+@pytest.mark.parametrize("name", ["-x.glb", "-out.gltf"])
+def test_a_name_that_begins_as_an_option_gets_help(name: str, call: Call) -> None:
+    run = call("inspect", name)
+    assert "no such option" in refusal(run, 2)
+    assert help_line(run) == f"if it is a file, write ./{name}"
