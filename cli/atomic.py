@@ -32,17 +32,32 @@ def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
 
     Links are followed; what is no plain file (/dev/null, a named pipe) is written into. Raises OutputError.
     """
-    target = links.followed(path)
-    with named_errors(path):
-        check_writable(path)
-        if target.exists() and not target.is_file():
-            with target.open("wb") as file:
-                file.writelines(piece.data for piece in pieces)
-        elif has_bytes(target, pieces):
-            os.utime(target)
-        else:
-            with temporaries() as made:
-                os.replace(write_temporary(target, pieces, made), target)
+    with commit_after(path, pieces):
+        pass
+
+
+@contextmanager
+def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
+    """Write one file like `write_file`, but rename it after the block only; where that fails, the file stays as it was.
+
+    So what may fail of this file (no permission, a full disk) fails before the block. What is no plain file is written
+    into before it.
+    """
+    target, temporary = links.followed(path), None
+    with temporaries() as made:
+        with named_errors(path):
+            check_writable(path)
+            if target.exists() and not target.is_file():
+                with target.open("wb") as file:
+                    file.writelines(piece.data for piece in pieces)
+            elif not has_bytes(target, pieces):
+                temporary = write_temporary(target, pieces, made)
+        yield
+        with named_errors(path):
+            if temporary is not None:
+                os.replace(temporary, target)
+            elif target.is_file():
+                os.utime(target)
 
 
 @dataclass

@@ -130,11 +130,20 @@ def write_text(text: str, path: str = PIPE) -> None:
 
     Half a surrogate pair, which JSON names can hold and UTF-8 can't, becomes \\ud83d: what JSON itself calls it.
     """
+    with commit_text_after(text, path):
+        pass
+
+
+@contextmanager
+def commit_text_after(text: str, path: str) -> Iterator[None]:
+    """Write a text product like `write_text`, a file so that it takes its place after the block, or not at all."""
     content = np.frombuffer(text.encode(errors="backslashreplace"), np.uint8)
     if path == PIPE:
         _to_stdout([content])
+        yield
     else:
-        atomic.write_file(Path(path), [content])
+        with atomic.commit_after(Path(path), [content]):
+            yield
 
 
 def check_output(path: str) -> None:
@@ -148,7 +157,7 @@ def check_output(path: str) -> None:
 
 
 def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
-    """Raise UsageError at once, before any work, where no file can be written at `path`.
+    """Raise UsageError or OutputError at once, before any work, where no file can be written at `path`.
 
     placeholders: what may stand in its name as {this}.
     """
@@ -161,6 +170,10 @@ def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
             raise UsageError(f"{path}: is a folder (expected a file name)")
         if not target.parent.is_dir():
             raise UsageError(f"{path}: there is no folder '{target.parent}'")
+        if target.is_file() or not target.exists():
+            atomic.check_writable(Path(path))
+            if not os.access(target.parent, os.W_OK):
+                raise OutputError(f"{path}: can't be written (no permission to write in its folder)")
     except PermissionError:
         raise OutputError(f"{path}: can't be written (permission denied)") from None
     except OSError as error:  # a name that no file can have

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import Annotated
@@ -168,33 +170,46 @@ def optimize(
             ceiling = None if max_error is None else request.bounds.max_error
             request, found = work.fitted(request, max_count, ceiling=ceiling)
         optimization.check(found, work.clips, request, work.scale)
-        about = _written(work, request, found, began, dry_run=dry_run)
-    _say(about, voice, report, dry_run=dry_run)
+        about = _about(work, request, found, began)
+        with _report(about, voice, report, dry_run=dry_run):
+            streams.write(about.after, output, source, dry_run=dry_run)
+    _say(about, voice, dry_run=dry_run)
     if not dry_run:
         note_images(about.after, source, output, voice)
 
 
-def _written(work: Job, request: Request, found: Optimized, began: float, *, dry_run: bool) -> optimization.About:
-    """Write what was found, and return all there is to say of it."""
+def _about(work: Job, request: Request, found: Optimized, began: float) -> optimization.About:
+    """Return all there is to say of what was found."""
     source, result = work.source, work.smaller(found)
-    size = streams.write(result, work.output, source, dry_run=dry_run)
     name = source.name if work.output == streams.PIPE else work.output
+    size, place = work.size(result), measured_at(work.scene)
     seconds = time.perf_counter() - began
-    place = measured_at(work.scene)
     return optimization.About(
         name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, place
     )
 
 
-def _say(about: optimization.About, voice: Voice, report: str | None, *, dry_run: bool) -> None:
+@contextmanager
+def _report(about: optimization.About, voice: Voice, path: str | None, *, dry_run: bool) -> Iterator[None]:
+    """Write the report around the block that writes the model: where one of them fails, neither file changes.
+
+    On stdout it comes first, so that the model stays as it was where nobody can read the report.
+    """
+    if path is None or (dry_run and path != streams.PIPE):
+        yield
+        return
+    warnings = [*voice.warnings, *optimization.warnings(about)]
+    with streams.commit_text_after(optimization.as_json(about, warnings=warnings), path):
+        yield
+
+
+def _say(about: optimization.About, voice: Voice, *, dry_run: bool) -> None:
     for line in optimization.lines(about, dry_run=dry_run):
         voice.say(line)
     for words in optimization.warnings(about):
         voice.warn(words)
     for line in optimization.details(about) if voice.verbose else ():
         voice.detail(line)
-    if report is not None and (report == streams.PIPE or not dry_run):
-        streams.write_text(optimization.as_json(about, warnings=voice.warnings), report)
 
 
 def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:

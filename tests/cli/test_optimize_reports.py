@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -84,6 +85,37 @@ def test_the_report_on_stdout_beside_a_file(fixture: Fixture, tmp_path: Path, ca
     run = call("optimize", fixture("noop"), tmp_path / "out.glb", "--report", "-", *FAST)
     assert run.json["unchanged"] is False
     assert "can't both be stdout" in refusal(call("optimize", fixture("noop"), "--report", "-", *FAST), 2)
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+def test_a_report_that_fails_leaves_the_model(ending: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    source, output = fixture("noop"), tmp_path / f"out.{ending}"
+    assert call("convert", source, output).code == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    run = call("optimize", source, output, "--max-error", "1%", "--report", "/dev/full", *FAST)
+    assert "/dev/full: can't be written (no space left on device)" in refusal(run, 3)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_model_that_fails_leaves_the_report(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    source, report = fixture("noop"), tmp_path / "report.json"
+    report.write_text("as it was")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    run = call("optimize", source, "/dev/full", "--report", report, *FAST)
+    assert "/dev/full: can't be written" in refusal(run, 3)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_report_that_nobody_may_write_is_refused_before_the_search(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, input = tmp_path / "closed", tmp_path / "no model.glb"
+    folder.mkdir()
+    input.write_bytes(b"")  # is never read
+    allowed = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: path != folder and allowed(path, mode))  # root may everything
+    run = call("optimize", input, tmp_path / "out.glb", "--report", folder / "report.json")
+    assert "report.json: can't be written (no permission" in refusal(run, 3)
 
 
 def test_words(fixture: Fixture, tmp_path: Path, call: Call) -> None:
