@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -120,6 +121,7 @@ def _clip(
     tracks: bool,
 ) -> ClipFacts:
     start, end, axes = clip.start, clip.end, clip.axes
+    counted = _with_end(clip, counted)
     stored_bytes = round(packed * cost.data)
     estimated = rate.estimate(sorted_unique(np.concatenate(axes))) if axes else None
     return ClipFacts(
@@ -154,6 +156,16 @@ def _clip(
         root_speed_m_per_s=way.speed,
         track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
     )
+
+
+def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
+    """The facts, with the key at the clip's end not redundant where only constant tracks have one."""
+    at_end = [i for i, track in enumerate(clip.tracks) if track.times[-1] == clip.end]
+    if clip.end <= clip.start or not all(counted.constant[i] and counted.redundant[i] for i in at_end):
+        return counted
+    redundant = counted.redundant.copy()
+    redundant[min(at_end, key=lambda i: redundant[i])] -= 1
+    return replace(counted, redundant=redundant)
 
 
 def _splines(clip: Clip) -> Bools:

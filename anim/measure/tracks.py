@@ -17,6 +17,7 @@ FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two s
 REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing
 UNIT = 1e-3  # a quaternion whose length is further off 1 than this was not meant
 UNIT_BYTE = 0.00769  # the same for quaternions in normalized bytes, by the Khronos validator
+STEPS = {5120: 127, 5121: 255, 5122: 32767, 5123: 65535}  # from 0 to 1, of normalized integers by component type
 WIDE_STEP = np.radians(170.0)  # rad; from here on players disagree about which way round is shorter
 
 
@@ -25,7 +26,8 @@ class TrackStats:
     """Facts about T tracks; arrays (T,).
 
     constant: never changes. no_effect: constant, and the node rests there anyway. redundant: keys that could go and
-    save bytes by that (see `removable`).
+    save bytes by that (see `removable`): the steps between those that stay are not wide, and players that don't
+    normalize rotations show the same. Of constants one stays, of splines two.
     non_unit, flips, wide: keys with a length off 1, sign changes from key to key (not under STEP), steps of 170° or
     more (under LINEAR alone), of rotations.
     widest: largest step in rad.
@@ -79,7 +81,8 @@ def _count(group: Joined, skeleton: Skeleton, result: TrackStats, given: dict[in
     constant = _same_values(group, values)
     result.constant[group.numbers] = constant
     result.no_effect[group.numbers] = _at_rest(group, constant, skeleton)
-    result.redundant[group.numbers] = np.where(constant, group.counts - 1, 0)
+    fewest = 1 if group.tangents is None else 2
+    result.redundant[group.numbers] = np.where(constant, np.maximum(group.counts - fewest, 0), 0)
     masks = np.split(_redundant(group, values, constant), group.starts[1:])
     given.update((number, masks[i]) for i, number in enumerate(group.numbers.tolist()) if not constant[i])
 
@@ -149,11 +152,20 @@ def _given(group: Joined, values: Floats, of_track: Ints, at: Ints) -> Bools:
     u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
         return _given_by_cubic(group.tangents, values, at, u[:, None], duration[:, None], allowed)
-    if group.kind is Kind.ROTATION:
-        between = quaternion.slerp(before, after, u)
-    else:
+    if group.kind is not Kind.ROTATION:
         between = before + u[:, None] * (after - before)
-    return np.asarray(_widest(here - between) <= allowed)
+        return np.asarray(_widest(here - between) <= allowed)
+    same = _widest(here - quaternion.slerp(before, after, u)) <= allowed
+    narrow = quaternion.dot(before, after) > np.cos(WIDE_STEP / 2)
+    return np.asarray(same & narrow & _same_lengths(group, of_track, at, u, allowed))
+
+
+def _same_lengths(group: Joined, of_track: Ints, at: Ints, u: Floats, allowed: Floats) -> Bools:
+    """Whether quaternions as stored are as long as between their neighbors, but for rounding to integers."""
+    before, here, after = (np.sqrt(quaternion.dot(q, q)) for q in (group.values[at + k] for k in (-1, 0, 1)))
+    steps = np.array([STEPS.get(track.storage.component_type, np.inf) for track in group.tracks])
+    off = np.abs(here - (before + u * (after - before)))
+    return np.asarray(off <= allowed + 2 / steps[of_track[at]])
 
 
 def _given_by_cubic(

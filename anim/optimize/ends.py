@@ -24,8 +24,9 @@ def held(track: Track) -> Track:
 def stretched(track: Track, start: float, end: float) -> Track:
     """Return the track with its first value held from `start` on, its last up to `end`; a spline by zero tangents."""
     head, tail = bool(track.times[0] > start), bool(track.times[-1] < end)
-    rows = [0] * head + list(range(len(track.times))) + [-1] * tail
-    at = np.concatenate(([start] * head, track.times, [end] * tail))
+    inner = slice(1, None) if head and tail and len(track.times) == 1 else slice(None)  # two keys hold one value
+    rows = [0] * head + list(range(len(track.times))[inner]) + [-1] * tail
+    at = np.concatenate(([start] * head, track.times[inner], [end] * tail))
     new = replace(
         track,
         times=at,

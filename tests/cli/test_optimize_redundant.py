@@ -6,9 +6,17 @@ from pathlib import Path
 
 import pytest
 
+import fixtures
 from tests.cli.conftest import Call, Find
 
 FAST = ("--effort", "fast")
+
+
+@pytest.mark.parametrize("name", sorted(fixtures.FIXTURES))
+def test_inspect_finds_no_redundant_key_of_a_fixture(name: str, fixture: Find, call: Call, tmp_path: Path) -> None:
+    assert call("optimize", fixture(name), tmp_path / "out.glb", *FAST).code == 0
+    clips = call("inspect", tmp_path / "out.glb", "--format", "json").json["files"][0]["clips"]
+    assert {each["name"]: each["redundant_keys"] for each in clips if each["redundant_keys"]} == {}
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from anim.measure.tracks import TrackStats, stats
-from anim.model import Skeleton, Track
+from anim.model import Skeleton, Storage, Track
 from anim.sampling import joined as module
 from anim.sampling.joined import joined
 from tests import clips
@@ -75,6 +76,32 @@ def test_keys_that_their_neighbors_give() -> None:
         clips.track("translation", t, cubic, CUBICSPLINE, tangents=(slopes, bent)),
     )
     assert found.redundant.tolist() == [1, 1, 1, 0]
+
+
+def test_a_still_spline_keeps_two_keys() -> None:
+    values, still = np.ones((3, 3)), np.zeros((3, 3))
+    assert of(clips.track("scale", [0, 1, 2], values, CUBICSPLINE, tangents=(still, still))).redundant.tolist() == [1]
+
+
+def test_a_key_that_leads_the_way_through_a_half_turn_is_needed() -> None:
+    """From 0° straight to 180° there is no shorter way."""
+    found = of(
+        clips.track("rotation", [0, 1, 2], clips.about("x", [0, 90, 180])),
+        clips.track("rotation", [0, 1, 2], clips.about("x", [0, 80, 160])),
+    )
+    assert found.redundant.tolist() == [0, 1]
+
+
+def test_a_quaternion_of_another_length_is_needed() -> None:
+    """Players that don't normalize show it; rounding to integers is no such length."""
+    turns = clips.about("x", [0, 30, 60])
+    rounded = replace(clips.track("rotation", [0, 1, 2], turns * [[1], [1 + 1e-5], [1]]), storage=Storage(5122, True))
+    found = of(
+        clips.track("rotation", [0, 1, 2], turns * [[1], [1 + 1e-5], [1]]),
+        clips.track("rotation", [0, 1, 2], turns * 1.01),
+        rounded,
+    )
+    assert found.redundant.tolist() == [0, 1, 1]
 
 
 @pytest.mark.parametrize("limit", [1, 4096])

@@ -31,3 +31,9 @@ def test_stretched_reaches_both_ends_and_shows_the_same(track: Track, start: flo
     at = np.linspace(start - 1, end + 1, 301)
     assert (found.times[0], found.times[-1]) == (start, end)
     np.testing.assert_allclose(sample(found, at), sample(track, at), atol=1e-12)
+
+
+def test_a_single_key_becomes_two() -> None:
+    single = Track(0, "translation", Interpolation.LINEAR, np.array([1.0]), np.array([[1.0, 0, 0]]))
+    assert stretched(single, 0.0, 2.0).times.tolist() == [0, 2]
+    assert stretched(single, 1.0, 2.0).times.tolist() == [1, 2]
