@@ -36,6 +36,8 @@ def floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     if not _is_finite(array):
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise RangeError(f"{name} holds {array[at]} at {list(at)} (expected finite numbers)")
+    if not array.flags.writeable:
+        return array
     fresh = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.dtype != array.dtype)
     return read_only(array) if fresh else own(array)
 

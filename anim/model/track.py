@@ -74,8 +74,10 @@ class Track:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "node", _node(self.node, self.path))
-        set_field(self, "interpolation", _interpolation(self.interpolation))
+        if type(self.node) is not int or self.node < 0 or self.path not in PATHS:  # else there is nothing to check
+            set_field(self, "node", _node(self.node, self.path))
+        if type(self.interpolation) is not Interpolation:
+            set_field(self, "interpolation", _interpolation(self.interpolation))
         times, values = arrays.times(self.times), arrays.floats(self.values, "K C", name="values")
         set_field(self, "times", times)
         set_field(self, "values", values)
