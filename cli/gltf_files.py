@@ -26,16 +26,23 @@ from cli import atomic, links, loading
 from cli.errors import OutputError
 
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name, for as long as others have the shorter ones
-GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
 
 
 def write(
-    document: Document, path: Path, *, same_folder: bool, spared: Sequence[Path] = (), dry_run: bool = False
+    document: Document,
+    path: Path,
+    *,
+    same_folder: bool,
+    spared: Sequence[Path] = (),
+    text: Bytes | None = None,
+    dry_run: bool = False,
 ) -> int:
     """Write a .gltf and those of its buffers that are files; return the bytes of what this is or would be.
 
     same_folder: as the input; buffers that are files there and have not changed stay these. spared: files that are
-    never removed, since the input needs them. A link is followed: the pair lies where it leads to.
+    never removed, since the input needs them. text: the document's own, which stays where all its buffers do. A link is
+    followed: the pair lies where it leads to.
     """
     named, path = path, links.followed(path)
     if path.exists() and not path.is_file():
@@ -43,14 +50,15 @@ def write(
     with nullcontext() if dry_run else atomic.locked(path.parent):
         names = _Names(path.parent, _external(path))
         files = container.gltf(document, path.stem, keep_external=same_folder, choose=names.choose)
-        text = files.pop(f"{path.stem}.gltf")
+        made = files.pop(f"{path.stem}.gltf")
+        content = made if text is None or files else [text]
         if not dry_run:
             with atomic.named_errors(named):
                 atomic.check_writable(path)
                 new = {path.parent / name: pieces for name, pieces in files.items() if name not in names.reused}
-                _commit(path, text, new)
-                _remove(names.old, path, text, spared)
-    return sum(len(piece) for pieces in (text, *files.values()) for piece in pieces)
+                _commit(path, content, new)
+                _remove(names.old, path, content, spared)
+    return sum(len(piece) for pieces in (content, *files.values()) for piece in pieces)
 
 
 @dataclass

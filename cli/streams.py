@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TypeAlias
 
 import numpy as np
@@ -22,7 +23,6 @@ from cli.report import Voice
 
 PIPE = "-"
 MAX_TRIES = 20  # of opening a .gltf with its buffers, while others replace it
-OTHERS = frozenset((".bin", ".bvh", ".csv", ".dae", ".fbx", ".json", ".npz", ".obj", ".usd", ".usda", ".usdc", ".usdz"))
 
 AUDIBLE = Voice()
 Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
@@ -147,13 +147,30 @@ def commit_text_after(text: str, path: str) -> Iterator[None]:
 
 
 def check_output(path: str) -> None:
-    """Raise UsageError at once, before any work, where a glTF can't be written to `path`."""
+    """Raise UsageError at once, before any work, where a glTF can't be written to `path`, or its ending says another.
+
+    A name without ending is a GLB; what is no plain file (/dev/null, a named pipe) may be called anything.
+    """
+    check_binary(path)
+    if path == PIPE or (ending := Path(path).suffix).lower() in ("", *gltf_files.GLTF_SUFFIXES):
+        return
+    target = links.followed(Path(path))
+    if target.exists() and not target.is_file():
+        return
+    near = difflib.get_close_matches(ending.lower(), gltf_files.GLTF_SUFFIXES, n=1)
+    *others, last = gltf_files.GLTF_SUFFIXES
+    raise UsageError(
+        f"{path}: glTF is no {ending.lower()} (expected {', '.join(others)} or {last}, or a name without ending for GLB)",
+        help=f"did you mean {PurePath(path).with_suffix(near[0])}?" if near else "",
+    )
+
+
+def check_binary(path: str) -> None:
+    """Raise UsageError or OutputError at once, before any work, where no binary can be written to `path`."""
     if path == PIPE:
         _no_terminal()
     else:
         check_file(path)
-        if (ending := Path(path).suffix.lower()) in OTHERS:
-            raise UsageError(f"{path}: glTF is no {ending} (expected .glb or .gltf)")
 
 
 def check_file(path: str, placeholders: Sequence[str] = ()) -> None:

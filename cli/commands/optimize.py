@@ -21,11 +21,11 @@ from anim.optimize.verify import PLAYERS
 from cli import optimization, optimize_request, options, streams
 from cli.edit import note_images
 from cli.errors import UsageError
+from cli.gltf_files import GLTF_SUFFIXES
 from cli.optimize_job import Job, job
 from cli.report import Voice
 
 PICTURES = (".png", ".svg")
-GLTF = (".glb", ".gltf", ".bin", ".vrm")
 
 
 class Meshopt(StrEnum):
@@ -229,7 +229,7 @@ def _check_outputs(input: str, output: str, report: str | None, curve_file: str 
 def _check_report(report: str, input: str, output: str) -> None:
     """Refuse a report in the place of a model."""
     streams.check_file(report)
-    if PurePath(report).suffix.lower() in GLTF or Path(report).resolve() in {
+    if PurePath(report).suffix.lower() in (*GLTF_SUFFIXES, ".bin") or Path(report).resolve() in {
         Path(other).resolve() for other in (input, output) if other != streams.PIPE
     }:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")

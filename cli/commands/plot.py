@@ -102,7 +102,7 @@ def plot(
     view = COMPONENTS if components else FROM_REST if euler is None else check_order(euler)
     source, output = _places(files or [], alone=alone)
     kind = _format(format, output)
-    streams.check_output(output)
+    streams.check_binary(output)
     if ease:
         picture = eases([parse(name) for name in ease], kind=kind)
     elif through is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +90,46 @@ def test_a_name_that_begins_as_an_option_gets_help(name: str, call: Call) -> Non
     run = call("inspect", name)
     assert "no such option" in refusal(run, 2)
     assert help_line(run) == f"if it is a file, write ./{name}"
+
+
+@pytest.mark.parametrize(
+    ("line", "near"),
+    [
+        (["convert", "IN", "x.gtlf"], "x.gltf"),
+        (["loop", "IN", "x.GLBB", "--clip", "walk"], "x.glb"),
+        (["optimize", "IN", "x.gl"], "x.glb"),
+        (["resample", "IN", "x.foo", "--fps", "4"], None),
+        (["trim", "IN", "x.glb.bak", "--to", "1"], None),
+        (["from-euler", "none.bvh", "x.bin"], None),
+    ],
+)
+def test_an_ending_that_is_no_gltf_is_refused(
+    line: list[str], near: str | None, call: Call, walk: Path, tmp_path: Path
+) -> None:
+    name = line[2]
+    run = call(line[0], walk if line[1] == "IN" else line[1], tmp_path / name, *line[3:])
+    said = refusal(run, 2)
+    assert (
+        f"glTF is no {Path(name).suffix.lower()} (expected .glb, .gltf, .vrm or .vrma, or a name without ending)"
+        in said
+    )
+    assert help_line(run) == ("" if near is None else f"did you mean {tmp_path / near}?")
+    assert list(tmp_path.iterdir()) == [walk]
+
+
+@pytest.mark.parametrize("name", ["x", "x.GLB", "x.vrm", "x.vrma", ".hidden"])
+def test_endings_of_a_glb(name: str, call: Call, walk: Path, tmp_path: Path) -> None:
+    call("convert", walk, tmp_path / name).product()
+    assert (tmp_path / name).read_bytes()[:4] == b"glTF"
+
+
+def test_what_is_no_plain_file_may_be_called_anything(call: Call, walk: Path, tmp_path: Path) -> None:
+    call("convert", walk, os.devnull).product()
+    pipe = tmp_path / "pipe.out"
+    os.mkfifo(pipe)
+    found: list[bytes] = []
+    reader = threading.Thread(target=lambda: found.append(pipe.read_bytes()))
+    reader.start()
+    call("convert", walk, pipe).product()
+    reader.join()
+    assert found[0][:4] == b"glTF"
