@@ -21,6 +21,7 @@ from cli.lengths import lengths
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by their number in the file
+DRY = " (dry run: nothing written)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +73,21 @@ def edit(
         result = write.replace_clips(document, new)
         written = read.clips(result)
         edited = Edited({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
-        if measure:
+        if not new:
+            pass
+        elif measure:
             edited = _measured(edited, source, accessors, skeleton, voice)
         else:
             for i, clip in edited.before.items():
                 voice.detail(f"  {read.label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
-        size = streams.write(result, output, source, dry_run=dry_run)
-    if chosen and not new:
-        voice.say("note: no track was changed")
+        size = streams.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run)
     if not dry_run:
         note_images(result, source, output, voice)
     name = source.name if output == streams.PIPE else output
+    if chosen and not new:
+        before = report.size(size) if size == source.size else report.change(source.size, size)
+        voice.say(f"{name}  {before}, unchanged: no track was changed{DRY if dry_run else ''}")
+        return
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
@@ -133,7 +138,7 @@ def _summary(name: str, before: int, after: int, edited: Edited, seconds: float,
     if edited.worst is not None:
         parts.append(_error(edited.worst, edited.diagonal) + (" (nodes only)" if edited.at_nodes else ""))
     parts.append(report.took(seconds))
-    return ", ".join(parts) + (" (dry run: nothing written)" if dry_run else "")
+    return ", ".join(parts) + (DRY if dry_run else "")
 
 
 def _error(error: MotionError, diagonal: float) -> str:

@@ -30,18 +30,23 @@ Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An input: its document, what messages call it, its size in bytes with its .bin files, and its real folder."""
+    """An input: its document, what messages call it, its size with its .bin files, its real folder, its own bytes."""
 
     document: Document
     name: str
     size: int
     folder: Path | None
+    data: Bytes
 
     def is_beside(self, output: str) -> bool:
         """Return whether `output` lies in the same folder, so that relative URIs stay right."""
         if self.folder is None or output == PIPE:
             return False
         return links.followed(Path(output)).parent.resolve() == self.folder.resolve()
+
+    def bytes_of(self, document: Document) -> Bytes | None:
+        """Return the bytes of the input where they are still those of a document: nothing of it was changed."""
+        return self.data if document is self.document and not document.expanded else None
 
     def is_at(self, path: str) -> bool:
         """Return whether this is the file at `path`."""
@@ -59,7 +64,7 @@ def source(path: str, voice: Voice = AUDIBLE, opener: Opener = container.read) -
         data, document = _received(opener) if path == PIPE else _opened(links.followed(Path(path)), opener)
         folder = None if path == PIPE else links.followed(Path(path)).parent
         note_mended(document, name, voice)
-        yield Source(document, name, len(data) + _external_size(document), folder)
+        yield Source(document, name, len(data) + _external_size(document), folder, data)
     except (UsageError, OutputError):
         raise
     except AnimError as error:
@@ -91,26 +96,34 @@ def note_mended(document: Document, name: str, voice: Voice) -> None:
     voice.say(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
 
 
-def write(document: Document, path: str, source: Source | None, *, dry_run: bool = False) -> int:
+def write(
+    document: Document, path: str, source: Source | None, *, unchanged: Bytes | None = None, dry_run: bool = False
+) -> int:
     """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
 
     The size is that of all these files, also of those that stay as they are. source: the input that the document comes
     from: external buffers and images that are still right from the output's folder keep their URI, and none of its
     files is ever removed. In another folder images are copied beside the output, and no file is overwritten. Files
-    appear whole or not at all, and only if their bytes differ from what is there; else the
-    time of the file at `path` is updated.
+    appear whole or not at all, and only if their bytes differ from what is there; else the time of the file at `path`
+    is updated. unchanged: bytes that say the same already (`Source.bytes_of`), written where they do as they are.
     """
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and path != PIPE and not source.is_beside(path):
         document, copies = images.along(document, source.folder, links.followed(Path(path)).parent)
+        unchanged = None if copies else unchanged  # some may have got other names
     if not dry_run:
         images.write_copies(copies)
     if path.lower().endswith(".gltf"):
         same_folder = source is not None and source.is_beside(path)
         spared = [] if source is None or source.is_at(path) else list(_files_beside(source))
-        size = gltf_files.write(document, Path(path), same_folder=same_folder, spared=spared, dry_run=dry_run)
+        text = None if unchanged is None or unchanged[:4].tobytes() == container.MAGIC else unchanged
+        size = gltf_files.write(
+            document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run
+        )
         return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
     content = container.glb(document)
+    if unchanged is not None and container.is_glb(unchanged) and not _external_size(document):
+        content = [unchanged]
     if not dry_run:
         write_bytes(content, path)
     return sum(len(piece) for piece in content)
@@ -158,9 +171,9 @@ def check_output(path: str) -> None:
     if target.exists() and not target.is_file():
         return
     near = difflib.get_close_matches(ending.lower(), gltf_files.GLTF_SUFFIXES, n=1)
-    *others, last = gltf_files.GLTF_SUFFIXES
+    expected = " or ".join((", ".join(gltf_files.GLTF_SUFFIXES[:-1]), gltf_files.GLTF_SUFFIXES[-1]))
     raise UsageError(
-        f"{path}: glTF is no {ending.lower()} (expected {', '.join(others)} or {last}, or a name without ending for GLB)",
+        f"{path}: glTF is no {ending.lower()} (expected {expected}, or a name without ending)",
         help=f"did you mean {PurePath(path).with_suffix(near[0])}?" if near else "",
     )
 

@@ -60,6 +60,11 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
     return Document(parsed, buffers_of(parsed, None, resolve, glb=False), (), text.indent_of(raw), expanded)
 
 
+def is_glb(data: Bytes) -> bool:
+    """Return whether bytes are a GLB from the first to the last, by its header."""
+    return data[:4].tobytes() == MAGIC and int.from_bytes(data[8:12].tobytes(), "little") == len(data)
+
+
 def glb(document: Document) -> list[Bytes]:
     """Return the pieces of a self-contained GLB: buffer 0 as BIN, any further buffer as a data URI.
 

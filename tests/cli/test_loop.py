@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +43,30 @@ def test_an_open_loop_gets_its_missing_frame(call: Call, fixture: Fixture) -> No
     found = call("loop", "--clip", "walk", "--format", "json", stdin=closed).json["loops"][0]
     assert found["kind"] == "closed"
     assert found["end_s"] == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+def test_what_is_closed_keeps_its_bytes(ending: str, call: Call, walk: Path, tmp_path: Path) -> None:
+    """Also in a style that we don't write."""
+    path = tmp_path / f"style.{ending}"
+    call("convert", walk, path).product()
+    if ending == "gltf":
+        path.write_text(json.dumps(json.loads(path.read_text()), indent=5))
+    else:
+        data = path.read_bytes()
+        size = int.from_bytes(data[12:16], "little")
+        text = json.dumps(json.loads(data[20 : 20 + size]), indent=3).encode()
+        text += b" " * (-len(text) % 4)
+        total = len(data) - size + len(text)
+        head = b"glTF" + (2).to_bytes(4, "little") + total.to_bytes(4, "little") + len(text).to_bytes(4, "little")
+        path.write_bytes(head + data[16:20] + text + data[20 + size :])
+    before = {each: each.read_bytes() for each in tmp_path.iterdir()}
+    run = call("loop", path, path, "--clip", "walk")
+    assert run.code == 0
+    assert "unchanged: no track was changed" in run.err
+    assert {each: each.read_bytes() for each in tmp_path.iterdir()} == before
+    if ending == "glb":
+        assert call("loop", "-", "-", "--clip", "walk", "-q", stdin=before[path]).product() == before[path]
 
 
 def test_no_loop_needs_a_blend(call: Call, fixture: Fixture) -> None:
