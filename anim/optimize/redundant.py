@@ -52,15 +52,20 @@ def _without_redundant(pairs: Sequence[tuple[Track, Stored]], skeleton: Skeleton
 
 def _with_shared_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
     """The tracks with equal times in one array, as one accessor of the file holds them."""
-    return [replace(track, times=axes.setdefault(track.times.tobytes(), times(track.times))) for track in tracks]
+    shared = [axes.setdefault(track.times.tobytes(), times(track.times)) for track in tracks]
+    return [
+        track if track.times is axis else replace(track, times=axis) for track, axis in zip(tracks, shared, strict=True)
+    ]
 
 
 def _every_other(mask: Bools) -> Bools:
     """The first, third, … key of every run: a key is judged by its neighbors, which must not go with it."""
+    if not mask.any():
+        return mask
     begins = np.flatnonzero(mask & ~np.concatenate(([False], mask[:-1])))
     at = np.arange(len(mask))
     run = np.searchsorted(begins, at, side="right") - 1
-    since = at - begins[run] if len(begins) else at
+    since = at - begins[run]
     return np.asarray(mask & (since % 2 == 0))
 
 
