@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import sorted_unique
 from anim.measure import rate
 from anim.measure.ends import LoopRange
 from anim.measure.seam import JointGap, Seam, SkinMotion
@@ -147,9 +147,8 @@ def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, 
     count = max(round((end - start) / step) - 1, 1)
     frames = np.unique(np.linspace(1, count, min(count, MAX_STEPS)).round())
     times = start + step * np.concatenate((frames - 1, frames, frames + 1))
-    before, here, after = np.split(skin.places(clip, np.minimum(times, end), root), 3, axis=1)
-    moved = np.linalg.norm(np.concatenate((here - before, after - here), axis=1), axis=2).max(axis=0)
-    return Steps(float(moved.max()), float(np.median(moved)), _longest(after - 2 * here + before) / step)
+    *moved, changed = skin.steps(clip, np.minimum(times, end).reshape(3, -1), root)
+    return Steps(float(np.max(moved)), float(np.median(moved)), float(changed.max()) / step)
 
 
 def _fps(clip: Clip) -> float:
@@ -162,7 +161,3 @@ def _travel(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -
         return 0.0
     both = world_by_node(skin.skeleton, pose(skin.skeleton, clip, np.array([start, end])))[root, :, :, 3]
     return float(np.linalg.norm(both[1] - both[0]))
-
-
-def _longest(vectors: Floats) -> float:
-    return float(np.sqrt((vectors * vectors).sum(axis=-1)).max())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +19,7 @@ from anim.sampling.joined import Joined
 from anim.sampling.pose import pose, rest, world_by_node
 
 PARTS = ("translation", "rotation", "scale")
+STEPS = np.array([[-1.0, 1, 0], [0, -1, 1], [1, -2, 1]])  # of three frames: two moves, and how much they differ
 AT_ONCE = 4_000_000  # numbers; moves of points that are looked at together
 
 
@@ -55,9 +56,9 @@ class Seam:
 class SkinMotion:
     """The points of a scene on which motion is seen: its vertices.
 
-    Seams are measured on all of them, long stretches (`places`) on those that stick out on each joint. Where nothing
-    has a vertex all nodes count, by six points around each. Nodes that move no vertex (IK controls, cameras) don't
-    count otherwise.
+    Seams and steps are measured on all of them, long stretches (`places`) on those that stick out on each joint. Where
+    nothing has a vertex all nodes count, by six points around each. Nodes that move no vertex (IK controls, cameras)
+    don't count otherwise.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -97,6 +98,36 @@ class SkinMotion:
         world = world_by_node(self.skeleton, pose(self.skeleton, clip, times))
         ends.take_off(self.skeleton, world, root)
         return self.points.places(world)
+
+    def steps(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
+        """Return (3, F) how far any vertex moves from the first of times (3, F) to the second and from there to the
+        third, and how much these two moves differ: the largest of each, the way of node `root` taken off.
+        """
+        frames = times.shape[1]
+        poses = pose(self.skeleton, clip, times.reshape(-1))
+        world = world_by_node(self.skeleton, poses)
+        ends.take_off(self.skeleton, world, root)
+        world = world.reshape(len(world), 3, frames, 3, 4)
+        weights = {node: each.reshape(3, frames, -1) for node, each in poses.weights.items()}
+        count = max(AT_ONCE // (9 * len(self._every)), 1)
+        cuts = [slice(first, first + count) for first in range(0, frames, count)]
+        parts = [self._steps(world[:, :, cut], {node: each[:, cut] for node, each in weights.items()}) for cut in cuts]
+        return np.concatenate(parts, axis=1)
+
+    def _steps(self, world: Floats, weights: Mapping[int, Floats]) -> Floats:
+        """world: (N, 3, F, 3, 4). weights: (3, F, M) by node."""
+        size, frames = world.shape[0], world.shape[2]
+        differences = np.moveaxis(np.tensordot(STEPS, world, (1, 1)), 0, 1)
+        squares = self._squares(differences.reshape(size, -1, 3, 4))
+        morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in weights]
+        if morphing:
+            squares[np.isin(self._owners, [mesh.owner for mesh in morphing])] = 0
+        most = np.sqrt(squares.max(axis=0)).reshape(3, frames).astype(np.float64)
+        for mesh in morphing:
+            seen = AtEnds(world.reshape(size, -1, 3, 4), {mesh.owner: weights[mesh.owner].reshape(3 * frames, -1)})
+            moved = np.tensordot(STEPS, _morphing(mesh, seen).reshape(3, frames, -1, 3), (1, 0))
+            most = np.maximum(most, np.sqrt((moved * moved).sum(axis=-1).max(axis=-1)))
+        return np.asarray(most)
 
     def seams(self, parts: Sequence[LoopRange], groups: Sequence[Joined] | None = None) -> list[Seam]:
         """Return how the end of each part meets its start, in pose and speed.

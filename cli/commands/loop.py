@@ -54,11 +54,11 @@ def loop(
 
     Without OUT and --blend: a report per clip: closed; closed except some joints, which are named; open by one frame
     (its last frame is missing); not a loop; or a single pose. The seam in pose and in speed is measured on the skin,
-    with the way of a traveling root taken off; nodes that move no vertex, like IK controls, don't count. "per frame"
-    and "inside" are the largest motion and the largest change of speed from one frame to the next inside the clip: a
-    seam that is much smaller is hardly seen. With OUT: an open loop gets its missing frame; --blend closes any seam in
-    value and speed over the last seconds; where only some joints stay open, it bends these and leaves all others as
-    they are. --find looks for the best part: trim it.
+    with the way of a traveling root taken off; nodes that move no vertex, like IK controls, don't count, and where no
+    mesh has a vertex all nodes do. "per frame" and "inside" are the largest motion and the largest change of speed from
+    one frame to the next inside the clip, on the same vertices: a seam that is much smaller is hardly seen. With OUT:
+    an open loop gets its missing frame; --blend closes any seam in value and speed over the last seconds; where only
+    some joints stay open, it bends these and leaves all others as they are. --find looks for the best part: trim it.
     """
     selection = Selection(clip or ())
     voice = Voice(quiet, verbose)
@@ -131,7 +131,7 @@ def _report(
     with streams.source(path, voice) as source:
         clips = read.clips(source.document)
         chosen = selection.chosen_clips(read.names(source.document))
-        skin, is_nodes = _skin(source, voice)
+        skin = _skin(source, voice)
         rows: list[tuple[str, Loop]] = []
         judged: list[tuple[int, Loop]] = []
         for i in chosen:
@@ -144,23 +144,35 @@ def _report(
                 rows.append((name, judged[-1][1]))
     advised = list(advice(judged))
     if format is Format.JSON:
-        streams.write_text(_json(rows, advised, is_nodes=is_nodes, warnings=voice.warnings))
+        streams.write_text(_json(rows, advised, on_skin=skin.is_skin, warnings=voice.warnings))
     elif not voice.quiet:
-        streams.write_text(_text(rows) + "".join(f"\n  {line}" for line in advised) + ("\n" if advised else ""))
+        streams.write_text(
+            _text(rows, on_skin=skin.is_skin) + "".join(f"\n  {line}" for line in advised) + ("\n" if advised else "")
+        )
 
 
-def _skin(source: streams.Source, voice: Voice) -> tuple[SkinMotion, bool]:
-    """Where seams are measured, and whether that is only at nodes: where vertices can't be read."""
+def _skin(source: streams.Source, voice: Voice) -> SkinMotion:
+    """Where seams are measured: at nodes where vertices can't be read."""
     try:
-        return SkinMotion(scenes.scene(source.document, source.name, voice)), False
+        return SkinMotion(scenes.scene(source.document, source.name, voice))
     except AnimError as error:
         hint = f" ({error.help})" if error.help else ""
         voice.warn(f"measured at nodes, not on the skin: {error}{hint}")
-        return SkinMotion(Scene(read.skeleton(source.document), ())), True
+        return SkinMotion(Scene(read.skeleton(source.document), ()))
 
 
-def _text(rows: list[tuple[str, Loop]]) -> str:
-    header = ["clip", "seconds", "kind", "seam", "per frame", "in speed", "inside", "at", "travel"]
+def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
+    header = [
+        "clip",
+        "seconds",
+        "kind",
+        "seam" if on_skin else "seam (nodes)",
+        "per frame",
+        "in speed",
+        "inside",
+        "at",
+        "travel",
+    ]
     cells: list[list[tables.Cell]] = [
         [
             name,
@@ -185,7 +197,7 @@ def _names(found: Loop, *, quote: bool = False) -> str:
     return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _json(rows: list[tuple[str, Loop]], advised: list[str], *, is_nodes: bool, warnings: list[str]) -> str:
+def _json(rows: list[tuple[str, Loop]], advised: list[str], *, on_skin: bool, warnings: list[str]) -> str:
     units = {"start": "start_s", "end": "end_s", "seam": "seam_m", "speed_seam": "speed_seam_m_per_s"}
     units |= {"frame": "frame_motion_m", "travel": "travel_m", "fps": "frame_rate_fps", "joints": "open_joints"}
     loops = []
@@ -196,6 +208,6 @@ def _json(rows: list[tuple[str, Loop]], advised: list[str], *, is_nodes: bool, w
         facts["largest_speed_change_m_per_s"] = each.inside.speed
         del facts["inside"]
         loops.append({"clip": name, **{units.get(key, key): value for key, value in facts.items()}})
-    report: dict[str, object] = {"schema": SCHEMA, "measured_on": "nodes" if is_nodes else "skin", "loops": loops}
+    report: dict[str, object] = {"schema": SCHEMA, "measured_on": "skin" if on_skin else "nodes", "loops": loops}
     report |= {"advice": advised, "warnings": warnings}
     return json.dumps(report, allow_nan=False, ensure_ascii=False, indent=1) + "\n"

@@ -30,6 +30,19 @@ def test_json_has_units_in_its_keys(call: Call, fixture: Fixture) -> None:
     assert {"clip", "kind", "start_s", "end_s", "seam_m", "speed_seam_m_per_s", "travel_m"} <= report["loops"][0].keys()
 
 
+def test_a_file_without_a_vertex_is_measured_at_nodes(call: Call, fixture: Fixture) -> None:
+    document = opened(fixture("biped").read_bytes())
+    nodes = [
+        {key: value for key, value in node.items() if key not in ("mesh", "skin")} for node in document.json["nodes"]
+    ]
+    bare = {key: value for key, value in document.json.items() if key != "meshes"}
+    data = glb_of(replace(document, json={**bare, "nodes": nodes}))
+    assert call("loop", "--format", "json", stdin=data).json["measured_on"] == "nodes"
+    assert "seam (nodes)" in call("loop", stdin=data).text
+    assert call("loop", fixture("biped"), "--format", "json").json["measured_on"] == "skin"
+    assert "seam (nodes)" not in call("loop", fixture("biped")).text
+
+
 def test_find_proposes_ranges(call: Call, fixture: Fixture) -> None:
     found = call("loop", fixture("biped"), "--clip", "walk", "--find", "--format", "json").json["loops"]
     assert found[0]["seam_m"] < 1e-4

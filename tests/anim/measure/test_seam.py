@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 import fixtures
 from anim.gltf import read
 from anim.maths import matrix, quaternion
+from anim.measure import seam
 from anim.measure.ends import LoopRange
 from anim.measure.loop import LoopKind, Steps, loop
 from anim.measure.seam import SkinMotion
@@ -148,6 +149,24 @@ def test_the_seam_is_how_far_a_bake_ends_from_its_start(name: str) -> None:
     for each in read.clips(document):
         first, last = bake(scene, each, times=np.array([each.start, each.end]), rigid=True).whole().positions
         assert loop(scene, each).seam == pytest.approx(np.linalg.norm(last - first, axis=1).max(), rel=1e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["arm", "biped", "morph_cube"])
+def test_steps_inside_are_those_of_a_bake(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of every vertex, skinned and morphed, whatever the number of frames that are looked at together."""
+    monkeypatch.setattr(seam, "AT_ONCE", 20_000)
+    document = opened(fixtures.build(name))
+    scene = read.scene(document)
+    for each in read.clips(document):
+        found = loop(scene, each)
+        step = min(1 / found.fps, (each.end - each.start) / 2)
+        count = max(round((each.end - each.start) / step), 2)
+        times = np.minimum(each.start + step * np.arange(count + 1), each.end)
+        places = bake(scene, each, times=times, rigid=True).whole().positions.astype(float)
+        moves = np.linalg.norm(np.diff(places, axis=0), axis=2).max(axis=1)
+        changes = np.linalg.norm(np.diff(places, n=2, axis=0), axis=2).max(axis=1)
+        assert found.inside.largest == pytest.approx(moves.max(), rel=1e-5, abs=1e-6)
+        assert found.inside.speed == pytest.approx(changes.max() / step, rel=1e-4, abs=1e-6 / step)
 
 
 def test_seams_of_a_bent_tube_are_closed_forms() -> None:
