@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated
 
@@ -58,7 +58,8 @@ def loop(
     mesh has a vertex all nodes do. "per frame" and "inside" are the largest motion and the largest change of speed from
     one frame to the next inside the clip, on the same vertices: a seam that is much smaller is hardly seen. With OUT:
     an open loop gets its missing frame; --blend closes any seam in value and speed over the last seconds; where only
-    some joints stay open, it bends these and leaves all others as they are. --find looks for the best part: trim it.
+    some joints stay open, it bends these and leaves all others as they are. --find looks for the best part: trim it; a
+    line says where no part loops better than the whole clip.
     """
     selection = Selection(clip or ())
     voice = Voice(quiet, verbose)
@@ -134,21 +135,44 @@ def _report(
         skin = _skin(source, voice)
         rows: list[tuple[str, Loop]] = []
         judged: list[tuple[int, Loop]] = []
+        parts: list[tuple[int, list[Loop]]] = []
         for i in chosen:
             root = traveling_root(skin.skeleton, clips[i])
             name = read.clip_name(clips[i].name, i)
             if find:
-                rows += [(name, r) for r in best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)]
+                parts.append((i, best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)))
+                rows += [(name, each) for each in parts[-1][1]]
             else:
                 judged.append((i, judge(skin, clips[i], root=root)))
                 rows.append((name, judged[-1][1]))
-    advised = list(advice(judged))
+    advised, notes = list(advice(judged)), list(_no_better(clips, parts))
     if format is Format.JSON:
-        streams.write_text(_json(rows, advised, on_skin=skin.is_skin, warnings=voice.warnings))
+        streams.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
     elif not voice.quiet:
-        streams.write_text(
-            _text(rows, on_skin=skin.is_skin) + "".join(f"\n  {line}" for line in advised) + ("\n" if advised else "")
-        )
+        lines = [f"  {line}\n" for line in (*advised, *notes)]
+        streams.write_text("\n".join(filter(None, (_text(rows, on_skin=skin.is_skin) if rows else "", "".join(lines)))))
+
+
+def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> Iterator[str]:
+    """Yield a line for the clips of which --find has no part to offer, by the reason. found: by the clips' numbers."""
+    reasons: dict[str, list[tuple[str, int]]] = {}
+    for number, parts in found:
+        if reason := _why_none(clips[number], parts):
+            reasons.setdefault(reason, []).append((clips[number].name, number))
+    yield from (f"{read.labels(those)}: {reason}" for reason, those in reasons.items())
+
+
+def _why_none(clip: Clip, parts: list[Loop]) -> str:
+    """Why no part of a clip is worth trimming, "" where one is. parts: the best first."""
+    if clip.end <= clip.start:
+        return "a single pose, with no part to find"
+    if not parts:
+        return "no part is as long as --shortest"
+    if all(each.kind is LoopKind.NOT_A_LOOP for each in parts):
+        return "no part is a loop"
+    best = parts[0]
+    is_whole = max(abs(best.start - clip.start), abs(best.end - clip.end)) < 0.5 / best.fps
+    return "no part loops better than the whole clip" if is_whole else ""
 
 
 def _skin(source: streams.Source, voice: Voice) -> SkinMotion:
@@ -197,7 +221,9 @@ def _names(found: Loop, *, quote: bool = False) -> str:
     return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _json(rows: list[tuple[str, Loop]], advised: list[str], *, on_skin: bool, warnings: list[str]) -> str:
+def _json(
+    rows: list[tuple[str, Loop]], advised: list[str], notes: list[str], *, on_skin: bool, warnings: list[str]
+) -> str:
     units = {"start": "start_s", "end": "end_s", "seam": "seam_m", "speed_seam": "speed_seam_m_per_s"}
     units |= {"frame": "frame_motion_m", "travel": "travel_m", "fps": "frame_rate_fps", "joints": "open_joints"}
     loops = []
@@ -209,5 +235,5 @@ def _json(rows: list[tuple[str, Loop]], advised: list[str], *, on_skin: bool, wa
         del facts["inside"]
         loops.append({"clip": name, **{units.get(key, key): value for key, value in facts.items()}})
     report: dict[str, object] = {"schema": SCHEMA, "measured_on": "skin" if on_skin else "nodes", "loops": loops}
-    report |= {"advice": advised, "warnings": warnings}
+    report |= {"advice": advised, "notes": notes, "warnings": warnings}
     return json.dumps(report, allow_nan=False, ensure_ascii=False, indent=1) + "\n"

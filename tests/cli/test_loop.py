@@ -13,8 +13,8 @@ from anim.gltf import read, write
 from anim.maths import quaternion
 from anim.model import Clip
 from tests.cli.conftest import Call, Find, Fixture
-from tests.cli.running import help_line, refusal
-from tests.clips import about
+from tests.cli.running import built, help_line, refusal
+from tests.clips import LINEAR, about, track
 from tests.files import clips_of, glb_of, opened
 
 
@@ -47,6 +47,31 @@ def test_find_proposes_ranges(call: Call, fixture: Fixture) -> None:
     found = call("loop", fixture("biped"), "--clip", "walk", "--find", "--format", "json").json["loops"]
     assert found[0]["seam_m"] < 1e-4
     assert found[0]["end_s"] - found[0]["start_s"] >= 0.5
+
+
+@pytest.mark.parametrize(
+    ("clip", "options", "words"),
+    [
+        ("walk", (), "clip 'walk': no part loops better than the whole clip"),
+        ("walk", ("--shortest", "50"), "clip 'walk': no part is as long as --shortest"),
+        ("fall", (), "clip 'fall': no part is a loop"),
+        ("pose", (), "clip 'pose': a single pose, with no part to find"),
+        ("nods", (), ""),
+    ],
+)
+def test_find_says_where_no_part_is_better(clip: str, options: tuple[str, ...], words: str, call: Call) -> None:
+    turns = {"fall": (0.0, 10, 40, 90, 160), "pose": (5.0,), "nods": (0.0, 60, 0, -30, 0, 90)}
+    data = built("biped")
+    if clip in turns:
+        rotation = track("rotation", 0.5 * np.arange(len(turns[clip])), about("x", turns[clip]), LINEAR, node=0)
+        document = opened(data)
+        data = glb_of(write.replace_clips(document, {0: Clip("walk", (rotation,))}))
+        data = data.replace(b'"walk"', b'"%s"' % clip.encode())
+    run = call("loop", "--find", "--clip", clip, *options, stdin=data)
+    assert run.code == 0, run.err
+    assert run.text.endswith(f"  {words}\n") if words else "no part" not in run.text
+    notes = call("loop", "--find", "--clip", clip, *options, "--format", "json", stdin=data).json["notes"]
+    assert notes == ([words] if words else [])
 
 
 def test_an_open_loop_gets_its_missing_frame(call: Call, fixture: Fixture) -> None:

@@ -109,10 +109,7 @@ def test_an_ending_that_is_no_gltf_is_refused(
     name = line[2]
     run = call(line[0], walk if line[1] == "IN" else line[1], tmp_path / name, *line[3:])
     said = refusal(run, 2)
-    assert (
-        f"glTF is no {Path(name).suffix.lower()} (expected .glb, .gltf, .vrm or .vrma, or a name without ending)"
-        in said
-    )
+    assert f"glTF is no {Path(name).suffix.lower()} (expected .glb, .gltf, .vrm or .vrma, or a name" in said
     assert help_line(run) == ("" if near is None else f"did you mean {tmp_path / near}?")
     assert list(tmp_path.iterdir()) == [walk]
 
