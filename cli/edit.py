@@ -14,6 +14,7 @@ from anim.gltf.accessors import Accessors
 from anim.gltf.document import Document
 from anim.measure.error import MotionError, Ruler
 from anim.measure.findings import badly_stored
+from anim.measure.tracks import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
 from anim.ops.selection import Selection
 from cli import images, report, scenes, streams
@@ -122,6 +123,7 @@ def _measured(
         scene, at_nodes = Scene(skeleton, ()), True
     ruler = Ruler(scene)
     worst: MotionError | None = None
+    _warn_of_lengths(edited, voice)
     for i, before in edited.before.items():
         found = ruler.error(before, edited.after[i])
         counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
@@ -129,6 +131,23 @@ def _measured(
         if worst is None or found.max_error > worst.max_error:
             worst = found
     return Edited(edited.before, edited.after, worst, ruler.diagonal, at_nodes)
+
+
+def _warn_of_lengths(edited: Edited, voice: report.Voice) -> None:
+    """Warn of rotations off unit length in tracks that changed: the stated error is for players that normalize them."""
+    off: list[tuple[str, int]] = []
+    keys = 0
+    for i, before in edited.before.items():
+        new = {track.target: track for track in edited.after[i].tracks}
+        counts = non_unit_keys(before.tracks)
+        changed = [n for n, track in zip(counts, before.tracks, strict=True) if n and new.get(track.target) != track]
+        if changed:
+            off.append((before.name, i))
+            keys += sum(changed)
+    if off:
+        found = f"{report.plural(keys, 'rotation key')} of {read.labels(off)} {'is' if keys == 1 else 'are'}"
+        rest = "players that don't normalize rotations may be further off than stated"
+        voice.warn(f"{found} off unit length; {rest}")
 
 
 def _summary(name: str, before: int, after: int, edited: Edited, seconds: float, *, dry_run: bool) -> str:

@@ -61,6 +61,27 @@ def removable_keys(tracks: Sequence[Track], skeleton: Skeleton) -> list[Bools]:
     return _all_stats(joined(tracks), skeleton)[1]
 
 
+def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
+    """Return how many keys of each track are rotations off unit length, beyond what their storage excuses."""
+    found = [0] * len(tracks)
+    turning = [i for i, track in enumerate(tracks) if track.kind is Kind.ROTATION]
+    if not turning:
+        return found
+    chosen = [tracks[i] for i in turning]
+    counts = [len(track.times) for track in chosen]
+    values = np.concatenate([track.values for track in chosen])
+    off = _off_unit(np.sqrt(quaternion.dot(values, values)), chosen, counts)
+    for i, sum_of_track in zip(turning, np.add.reduceat(off, np.cumsum([0, *counts[:-1]]), dtype=int), strict=True):
+        found[i] = int(sum_of_track)
+    return found
+
+
+def _off_unit(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[int]) -> Bools:
+    """Which of all keys' lengths (S,) are off 1 by more than is usual for how their tracks are stored."""
+    bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in tracks])
+    return np.asarray(np.abs(lengths - 1) > np.repeat(np.where(bytes_only, UNIT_BYTE, UNIT), counts))
+
+
 def _all_stats(groups: Sequence[Joined], skeleton: Skeleton) -> tuple[TrackStats, list[Bools]]:
     """The facts, with redundant keys of constants only, and which keys of all other tracks are redundant."""
     count = sum(len(group.tracks) for group in groups)
@@ -90,14 +111,12 @@ def _count(group: Joined, skeleton: Skeleton, result: TrackStats, given: dict[in
 def _turns(group: Joined, result: TrackStats) -> Floats:
     """The rotations (S, 4) at unit length, signs aligned within each track; what is counted goes into `result`."""
     lengths = np.sqrt(quaternion.dot(group.values, group.values))
-    bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in group.tracks])
-    allowed = np.repeat(np.where(bytes_only, UNIT_BYTE, UNIT), group.counts)
     values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
     dots = np.ones(len(values))  # of each key with the one before it; the first of a track has none
     dots[1:] = quaternion.dot(values[1:], values[:-1])
     dots[group.starts] = 1.0
     angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))
-    result.non_unit[group.numbers] = _sums(group, np.abs(lengths - 1) > allowed)
+    result.non_unit[group.numbers] = _sums(group, _off_unit(lengths, group.tracks, group.counts))
     if group.interpolation is not Interpolation.STEP:  # which never is on the way from one key to the next
         result.flips[group.numbers] = _sums(group, dots < 0)
     if group.interpolation is Interpolation.LINEAR:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.conftest import Call
+from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Floats, Player
 from tests.fixtures.reading import decode
 
@@ -84,3 +84,13 @@ def test_a_dry_run_says_the_same_and_writes_nothing(biped: bytes, call: Call, tm
         if out == "-":
             assert dry.err.split(", ")[1:3] == real.err.split(", ")[1:3]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_keys_off_unit_length_make_the_stated_error_one_of_players_that_normalize(fixture: Fixture, call: Call) -> None:
+    """Also with -q, for it changes what the number means; not where no such track is changed."""
+    path = fixture("noop")
+    run = call("resample", path, "-", "--fps", "30", "-q")
+    assert "warning: 1 rotation key of clip 'non_unit' is off unit length" in run.err
+    assert "normalize" in run.err
+    assert "off unit" not in call("resample", path, "-", "--fps", "30", "--clip", "straight").err
+    assert "off unit" not in call("resample", path, "-", "--fps", "30", "--path", "translation").err
