@@ -49,12 +49,14 @@ def edit(
     dry_run: bool,
     measure: bool = True,
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
+    advise: Callable[[Clip, int], str] = lambda clip, number: "",
 ) -> None:
     """Change the selected clips of one file and write it; one line on stderr says what came of it.
 
     change: gets a clip, the numbers of its selected tracks, and what reads the scene; returns the new clip.
     measure: compare the motion of the written file with that of the input, on the surface.
     notes: gets the clips that are changed, before and after, and returns what a user should know, a line each.
+    advise: gets a clip that can't be changed, and its number, and returns what to do, "" where it doesn't know.
     """
     began = time.perf_counter()
     if not dry_run:
@@ -66,7 +68,12 @@ def edit(
         skeleton = read.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
         scene = cache(lambda: _scene(document, accessors, skeleton))
-        new = {i: _changed(clips[i], i, selection.chosen_tracks(clips[i], skeleton), scene, change) for i in chosen}
+        new = {}
+        for i in chosen:
+            try:
+                new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), scene)
+            except AnimError as error:
+                raise error.at(read.label(clips[i].name, i)).advise(advise(clips[i], i)) from None
         stale = badly_stored(document.json)
         new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
         for note in notes({i: clips[i] for i in new}, new):
@@ -90,13 +97,6 @@ def edit(
         voice.say(f"{name}  {before}, unchanged: no track was changed{DRY if dry_run else ''}")
         return
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
-
-
-def _changed(clip: Clip, number: int, tracks: frozenset[int], scene: Callable[[], Scene], change: Change) -> Clip:
-    try:
-        return change(clip, tracks, scene)
-    except AnimError as error:
-        raise error.at(read.label(clip.name, number)) from None
 
 
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:

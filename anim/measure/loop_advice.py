@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from anim.measure.loop import Loop, LoopKind
+from anim.model import Clip
 
 BLEND_S = 0.25  # over which a seam is closed, where the clip is four times as long or more
 
@@ -23,7 +24,18 @@ def advice(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
     for kind, words in _WORDS.items():
         of_kind = [(number, each) for number, each in found if each.kind is kind]
         if of_kind:
-            seconds = min([BLEND_S, *((each.end - each.start) / 4 for _, each in of_kind)])
-            blend = "" if kind is LoopKind.OPEN_BY_ONE_FRAME else f" --blend {seconds:.3g}"
+            blend = (
+                "" if kind is LoopKind.OPEN_BY_ONE_FRAME else _blend(*(each.end - each.start for _, each in of_kind))
+            )
             clips = "".join(f" --clip '#{number}'" for number, _ in of_kind)  # all: others must stay as they are
             yield f"{words}: gltf-anim loop IN OUT{blend}{clips}"
+
+
+def closing_command(clip: Clip, number: int) -> str:
+    """Return what makes a clip end as it starts, whatever its kind."""
+    return f"gltf-anim loop IN OUT{_blend(clip.end - clip.start)} --clip '#{number}'"
+
+
+def _blend(*durations: float) -> str:
+    """The option, for clips that last so many seconds."""
+    return f" --blend {min(BLEND_S, *(duration / 4 for duration in durations)):.3g}"

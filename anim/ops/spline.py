@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from anim.curves.spline_keys import TangentRule
@@ -11,19 +12,33 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Track
 
 
-def spline(clip: Clip, *, tangents: TangentRule, cyclic: bool = False, tracks: frozenset[int] | None = None) -> Clip:
+def spline(
+    clip: Clip,
+    *,
+    tangents: TangentRule,
+    cyclic: bool = False,
+    tracks: frozenset[int] | None = None,
+    label: Callable[[int], str] = "node {}".format,
+) -> Clip:
     """Return the clip with its keys joined by cubics whose tangents follow a rule; tangents that were there go.
 
     Rotations get theirs from angular velocities, so that they are those of a turning thing. STEP tracks hold on purpose
     and stay; so do tracks with one key. Values stay too, but under a rule that approximates (bspline).
     cyclic: a loop: the first and the last key are neighbors, so value and speed have no seam.
+    label: gives what errors call a node (`Skeleton.label`).
     Raises RangeError where the rule can't be used.
     (keys 0, 1, 2 s: 0, 1, 0; time-aware) → tangents 2, 0, −2
     """
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
-    return Clip(
-        clip.name, tuple(_splined(t, tangents, cyclic=cyclic) if i in chosen else t for i, t in enumerate(clip.tracks))
-    )
+    new = list(clip.tracks)
+    for i in sorted(chosen):
+        track = new[i]
+        try:
+            new[i] = _splined(track, tangents, cyclic=cyclic)
+        except AnimError as error:
+            target = track.pointer if track.node is None else f"{label(track.node)}, {track.path}"
+            raise error.at(f"track of {target}", ": ") from None
+    return Clip(clip.name, tuple(new))
 
 
 def departure(before: Clip, after: Clip) -> tuple[float, float]:
@@ -47,11 +62,7 @@ def _splined(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
     if track.interpolation is Interpolation.STEP or track.kind is Kind.DISCRETE or len(track.times) == 1:
         return track
     make = rotation_keys if track.kind is Kind.ROTATION else spline_keys
-    try:
-        keys = make(track.times, track.values, rule, cyclic=cyclic)
-    except AnimError as error:
-        target = track.pointer if track.node is None else f"node {track.node}, {track.path}"
-        raise error.at(f"track of {target}", ": ") from None
+    keys = make(track.times, track.values, rule, cyclic=cyclic)
     return replace(
         track,
         interpolation=Interpolation.CUBICSPLINE,

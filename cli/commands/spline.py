@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated
 
 import typer
 
 from anim.curves.tangents import DEFAULT, TANGENT_MAKERS, TANGENTS, parse
 from anim.gltf import read
-from anim.model import Clip
+from anim.measure.loop_advice import closing_command
+from anim.model import Clip, Scene
+from anim.ops.loop import open_tracks
 from anim.ops.selection import Selection
 from anim.ops.spline import departure
 from anim.ops.spline import spline as splined
@@ -48,11 +50,18 @@ def spline(
         return
     rule = parse(tangents)
 
-    def change(each: Clip, tracks: frozenset[int], _: object) -> Clip:
-        return splined(each, tangents=rule, cyclic=cyclic, tracks=tracks)
+    def change(each: Clip, tracks: frozenset[int], scene: Callable[[], Scene]) -> Clip:
+        def label(node: int) -> str:
+            return scene().skeleton.label(node)
+
+        return splined(each, tangents=rule, cyclic=cyclic, tracks=tracks, label=label)
+
+    def advise(each: Clip, number: int) -> str:
+        is_open = (cyclic or rule.loop) and open_tracks(each)
+        return f"close it first: {closing_command(each, number)}" if is_open else ""
 
     selection = Selection(clip or (), node or (), path or ())
-    edit(input, output, selection, change, Voice(quiet, verbose), dry_run=dry_run, notes=_notes)
+    edit(input, output, selection, change, Voice(quiet, verbose), dry_run=dry_run, notes=_notes, advise=advise)
 
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from anim.curves.tangents import TANGENTS
 from anim.model import Interpolation
 from tests.cli.conftest import Call, Fixture
-from tests.cli.running import refusal
+from tests.cli.running import help_line, refusal, shell
 from tests.files import clips_of
 
 
@@ -33,3 +36,16 @@ def test_says_how_far_the_motion_moved(call: Call, fixture: Fixture) -> None:
 
 def test_unknown_rule_is_refused(call: Call, fixture: Fixture) -> None:
     assert "'catmul-rom'" in refusal(call("spline", fixture("biped"), "--tangents", "catmul-rom"), 2)
+
+
+def test_a_loop_that_is_open_is_named_and_closed_by_the_help(call: Call, walk: Path, tmp_path: Path) -> None:
+    half, closed = tmp_path / "half.glb", tmp_path / "closed.glb"
+    assert call("trim", walk, half, "--clip", "walk", "--to", "0.4").code == 0
+    for options in (("--cyclic", "--tangents", "natural"), ("--tangents", "periodic")):
+        run = call("spline", half, "-", "--clip", "walk", *options)
+        assert re.search(r"clip 'walk', track of node \d+ '\w+', rotation: the loop is open", refusal(run, 2))
+        advice, command = help_line(run).split(": ")
+        assert (advice, command) == ("close it first", "gltf-anim loop IN OUT --blend 0.1 --clip '#0'")
+        assert shell(command.replace("IN", half.name).replace("OUT", closed.name), tmp_path).code == 0
+        assert call("spline", closed, "-", "--clip", "walk", *options).code == 0
+    assert help_line(call("spline", half, "-", "--tangents", "catmul-rom", "--cyclic")) == "did you mean 'catmull-rom'?"
