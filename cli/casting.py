@@ -9,14 +9,15 @@ from anim.errors import NotFoundError
 from anim.exchange import aliases
 from anim.exchange.humanoid import stated_roles
 from anim.exchange.left_over import left_over, with_left_over
-from anim.exchange.onto import onto
+from anim.exchange.onto import onto, to_match
 from anim.exchange.retarget import Floor
 from anim.gltf import author, read, write
 from anim.gltf.document import Document
+from anim.model import Scene
 from anim.ops.selection import Selection
-from cli import conversion, report, scenes, streams
+from cli import conversion, report, scenes, streams, tables
 from cli.conversion import Conversion
-from cli.errors import CheckError
+from cli.errors import CheckError, UsageError
 from cli.report import Voice
 
 
@@ -41,15 +42,19 @@ def cast(made: Conversion, character: streams.Source, casting: Casting, voice: V
     """
     document = character.document
     scene = scenes.scene(document, character.name, voice)
-    done = onto(
-        made.converted,
-        scene,
-        aliases=casting.names,
-        nested=made.motion.nested,
-        stated=stated_roles(document.json),
-        floor=casting.floor,
-        rest_at=casting.rest_at,
-    )
+    try:
+        done = onto(
+            made.converted,
+            scene,
+            aliases=casting.names,
+            nested=made.motion.nested,
+            stated=stated_roles(document.json),
+            floor=casting.floor,
+            rest_at=casting.rest_at,
+        )
+    except NotFoundError:  # no joint is matched, or an alias names one that is not there
+        _list_joints(made, scene, voice)
+        raise
     left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
     if casting.fail_unmatched is not None and len(left) > casting.fail_unmatched:
         raise CheckError(
@@ -68,6 +73,17 @@ def cast(made: Conversion, character: streams.Source, casting: Casting, voice: V
         clip = with_left_over(done, stay, scene.skeleton)
         return made, write.replace_clips(document, {casting.replaced: clip})
     return made, author.add_clips(document, [done.clip])
+
+
+def _list_joints(made: Conversion, scene: Scene, voice: Voice) -> None:
+    """Say, where details are wanted, which names there are to pair."""
+    moving, moved = to_match(made.converted, scene, nested=made.motion.nested)
+    for what, skeleton, nodes in (
+        ("motion", made.converted.skeleton, moving),
+        ("character", scene.skeleton, moved),
+    ):
+        names = ", ".join(f"'{skeleton.names[node]}'" for node in sorted(nodes))
+        voice.detail(f"joints of the {what} ({len(nodes)}): {tables.one_line(names)}")
 
 
 def pairs(path: str | None) -> dict[str, str]:
@@ -109,6 +125,13 @@ def index_of(replaced: str | None, document: Document) -> int | None:
         listed = ", ".join(f"#{i} '{names[i]}'" for i in found[: conversion.LISTED])
         raise NotFoundError(f"--replace '{replaced}' means {len(found)} clips (expected one)", help=f"one of {listed}")
     return found[0]
+
+
+def check_name(name: str | None, replaced: int | None, document: Document) -> None:
+    """Raise UsageError where a clip is to take the place of another under a name that is not that one's."""
+    if name is not None and replaced is not None and name != (own := read.names(document)[replaced]):
+        words = f"--replace keeps the name of the clip, '{own}' (got --name '{name}')"
+        raise UsageError(words, help="leave --name out")
 
 
 def _called(made: Conversion, name: str, *notes: str) -> Conversion:

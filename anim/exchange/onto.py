@@ -55,14 +55,14 @@ def onto(
     nested: whether the motion has a hierarchy; if not, its curves are the nodes' own and go to them as they are.
     Raises NotFoundError where no joint is matched, or there is none.
     """
-    joints = {int(node) for each in target.instances if each.skin is not None for node in each.skin.joints}
-    moving = _parents_first(source)
+    joints = _skin_joints(target)
+    moving, moved = to_match(source, target, nested=nested)
     matching = match(
         source.skeleton.names,
         target.skeleton.names,
         aliases=aliases,
         of_source=moving,
-        of_target=sorted(joints) if joints and nested else list(range(len(target.skeleton))),
+        of_target=moved,
         others=_others(target, joints) if nested else [],
         same=same_tree(source.skeleton, target.skeleton, moving) if nested else {},
         stated=stated,
@@ -89,6 +89,20 @@ def onto(
         if track.node is not None and track.node in matching.pairs
     ]
     return Onto(Clip(source.clip.name, tuple(tracks)), matching, 1.0, (0.0, 0.0))
+
+
+def to_match(source: Converted, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
+    """Return the nodes of the motion, parents first, and those of the character that are matched with each other.
+
+    nested: as for `onto`.
+    """
+    joints = _skin_joints(target)
+    moved = sorted(joints) if joints and nested else list(range(len(target.skeleton)))
+    return _parents_first(source), moved
+
+
+def _skin_joints(scene: Scene) -> set[int]:
+    return {int(node) for each in scene.instances if each.skin is not None for node in each.skin.joints}
 
 
 def _without(matching: Matching) -> tuple[str, ...]:

@@ -24,18 +24,17 @@ def advice(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
     for kind, words in _WORDS.items():
         of_kind = [(number, each) for number, each in found if each.kind is kind]
         if of_kind:
-            blend = (
-                "" if kind is LoopKind.OPEN_BY_ONE_FRAME else _blend(*(each.end - each.start for _, each in of_kind))
-            )
+            durations = [each.end - each.start for _, each in of_kind]
+            blend = "" if kind is LoopKind.OPEN_BY_ONE_FRAME else _blend(durations)
             clips = "".join(f" --clip '#{number}'" for number, _ in of_kind)  # all: others must stay as they are
             yield f"{words}: gltf-anim loop IN OUT{blend}{clips}"
 
 
 def closing_command(clip: Clip, number: int) -> str:
     """Return what makes a clip end as it starts, whatever its kind."""
-    return f"gltf-anim loop IN OUT{_blend(clip.end - clip.start)} --clip '#{number}'"
+    return f"gltf-anim loop IN OUT{_blend([clip.end - clip.start])} --clip '#{number}'"
 
 
-def _blend(*durations: float) -> str:
+def _blend(durations: Sequence[float]) -> str:
     """The option, for clips that last so many seconds."""
     return f" --blend {min(BLEND_S, *(duration / 4 for duration in durations)):.3g}"

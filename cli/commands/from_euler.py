@@ -27,7 +27,7 @@ from anim.exchange.units import guess_unit
 from anim.gltf import author
 from anim.maths.euler import Frame, check_order
 from cli import conversion, options, report, streams, units
-from cli.casting import Casting, cast, index_of, named, pairs
+from cli.casting import Casting, cast, check_name, index_of, named, pairs
 from cli.conversion import Conversion
 from cli.errors import UsageError
 from cli.options import Format
@@ -93,7 +93,8 @@ def from_euler(
     ] = None,
     name: Annotated[str | None, typer.Option("--name", help="Name of the clip; else the file's.")] = None,
     replace: Annotated[
-        str | None, typer.Option("--replace", metavar="CLIP", help="--onto: the clip that gives way, or '#3'.")
+        str | None,
+        typer.Option("--replace", metavar="CLIP", help="--onto: the clip that gives way, or '#3'."),
     ] = None,
     format: Annotated[Format, typer.Option("--format", help="Report as text on stderr, or JSON.")] = Format.TEXT,
     dry_run: options.DryRun = False,
@@ -105,8 +106,8 @@ def from_euler(
     Every axis is evaluated on its own keys, the axes are combined as --order and --frame say, and keys are placed so
     that slerp follows the motion between them too. A BVH says its order itself, and keeps its frames. Without --onto a
     skeleton is made; with it, joints are matched by name and the motion is put on the character, with regard to both
-    rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints. README shows
-    what CSV and JSON look like.
+    rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints, or all
+    names where none match. README shows what CSV and JSON look like.
     """
     began = time.perf_counter()
     voice = report.Voice(quiet, verbose)
@@ -115,8 +116,6 @@ def from_euler(
     if onto is None and (alias, fail_unmatched, rest_at, replace, floor) != (*[None] * 4, Floor.CONTACT):
         words = "--alias, --fail-unmatched, --floor, --replace and --rest-at"
         raise UsageError(f"{words} are about a character (--onto names it)")
-    if replace is not None and name is not None:
-        raise UsageError("--replace keeps the name of the clip (leave --name out)")
     stated = Stated(_order(order), frame, unit)
     with streams.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = formats.of_path(source) or formats.of_content(data.tobytes())
@@ -138,6 +137,7 @@ def from_euler(
         names = pairs(alias)
         with streams.source(onto, voice) as character:
             taken = index_of(replace, character.document)
+            check_name(name, taken, character.document)
             made = named(made, character.document, name=name, replaced=taken)
             casting = Casting(names, floor, rest_at, fail_unmatched, taken)
             made, document = cast(made, character, casting, voice)

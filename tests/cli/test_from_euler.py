@@ -183,7 +183,11 @@ def test_a_clip_gives_way(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     assert call("from-euler", *onto, "--replace", "w*").code == 5
     missing = call("from-euler", *onto, "--replace", "wavy")
     assert (missing.code, "did you mean 'wave'?" in missing.err) == (5, True)
-    assert call("from-euler", *onto, "--replace", "wave", "--name", "hello").code == 2
+    for same in ("wave", "#1"):
+        assert call("from-euler", *onto, "--replace", same, "--name", "wave").product() == by_name.out
+    other = call("from-euler", *onto, "--replace", "#1", "--name", "hello")
+    assert "--replace keeps the name of the clip, 'wave' (got --name 'hello')" in refusal(other, 2)
+    assert help_line(other) == "leave --name out"
 
 
 def test_what_a_bvh_does_not_hold_stays_when_the_clip_gives_way(call: Call, asset: Find, tmp_path: Path) -> None:
@@ -204,6 +208,22 @@ def test_strangers_are_shown_how_to_pair(call: Call, asset: Find) -> None:
     run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", asset("CesiumMan.glb"))
     assert "no joint of the motion is one of the character" in refusal(run, 5)
     assert help_line(run) == "pair them in an --alias file, in lines such as 'Hips,Skeleton_torso_joint_1'"
+
+
+def test_strangers_are_listed_where_all_is_to_be_said(call: Call, asset: Find) -> None:
+    to = ("from-euler", asset("bvh/example.bvh"), "-", "--onto", asset("CesiumMan.glb"))
+    run = call(*to, "-v")
+    assert (run.code, run.out) == (5, b"")
+    *lists, problem, help = run.err.splitlines()
+    assert "no joint of the motion is one of the character" in problem
+    assert help.startswith("help: pair them")
+    joints, others = (line.split(": ", 1) for line in lists[-2:])
+    assert joints[0] == "joints of the motion (18)"
+    assert joints[1].split(", ")[:3] == ["'Hips'", "'Chest'", "'Neck'"]
+    assert others[0] == "joints of the character (19)"
+    assert others[1].split(", ")[0] == "'Skeleton_torso_joint_1'"
+    assert len(others[1].split(", ")) == 19
+    assert "joints of the character" not in call(*to).err
 
 
 def test_too_many_strangers_fail(call: Call, asset: Find, fixture: Fixture) -> None:
