@@ -10,8 +10,6 @@ from anim.arrays import AnyArray, Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker, baker
 
-MAX_FRAMES = 64  # that are compared in a bake, evenly over its own
-
 
 class Deviation(NamedTuple):
     """The largest distance (m) of a vertex from its place by linear blending, and when (s). size: m, of the model."""
@@ -28,15 +26,14 @@ def linear_baker(made: Baker, *, space: str) -> Baker:
 
 
 def deviation(made: Baker, linear: Baker, clip: Clip, times: Floats) -> Deviation:
-    """Return how far `made` is from `linear`, bakers of the same meshes, in up to 64 of the frames at `times` (F,)."""
-    chosen = times[np.unique(np.linspace(0, len(times) - 1, min(len(times), MAX_FRAMES)).round().astype(np.int64))]
+    """Return how far `made` is from `linear`, bakers of the same meshes, in the frames at `times` (F,)."""
     size = model_size(made)
     most = Deviation(0.0, 0.0, size)
-    both = (each.bake(clip, times=chosen).chunks() for each in (made, linear))
+    both = (each.bake(clip, times=times).chunks() for each in (made, linear))
     for ours, theirs in zip(*both, strict=True):
         found = farthest(ours.positions, theirs.positions)
         at = int(found.argmax())
-        most = max(most, Deviation(float(found[at]), float(chosen[ours.first + at]), size))
+        most = max(most, Deviation(float(found[at]), float(times[ours.first + at]), size))
     return most
 
 

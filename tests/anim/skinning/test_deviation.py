@@ -28,6 +28,19 @@ def test_a_screw_of_a_half_turn_leaves_linear_blending_by_half_its_chord() -> No
     assert found.distance > model_size(made) == pytest.approx(np.linalg.norm([0.2, 0.2, 1]), rel=0.01)
 
 
+def test_every_frame_is_looked_at() -> None:
+    """Torn in one of a thousand frames."""
+    of, _ = torn()
+    times = np.arange(1000) / 30
+    places, turns = np.tile([0, 0.5, 0], (1000, 1)), np.zeros(1000)
+    places[617], turns[617] = [0, FAR, 0], 179.9
+    played = clip(track("translation", times, places, node=1), track("rotation", times, about("x", turns), node=1))
+    made = baker(of, method="dqs")
+    found = deviation(made, linear_baker(made, space="world"), played, times)
+    assert found.distance == pytest.approx(FAR / 2, rel=0.05)
+    assert found.time == times[617]
+
+
 def test_linear_blending_is_not_off_itself() -> None:
     of, played = torn()
     made = baker(of)
