@@ -14,6 +14,7 @@ from anim.skinning.deviation import Deviation
 from cli import report
 from cli.report import Voice
 
+SHOWN_JOINTS = 3  # that a note lists
 SHOWN = 1e-3  # of the diagonal; less is not seen
 
 
@@ -28,6 +29,17 @@ def lost(found: Sequence[tuple[str, Deviation]], method: str, voice: Voice) -> N
             f"{method} can't be used: a vertex is {report.length(worst.distance)} from where linear blending "
             f"(lbs), and so every player, has it, more than the model's size of {report.length(worst.size)}, at "
             f"{worst.time:.3g} s of {name}"
+        )
+
+
+def uneven(joints: Sequence[int], scene: Scene, method: str, voice: Voice) -> None:
+    """Note which joints scale unevenly while a method plays that other tools define differently there."""
+    if joints:
+        names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
+        more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
+        voice.say(
+            f"note: {names}{more}: uneven scale, where tools define {method} differently; here each joint stretches the "
+            "mesh about its own place, then turns it"
         )
 
 

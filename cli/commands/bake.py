@@ -22,6 +22,7 @@ from anim.sampling.times import grid
 from anim.skinning.bake import SPACES, Baker, baked, baker
 from anim.skinning.between import Missed, between
 from anim.skinning.deviation import Deviation, deviation, linear_baker
+from anim.skinning.uneven import uneven_joints
 from cli import bake_notes, cache_files, cache_options, meshes, options, output_names, report, scenes, streams, units
 from cli.cache_files import Saved
 from cli.errors import UsageError
@@ -83,7 +84,9 @@ def bake(
     Vertices come in the order of the scene: nodes depth-first, primitives as in the file, vertices as in their
     accessors. Skinned meshes are in world space, where their own node doesn't count. Several clips need {clip} in OUT,
     which is replaced by each name; {mesh} makes a file per mesh.
-    Skin weights that don't add up to 1 are divided by their sum, as players do.
+    Skin weights that don't add up to 1 are divided by their sum, as players do. Where joints scale unevenly, tools
+    define all methods but lbs differently: here each joint stretches the mesh about its own place, then turns it. A
+    method that loses the model in any frame is warned of.
     """
     voice = Voice(quiet, verbose)
     began = time.perf_counter()
@@ -116,6 +119,7 @@ def bake(
         made: dict[int, Baker] = {}
         linear: Baker | None = None
         deviations: list[tuple[str, Deviation]] = []
+        uneven: set[int] = set()
         for job in jobs:
             if job.group not in made:
                 made = {
@@ -136,6 +140,7 @@ def bake(
             times, label = _times(each, fps), read.label(each.name, job.clip or 0)
             if linear is not None:
                 deviations.append((label, deviation(made[job.group], linear, each, times)))
+                uneven.update(uneven_joints(made[job.group], each, times))
             if fps is None:
                 missed.append((label, between(made[job.group], each, times)))
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
@@ -155,6 +160,7 @@ def bake(
         at_rest = made[jobs[-1].group].rest
     bake_notes.gaps(missed, at_rest, voice)
     bake_notes.lost(deviations, method.value, voice)
+    bake_notes.uneven(sorted(uneven), scene, method.value, voice)
     took = report.took(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
     voice.say(f"{_summary(done, method.value)}, {took}")
 

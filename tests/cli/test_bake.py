@@ -18,6 +18,7 @@ from fixtures.broken.pieces import buffered, text
 from tests.anim.skinning.test_deviation import torn
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal, shell
+from tests.clips import clip, track
 from tests.files import glb_of, opened_fixture, opened_path
 
 
@@ -171,6 +172,15 @@ def test_a_method_that_loses_the_model_is_told_however_quiet(call: Call, tmp_pat
     report = call("collapse", tmp_path / "torn.glb", "--clip", "torn", "--fps", "8").text
     assert "dqs can't be used" in report
     assert "--method dqs" not in report
+
+
+def test_joints_that_scale_unevenly_are_named_for_methods_that_turn(call: Call, tmp_path: Path) -> None:
+    grown = clip(track("scale", [0, 1], [[1, 1, 1], [1, 1, 2]], node=1), name="grown")
+    (tmp_path / "grown.glb").write_bytes(glb_of(write.replace_clips(opened_fixture("tube"), {0: grown})))
+    bake = ("bake", tmp_path / "grown.glb", tmp_path / "grown.npz", "--clip", "grown")
+    name = opened_fixture("tube").json["nodes"][1]["name"]
+    assert f"note: '{name}': uneven scale, where tools define dqs differently" in call(*bake, "--method", "dqs").err
+    assert "uneven" not in call(*bake).err
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,41 @@
+"""Joints that scale by different factors along different axes, where tools differ on all methods but lbs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Clip
+from anim.skinning.bake import Baker
+from anim.skinning.carriers import bind_shape
+from anim.skinning.frames import Playback
+from anim.skinning.layer import Layer
+
+UNEVEN = 1e-3  # by how much factors may differ, as a share; rounding in files leaves less
+AT_ONCE = 256  # frames
+
+
+def uneven_joints(made: Baker, clip: Clip, times: Floats) -> tuple[int, ...]:
+    """Return the nodes of joints with weight that scale unevenly, or shear, at any of `times` (F,) s, increasing.
+
+    A stretch that all bind matrices of a mesh have alike doesn't count: it is undone before joints move the mesh.
+    """
+    playback = Playback(made.scene.skeleton, clip)
+    found: set[int] = set()
+    for first in range(0, len(times), AT_ONCE):
+        frames = playback.at(times[first : first + AT_ONCE])
+        for layer in made.layers:
+            found |= _uneven(layer, layer.matrices(frames, slice(None)))
+    return tuple(sorted(found))
+
+
+def _uneven(layer: Layer, matrices: Floats) -> set[int]:
+    """matrices: (n, J, 3, 4) of a mesh's joints."""
+    used = np.unique(layer.rig.joint)
+    linear, shape = matrices[:, used, :, :3], bind_shape(layer.rig)
+    if shape is not None:
+        linear = linear @ np.linalg.inv(shape)
+    square = np.swapaxes(linear, -1, -2) @ linear
+    even = np.trace(square, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
+    off = np.abs(square - even).max(axis=(0, 2, 3)) > 2 * UNEVEN * even[..., 0, 0].max(axis=0)
+    return {int(layer.rig.nodes[joint]) for joint in used[off]}
