@@ -38,8 +38,8 @@ def uneven(joints: Sequence[int], scene: Scene, method: str, voice: Voice) -> No
         names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
         more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
         voice.say(
-            f"note: {names}{more}: uneven scale, where tools define {method} differently; here each joint stretches the "
-            "mesh about its own place, then turns it"
+            f"note: {names}{more}: uneven scale, where tools define {method} differently; here each joint stretches "
+            "the mesh about its own place, then turns it"
         )
 
 

@@ -180,7 +180,7 @@ def test_joints_that_scale_unevenly_are_named_for_methods_that_turn(call: Call, 
     bake = ("bake", tmp_path / "grown.glb", tmp_path / "grown.npz", "--clip", "grown")
     name = opened_fixture("tube").json["nodes"][1]["name"]
     assert f"note: '{name}': uneven scale, where tools define dqs differently" in call(*bake, "--method", "dqs").err
-    assert "uneven" not in call(*bake).err
+    assert "uneven scale" not in call(*bake).err
 
 
 @pytest.mark.parametrize(
@@ -240,8 +240,8 @@ def test_bad_files_are_refused(name: str, call: Call, bad_input: Find, tmp_path:
 def test_a_real_file_with_every_clip(call: Call, asset: Find, tmp_path: Path) -> None:
     source = asset("Fox.glb")
     assert call("bake", source, tmp_path / "{clip}.npz", "--method", "dqs", "-q").code == 0
-    for clip in read.clips(opened_path(source)):
-        positions = np.load(tmp_path / f"{clip.name}.npz")["positions"]
+    for each in read.clips(opened_path(source)):
+        positions = np.load(tmp_path / f"{each.name}.npz")["positions"]
         assert positions.shape[1:] == (1728, 3)
         assert np.isfinite(positions).all()
 
