@@ -39,6 +39,11 @@ class Skeleton:
             if len(array) != len(self.names) or len(self.parents) != len(self.names):
                 raise ShapeError(f"{name} has {len(array)} rows for {len(self.names)} names")
             set_field(self, name, array)
+        set_field(self, "sheared", arrays.own(np.asarray(self.sheared, dtype=np.int64)))
+        arrays.check_shape(self.sheared, "X", name="sheared")
+        set_field(self, "sheared_local", arrays.floats(self.sheared_local, "X 3 4", name="sheared_local"))
+        if len(self.sheared_local) != len(self.sheared):
+            raise ShapeError(f"sheared_local has {len(self.sheared_local)} matrices for {len(self.sheared)} nodes")
         self.levels()
 
     def __len__(self) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -48,3 +50,15 @@ def test_labels() -> None:
     assert nodes.label(0) == "node 0 'hip'"
     assert nodes.label(1) == "node 1"
     assert len(nodes) == 2
+
+
+def test_nobody_writes_into_a_skeleton() -> None:
+    sheared, local = np.array([0]), np.zeros((1, 3, 4))
+    tree = replace(skeleton([-1, 0]), sheared=sheared, sheared_local=local)
+    sheared[0], local[0] = 1, 7
+    assert tree.sheared.tolist() == [0]
+    assert not tree.sheared_local.any()
+    arrays = [getattr(tree, each.name) for each in fields(tree) if each.name != "names"]
+    assert [array.flags.writeable for array in arrays] == [False] * len(arrays)
+    with pytest.raises(ShapeError, match="sheared_local has 2 matrices for 1 nodes"):
+        replace(tree, sheared_local=np.zeros((2, 3, 4)))
