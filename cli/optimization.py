@@ -1,15 +1,12 @@
-"""What `optimize` says of its work: a line or two for a person, every figure for a script."""
+"""What `optimize` says of its work to a person: a line or two, and the points of a curve."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json as jsonlib
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from anim.gltf import read
 from anim.gltf.document import Document
@@ -27,7 +24,6 @@ from cli import optimize_proof
 from cli.errors import CheckError
 from cli.report import change, length, plural, share, size, took
 
-SCHEMA = 1
 LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
 
 
@@ -54,6 +50,19 @@ class About:
     def unchanged(self) -> bool:
         """Whether the input was given back."""
         return self.after is self.before
+
+    @property
+    def unchanged_because(self) -> str | None:
+        """Why the output is the input, None where it is not."""
+        if not self.unchanged:
+            return None
+        return "optimized like this before" if self.found.unchanged else "no smaller file within the bound"
+
+    @property
+    def optimized_before(self) -> bool:
+        """Whether the input says that it came from here."""
+        extras = self.before.json["asset"].get("extras", {})
+        return isinstance(extras, dict) and KEY in extras
 
 
 def is_long(clips: Sequence[Clip], chosen: Sequence[int]) -> bool:
@@ -89,9 +98,9 @@ def lines(about: About, *, dry_run: bool) -> list[str]:
     """Return what is always said."""
     dry = " (dry run: nothing written)" if dry_run else ""
     if about.unchanged:
-        said = f"{about.name}  {size(about.size_after)}, unchanged: {_why_unchanged(about)}{dry}"
+        said = f"{about.name}  {size(about.size_after)}, unchanged: {about.unchanged_because}{dry}"
         return [said]
-    keys = f"{_keys(about.clips, about)} → {sum(_count(each.clip) for each in about.found.solutions.values())} keys"
+    keys = f"{_keys(about.clips, about)} → {sum(count_keys(each.clip) for each in about.found.solutions.values())} keys"
     summary = [
         f"{about.name}  {change(about.size_before, about.size_after)}",
         f"animation {change(cost(about.before), cost(about.after))}",
@@ -115,63 +124,14 @@ def details(about: About) -> list[str]:
 
 def _clip_line(about: About, number: int, solution: Solution) -> str:
     source = about.clips[number]
-    counts = (
-        f"{_count(source)} → {_count(solution.clip)} keys, {len(source.tracks)} → {len(solution.clip.tracks)} tracks"
-    )
+    keys = f"{count_keys(source)} → {count_keys(solution.clip)} keys"
+    counts = f"{keys}, {len(source.tracks)} → {len(solution.clip.tracks)} tracks"
     found = about.found.verdicts[number]
     assert found.statistics is not None  # -v asks for them
     usual = f", p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
     usual = optimize_proof.of_clip(found, about.request) + usual
     moved = found.error.max_error > NOTHING * about.scale
     return f"  {read.label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
-
-
-def _why_unchanged(about: About) -> str | None:
-    """Why the output is the input, None where it is not."""
-    if not about.unchanged:
-        return None
-    return "optimized like this before" if about.found.unchanged else "no smaller file within the bound"
-
-
-def as_json(about: About, *, warnings: Sequence[str] = ()) -> str:
-    """Return the report as a JSON document, schema 1. warnings: said so far."""
-    request = about.request
-    content = {
-        "schema": SCHEMA,
-        "output": about.name,
-        "unchanged": about.unchanged,
-        "unchanged_because": _why_unchanged(about),
-        "seconds": round(about.seconds, 3),
-        "diagonal_m": about.scale,
-        "measured_at": about.measured_at,
-        "optimized_before": _is_marked(about.before),
-        "bounds": {
-            "max_error_m": request.bounds.max_error,
-            "shell_m": request.bounds.shell,
-            "max_pointer_error": request.bounds.max_pointer_error,
-            "max_angle_deg": None if request.bounds.max_angle is None else math.degrees(request.bounds.max_angle),
-            "max_speed_error_m_per_s": request.bounds.max_speed_error,
-        },
-        "policy": {
-            "drop": str(request.policy.drop),
-            "reference": str(request.policy.reference),
-            "rebase_rest": request.policy.rebase_rest,
-            "drop_invisible": request.policy.drop_invisible,
-            "kept_nodes": sorted(request.policy.keep),
-            "packing": str(request.packing),
-            "objective": str(request.objective),
-            "effort": request.effort,
-            "players": list(request.players),
-        },
-        "bytes": {
-            "before": _bytes(about.size_before, about.before),
-            "after": _bytes(about.size_after, about.after),
-        },
-        "moved_rest": [_target(about, node, path) for node, path in about.found.moved],
-        "clips": [] if about.unchanged else [_clip(about, i, each) for i, each in about.found.solutions.items()],
-        "warnings": list(warnings),
-    }
-    return jsonlib.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def curve_line(sized: Sized, scale: float) -> str:
@@ -199,10 +159,11 @@ def cost(document: Document) -> int:
 
 
 def _keys(clips: Sequence[Clip], about: About) -> int:
-    return sum(_count(clips[i]) for i in about.found.solutions)
+    return sum(count_keys(clips[i]) for i in about.found.solutions)
 
 
-def _count(clip: Clip) -> int:
+def count_keys(clip: Clip) -> int:
+    """Return the keys of all tracks."""
     return sum(len(track.times) for track in clip.tracks)
 
 
@@ -232,14 +193,9 @@ def _error_words(verdict: Verdict, about: About) -> str:
 
 def _earlier(about: About) -> list[str]:
     """What to know where the input was lossy before: nothing in a file tells its motion from its own source's."""
-    if not _is_marked(about.before):
+    if not about.optimized_before:
         return []
     return ["the input was optimized before; errors are measured from it, not from its source"]
-
-
-def _is_marked(document: Document) -> bool:
-    extras = document.json["asset"].get("extras", {})
-    return isinstance(extras, dict) and KEY in extras
 
 
 def _policy(about: About) -> list[str]:
@@ -257,53 +213,3 @@ def _policy(about: About) -> list[str]:
         names = [read.clip_name(about.clips[i].name, i) for i in about.found.without_loss]
         words.append(f"kept without loss, as no smaller way held all bounds: {', '.join(names)}")
     return [f"  {'; '.join(words)}"] if words else []
-
-
-def _bytes(file: int, document: Document) -> dict[str, int]:
-    whole = footprints(document)[1]
-    return {"file": file, "data": whole.data, "stored": stored(document), "json": whole.json}
-
-
-def _target(about: About, node: int | None, path: str, pointer: str | None = None) -> dict[str, Any]:
-    if node is None:
-        return {"pointer": pointer, "path": path}
-    names = read.skeleton(about.before).names
-    return {"node": node, "name": names[node] if node < len(names) else "", "path": path}
-
-
-def _clip(about: About, number: int, solution: Solution) -> dict[str, Any]:
-    source, verdict = about.clips[number], about.found.verdicts[number]
-    error, rest = verdict.error, verdict.statistics
-    assert rest is not None  # a report asks for details
-    return {
-        "number": number,
-        "name": source.name,
-        "end_s": source.end,
-        "keys_before": _count(source),
-        "keys_after": _count(solution.clip),
-        "tracks_before": len(source.tracks),
-        "tracks_after": len(solution.clip.tracks),
-        "max_error_m": error.max_error,
-        "max_error_percent": 100 * error.max_error / about.scale if about.scale else 0.0,
-        "at": {
-            "mesh": error.place,
-            "joint": error.joint,
-            "vertex": error.vertex,
-            "time_s": error.time,
-            "player": verdict.player,
-        },
-        "certified_error_m": verdict.certified,
-        "not_certified_because": optimize_proof.why_not(verdict, about.request),
-        "p99_m": rest.p99,
-        "mean_m": rest.mean,
-        "max_angle_deg": math.degrees(rest.angle.size),
-        "max_speed_error_m_per_s": rest.speed.size,
-        "max_weight_error": rest.weight.size,
-        "max_pointer_error": error.max_pointer_error,
-        "times_checked": error.times,
-        "without_loss": number in about.found.without_loss,
-        "dropped": [
-            _target(about, track.node, track.path, track.pointer)
-            for track in (source.tracks[k] for k in solution.dropped)
-        ],
-    }

@@ -18,7 +18,7 @@ from anim.optimize.optimize import Optimized
 from anim.optimize.request import Request
 from anim.optimize.tradeoff import MOST, SHARES, curve
 from anim.optimize.verify import PLAYERS
-from cli import optimization, optimize_request, options, streams
+from cli import optimization, optimize_report, optimize_request, options, streams
 from cli.edit import note_images
 from cli.errors import UsageError
 from cli.gltf_files import GLTF_SUFFIXES
@@ -199,7 +199,7 @@ def _report(about: optimization.About, voice: Voice, path: str | None, *, dry_ru
         yield
         return
     warnings = [*voice.warnings, *optimization.warnings(about)]
-    with streams.commit_text_after(optimization.as_json(about, warnings=warnings), path):
+    with streams.commit_text_after(optimize_report.as_json(about, warnings=warnings), path):
         yield
 
 
