@@ -11,8 +11,8 @@ from typing import Any
 from typer import TyperException
 
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
-from cli.report import Voice
 from cli.tables import one_line
+from cli.text import Voice
 
 PROGRAM = "gltf-anim"
 DONE, BUG, USAGE, FORMAT, UNSUPPORTED, NOT_FOUND, CHECK = range(7)

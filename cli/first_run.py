@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from cli.report import Voice
+from cli.text import Voice
 
 
 def announce_compiling(voice: Voice) -> None:

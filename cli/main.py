@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from anim import __version__
-from cli.coerce import quicken
+from cli.typer_options import quicken
 
 PROGRAM = "gltf-anim"
 

@@ -10,9 +10,9 @@ import DracoPy
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.gltf import text
-from anim.gltf.accessors import Accessors
 from anim.gltf.document import Buffer, Document
+from anim.gltf.io import json_text
+from anim.gltf.reading.accessors import Accessors
 
 EXTENSION = "KHR_draco_mesh_compression"
 BITS = 20  # of positions
@@ -22,7 +22,7 @@ DATA = "data:application/octet-stream;base64,"  # what a buffer is written as
 
 def compressed(document: Document) -> Document:
     """Return the document with every primitive's vertices and faces as Draco data in a buffer of its own."""
-    content: dict[str, Any] = json.loads(text.dump(document.json))
+    content: dict[str, Any] = json.loads(json_text.dump(document.json))
     accessors = Accessors(document)
     for mesh in content["meshes"]:
         for primitive in mesh["primitives"]:

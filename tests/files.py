@@ -10,8 +10,9 @@ import numpy as np
 
 import fixtures
 from anim.errors import FormatError
-from anim.gltf import container, read
 from anim.gltf.document import Bytes, Document
+from anim.gltf.io import container
+from anim.gltf.reading import reader
 from anim.model import Clip
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -86,4 +87,4 @@ def _on_disk(path: Path) -> Bytes:
 
 def clips_of(data: bytes) -> tuple[Clip, ...]:
     """Return the clips in the bytes of a file that needs no other."""
-    return read.clips(opened(data))
+    return reader.clips(opened(data))

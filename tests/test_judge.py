@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.gltf import read, write
 from anim.gltf.document import Document
-from anim.measure.error import SLACK, Ruler, check_times
-from anim.measure.surface import placed, surfaces
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
+from anim.measure.error.metric import SLACK, Ruler, check_times
+from anim.measure.error.surface import placed, surfaces
 from anim.model import Clip, Scene
 from anim.ops.resample import resample
 from anim.sampling import pose
@@ -72,8 +73,8 @@ def test_a_morph_weight_moves_by_its_delta(tmp_path: Path) -> None:
 
 def test_nodes_without_vertices_are_reported_by_themselves(tmp_path: Path) -> None:
     document = opened_fixture("interpolations")
-    node = read.skeleton(document).names.index("step_scale_place")
-    place = read.skeleton(document).translation[node]
+    node = reader.skeleton(document).names.index("step_scale_place")
+    place = reader.skeleton(document).translation[node]
 
     def change(before: Clip) -> Clip:
         raised = track("translation", [0], [np.add(place, [0, 0.01, 0])], node=node)
@@ -91,7 +92,7 @@ def test_nodes_without_vertices_are_reported_by_themselves(tmp_path: Path) -> No
 def test_other_vertices_give_way_to_the_truths_on_the_others_nodes(tmp_path: Path) -> None:
     document = opened_fixture("tube_f03")
     number = _number(document, "bend90")
-    changed = write.replace_clips(document, {number: _turned(93)(read.clips(document)[number])})
+    changed = writer.replace_clips(document, {number: _turned(93)(reader.clips(document)[number])})
     other = tmp_path / "other.glb"
     other.write_bytes(_with_larger_mesh(glb_of(changed)))
     found = judge(_written(tmp_path, "truth", document), other)
@@ -159,14 +160,14 @@ def test_what_is_not_gltf_is_refused_in_threes_words(tmp_path: Path) -> None:
 def test_our_ruler_and_three_agree_on_real_files(asset: Find, name: str, tmp_path: Path) -> None:
     """Where and when three finds the worst, `anim` does; and our ruler overstates it by no more than its slack."""
     document = opened_path(asset(name))
-    before = read.clips(document)
-    changed = write.replace_clips(document, {i: resample(each, fps=9) for i, each in enumerate(before)})
+    before = reader.clips(document)
+    changed = writer.replace_clips(document, {i: resample(each, fps=9) for i, each in enumerate(before)})
     found = judge(asset(name), _written(tmp_path, "other", changed))
-    ruler = Ruler(read.scene(document))
+    ruler = Ruler(reader.scene(document))
     assert found.by_vertex
     assert len(found.clips) == len(before)
     assert found.diagonal == pytest.approx(ruler.diagonal, rel=1e-6)
-    for each, old, new in zip(found.clips, before, read.clips(changed), strict=True):
+    for each, old, new in zip(found.clips, before, reader.clips(changed), strict=True):
         assert each.max_error > 1e-3 * found.diagonal  # else nothing is compared
         assert _at_node(ruler.scene, each, old, new) == pytest.approx(each.max_error, abs=1e-6 * found.diagonal)
         times = np.union1d(np.arange(0, each.duration, 1 / RATE), check_times(old, new)[::2])
@@ -192,7 +193,7 @@ def _placed(scene: Scene, found: ClipVerdict, clip: Clip) -> list[Floats]:
 
 
 def _judged(folder: Path, document: Document, number: int, change: Callable[[Clip], Clip]) -> Verdict:
-    changed = write.replace_clips(document, {number: change(read.clips(document)[number])})
+    changed = writer.replace_clips(document, {number: change(reader.clips(document)[number])})
     return judge(_written(folder, "truth", document), _written(folder, "other", changed))
 
 
@@ -203,7 +204,7 @@ def _written(folder: Path, name: str, document: Document) -> Path:
 
 
 def _number(document: Document, name: str) -> int:
-    return read.names(document).index(name)
+    return reader.names(document).index(name)
 
 
 def _shifted(node: str, path: str, *, key: int, by: list[float]) -> Callable[[Clip], Clip]:

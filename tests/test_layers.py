@@ -19,7 +19,8 @@ LEVELS = (
     {"arrays"},
     {"maths"},
     {"model"},
-    {"gltf", "sampling", "curves"},
+    {"gltf", "sampling"},
+    {"curves"},
     {"measure"},
     {"ops", "exchange", "skinning", "simulation", "caches", "optimize"},
     {"show"},
@@ -122,7 +123,7 @@ def _imported(path: Path) -> frozenset[str]:
 
 
 def _names(node: ast.AST) -> list[str]:
-    """What an import statement names: "anim.gltf" and "anim.gltf.read" for `from anim.gltf import read`."""
+    """What an import statement names: "anim.gltf" and "anim.gltf.reading.reader" for `from anim.gltf import read`."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     if isinstance(node, ast.ImportFrom):

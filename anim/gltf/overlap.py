@@ -5,8 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from anim.gltf.encode import Numbers
-from anim.gltf.ranges import ALIGNMENT
+from anim.gltf.writing.byte_ranges import ALIGNMENT
+from anim.gltf.writing.encoding import Numbers
 
 
 def inside(contents: Sequence[Numbers]) -> dict[int, tuple[int, int]]:

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.curves.ease import Easing
-from anim.curves.fit import cubic_pieces, fit_linear
+from anim.curves.easing.function import Easing
+from anim.curves.fitting import adaptive_keys
+from anim.curves.fitting.easing_fit import cubic_pieces, fit_linear
 from anim.errors import RangeError
 from anim.model import Clip, Interpolation, Kind, Track
-from anim.ops import refine
-from anim.ops.assemble import held, spline_track, step_track
-from anim.ops.eased import EasedTrack, eased_pieces, stepped_pieces
-from anim.sampling import piece
+from anim.ops.cubic_segments import held, spline_track, step_track
+from anim.ops.ease_track import EasedTrack, eased_pieces, stepped_pieces
+from anim.sampling import segment
 
 TOLERANCE = 1e-3  # of a piece's range
 ANGLE_TOLERANCE = math.radians(0.05)
@@ -93,21 +93,21 @@ class _Job:
         for k in range(len(track.times) - 1):
             if inside[k]:
                 times.append(track.times[k] + (track.times[k + 1] - track.times[k]) * u)
-                values.append(piece.values(track, np.full(len(u), k), shares))
+                values.append(segment.values(track, np.full(len(u), k), shares))
             times.append(track.times[k + 1 : k + 2])
             values.append(track.values[k + 1 : k + 2])
         return held(track, np.concatenate(times), np.concatenate(values), Interpolation.LINEAR)
 
     def _followed(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        return refine.spline_track(track, refine.cubic_keys(motion, corners, tolerance=tolerance))
+        return adaptive_keys.spline_track(track, adaptive_keys.cubic_keys(motion, corners, tolerance=tolerance))
 
     def _sampled(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        keys = refine.linear_keys(motion, corners, tolerance=tolerance)
+        keys = adaptive_keys.linear_keys(motion, corners, tolerance=tolerance)
         return held(track, keys.times, keys.values, Interpolation.LINEAR)
 
-    def _motion(self, track: Track, inside: Bools) -> tuple[refine.Motion, Floats, float]:
+    def _motion(self, track: Track, inside: Bools) -> tuple[adaptive_keys.Motion, Floats, float]:
         """The eased track as functions of time, with the times where it is not smooth, and how near to follow it."""
         allowed, speed = self._allowed(track, inside)
         near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
@@ -117,13 +117,19 @@ class _Job:
         starts, durations = track.times[:-1][inside], np.diff(track.times)[inside]
         corners = np.concatenate((track.times, (starts[:, None] + durations[:, None] * breaks).reshape(-1)))
         eased = EasedTrack(track, inside, cubics)
-        return refine.Motion(eased.values, eased.rates, track.kind is Kind.ROTATION), np.sort(corners), allowed / 2
+        return (
+            adaptive_keys.Motion(eased.values, eased.rates, track.kind is Kind.ROTATION),
+            np.sort(corners),
+            allowed / 2,
+        )
 
     def _allowed(self, track: Track, inside: Bools) -> tuple[float, float]:
         """How far keys may be off, and how fast the track changes per share of a piece: an ease's error times that."""
-        speed = piece.fastest(track, np.flatnonzero(inside))
+        speed = segment.fastest(track, np.flatnonzero(inside))
         if track.kind is Kind.ROTATION:
             return self.tolerances.angle, speed
         ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]
         moving = ranges[ranges > 0]
-        return refine.reachable(track, self.tolerances.share * float(moving.min() if len(moving) else 1.0)), speed
+        return adaptive_keys.reachable(
+            track, self.tolerances.share * float(moving.min() if len(moving) else 1.0)
+        ), speed

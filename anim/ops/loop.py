@@ -10,7 +10,7 @@ from anim.arrays import Bools, Floats
 from anim.errors import RangeError
 from anim.maths import hermite, quaternion
 from anim.model import Clip, Interpolation, Kind, Track
-from anim.sampling.slopes import rates
+from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
 SPARSE = 6  # keys that a blend needs at least; sparser LINEAR tracks get more

@@ -10,7 +10,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Track
-from anim.sampling import slopes
+from anim.sampling import derivatives
 from anim.sampling.batch import Batch, batches
 from anim.sampling.times import grid, key_times
 
@@ -107,7 +107,7 @@ def _keyed(track: Track, goal: Interpolation, times: Floats, values: Floats) -> 
 
 def _tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Tangents of the new keys; a piece that was there from key to key keeps its own, to the bit."""
-    before, after = slopes.tangents(track, times, values)
+    before, after = derivatives.tangents(track, times, values)
     if track.in_tangents is None or track.out_tangents is None:
         return before, after
     at = np.minimum(np.searchsorted(track.times, times), len(track.times) - 1)

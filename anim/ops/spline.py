@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from anim.curves.spline_keys import TangentRule
-from anim.curves.tangents import rotation_keys, spline_keys
+from anim.curves.tangents.rule import TangentRule
+from anim.curves.tangents.table import rotation_keys, spline_keys
 from anim.errors import AnimError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Track

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Floats
+from anim.curves.fitting import adaptive_keys
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Kind, Track
-from anim.ops import refine
 from anim.ops.retime import shifted
-from anim.sampling.slopes import rates
+from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
 ANGLE_TOLERANCE = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
@@ -108,13 +108,13 @@ def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[
 
 def _with_cuts(track: Track, times: Floats) -> Floats:
     """The times with more of them in the cut pieces at both ends, where a rotation's cubic is normalized anew."""
-    motion = refine.Motion(
+    motion = adaptive_keys.Motion(
         lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
     )
     parts = [times]
     for piece in (times[:2], times[-2:]):
         if not np.isin(piece, track.times).all():
-            parts.append(refine.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE).times)
+            parts.append(adaptive_keys.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE).times)
     return np.unique(np.concatenate(parts))
 
 

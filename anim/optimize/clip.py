@@ -9,16 +9,16 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import FLOAT32, Clip, Interpolation, Track
-from anim.optimize import ends, lossless, morph, pointers
-from anim.optimize.coding import Stored
-from anim.optimize.limits import Drop
-from anim.optimize.outcome import Fate, Outcome
-from anim.optimize.search import search
-from anim.optimize.setting import Setting
-from anim.optimize.solution import Solution, value_bytes
-from anim.optimize.strains import Strains
-from anim.optimize.trial import CHORDS_NOTICED, Bench
-from anim.optimize.truth import PATHS, Truth, key_grid, truth
+from anim.optimize.options import Drop
+from anim.optimize.search.bound_usage import Strains
+from anim.optimize.search.context import Setting
+from anim.optimize.search.plan import Fate, Outcome
+from anim.optimize.search.search import search
+from anim.optimize.search.solution import Solution, value_bytes
+from anim.optimize.search.source_motion import PATHS, Truth, key_grid, truth
+from anim.optimize.search.trial import CHORDS_NOTICED, Bench
+from anim.optimize.tracks import clip_ends, lossless, morph_weights, pointer_tracks
+from anim.optimize.tracks.quantization import Stored
 from anim.sampling import times
 
 MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
@@ -78,7 +78,7 @@ class _Sorted:
     def _sort(self, i: int, track: Track) -> None:
         policy, exact = self._setting.policy, self._setting.bounds.max_error == 0
         if track.node is None or track.path == "pointer":
-            self._put(i, pointers.thinned(track, self._setting.bounds.max_pointer_error))
+            self._put(i, pointer_tracks.thinned(track, self._setting.bounds.max_pointer_error))
         elif self._is_unseen(i):
             self._dropped.append(i)
         elif track.path == "weights":
@@ -136,12 +136,12 @@ class _Sorted:
             if exact or not reach.size or track.interpolation is Interpolation.STEP:
                 self._put(i, lossless.lossless(track))
                 continue
-            from_rest = morph.off(track, setting.weights_at_rest(track.node), reach)
+            from_rest = morph_weights.off(track, setting.weights_at_rest(track.node), reach)
             if self._droppable(i) and from_rest <= bound:
                 self._dropped.append(i)
                 self._spent += from_rest
                 continue
-            new, stored, off = morph.thinned(track, reach, bound, key_grid([track]), setting.coding.packing)
+            new, stored, off = morph_weights.thinned(track, reach, bound, key_grid([track]), setting.coding.packing)
             if track.interpolation is Interpolation.CUBICSPLINE and self._spline_is_smaller(i, new, {i: (new, stored)}):
                 self._put(i, lossless.lossless(track))
                 continue
@@ -219,12 +219,12 @@ def _new_track(track: Track, at: Floats, stored: Stored) -> Track:
 def _with_ends(clip: Clip, every: dict[int, tuple[Track, Stored]], dropped: list[int]) -> Solution:
     """The solution, with at least one track, and with keys at the clip's start and end."""
     if not every and clip.tracks:
-        every = {0: _as_it_is(ends.held(clip.tracks[0]))}
+        every = {0: _as_it_is(clip_ends.held(clip.tracks[0]))}
         dropped = [i for i in dropped if i != 0]
     made = Clip(clip.name, tuple(track for track, _ in every.values()))
     if every and (made.end < clip.end or made.start > clip.start):
         number = min(every, key=lambda i: (len(every[i][0].times), every[i][0].values.shape[1], i))
-        every[number] = _as_it_is(ends.stretched(every[number][0], clip.start, clip.end))
+        every[number] = _as_it_is(clip_ends.stretched(every[number][0], clip.start, clip.end))
     ordered = [every[i] for i in sorted(every)]
     tracks, stored = tuple(track for track, _ in ordered), tuple(each for _, each in ordered)
     return Solution(Clip(clip.name, tracks), stored, tuple(dropped))

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from anim.gltf import read
 from anim.gltf.document import Document
-from anim.measure.surface import has_vertices
+from anim.gltf.reading import reader
+from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
-from anim.optimize import seal
+from anim.optimize import fingerprint
 from anim.optimize.clip import Task
-from anim.optimize.constants import known
-from anim.optimize.crew import crew
-from anim.optimize.rebase import rebase
-from anim.optimize.redundant import drop_redundant_keys
+from anim.optimize.clip_optimizer import Site, finished, judged
+from anim.optimize.process_pool import crew
 from anim.optimize.request import Request
-from anim.optimize.site import Site, finished, judged
-from anim.optimize.solution import Solution
-from anim.optimize.verify import Verdict
-from anim.optimize.written import differing, written
+from anim.optimize.rest_pose import rebase
+from anim.optimize.search.solution import Solution
+from anim.optimize.shared_constants import known
+from anim.optimize.tracks.redundant_keys import drop_redundant_keys
+from anim.optimize.verification import Verdict
+from anim.optimize.writing import differing, written
 
 MARGIN = 0.985  # of the bound, that a search may use
 
@@ -61,7 +61,7 @@ def optimize(
     """
     chosen = range(len(clips)) if chosen is None else chosen
     options = f"{request.name} {tuple(chosen)}"
-    if seal.is_sealed(document, clips, options):
+    if fingerprint.is_sealed(document, clips, options):
         return Optimized(document, {}, {}, unchanged=True)
     request = _in_sight(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
@@ -72,7 +72,7 @@ def optimize(
     without_loss: list[int] = []
 
     def name(item: tuple[int, object]) -> str:
-        return read.label(clips[item[0]].name, item[0])
+        return reader.label(clips[item[0]].name, item[0])
 
     with crew(min(workers, len(tasks)), site, start=start) as workforce:
         results = workforce.each(finished, tasks, label=name)
@@ -87,10 +87,10 @@ def optimize(
             if found.holds:
                 solutions[number], verdicts[number] = slimmer[number], found
     new = written(base.document if base else document, solutions, request.packing)
-    read_back = read.clips(new)
+    read_back = reader.clips(new)
     for number in differing(read_back, solutions):
         verdicts[number] = site.judged(number, read_back[number])
-    done = seal.sealed(new, read_back, options)
+    done = fingerprint.sealed(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from anim.optimize.limits import Bounds, Objective, Packing, Policy
-from anim.optimize.verify import PLAYERS
+from anim.optimize.options import Bounds, Objective, Packing, Policy
+from anim.optimize.verification import PLAYERS
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,15 +12,15 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError, UnsupportedError
 from anim.model import Clip, Instance, Part, Primitive, Scene, VertexCache
-from anim.skinning.bulge import Clamped
-from anim.skinning.frames import Playback
-from anim.skinning.layer import Layer, Make, layer
-from anim.skinning.linear_blend import LinearBlend
-from anim.skinning.methods import SKINNING_METHODS
-from anim.skinning.mixed import Mixed
-from anim.skinning.rig import Rig
-from anim.skinning.skinner import Skinner
-from anim.skinning.stream import Stream
+from anim.skinning.binding import Rig
+from anim.skinning.bound_mesh import Layer, Make, layer
+from anim.skinning.chunk_pipeline import Stream
+from anim.skinning.methods.blended import Mixed
+from anim.skinning.methods.bulge_clamp import Clamped
+from anim.skinning.methods.linear_blend import LinearBlend
+from anim.skinning.methods.registry import SKINNING_METHODS
+from anim.skinning.methods.skinner import Skinner
+from anim.skinning.pose_blocks import Playback
 
 SPACES = ("world", "mesh")
 

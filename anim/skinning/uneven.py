@@ -7,9 +7,9 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
-from anim.skinning.carriers import bind_shape
-from anim.skinning.frames import Playback
-from anim.skinning.layer import Layer
+from anim.skinning.bound_mesh import Layer
+from anim.skinning.pose_blocks import Playback
+from anim.skinning.weighted_joints import bind_shape
 
 UNEVEN = 1e-3  # by how much factors may differ, as a share; rounding in files leaves less
 AT_ONCE = 256  # frames

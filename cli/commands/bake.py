@@ -13,23 +13,26 @@ import numpy as np
 import typer
 
 from anim.arrays import Floats, sorted_unique
-from anim.caches import axes, extent
-from anim.caches import order as orders
-from anim.gltf import read
+from anim.caches.transforms import bounds, up_axis
+from anim.caches.transforms import vertex_order as orders
+from anim.gltf.reading import reader
 from anim.model import Clip, Scene, VertexCache
 from anim.ops.selection import Selection
 from anim.sampling.times import grid
+from anim.skinning.analysis.inbetween_error import Missed, between
+from anim.skinning.analysis.method_deviation import Deviation, deviation, linear_baker
 from anim.skinning.bake import SPACES, Baker, baked, baker
-from anim.skinning.between import Missed, between
-from anim.skinning.deviation import Deviation, deviation, linear_baker
 from anim.skinning.uneven import uneven_joints
-from cli import bake_notes, cache_files, cache_options, meshes, options, output_names, report, scenes, streams, units
-from cli.cache_files import Saved
+from cli import text, units
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
+from cli.io import cache_files, documents, output_names, scenes
+from cli.io.cache_files import Saved
+from cli.options import caches, common, mesh_selection
+from cli.options.skinning_methods import ABOUT, Method
 from cli.progress import Progress
-from cli.report import Voice, plural
-from cli.skinning_methods import ABOUT, Method
+from cli.reports import bake_notes
+from cli.text import Voice, plural
 
 PLACEHOLDERS = ("mesh", "clip")
 LISTED = 8  # files in a note
@@ -40,8 +43,8 @@ WORLD = Space("world")
 
 
 def bake(
-    input: options.Input = "-",
-    output: cache_options.Product = "-",
+    input: common.Input = "-",
+    output: caches.Product = "-",
     *,
     method: Annotated[Method, typer.Option("--method", help=ABOUT)] = LBS,
     blend: Annotated[
@@ -55,29 +58,29 @@ def bake(
         float | None,
         typer.Option("--fps", metavar="N", help="Frames per second; without it one frame per key of the clip."),
     ] = None,
-    clip: options.Clips = None,
-    mesh: meshes.Meshes = None,
+    clip: common.Clips = None,
+    mesh: mesh_selection.Meshes = None,
     space: Annotated[Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")] = WORLD,
     normals: Annotated[
-        bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(cache_options.holding('normals'))}).")
+        bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(caches.holding('normals'))}).")
     ] = False,
     tangents: Annotated[
         bool,
-        typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(cache_options.holding('tangents'))})."),
+        typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(caches.holding('tangents'))})."),
     ] = False,
     rigid: Annotated[bool, typer.Option("--rigid", help="Bake meshes that only nodes move, too.")] = False,
-    format: cache_options.FormatOption = None,
-    up: cache_options.UpOption = None,
-    order: cache_options.OrderOption = None,
-    max_error: cache_options.MaxError = None,
-    quantize: cache_options.Quantize = False,
-    layout: cache_options.LayoutOption = None,
-    preset: cache_options.PresetOption = None,
-    depth: cache_options.DepthOption = None,
-    rest: cache_options.RestOption = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    format: caches.FormatOption = None,
+    up: caches.UpOption = None,
+    order: caches.OrderOption = None,
+    max_error: caches.MaxError = None,
+    quantize: caches.Quantize = False,
+    layout: caches.LayoutOption = None,
+    preset: caches.PresetOption = None,
+    depth: caches.DepthOption = None,
+    rest: caches.RestOption = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Bake skinning and morph targets to a vertex cache, by a method that glTF itself can't play.
 
@@ -94,22 +97,22 @@ def bake(
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     ending = cache_files.check(output, None if format is None else f".{format}", PLACEHOLDERS)
     given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
-    cache_options.check_held(ending, normals=normals, tangents=tangents)
+    caches.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    caches.check_held(ending, normals=normals, tangents=tangents)
     done: list[_Done] = []
-    with streams.source(input, voice) as source:
+    with documents.source(input, voice) as source:
         document = source.document
-        clips = read.clips(document)
+        clips = reader.clips(document)
         scene = scenes.scene(
             document,
             source.name,
             voice,
             normals=normals or tangents,
             tangents=tangents,
-            nodes=lambda scene: meshes.nodes(scene, mesh),
+            nodes=lambda scene: mesh_selection.nodes(scene, mesh),
         )
-        numbers = Selection(clip or ()).chosen_clips(read.names(document))
-        nodes = meshes.nodes(scene, mesh)
+        numbers = Selection(clip or ()).chosen_clips(reader.names(document))
+        nodes = mesh_selection.nodes(scene, mesh)
         groups = _groups(scene, nodes, output, rigid=rigid)
         jobs = _jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
         announce_compiling(voice)
@@ -137,7 +140,7 @@ def bake(
                 }
                 linear = None if method is LBS else linear_baker(made[job.group], space=space.value)
             each = Clip("", ()) if job.clip is None else clips[job.clip]
-            times, label = _times(each, fps), read.label(each.name, job.clip or 0)
+            times, label = _times(each, fps), reader.label(each.name, job.clip or 0)
             if linear is not None:
                 deviations.append((label, deviation(made[job.group], linear, each, times)))
                 uneven.update(uneven_joints(made[job.group], each, times))
@@ -146,7 +149,7 @@ def bake(
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
             cache = _turned(made[job.group].bake(each, times=times, progress=progress), up, order)
             try:
-                writing = cache_options.writing(ending, given | {"max_error": _meters(max_error, cache)})
+                writing = caches.writing(ending, given | {"max_error": _meters(max_error, cache)})
                 saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)
             except BaseException:
                 _say_written(done, voice, dry_run=dry_run)
@@ -161,7 +164,7 @@ def bake(
     bake_notes.gaps(missed, at_rest, voice)
     bake_notes.lost(deviations, method.value, voice)
     bake_notes.uneven(sorted(uneven), scene, method.value, voice)
-    took = report.took(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
+    took = text.took(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
     voice.say(f"{_summary(done, method.value)}, {took}")
 
 
@@ -224,11 +227,11 @@ def _say_written(done: Sequence[_Done], voice: Voice, *, dry_run: bool) -> None:
 def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
     if order is not None:
         cache = orders.ordered(cache, str(order))
-    return cache if up is None else axes.turned(cache, str(up))
+    return cache if up is None else up_axis.turned(cache, str(up))
 
 
 def _meters(max_error: str | None, cache: VertexCache) -> float | None:
-    return None if max_error is None else units.meters(max_error, "--max-error", lambda: extent.diagonal(cache))
+    return None if max_error is None else units.meters(max_error, "--max-error", lambda: bounds.diagonal(cache))
 
 
 def _say_notes(done: list[_Done], voice: Voice) -> None:
@@ -240,15 +243,15 @@ def _say_notes(done: list[_Done], voice: Voice) -> None:
 
 
 def _summary(done: list[_Done], method: str) -> str:
-    file = "stdout" if done[0].file == streams.PIPE else done[0].file
+    file = "stdout" if done[0].file == documents.PIPE else done[0].file
     name = file if len(done) == 1 else f"{plural(len(done), 'clip')}, {file} …"
     frames = plural(sum(each.frames for each in done), "frame")
     of = f" of '{done[0].clip}'" if len(done) == 1 and done[0].clip else ""
-    parts = [f"{name}  {report.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
+    parts = [f"{name}  {text.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
     vertices = sorted({each.vertices for each in done})
     parts.append(f"{frames} of {' to '.join(map(str, dict.fromkeys((vertices[0], vertices[-1]))))} vertices")
     errors = [each.saved.written.max_error for each in done if each.saved.written.max_error is not None]
-    parts += [f"max {report.length(max(errors))} at frames"] if errors else []
+    parts += [f"max {text.length(max(errors))} at frames"] if errors else []
     count = sum(len(each.saved.files) for each in done)
     return ", ".join([*parts, *([plural(count, "file")] if count > len(done) else [])])
 

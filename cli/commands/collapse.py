@@ -9,26 +9,28 @@ import numpy as np
 import typer
 
 from anim.errors import NotFoundError
-from anim.gltf import read
+from anim.gltf.reading import reader
 from anim.ops.selection import Selection
 from anim.sampling.times import grid
-from anim.show.collapse import collapse as picture_of
-from anim.skinning.advice import Found
-from anim.skinning.collapse import Comparison
-from cli import collapses, meshes, options, scenes, streams
-from cli.collapses import Seen
+from anim.show.plots.collapse_plot import collapse as picture_of
+from anim.skinning.analysis.collapse import Comparison
+from anim.skinning.analysis.recommendations import Found
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
-from cli.options import Format
+from cli.io import documents, scenes
+from cli.options import common, mesh_selection
+from cli.options.common import Format
+from cli.options.skinning_methods import Method
 from cli.progress import Progress
-from cli.report import Voice, size
-from cli.skinning_methods import Method
+from cli.reports import collapse_report
+from cli.reports.collapse_report import Seen
+from cli.text import Voice, size
 
 USUAL = ("lbs", "dqs")
 
 
 def collapse(
-    input: options.Input = "-",
+    input: common.Input = "-",
     *,
     method: Annotated[
         list[Method] | None, typer.Option("--method", help="A method to compare; may be repeated.  [default: lbs, dqs]")
@@ -37,13 +39,13 @@ def collapse(
         bool, typer.Option("--bulge-clamp", help="Look at methods other than lbs as bake --bulge-clamp makes them.")
     ] = False,
     fps: Annotated[float, typer.Option("--fps", metavar="N", help="Frames per second to look at.")] = 30,
-    clip: options.Clips = None,
-    mesh: meshes.Meshes = None,
-    format: options.Report = Format.TEXT,
+    clip: common.Clips = None,
+    mesh: mesh_selection.Meshes = None,
+    format: common.Report = Format.TEXT,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="OUT", help="Draw index and volume over time into a .png or .svg.")
     ] = None,
-    quiet: options.Quiet = False,
+    quiet: common.Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every mesh, not the worst of each clip.")] = False,
 ) -> None:
     """Say where skin collapses when joints twist and bend, and what other methods make of it.
@@ -58,41 +60,47 @@ def collapse(
     voice = Voice(quiet)
     methods = tuple(dict.fromkeys(str(each) for each in method)) if method else USUAL
     found: list[Found] = []
-    with streams.source(input, voice) as source:
+    with documents.source(input, voice) as source:
         document = source.document
-        clips = read.clips(document)
-        scene = scenes.scene(document, source.name, voice, nodes=lambda scene: meshes.nodes(scene, mesh))
-        numbers = Selection(clip or ()).chosen_clips(read.names(document))
+        clips = reader.clips(document)
+        scene = scenes.scene(document, source.name, voice, nodes=lambda scene: mesh_selection.nodes(scene, mesh))
+        numbers = Selection(clip or ()).chosen_clips(reader.names(document))
         if plot is not None and not numbers:
             raise NotFoundError("there is no clip to draw")
         announce_compiling(Voice(quiet))
-        comparison = Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=meshes.nodes(scene, mesh))
+        comparison = Comparison(
+            scene, methods=methods, bulge_clamp=bulge_clamp, nodes=mesh_selection.nodes(scene, mesh)
+        )
         progress = Progress("collapse", len(numbers), shown=not quiet)
         for done, i in enumerate(numbers):
             times = grid(clips[i].start, clips[i].end, fps=fps)
-            found += [Found(i, read.clip_name(clips[i].name, i), each) for each in comparison.of(clips[i], times=times)]
+            found += [
+                Found(i, reader.clip_name(clips[i].name, i), each) for each in comparison.of(clips[i], times=times)
+            ]
             progress(done + 1)
         progress.close()
     seen = Seen(source.name, comparison.meshes, methods, bulge_clamp, fps, found, voice.warnings)
     if plot is not None:
         _draw(seen, plot, voice)
     if format is Format.JSON:
-        streams.write_text(collapses.as_json(seen))
+        documents.write_text(collapse_report.as_json(seen))
     elif not quiet:
-        streams.write_text(collapses.text(seen, every=verbose))
+        documents.write_text(collapse_report.text(seen, every=verbose))
 
 
 def _check(fps: float, plot: str | None) -> None:
     if fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     if plot is not None:
-        streams.check_file(plot)
+        documents.check_file(plot)
         if PurePath(plot).suffix.lower() not in (".png", ".svg"):
             raise UsageError(f"{plot}: is no .png or .svg file")
 
 
 def _draw(seen: Seen, plot: str, voice: Voice) -> None:
     title = PurePath(seen.name).stem + (", bulge clamp" if seen.clamped else "")
-    picture = picture_of(collapses.worst_of_clips(seen.found), title=title, kind=PurePath(plot).suffix.lower()[1:])
-    streams.write_bytes([np.frombuffer(picture, np.uint8)], plot)
+    picture = picture_of(
+        collapse_report.worst_of_clips(seen.found), title=title, kind=PurePath(plot).suffix.lower()[1:]
+    )
+    documents.write_bytes([np.frombuffer(picture, np.uint8)], plot)
     voice.say(f"{plot}  {size(len(picture))}")

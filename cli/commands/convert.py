@@ -7,18 +7,20 @@ from typing import Annotated
 
 import typer
 
-from cli import images, options, report, streams
+from cli import text
+from cli.io import documents, images
+from cli.options import common
 
 
 def convert(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
     embed: Annotated[
         bool, typer.Option("--embed", help="Take external images into the file, if they are there.")
     ] = False,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
 ) -> None:
     """Change between .glb and .gltf, and nothing else.
 
@@ -26,18 +28,18 @@ def convert(
     of the JSON stays as it is: numbers, order, extras, unknown extensions. In another folder external images are copied
     beside the output.
     """
-    voice = report.Voice(quiet)
+    voice = text.Voice(quiet)
     began = time.perf_counter()
     if not dry_run:
-        streams.check_output(output)
-    with streams.source(input, voice) as source:
+        documents.check_output(output)
+    with documents.source(input, voice) as source:
         document = source.document
         if embed:
             document = images.embed(document, source.folder)
-        size = streams.write(document, output, source, dry_run=dry_run)
+        size = documents.write(document, output, source, dry_run=dry_run)
     if not dry_run and (embed or not source.is_beside(output)):
-        copied = output != streams.PIPE
+        copied = output != documents.PIPE
         for note in images.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
             voice.say(note)
-    name = source.name if output == streams.PIPE else output
-    voice.say(f"{name}  {report.change(source.size, size)}, {report.took(time.perf_counter() - began)}")
+    name = source.name if output == documents.PIPE else output
+    voice.say(f"{name}  {text.change(source.size, size)}, {text.took(time.perf_counter() - began)}")

@@ -9,27 +9,29 @@ from typing import Annotated, Any
 
 import typer
 
-from anim.caches import axes, extent, frames
-from anim.caches import order as orders
-from anim.caches.formats import CACHE_FORMATS
-from anim.caches.settings import Reading
+from anim.caches.options import Reading
+from anim.caches.registry import CACHE_FORMATS
+from anim.caches.transforms import bounds, resample, up_axis
+from anim.caches.transforms import vertex_order as orders
 from anim.model import Chunk, VertexCache
-from cli import cache_files, cache_options, options, report, streams, units
+from cli import text, units
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
+from cli.io import cache_files, documents
+from cli.options import caches, common
 from cli.progress import Progress
 
 Cache = Annotated[
     str,
-    typer.Argument(metavar="IN", help=f"A cache: {cache_options.FORMATS}; '-' for stdin.", show_default=False),
+    typer.Argument(metavar="IN", help=f"A cache: {caches.FORMATS}; '-' for stdin.", show_default=False),
 ]
 
 
 def convert_cache(
     input: Cache = "-",
-    output: cache_options.Product = "-",
+    output: caches.Product = "-",
     *,
-    format: cache_options.FormatOption = None,
+    format: caches.FormatOption = None,
     at: Annotated[float | None, typer.Option("--at", metavar="S", help="Only the frame at this time.")] = None,
     fps: Annotated[
         float | None, typer.Option("--fps", metavar="N", help="New frames, on straight lines between the old.")
@@ -38,16 +40,16 @@ def convert_cache(
         float | None,
         typer.Option("--read-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24)."),
     ] = None,
-    up: cache_options.UpOption = None,
-    order: cache_options.OrderOption = None,
-    max_error: cache_options.MaxError = None,
-    quantize: cache_options.Quantize = False,
-    layout: cache_options.LayoutOption = None,
-    preset: cache_options.PresetOption = None,
-    depth: cache_options.DepthOption = None,
-    rest: cache_options.RestOption = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
+    up: caches.UpOption = None,
+    order: caches.OrderOption = None,
+    max_error: caches.MaxError = None,
+    quantize: caches.Quantize = False,
+    layout: caches.LayoutOption = None,
+    preset: caches.PresetOption = None,
+    depth: caches.DepthOption = None,
+    rest: caches.RestOption = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
 ) -> None:
     """Change a vertex cache into another format, frame by frame.
 
@@ -58,7 +60,7 @@ def convert_cache(
     --order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply. Textures (.exr, .png) get a JSON
     and a mesh beside them. A pipe takes one file: textures don't go through it, of sequences a single frame does.
     """
-    voice = report.Voice(quiet)
+    voice = text.Voice(quiet)
     began = time.perf_counter()
     for name, rate in (("--fps", fps), ("--read-fps", read_fps)):
         if rate is not None and rate <= 0:
@@ -67,7 +69,7 @@ def convert_cache(
         raise UsageError("--at and --fps exclude each other")
     ending = cache_files.check(output, None if format is None else f".{format}")
     given: dict[str, Any] = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    cache_options.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    caches.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
     with cache_files.load(input, Reading(read_fps)) as loaded:
         if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
@@ -75,8 +77,8 @@ def convert_cache(
             announce_compiling(voice)
         cache = _changed(loaded.cache, at, fps, up, order)
         if max_error is not None:
-            given["max_error"] = units.meters(max_error, "--max-error", lambda: extent.diagonal(cache))
-        writing = cache_options.writing(ending, given)
+            given["max_error"] = units.meters(max_error, "--max-error", lambda: bounds.diagonal(cache))
+        writing = caches.writing(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:
             saved = cache_files.save(_counted(cache, progress), output, writing, ending=ending, dry_run=dry_run)
@@ -89,16 +91,16 @@ def convert_cache(
         voice.warn(words)
     for note in saved.written.notes:
         voice.say(f"note: {note}")
-    name = loaded.name if output == streams.PIPE else output
+    name = loaded.name if output == documents.PIPE else output
     parts = [
-        f"{name}  {report.change(size, saved.size)}",
-        f"{report.plural(cache.frame_count, 'frame')} of {cache.vertex_count} vertices",
+        f"{name}  {text.change(size, saved.size)}",
+        f"{text.plural(cache.frame_count, 'frame')} of {cache.vertex_count} vertices",
     ]
     if saved.written.max_error is not None:
-        parts.append(f"max {report.length(saved.written.max_error)}")
+        parts.append(f"max {text.length(saved.written.max_error)}")
     if len(saved.files) > 1:
         parts.append(f"{len(saved.files)} files")
-    parts.append(report.took(time.perf_counter() - began))
+    parts.append(text.took(time.perf_counter() - began))
     voice.say(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
 
 
@@ -106,12 +108,12 @@ def _changed(
     cache: VertexCache, at: float | None, fps: float | None, up: str | None, chosen: str | None
 ) -> VertexCache:
     if at is not None:
-        cache = frames.at_time(cache, at)
+        cache = resample.at_time(cache, at)
     if fps is not None:
-        cache = frames.at_rate(cache, fps)
+        cache = resample.at_rate(cache, fps)
     if chosen is not None:
         cache = orders.ordered(cache, str(chosen))
-    return cache if up is None else axes.turned(cache, str(up))
+    return cache if up is None else up_axis.turned(cache, str(up))
 
 
 def _counted(cache: VertexCache, progress: Progress) -> VertexCache:

@@ -10,25 +10,28 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.gltf import read
-from anim.gltf.accessors import Accessors
-from anim.measure.diff import diff as compared
-from anim.measure.error import FPS, Ruler
-from anim.measure.footprint import Footprint, footprints
-from anim.measure.matching import by_name
-from anim.measure.players import PLAYERS, pair
-from anim.measure.profile import profile
-from anim.measure.stored import stored
-from anim.measure.surface import diagonal, measured_at
+from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
+from anim.measure.compare.diff import diff as compared
+from anim.measure.compare.name_matching import by_name
+from anim.measure.error.error_curve import profile
+from anim.measure.error.metric import FPS, Ruler
+from anim.measure.error.surface import diagonal, measured_at
+from anim.measure.inspect.storage_cost import Footprint, footprints
+from anim.measure.inspect.stored_bytes import stored
 from anim.model import Clip, Scene
 from anim.ops.selection import Selection
-from anim.show import diff as picture
-from anim.show.sheet import FORMATS
-from cli import differences, options, scenes, streams, units
-from cli.differences import File, Found
+from anim.sampling.players import PLAYERS, pair
+from anim.show.plots import error_plot as picture
+from anim.show.plots.figure import FORMATS
+from cli import units
 from cli.errors import CheckError, UsageError
-from cli.options import Format
-from cli.report import Voice, length, plural, size
+from cli.io import documents, scenes
+from cli.options import common
+from cli.options.common import Format
+from cli.reports import diff_report
+from cli.reports.diff_report import File, Found
+from cli.text import Voice, length, plural, size
 
 OFF = ("0", "0%", "0m")
 
@@ -44,7 +47,7 @@ def diff(
         typer.Argument(metavar="[B]", help="What to hold against it; with --players none.", show_default=False),
     ] = None,
     *,
-    format: options.Report = Format.TEXT,
+    format: common.Report = Format.TEXT,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="OUT", help="Draw the error over time: a .png or .svg file.")
     ] = None,
@@ -64,8 +67,8 @@ def diff(
     shell: Annotated[
         str, typer.Option("--shell", metavar="LENGTH", help="How far around nodes without vertices; 0: leave them out.")
     ] = "1%",
-    clip: options.Clips = None,
-    quiet: options.Quiet = False,
+    clip: common.Clips = None,
+    quiet: common.Quiet = False,
 ) -> None:
     """Say how far apart the motion of two files is, in metres on the surface.
 
@@ -82,7 +85,7 @@ def diff(
     """
     voice, selection = Voice(quiet), Selection(clip or ())
     who = _players(new, str(player), players)
-    if old == new == streams.PIPE:
+    if old == new == documents.PIPE:
         raise UsageError("A and B can't both be stdin")
     if fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
@@ -97,14 +100,14 @@ def diff(
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
     report = Found(one.file, other.file, found, *_names(one, other), who, fps, radius, measured_at(one.scene))
     if report.are_strangers:
-        voice.warn(f"{differences.STRANGERS}: are they two versions of one thing?")
+        voice.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
     if format is Format.JSON:
-        streams.write_text(differences.as_json(report, warnings=voice.warnings))
+        documents.write_text(diff_report.as_json(report, warnings=voice.warnings))
     elif not quiet:
-        streams.write_text(differences.text(report))
+        documents.write_text(diff_report.text(report))
     if plot is not None:
         drawn = _drawn(report, ruler, one, other, kind, limit)
-        streams.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
+        documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
         voice.say(f"{plot}  {size(len(drawn))}")
     if limit is not None:
         _check(report, limit)
@@ -134,10 +137,10 @@ class _Side:
 
 
 def _opened(path: str, voice: Voice) -> _Side:
-    with streams.source(path, voice) as source:
+    with documents.source(path, voice) as source:
         document = source.document
         accessors = Accessors(document)
-        clips = read.clips(document, accessors)
+        clips = reader.clips(document, accessors)
         scene = scenes.scene(document, source.name, voice, accessors=accessors)
         cost = Footprint(stored(document), footprints(document)[1].json)
         return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
@@ -154,7 +157,7 @@ def _kind(path: str) -> str:
     ending = PurePath(path).suffix.lower().lstrip(".")
     if ending not in FORMATS:
         raise UsageError(f"{path}: --plot writes .png or .svg")
-    streams.check_file(path)
+    documents.check_file(path)
     return ending
 
 
@@ -163,7 +166,7 @@ def _drawn(found: Found, ruler: Ruler, one: _Side, other: _Side, kind: str, limi
     profiles = [
         replace(
             profile(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps),
-            name=read.clip_name(each.name, each.old),
+            name=reader.clip_name(each.name, each.old),
         )
         for each in apart[: picture.LIMIT]
     ]
@@ -187,10 +190,10 @@ def _check(found: Found, limit: float) -> None:
     """Raise CheckError where a clip is farther away than `limit`, in m, or missing, or nothing was compared."""
     if found.diff.missing_clips:
         number = found.diff.missing_clips[0]
-        raise CheckError(f"{found.new.name}: {read.label(found.old.clips[number], number)} is missing")
+        raise CheckError(f"{found.new.name}: {reader.label(found.old.clips[number], number)} is missing")
     if not found.diff.clips:
         raise CheckError(f"{found.old.name}, {found.new.name}: no clips to compare")
     above = [each for each in found.diff.clips if each.error.max_error > limit]
     if above:
         more = f" and {len(above) - 1} more" if len(above) > 1 else ""
-        raise CheckError(f"{found.new.name}: {differences.worst(found)}{more} (limit {length(limit)})")
+        raise CheckError(f"{found.new.name}: {diff_report.worst(found)}{more} (limit {length(limit)})")

@@ -10,17 +10,19 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.curves.ease import Easing
-from anim.curves.easing import EASING_MAKERS, EASINGS, parse, sparkline
-from anim.gltf import read
+from anim.curves.easing.function import Easing
+from anim.curves.easing.table import EASING_MAKERS, EASINGS, parse, sparkline
+from anim.gltf.reading import reader
 from anim.model import Clip, Track
 from anim.ops import ease as by_segment
-from anim.ops import warp as by_range
+from anim.ops import time_warp as by_range
 from anim.ops.selection import Selection
-from cli import options, streams, units
-from cli.edit import Clips, edit
+from cli import units
 from cli.errors import UsageError
-from cli.report import Voice
+from cli.io import documents
+from cli.options import common
+from cli.text import Voice
+from cli.workflows.edit_clips import Clips, edit
 
 
 class Per(StrEnum):
@@ -35,8 +37,8 @@ CUBIC = Interpolation("cubicspline")
 
 
 def ease(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
     ease: Annotated[
         str, typer.Option("--ease", metavar="NAME", help="smoothstep, quad-in-out, 'cubic-bezier(.2,0,0,1)', …")
@@ -45,8 +47,8 @@ def ease(
     per: Annotated[
         Per, typer.Option("--per", help="Ease every piece from key to key, or the whole range once.")
     ] = Per.SEGMENT,
-    start: options.From = None,
-    end: options.To = None,
+    start: common.From = None,
+    end: common.To = None,
     tolerance: Annotated[
         str, typer.Option("--tolerance", metavar="SHARE", help="For eases that no cubic is: share of a piece's range.")
     ] = "0.1%",
@@ -56,12 +58,12 @@ def ease(
     interpolation: Annotated[
         Interpolation, typer.Option("--interpolation", help="cubicspline needs few keys, linear plays everywhere.")
     ] = CUBIC,
-    clip: options.Clips = None,
-    node: options.Nodes = None,
-    path: options.Paths = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    clip: common.Clips = None,
+    node: common.Nodes = None,
+    path: common.Paths = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Give motion another tempo between the same keys.
 
@@ -71,7 +73,7 @@ def ease(
     purpose and stay. Overshooting eases go beyond the keys; what that does to scale and weights is reported.
     """
     if list_eases:
-        streams.write_text(_table())
+        documents.write_text(_table())
         return
     easing = parse(ease)
     share, angle = units.share(tolerance, "--tolerance"), units.angle(angle_tolerance, "--angle-tolerance")
@@ -151,7 +153,7 @@ def _usual_step(tracks: Iterable[Track]) -> float | None:
 
 
 def _labels(clips: Clips, numbers: Iterable[int]) -> str:
-    return read.labels([(clips[i].name, i) for i in numbers])
+    return reader.labels([(clips[i].name, i) for i in numbers])
 
 
 def _table() -> str:

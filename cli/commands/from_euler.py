@@ -11,26 +11,29 @@ from typing import Annotated
 import typer
 
 from anim.errors import FormatError, RangeError
-from anim.exchange import formats
-from anim.exchange.bvh import BvhPosition
-from anim.exchange.convention import Stated
-from anim.exchange.formats import TRACK_FORMATS, Reading
-from anim.exchange.from_euler import from_euler as converted_from
-from anim.exchange.gimbal import gimbal
-from anim.exchange.local import extent, skeleton
-from anim.exchange.motion import EulerMotion, Unit, scaled, turned_up
-from anim.exchange.recorded import Keys
-from anim.exchange.retarget import Floor
-from anim.exchange.sticks import sticks
-from anim.exchange.trees import trees
-from anim.exchange.units import guess_unit
-from anim.gltf import author
+from anim.exchange.euler.baked_keys import Keys
+from anim.exchange.euler.convention import Stated
+from anim.exchange.euler.evaluate import extent, skeleton
+from anim.exchange.euler.from_euler import from_euler as converted_from
+from anim.exchange.euler.gimbal import gimbal
+from anim.exchange.euler.motion import EulerMotion, Unit, scaled, turned_up
+from anim.exchange.euler.unit_guess import guess_unit
+from anim.exchange.formats import registry
+from anim.exchange.formats.bvh_reader import BvhPosition
+from anim.exchange.formats.registry import TRACK_FORMATS, Reading
+from anim.exchange.retarget.retarget import Floor
+from anim.exchange.split_skins import trees
+from anim.exchange.stick_mesh import sticks
+from anim.gltf import authoring
 from anim.maths.euler import Frame, check_order
-from cli import conversion, options, report, streams, units
-from cli.casting import Casting, cast, check_name, index_of, named, pairs
-from cli.conversion import Conversion
+from cli import text, units
 from cli.errors import UsageError
-from cli.options import Format
+from cli.io import documents
+from cli.options import common
+from cli.options.common import Format
+from cli.reports import from_euler_report
+from cli.reports.from_euler_report import Conversion
+from cli.workflows.character import Casting, cast, check_name, index_of, named, pairs
 
 TALL = 10.0  # m; a skeleton that is taller is hardly in meters
 
@@ -53,7 +56,7 @@ def from_euler(
     source: Annotated[
         str, typer.Argument(metavar="SOURCE", help="A .bvh, .csv or .json file, '-' for stdin.", show_default=False)
     ] = "-",
-    output: options.Output = "-",
+    output: common.Output = "-",
     *,
     order: Annotated[
         str | None,
@@ -97,9 +100,9 @@ def from_euler(
         typer.Option("--replace", metavar="CLIP", help="--onto: the clip that gives way, or '#3'."),
     ] = None,
     format: Annotated[Format, typer.Option("--format", help="Report as text on stderr, or JSON.")] = Format.TEXT,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Turn Euler tracks into glTF: BVH, or CSV or JSON curves.
 
@@ -110,19 +113,19 @@ def from_euler(
     names where none match. README shows what CSV and JSON look like.
     """
     began = time.perf_counter()
-    voice = report.Voice(quiet, verbose)
+    voice = text.Voice(quiet, verbose)
     limit = units.angle(tolerance, "--tolerance")
     _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
     if onto is None and (alias, fail_unmatched, rest_at, replace, floor) != (*[None] * 4, Floor.CONTACT):
         words = "--alias, --fail-unmatched, --floor, --replace and --rest-at"
         raise UsageError(f"{words} are about a character (--onto names it)")
     stated = Stated(_order(order), frame, unit)
-    with streams.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
-        kind = formats.of_path(source) or formats.of_content(data.tobytes())
+    with documents.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
+        kind = registry.of_path(source) or registry.of_content(data.tobytes())
         motion = kind.read(data.tobytes(), Reading(stated, bvh_position))
         motion = turned_up(motion) if up is Up.Z else motion
         meters, words, is_guess = _meters_per_unit(motion, scale, known=kind.has_units)
-        clip = name or (Path(source).stem if source != streams.PIPE else "motion")
+        clip = name or (Path(source).stem if source != documents.PIPE else "motion")
         converted = converted_from(scaled(motion, meters), tolerance=limit, keys=keys, name=clip)
         if not converted.clip.tracks:
             raise FormatError("no curve has a key: there is no motion in it")
@@ -131,26 +134,29 @@ def from_euler(
     if onto is None:
         bones = converted.skeleton
         bodies = trees(bones, *sticks(bones, converted.ends)) if mesh is Mesh.STICKS else []
-        document = author.author(bones, [converted.clip], bodies)
-        before, size = len(data), streams.write(document, output, None, dry_run=dry_run)
+        document = authoring.author(bones, [converted.clip], bodies)
+        before, size = len(data), documents.write(document, output, None, dry_run=dry_run)
     else:
         names = pairs(alias)
-        with streams.source(onto, voice) as character:
+        with documents.source(onto, voice) as character:
             taken = index_of(replace, character.document)
             check_name(name, taken, character.document)
             made = named(made, character.document, name=name, replaced=taken)
             casting = Casting(names, floor, rest_at, fail_unmatched, taken)
             made, document = cast(made, character, casting, voice)
-            before, size = character.size, streams.write(document, output, character, dry_run=dry_run)
-    for each in conversion.warnings(made):
+            before, size = character.size, documents.write(document, output, character, dry_run=dry_run)
+    for each in from_euler_report.warnings(made):
         voice.warn(each)
     if format is Format.JSON:
-        streams.write_text(conversion.as_json(made, warnings=voice.warnings))
-    for line in conversion.lines(made, verbose=verbose):
+        documents.write_text(from_euler_report.as_json(made, warnings=voice.warnings))
+    for line in from_euler_report.lines(made, verbose=verbose):
         voice.say(line)
-    parts = [f"{called if output == streams.PIPE else output}  {report.change(before, size)}", conversion.counts(made)]
+    parts = [
+        f"{called if output == documents.PIPE else output}  {text.change(before, size)}",
+        from_euler_report.counts(made),
+    ]
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.say(f"{', '.join(parts)}, {report.took(time.perf_counter() - began)}{ending}")
+    voice.say(f"{', '.join(parts)}, {text.took(time.perf_counter() - began)}{ending}")
 
 
 def _order(order: str | None) -> str | None:
@@ -168,24 +174,24 @@ def _check(
         raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
     if onto is not None and mesh is not Mesh.NONE:
         raise UsageError("--mesh makes a body for a new skeleton (--onto has one)")
-    if source == onto == streams.PIPE:
+    if source == onto == documents.PIPE:
         raise UsageError("SOURCE and --onto can't both be stdin")
-    if format is Format.JSON and output == streams.PIPE and not dry_run:
+    if format is Format.JSON and output == documents.PIPE and not dry_run:
         raise UsageError("--format json and the GLB both want stdout", help="name an output file, or add --dry-run")
     if not dry_run:
-        streams.check_output(output)
+        documents.check_output(output)
 
 
 def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str, bool]:
     """Meters per unit of the motion, the words that say where that comes from, and whether it is uncertain."""
     height = extent(skeleton(motion))
     if scale is not None:
-        return scale, f"{scale:g} m per unit (--scale): the skeleton measures {report.length(height * scale)}", False
+        return scale, f"{scale:g} m per unit (--scale): the skeleton measures {text.length(height * scale)}", False
     if known and height < TALL:
         return 1.0, "", False
     if known:
-        return 1.0, f"the skeleton measures {report.length(height)} (--scale 0.01 if its unit is centimeters)", True
+        return 1.0, f"the skeleton measures {text.length(height)} (--scale 0.01 if its unit is centimeters)", True
     guess = guess_unit(height)
-    measures = f"the skeleton then measures {report.length(guess.height)}"
+    measures = f"the skeleton then measures {text.length(guess.height)}"
     words = f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
     return guess.scale, words, True

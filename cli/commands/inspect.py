@@ -11,19 +11,23 @@ from typing import Annotated, Any
 import typer
 
 from anim.errors import AnimError, FormatError
-from anim.gltf import container, read
-from anim.gltf.accessors import Accessors
-from anim.gltf.broken import Broken, read_broken, unread_buffers
 from anim.gltf.document import Bytes, Document
-from anim.measure import findings
-from anim.measure.facts import Facts
-from anim.measure.findings import Finding, Severity
-from anim.measure.inspect import inspect as facts_of
+from anim.gltf.io import container
+from anim.gltf.io.lenient import Broken, read_broken, unread_buffers
+from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
+from anim.measure.inspect import file_findings
+from anim.measure.inspect.file_findings import Finding, Severity
+from anim.measure.inspect.inspect import inspect as facts_of
+from anim.measure.inspect.report import Facts
 from anim.ops.selection import Selection
-from cli import errors, inspection, options, streams, tables
+from cli import errors, tables
 from cli.errors import CheckError
-from cli.inspected import Inspected, Smoothness
-from cli.report import Voice
+from cli.io import documents
+from cli.options import common
+from cli.reports import inspect_report
+from cli.reports.inspect_data import Inspected, Smoothness
+from cli.text import Voice
 
 SCHEMA = 1
 LOST = "put it there, or mend the URI"
@@ -53,8 +57,8 @@ def inspect(
         Severity | None,
         typer.Option("--fail-on", help="Exit 6 where a finding is this bad or worse.", show_default=False),
     ] = None,
-    clip: options.Clips = None,
-    quiet: options.Quiet = False,
+    clip: common.Clips = None,
+    quiet: common.Quiet = False,
 ) -> int:
     """Show what is in a file and whether it is healthy.
 
@@ -71,7 +75,7 @@ def inspect(
     done: list[Inspected] = []
     smooth: list[Smoothness] = []
     refused: list[AnimError] = []
-    for path in inputs or [streams.PIPE]:
+    for path in inputs or [documents.PIPE]:
         try:
             inspected, tracks_of_clips = _inspected(path, selection, tracks=tracks, continuity=continuity)
         except AnimError as error:
@@ -82,13 +86,13 @@ def inspect(
         smooth.append(tracks_of_clips)
         refused += [_named(fault, inspected[0]) for fault in inspected[2].faults[:1]]
     if format is Format.JSON:
-        streams.write_text(_json(done, smooth))
+        documents.write_text(_json(done, smooth))
     elif format is Format.CSV:
-        streams.write_text(_csv(done, smooth, tracks=tracks, continuity=continuity))
+        documents.write_text(_csv(done, smooth, tracks=tracks, continuity=continuity))
     elif not quiet:
         for i, (name, size, facts) in enumerate(done):
-            page = inspection.page(name, size, facts, smooth[i], tracks=tracks)
-            streams.write_text(("\n" if i else "") + page)
+            page = inspect_report.page(name, size, facts, smooth[i], tracks=tracks)
+            documents.write_text(("\n" if i else "") + page)
     worst = max(map(errors.reported, refused), default=errors.DONE)
     if fail_on is not None:
         _check(done, fail_on)
@@ -98,11 +102,11 @@ def inspect(
 def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, continuity: bool) -> str:
     """One table: rows of clips or tracks, and a row for the first fault of each file that has one."""
     if continuity:
-        from cli import smoothness
+        from cli.reports import continuity_report
 
-        header, rows = smoothness.rows(done, smooth)
+        header, rows = continuity_report.rows(done, smooth)
     else:
-        header, rows = inspection.track_rows(done) if tracks else inspection.clip_rows(done)
+        header, rows = inspect_report.track_rows(done) if tracks else inspect_report.clip_rows(done)
     filled: list[list[tables.Cell]] = [[*row, ""] for row in rows]
     empty = [""] * (len(header) - 1)
     filled += [[name, *empty, str(facts.faults[0])] for name, _, facts in done if facts.faults]
@@ -111,7 +115,7 @@ def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, conti
 
 def _unreadable(path: str, error: AnimError) -> Inspected:
     """What is known of a file of which nothing can be read."""
-    name = streams.called(path)
+    name = documents.called(path)
     fault = copy(error)
     fault.where = fault.where.removeprefix(name).removeprefix(": ")
     facts = Facts(
@@ -125,7 +129,7 @@ def _unreadable(path: str, error: AnimError) -> Inspected:
         animation_json_bytes=0,
         clips=(),
         skins=(),
-        findings=tuple(findings.of_faults([fault])),
+        findings=tuple(file_findings.of_faults([fault])),
         faults=(fault,),
     )
     return name, 0, facts
@@ -142,7 +146,7 @@ def _check(done: list[Inspected], limit: Severity) -> None:
         (name, each)
         for name, _, facts in done
         for each in facts.findings
-        if each.name != findings.INVALID and order.index(each.severity) <= order.index(limit)
+        if each.name != file_findings.INVALID and order.index(each.severity) <= order.index(limit)
     ]
     if bad:
         name, first = bad[0]
@@ -152,12 +156,13 @@ def _check(done: list[Inspected], limit: Severity) -> None:
 
 def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:
     opener = _Opener()
-    with streams.source(path, Voice(quiet=True), opener.open) as source:
+    with documents.source(path, Voice(quiet=True), opener.open) as source:
         document = source.document
-        chosen = selection.chosen_clips(read.names(document)) if selection.clips else None
+        chosen = selection.chosen_clips(reader.names(document)) if selection.clips else None
         facts = facts_of(document, file_bytes=source.size, chosen=chosen, tracks=tracks, broken=opener.broken)
         lost = (
-            Finding("missing-file", Severity.WARNING, *each, LOST) for each in streams.missing(document, source.folder)
+            Finding("missing-file", Severity.WARNING, *each, LOST)
+            for each in documents.missing(document, source.folder)
         )
         facts = replace(facts, findings=(*facts.findings, *lost))
         smooth = _smooth(document, facts) if continuity else ()
@@ -175,7 +180,7 @@ class _Opener:
         self.broken = None
         try:
             document = container.read(data, resolve)
-            read.skeleton(document)
+            reader.skeleton(document)
         except AnimError as refusal:
             self.broken = read_broken(data, resolve, refusal)
             return self.broken.document
@@ -185,10 +190,10 @@ class _Opener:
 
 
 def _smooth(document: Document, facts: Facts) -> Smoothness:
-    from anim.measure.continuity import continuity
+    from anim.measure.continuity.continuity import continuity
 
-    clips, _ = read.readable_clips(document, Accessors(document))
-    skeleton = read.skeleton(document)
+    clips, _ = reader.readable_clips(document, Accessors(document))
+    skeleton = reader.skeleton(document)
     return tuple(continuity(clips[each.index], skeleton) for each in facts.clips)
 
 
@@ -200,11 +205,11 @@ def _json(done: list[Inspected], smooth: list[Smoothness]) -> str:
 
 
 def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> None:
-    from cli import smoothness
+    from cli.reports import continuity_report
 
     for file, of_clips in zip(files, smooth, strict=True):
         for clip, tracks in zip(file["clips"], of_clips, strict=False):
-            clip["continuity"] = [smoothness.json(track) for track in tracks]
+            clip["continuity"] = [continuity_report.json(track) for track in tracks]
 
 
 def _plain(facts: dict[str, Any]) -> dict[str, Any]:

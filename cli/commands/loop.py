@@ -10,19 +10,21 @@ from typing import Annotated
 import typer
 
 from anim.errors import AnimError
-from anim.gltf import read
-from anim.measure.loop import Loop, LoopKind, best_ranges, judge
-from anim.measure.loop_advice import advice
-from anim.measure.seam import SkinMotion
-from anim.measure.travel import traveling_root
+from anim.gltf.reading import reader
+from anim.measure.inspect.root_motion import traveling_root
+from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge
+from anim.measure.loops.recommendations import advice
+from anim.measure.loops.seam import SkinMotion
 from anim.model import Clip, Scene
 from anim.ops import loop as closing
 from anim.ops.selection import Selection
-from cli import options, scenes, streams, tables
-from cli.edit import edit
+from cli import tables
 from cli.errors import UsageError
-from cli.options import Format
-from cli.report import Voice, length, speed
+from cli.io import documents, scenes
+from cli.options import common
+from cli.options.common import Format
+from cli.text import Voice, length, speed
+from cli.workflows.edit_clips import edit
 
 SCHEMA = 1
 HELP = "--blend S closes over the last S seconds; --clip leaves others alone"
@@ -30,7 +32,7 @@ MAX_NAMES = 3  # joints that a table or a message lists
 
 
 def loop(
-    input: options.Input = "-",
+    input: common.Input = "-",
     output: Annotated[
         str | None,
         typer.Argument(metavar="OUT", help="Where the closed loop goes; without it: report.", show_default=False),
@@ -44,11 +46,11 @@ def loop(
     shortest: Annotated[
         float | None, typer.Option("--shortest", metavar="S", help="For --find; half of the clip by default.")
     ] = None,
-    format: options.Report = Format.TEXT,
-    clip: options.Clips = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    format: common.Report = Format.TEXT,
+    clip: common.Clips = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Say what kind of loop a clip is, and close it.
 
@@ -69,7 +71,7 @@ def loop(
     if find:
         raise UsageError("--find only reports", help="trim --from … --to … the part that it names")
     closing_of = _Closing(blend, input)
-    edit(input, output or streams.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
+    edit(input, output or documents.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
 
 
 class _Closing:
@@ -80,7 +82,7 @@ class _Closing:
 
     def __init__(self, blend: float | None, path: str) -> None:
         self._blend = blend
-        self._path = "stdin" if path == streams.PIPE else path
+        self._path = "stdin" if path == documents.PIPE else path
         self._skin: SkinMotion | None = None
         self._problems: list[str] = []
         self._poses: list[str] = []
@@ -129,16 +131,16 @@ def _problem(found: Loop) -> str:
 def _report(
     path: str, selection: Selection, voice: Voice, *, find: bool, shortest: float | None, format: Format
 ) -> None:
-    with streams.source(path, voice) as source:
-        clips = read.clips(source.document)
-        chosen = selection.chosen_clips(read.names(source.document))
+    with documents.source(path, voice) as source:
+        clips = reader.clips(source.document)
+        chosen = selection.chosen_clips(reader.names(source.document))
         skin = _skin(source, voice)
         rows: list[tuple[str, Loop]] = []
         judged: list[tuple[int, Loop]] = []
         parts: list[tuple[int, list[Loop]]] = []
         for i in chosen:
             root = traveling_root(skin.skeleton, clips[i])
-            name = read.clip_name(clips[i].name, i)
+            name = reader.clip_name(clips[i].name, i)
             if find:
                 parts.append((i, best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)))
                 rows += [(name, each) for each in parts[-1][1]]
@@ -147,10 +149,12 @@ def _report(
                 rows.append((name, judged[-1][1]))
     advised, notes = list(advice(judged)), list(_no_better(clips, parts))
     if format is Format.JSON:
-        streams.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
+        documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
     elif not voice.quiet:
         lines = [f"  {line}\n" for line in (*advised, *notes)]
-        streams.write_text("\n".join(filter(None, (_text(rows, on_skin=skin.is_skin) if rows else "", "".join(lines)))))
+        documents.write_text(
+            "\n".join(filter(None, (_text(rows, on_skin=skin.is_skin) if rows else "", "".join(lines))))
+        )
 
 
 def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> Iterator[str]:
@@ -159,7 +163,7 @@ def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> It
     for number, parts in found:
         if reason := _why_none(clips[number], parts):
             reasons.setdefault(reason, []).append((clips[number].name, number))
-    yield from (f"{read.labels(those)}: {reason}" for reason, those in reasons.items())
+    yield from (f"{reader.labels(those)}: {reason}" for reason, those in reasons.items())
 
 
 def _why_none(clip: Clip, parts: list[Loop]) -> str:
@@ -175,14 +179,14 @@ def _why_none(clip: Clip, parts: list[Loop]) -> str:
     return "no part loops better than the whole clip" if is_whole else ""
 
 
-def _skin(source: streams.Source, voice: Voice) -> SkinMotion:
+def _skin(source: documents.Source, voice: Voice) -> SkinMotion:
     """Where seams are measured: at nodes where vertices can't be read."""
     try:
         return SkinMotion(scenes.scene(source.document, source.name, voice))
     except AnimError as error:
         hint = f" ({error.help})" if error.help else ""
         voice.warn(f"measured at nodes, not on the skin: {error}{hint}")
-        return SkinMotion(Scene(read.skeleton(source.document), ()))
+        return SkinMotion(Scene(reader.skeleton(source.document), ()))
 
 
 def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:

@@ -12,18 +12,21 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.measure.surface import measured_at
-from anim.optimize.limits import EFFORTS, Drop, Objective, Packing, Policy, Reference
+from anim.measure.error.surface import measured_at
 from anim.optimize.optimize import Optimized
+from anim.optimize.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
+from anim.optimize.rate_distortion import MOST, SHARES, curve
 from anim.optimize.request import Request
-from anim.optimize.tradeoff import MOST, SHARES, curve
-from anim.optimize.verify import PLAYERS
-from cli import optimization, optimize_report, optimize_request, options, streams
-from cli.edit import note_images
+from anim.optimize.verification import PLAYERS
 from cli.errors import UsageError
-from cli.gltf_files import GLTF_SUFFIXES
-from cli.optimize_job import Job, job
-from cli.report import Voice
+from cli.io import documents
+from cli.io.gltf_files import GLTF_SUFFIXES
+from cli.options import common
+from cli.reports import optimize_json, optimize_report
+from cli.text import Voice
+from cli.workflows import optimize_request
+from cli.workflows.edit_clips import note_images
+from cli.workflows.optimize_job import Job, job
 
 PICTURES = (".png", ".svg")
 
@@ -47,8 +50,8 @@ BALANCED = Effort("balanced")
 
 
 def optimize(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
     max_error: Annotated[
         str | None,
@@ -119,10 +122,10 @@ def optimize(
             help="Animation bytes of all clips against error as .csv, .png or .svg; writes no glTF then.",
         ),
     ] = None,
-    clip: options.Clips = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    clip: common.Clips = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Make animations smaller, within an error that no vertex exceeds.
 
@@ -140,7 +143,7 @@ def optimize(
     _check_outputs(input, output, report, curve_file, dry_run=dry_run)
     if curve_file is not None and (max_bytes is not None or report is not None):
         raise UsageError("--curve goes with neither --max-bytes nor --report")
-    with streams.source(input, voice) as source:
+    with documents.source(input, voice) as source:
         work = job(source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice)
         said = {
             "max_error": optimize_request.MAX_ERROR if max_error is None else max_error,
@@ -169,68 +172,68 @@ def optimize(
         else:
             ceiling = None if max_error is None else request.bounds.max_error
             request, found = work.fitted(request, max_count, ceiling=ceiling)
-        optimization.check(found, work.clips, request, work.scale)
+        optimize_report.check(found, work.clips, request, work.scale)
         about = _about(work, request, found, began)
         with _report(about, voice, report, dry_run=dry_run):
-            streams.write(about.after, output, source, dry_run=dry_run)
+            documents.write(about.after, output, source, dry_run=dry_run)
     _say(about, voice, dry_run=dry_run)
     if not dry_run:
         note_images(about.after, source, output, voice)
 
 
-def _about(work: Job, request: Request, found: Optimized, began: float) -> optimization.About:
+def _about(work: Job, request: Request, found: Optimized, began: float) -> optimize_report.About:
     """Return all there is to say of what was found."""
     source, result = work.source, work.smaller(found)
-    name = source.name if work.output == streams.PIPE else work.output
+    name = source.name if work.output == documents.PIPE else work.output
     size, place = work.size(result), measured_at(work.scene)
     seconds = time.perf_counter() - began
-    return optimization.About(
+    return optimize_report.About(
         name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, place
     )
 
 
 @contextmanager
-def _report(about: optimization.About, voice: Voice, path: str | None, *, dry_run: bool) -> Iterator[None]:
+def _report(about: optimize_report.About, voice: Voice, path: str | None, *, dry_run: bool) -> Iterator[None]:
     """Write the report around the block that writes the model: where one of them fails, neither file changes.
 
     On stdout it comes first, so that the model stays as it was where nobody can read the report.
     """
-    if path is None or (dry_run and path != streams.PIPE):
+    if path is None or (dry_run and path != documents.PIPE):
         yield
         return
-    warnings = [*voice.warnings, *optimization.warnings(about)]
-    with streams.commit_text_after(optimize_report.as_json(about, warnings=warnings), path):
+    warnings = [*voice.warnings, *optimize_report.warnings(about)]
+    with documents.commit_text_after(optimize_json.as_json(about, warnings=warnings), path):
         yield
 
 
-def _say(about: optimization.About, voice: Voice, *, dry_run: bool) -> None:
-    for line in optimization.lines(about, dry_run=dry_run):
+def _say(about: optimize_report.About, voice: Voice, *, dry_run: bool) -> None:
+    for line in optimize_report.lines(about, dry_run=dry_run):
         voice.say(line)
-    for words in optimization.warnings(about):
+    for words in optimize_report.warnings(about):
         voice.warn(words)
-    for line in optimization.details(about) if voice.verbose else ():
+    for line in optimize_report.details(about) if voice.verbose else ():
         voice.detail(line)
 
 
 def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
     """Refuse at once what can't be written, or would be written over something else."""
     if curve_file is not None:
-        streams.check_file(curve_file)
+        documents.check_file(curve_file)
         if PurePath(curve_file).suffix.lower() not in (".csv", *PICTURES):
             raise UsageError(f"{curve_file}: is no .csv, .png or .svg file")
     elif not dry_run:
-        streams.check_output(output)
-    if report is not None and report != streams.PIPE:
+        documents.check_output(output)
+    if report is not None and report != documents.PIPE:
         _check_report(report, input, output)
-    if report == output == streams.PIPE and curve_file is None and not dry_run:
+    if report == output == documents.PIPE and curve_file is None and not dry_run:
         raise UsageError("--report and OUT can't both be stdout")
 
 
 def _check_report(report: str, input: str, output: str) -> None:
     """Refuse a report in the place of a model."""
-    streams.check_file(report)
+    documents.check_file(report)
     if PurePath(report).suffix.lower() in (*GLTF_SUFFIXES, ".bin") or Path(report).resolve() in {
-        Path(other).resolve() for other in (input, output) if other != streams.PIPE
+        Path(other).resolve() for other in (input, output) if other != documents.PIPE
     }:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
@@ -239,16 +242,16 @@ def _draw_curve(work: Job, request: Request, path: str, voice: Voice, *, dry_run
     sizes = []
     bounds = (0.0, *SHARES, MOST)  # also what is kept without loss, and the least that any bound leaves
     for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
-        voice.say(optimization.curve_line(sized, work.scale))
+        voice.say(optimize_report.curve_line(sized, work.scale))
         sizes.append(sized)
     if dry_run:
         return
     kind = PurePath(path).suffix.lower()[1:]
     if kind == "csv":
-        streams.write_text(optimization.curve_csv(sizes, work.scale), path)
+        documents.write_text(optimize_report.curve_csv(sizes, work.scale), path)
     else:
-        from anim.show.tradeoff import tradeoff as picture
+        from anim.show.plots.rate_distortion_plot import tradeoff as picture
 
-        title, source = PurePath(work.source.name).name, optimization.cost(work.source.document)
+        title, source = PurePath(work.source.name).name, optimize_report.cost(work.source.document)
         drawn = picture(sizes, work.scale, title=title, kind=kind, source=source)
-        streams.write_bytes([np.frombuffer(drawn, np.uint8)], path)
+        documents.write_bytes([np.frombuffer(drawn, np.uint8)], path)

@@ -10,18 +10,19 @@ import numpy as np
 import typer
 
 from anim.arrays import Floats
-from anim.curves.easing import parse
+from anim.curves.easing.table import parse
 from anim.maths.euler import check_order
 from anim.ops.selection import Selection
-from anim.show import plot as tracks
-from anim.show.chosen import Chosen, choose
-from anim.show.chosen import compare as compared
-from anim.show.eases import eases
-from anim.show.rotations import COMPONENTS, FROM_REST
-from anim.show.through import through as curves_through
-from cli import options, streams
+from anim.show.plots import track_plot as tracks
+from anim.show.plots.easing_plot import eases
+from anim.show.plots.rotations import COMPONENTS, FROM_REST
+from anim.show.plots.tangent_plot import through as curves_through
+from anim.show.plots.track_selection import Chosen, choose
+from anim.show.plots.track_selection import compare as compared
 from cli.errors import UsageError
-from cli.report import Voice, plural, size
+from cli.io import documents
+from cli.options import common
+from cli.text import Voice, plural, size
 
 
 class Format(StrEnum):
@@ -70,10 +71,10 @@ def plot(
         bool, typer.Option("--components", help="Rotations as x, y, z, w of their quaternions, with tangent handles.")
     ] = False,
     limit: Annotated[int, typer.Option("--limit", metavar="N", help="At most so many tracks.")] = tracks.LIMIT,
-    clip: options.Clips = None,
-    node: options.Nodes = None,
-    path: options.Paths = None,
-    quiet: options.Quiet = False,
+    clip: common.Clips = None,
+    node: common.Nodes = None,
+    path: common.Paths = None,
+    quiet: common.Quiet = False,
 ) -> None:
     """See the curves of tracks, of eases, and of tangent rules.
 
@@ -102,7 +103,7 @@ def plot(
     view = COMPONENTS if components else FROM_REST if euler is None else check_order(euler)
     source, output = _places(files or [], alone=alone)
     kind = _format(format, output)
-    streams.check_binary(output)
+    documents.check_binary(output)
     if ease:
         picture = eases([parse(name) for name in ease], kind=kind)
     elif through is not None:
@@ -110,8 +111,8 @@ def plot(
         picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
     else:
         picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
-    streams.write_bytes([np.frombuffer(picture, np.uint8)], output)
-    if output != streams.PIPE:
+    documents.write_bytes([np.frombuffer(picture, np.uint8)], output)
+    if output != documents.PIPE:
         voice.say(f"{output}  {size(len(picture))}")
 
 
@@ -121,15 +122,15 @@ def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
     if len(files) > most:
         raise UsageError(f"{len(files)} files are named (expected {'OUT' if alone else 'IN and OUT'})")
     if alone:
-        return "", files[0] if files else streams.PIPE
-    return (files[0] if files else streams.PIPE), (files[1] if len(files) > 1 else streams.PIPE)
+        return "", files[0] if files else documents.PIPE
+    return (files[0] if files else documents.PIPE), (files[1] if len(files) > 1 else documents.PIPE)
 
 
 def _format(chosen: Format | None, output: str) -> str:
     ending = PurePath(output).suffix.lower().lstrip(".")
     if chosen is not None:
         return chosen.value
-    if output == streams.PIPE:
+    if output == documents.PIPE:
         return Format.PNG.value
     if ending not in list(Format):
         raise UsageError(f"{output}: is no .png or .svg file", help="name OUT so, or say --format png or svg")
@@ -155,13 +156,13 @@ def _tracks(
 ) -> bytes:
     if limit < 1:
         raise UsageError(f"--limit is {limit} (expected 1 or more)")
-    if source == other == streams.PIPE:
+    if source == other == documents.PIPE:
         raise UsageError("IN and --compare can't both be stdin")
     names = None
-    with streams.source(source, voice) as opened:
+    with documents.source(source, voice) as opened:
         chosen, name = choose(opened.document, selection, limit=limit, view=view), opened.name
     if other is not None:
-        with streams.source(other, voice) as opened:
+        with documents.source(other, voice) as opened:
             chosen, alone = compared(chosen, opened.document)
         names = tracks.Names(PurePath(name).name, PurePath(opened.name).name)
         if alone:

@@ -13,23 +13,26 @@ import numpy as np
 import typer
 
 from anim.arrays import Floats
-from anim.caches import glb
-from anim.caches.beginnings import HEAD, ending_of
-from anim.caches.files import Memory, suffix
-from anim.caches.formats import CACHE_FORMATS, reader_for
-from anim.caches.settings import Reading
-from anim.gltf import container, read
+from anim.caches.formats import gltf
+from anim.caches.options import Reading
+from anim.caches.registry import CACHE_FORMATS, reader_for
+from anim.caches.sniffing import HEAD, ending_of
+from anim.caches.storage import Memory, suffix
 from anim.gltf.document import Document
+from anim.gltf.io import container
+from anim.gltf.reading import reader
 from anim.model import VertexCache
 from anim.ops.selection import Selection
-from anim.show import filmstrip, image_file, shots
-from anim.show.camera import AZIMUTH, ELEVATION
-from anim.show.filmstrip import HEIGHT, Look
-from anim.show.shots import Shot, When
-from cli import cache_files, meshes, options, report, scenes, streams
+from anim.show.filmstrip import clips, filmstrip, image_file
+from anim.show.filmstrip.camera import AZIMUTH, ELEVATION
+from anim.show.filmstrip.clips import Shot, When
+from anim.show.filmstrip.filmstrip import HEIGHT, Look
+from cli import text
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
-from cli.skinning_methods import Method
+from cli.io import cache_files, documents, scenes
+from cli.options import common, mesh_selection
+from cli.options.skinning_methods import Method
 
 ENDINGS = (".png", *image_file.MOVING)
 FRAMES, FPS = 8, 24.0
@@ -59,9 +62,9 @@ def render(
         float | None,
         typer.Option("--fps", metavar="N", help="Frames per second of a moving OUT, default 24.", min=0.1),
     ] = None,
-    begin: options.From = None,
-    end: options.To = None,
-    clip: options.Clips = None,
+    begin: common.From = None,
+    end: common.To = None,
+    clip: common.Clips = None,
     method: Annotated[
         list[Method] | None, typer.Option("--method", help="How skin is bent; repeat to compare.  [default: lbs]")
     ] = None,
@@ -73,8 +76,8 @@ def render(
         typer.Option("--checker", help="Draw squares that are fixed to the rest pose: they show twist and stretch."),
     ] = False,
     wire: Annotated[bool, typer.Option("--wire", help="Draw the edges of the triangles.")] = False,
-    mesh: meshes.Meshes = None,
-    hide: meshes.Hidden = None,
+    mesh: mesh_selection.Meshes = None,
+    hide: mesh_selection.Hidden = None,
     follow: Annotated[
         bool | None,
         typer.Option(
@@ -90,7 +93,7 @@ def render(
     elevation: Annotated[
         float, typer.Option("--elevation", metavar="DEG", help="Camera: above the horizon.", min=-89, max=89)
     ] = ELEVATION,
-    quiet: options.Quiet = False,
+    quiet: common.Quiet = False,
 ) -> None:
     """Draw a clip as a filmstrip, or as a moving .webp, .gif or .apng.
 
@@ -99,7 +102,7 @@ def render(
     beside the time. Several clips come one under the other, several methods in rows of each; side by side in a film.
     Without --clip it is the first one. .gif, .webp and .apng need the extra plot; a .png needs nothing.
     """
-    voice = report.Voice(quiet)
+    voice = text.Voice(quiet)
     began = time.perf_counter()
     ending = _ending(output)
     if at and (count is not None or fps is not None):
@@ -112,17 +115,17 @@ def render(
             given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide}
             if unknown := next((name for name, value in given.items() if value), None):
                 raise UsageError(f"--{unknown} means nothing to a vertex cache")
-            found = shots.of_cache(seen, when)
+            found = clips.of_cache(seen, when)
         else:
-            names = read.names(seen)
+            names = reader.names(seen)
             numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
             if is_moving and count is not None and count > 1 and len(numbers) > 1:
                 when = _one_rate(seen, numbers, when)
             announce_compiling(voice)
-            scene = scenes.scene(seen, name, voice, nodes=lambda scene: meshes.shown(scene, mesh, hide))
-            nodes = meshes.shown(scene, mesh, hide)
-            found = shots.of_document(seen, numbers, [str(each) for each in method or ()], when, nodes=nodes)
-        rows, extent = shots.rows(found, heated=heat, followed=follow)
+            scene = scenes.scene(seen, name, voice, nodes=lambda scene: mesh_selection.shown(scene, mesh, hide))
+            nodes = mesh_selection.shown(scene, mesh, hide)
+            found = clips.of_document(seen, numbers, [str(each) for each in method or ()], when, nodes=nodes)
+        rows, extent = clips.rows(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
         look = Look(size, azimuth, elevation, checker, wire)
         if is_moving:
@@ -131,16 +134,16 @@ def render(
             drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(times))
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, extent, title=title, look=look))
-    streams.write_bytes([np.frombuffer(drawn, np.uint8)], output)
-    frames = report.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
-    called = name if output == streams.PIPE else output
-    voice.say(f"{called}  {report.size(len(drawn))}, {frames}, {report.took(time.perf_counter() - began)}")
+    documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)
+    frames = text.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
+    called = name if output == documents.PIPE else output
+    voice.say(f"{called}  {text.size(len(drawn))}, {frames}, {text.took(time.perf_counter() - began)}")
 
 
 def _ending(output: str) -> str:
-    if output == streams.PIPE:
+    if output == documents.PIPE:
         return ".png"
-    streams.check_file(output)
+    documents.check_file(output)
     ending = PurePath(output).suffix.lower()
     if ending not in ENDINGS:
         raise UsageError(f"{output}: no picture is called '{ending}' (expected {', '.join(ENDINGS)})")
@@ -148,26 +151,26 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, voice: report.Voice) -> Iterator[tuple[Document | VertexCache, str]]:
+def _opened(path: str, voice: text.Voice) -> Iterator[tuple[Document | VertexCache, str]]:
     """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes.
 
     voice: says what readers found.
     """
-    if path != streams.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
+    if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
         with cache_files.load(path, Reading()) as loaded:
             for words in loaded.notes:
                 voice.warn(words)
             yield loaded.cache, loaded.name
-    elif path != streams.PIPE:
-        with streams.source(path, voice) as source:
-            yield glb.pages(source.document) or source.document, source.name
+    elif path != documents.PIPE:
+        with documents.source(path, voice) as source:
+            yield gltf.pages(source.document) or source.document, source.name
     else:
-        with streams.content(path) as (data, name):
+        with documents.content(path) as (data, name):
             head = data[:HEAD].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data)
-                streams.note_mended(document, name, voice)
-                yield glb.pages(document) or document, name
+                documents.note_mended(document, name, voice)
+                yield gltf.pages(document) or document, name
             else:
                 ending = ending_of(head, len(data))
                 cache_files.check_pipe(name, ending)
@@ -177,7 +180,7 @@ def _opened(path: str, voice: report.Voice) -> Iterator[tuple[Document | VertexC
 
 def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:
     """As many frames of the longest clip, and the others at its rate: in a film all play at once."""
-    clips = read.clips(document)
+    clips = reader.clips(document)
     spans = [when.span(clips[i].start, clips[i].end) for i in numbers]
     longest = max(last - first for first, last in spans)
     return replace(when, count=None, fps=((when.count or 0) - 1) / longest) if longest > 0 else when

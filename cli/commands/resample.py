@@ -10,18 +10,18 @@ import typer
 from anim.ops.resample import INTERPOLATIONS, KEEP
 from anim.ops.resample import resample as resampled
 from anim.ops.selection import Selection
-from cli import options
-from cli.edit import edit
 from cli.errors import UsageError
-from cli.report import Voice
+from cli.options import common
+from cli.text import Voice
+from cli.workflows.edit_clips import edit
 
 Interpolation = StrEnum("Interpolation", [(name, name) for name in INTERPOLATIONS])  # type: ignore[misc]
 AS_IT_IS = Interpolation(KEEP)
 
 
 def resample(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
     fps: Annotated[
         float, typer.Option("--fps", metavar="N", help="Frames per second; any number above 0.", show_default=False)
@@ -30,12 +30,12 @@ def resample(
         Interpolation, typer.Option("--interpolation", help="What lies between the new keys.")
     ] = AS_IT_IS,
     snap: Annotated[bool, typer.Option("--snap", help="Move the jumps of STEP tracks onto the grid too.")] = False,
-    clip: options.Clips = None,
-    node: options.Nodes = None,
-    path: options.Paths = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    clip: common.Clips = None,
+    node: common.Nodes = None,
+    path: common.Paths = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Put the keys of clips on a regular grid of frames.
 

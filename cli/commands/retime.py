@@ -6,20 +6,20 @@ from typing import Annotated
 
 import typer
 
-from anim.curves.easing import parse
+from anim.curves.easing.table import parse
 from anim.model import Clip
 from anim.ops.retime import retime as retimed
 from anim.ops.selection import Selection
-from anim.ops.warp import warp
-from cli import options
-from cli.edit import edit
+from anim.ops.time_warp import warp
 from cli.errors import UsageError
-from cli.report import Voice
+from cli.options import common
+from cli.text import Voice
+from cli.workflows.edit_clips import edit
 
 
 def retime(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
     speed: Annotated[
         float | None, typer.Option("--speed", metavar="N", help="Times as fast: 0.25 takes four times as long.")
@@ -33,12 +33,12 @@ def retime(
         str | None, typer.Option("--warp", metavar="EASE", help="Run through the whole clip with an ease.")
     ] = None,
     offset: Annotated[float, typer.Option("--offset", metavar="S", help="Start so many seconds later.")] = 0.0,
-    clip: options.Clips = None,
-    node: options.Nodes = None,
-    path: options.Paths = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    clip: common.Clips = None,
+    node: common.Nodes = None,
+    path: common.Paths = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Change when things happen: faster, slower, backwards, there and back, later.
 

@@ -13,15 +13,17 @@ import typer
 
 from anim.arrays import Floats, sorted_unique
 from anim.errors import NotFoundError
-from anim.gltf import read
+from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton
 from anim.ops.selection import Selection
 from anim.sampling.sample import SPACES, Sampled
 from anim.sampling.sample import sample as sampled
 from anim.sampling.times import grid
-from cli import options, streams, tables
+from cli import tables
 from cli.errors import UsageError
-from cli.report import Voice
+from cli.io import documents
+from cli.options import common
+from cli.text import Voice
 
 SCHEMA = 1
 
@@ -43,7 +45,7 @@ Product = Annotated[
 
 
 def sample(
-    input: options.Input = "-",
+    input: common.Input = "-",
     output: Product = "-",
     *,
     at: Annotated[
@@ -58,9 +60,9 @@ def sample(
     format: Annotated[
         Format | None, typer.Option("--format", help="Default: by OUT's ending; json for '-'.", show_default=False)
     ] = None,
-    clip: options.Clips = None,
-    node: options.Nodes = None,
-    quiet: options.Quiet = False,
+    clip: common.Clips = None,
+    node: common.Nodes = None,
+    quiet: common.Quiet = False,
 ) -> None:
     """Give the pose of every node at chosen times: for scripts and plots.
 
@@ -73,22 +75,22 @@ def sample(
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     chosen_format = format or _format_of(output)
-    if output != streams.PIPE:
-        streams.check_file(output)
-    with streams.source(input, Voice(quiet)) as source:
+    if output != documents.PIPE:
+        documents.check_file(output)
+    with documents.source(input, Voice(quiet)) as source:
         document = source.document
         selection = Selection(clip or (), node or ())
-        clips, skeleton = read.clips(document), read.skeleton(document)
-        numbers = selection.chosen_clips(read.names(document))
+        clips, skeleton = reader.clips(document), reader.skeleton(document)
+        numbers = selection.chosen_clips(reader.names(document))
         nodes = selection.chosen_nodes(skeleton)
         taken = [
             (i, clips[i], sampled(skeleton, clips[i], _times(clips[i], at, fps), space=space.value)) for i in numbers
         ]
     if chosen_format is Format.NPZ:
-        streams.write_bytes([_npz(taken, skeleton, nodes)], output)
+        documents.write_bytes([_npz(taken, skeleton, nodes)], output)
     else:
         write = _json if chosen_format is Format.JSON else _csv
-        streams.write_text(write(taken, skeleton, nodes, space), output)
+        documents.write_text(write(taken, skeleton, nodes, space), output)
 
 
 Taken = list[tuple[int, Clip, Sampled]]
@@ -142,7 +144,7 @@ def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], _: Space) -> str:
         joined = np.concatenate((poses.translation, poses.rotation, poses.scale), axis=2)
         for f, time in enumerate(_short(poses.times)):
             rows += [
-                [read.clip_name(clip.name, number), time, i, skeleton.names[i], *_short(joined[f, i])] for i in nodes
+                [reader.clip_name(clip.name, number), time, i, skeleton.names[i], *_short(joined[f, i])] for i in nodes
             ]
     return tables.comma_separated(header, rows)
 

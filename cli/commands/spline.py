@@ -8,22 +8,23 @@ from typing import Annotated
 
 import typer
 
-from anim.curves.tangents import DEFAULT, TANGENT_MAKERS, TANGENTS, parse
-from anim.gltf import read
-from anim.measure.loop_advice import closing_command
+from anim.curves.tangents.table import DEFAULT, TANGENT_MAKERS, TANGENTS, parse
+from anim.gltf.reading import reader
+from anim.measure.loops.recommendations import closing_command
 from anim.model import Clip, Scene
 from anim.ops.loop import open_tracks
 from anim.ops.selection import Selection
 from anim.ops.spline import departure
 from anim.ops.spline import spline as splined
-from cli import options, streams
-from cli.edit import Clips, edit
-from cli.report import Voice
+from cli.io import documents
+from cli.options import common
+from cli.text import Voice
+from cli.workflows.edit_clips import Clips, edit
 
 
 def spline(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
     tangents: Annotated[
         str, typer.Option("--tangents", metavar="NAME", help="The rule for the slope at each key; see --list.")
@@ -32,12 +33,12 @@ def spline(
     cyclic: Annotated[
         bool, typer.Option("--cyclic", help="A loop: first and last key are neighbors, no seam in value or speed.")
     ] = False,
-    clip: options.Clips = None,
-    node: options.Nodes = None,
-    path: options.Paths = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    clip: common.Clips = None,
+    node: common.Nodes = None,
+    path: common.Paths = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Join keys by a smooth curve: CUBICSPLINE with tangents by a rule.
 
@@ -46,7 +47,7 @@ def spline(
     that were there go; STEP tracks hold on purpose and stay. The last line says how far the motion between keys moved.
     """
     if list_rules:
-        streams.write_text(_table())
+        documents.write_text(_table())
         return
     rule = parse(tangents)
 
@@ -72,7 +73,7 @@ def _notes(before: Clips, after: Clips) -> Iterator[str]:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))
         far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SEEN else []
         far += [f"other values by up to {moved:.3g}"] if moved else []
-        where = read.labels([(before[i].name, i) for i in found])
+        where = reader.labels([(before[i].name, i) for i in found])
         yield f"{where}: the curve passes keys by, {', '.join(far)}; --tangents natural goes through them"
 
 

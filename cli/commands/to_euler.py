@@ -10,19 +10,21 @@ from typing import Annotated
 import typer
 
 from anim.errors import NotFoundError, RangeError
-from anim.exchange.bind_pose import bind_pose, completed
-from anim.exchange.formats import TRACK_FORMATS, TrackFormat, of_path
-from anim.exchange.motion import Convention, EulerMotion, Unit
-from anim.exchange.orders import BEST, USUAL, Orders, parse
-from anim.exchange.to_bvh import to_bvh
-from anim.exchange.to_euler import to_euler as curves_of
-from anim.gltf import read
+from anim.exchange.euler.motion import Convention, EulerMotion, Unit
+from anim.exchange.euler.rotation_order import BEST, USUAL, Orders, parse
+from anim.exchange.euler.to_bvh_motion import to_bvh
+from anim.exchange.euler.to_euler import to_euler as curves_of
+from anim.exchange.formats.registry import TRACK_FORMATS, TrackFormat, of_path
+from anim.exchange.retarget.bind_pose import bind_pose, completed
 from anim.gltf.document import Document, items
+from anim.gltf.reading import reader
 from anim.maths.euler import Frame
 from anim.model import Clip
 from anim.ops.selection import Selection
-from cli import options, report, streams, units
+from cli import text, units
 from cli.errors import UsageError
+from cli.io import documents
+from cli.options import common
 
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
 LEAST_DEG = 1e-6  # degrees; below is what rounding leaves
@@ -31,7 +33,7 @@ CENTIMETERS = 0.01  # m per unit of a BVH, unless told
 
 
 def to_euler(
-    input: options.Input = "-",
+    input: common.Input = "-",
     output: Annotated[
         str, typer.Argument(metavar="OUT", help="A .bvh, .csv or .json file, '-' for stdout.", show_default=False)
     ] = "-",
@@ -61,9 +63,9 @@ def to_euler(
     format: Annotated[
         Format | None, typer.Option("--format", help="Default: by OUT's ending; bvh for '-'.", show_default=False)
     ] = None,
-    clip: options.Clips = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
+    clip: common.Clips = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
 ) -> None:
     """Write a clip as Euler curves that run on without jumps: BVH, or CSV or JSON curves.
 
@@ -72,32 +74,32 @@ def to_euler(
     node's own angles, with its rest and its parent, and are what from-euler reads.
     """
     began = time.perf_counter()
-    voice = report.Voice(quiet)
+    voice = text.Voice(quiet)
     kind = _kind(output, format)
     limit = None if tolerance is None else units.angle(tolerance, "--tolerance")
     orders = _orders(order, kind)
     _check(kind, unit, frame, scale, limit)
-    if output != streams.PIPE and not dry_run:
-        streams.check_file(output)
+    if output != documents.PIPE and not dry_run:
+        documents.check_file(output)
     convention = Convention(USUAL if orders.otherwise == BEST else orders.otherwise, frame, unit)
-    with streams.source(input, voice) as source:
-        chosen = _only(read.clips(source.document), clip)
+    with documents.source(input, voice) as source:
+        chosen = _only(reader.clips(source.document), clip)
         motion, words, num_bound = _motion(
             source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS
         )
         data = kind.write(motion, convention)
     if not dry_run:
-        streams.write_text(data.decode(), output)
+        documents.write_text(data.decode(), output)
     if num_bound:
-        resting = f"{report.plural(num_bound, 'joint')} rest elsewhere in the file than the skin was bound"
+        resting = f"{text.plural(num_bound, 'joint')} rest elsewhere in the file than the skin was bound"
         voice.warn(f"{resting}: the bind pose is the rest of these curves")
     for note in motion.notes:
         voice.warn(note)
-    name = source.name if output == streams.PIPE else output
+    name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     voice.say(
-        f"{name}  {report.change(source.size, len(data))}, {report.plural(len(motion.nodes), 'node')}, "
-        f"{words}{report.took(time.perf_counter() - began)}{ending}"
+        f"{name}  {text.change(source.size, len(data))}, {text.plural(len(motion.nodes), 'node')}, "
+        f"{words}{text.took(time.perf_counter() - began)}{ending}"
     )
 
 
@@ -105,7 +107,7 @@ def _kind(output: str, format: Format | None) -> TrackFormat:
     if format is not None:
         return TRACK_FORMATS[str(format)]
     found = of_path(output)
-    if found is None and output != streams.PIPE:
+    if found is None and output != documents.PIPE:
         known = ", ".join(each.suffix for each in TRACK_FORMATS.values())
         raise UsageError(f"'{output}' names no format (expected {known}, or --format)")
     return found or TRACK_FORMATS["bvh"]
@@ -139,9 +141,9 @@ def _check(kind: TrackFormat, unit: Unit, frame: Frame, scale: float | None, lim
 def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
     chosen = Selection(globs or ()).chosen_clips([each.name for each in clips])
     if len(chosen) != 1:
-        names = ", ".join(f"'{read.clip_name(clips[i].name, i)}'" for i in chosen[:8])
+        names = ", ".join(f"'{reader.clip_name(clips[i].name, i)}'" for i in chosen[:8])
         raise NotFoundError(
-            f"{report.plural(len(chosen), 'clip')} to choose from (expected one)",
+            f"{text.plural(len(chosen), 'clip')} to choose from (expected one)",
             help=f"--clip one of {names}" if chosen else "",
         )
     return clips[chosen[0]]
@@ -158,8 +160,8 @@ def _motion(
     scale: float,
 ) -> tuple[EulerMotion, str, int]:
     """The motion to write, words on what it lost, and how many joints rest elsewhere in the file."""
-    nodes = read.skeleton(document)
-    bound = bind_pose(nodes, read.skins(document))
+    nodes = reader.skeleton(document)
+    bound = bind_pose(nodes, reader.skins(document))
     skeleton = bound.skeleton
     clip = completed(clip, nodes, skeleton)
     if kind is TRACK_FORMATS["bvh"]:

@@ -8,23 +8,23 @@ import typer
 
 from anim.ops.selection import Selection
 from anim.ops.trim import trim as trimmed
-from cli import options
-from cli.edit import edit
 from cli.errors import UsageError
-from cli.report import Voice
+from cli.options import common
+from cli.text import Voice
+from cli.workflows.edit_clips import edit
 
 
 def trim(
-    input: options.Input = "-",
-    output: options.Output = "-",
+    input: common.Input = "-",
+    output: common.Output = "-",
     *,
-    start: options.From = None,
-    end: options.To = None,
+    start: common.From = None,
+    end: common.To = None,
     rebase: Annotated[bool, typer.Option("--rebase", help="Move what is kept to start at 0 s.")] = False,
-    clip: options.Clips = None,
-    dry_run: options.DryRun = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
+    clip: common.Clips = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """Keep the part of a clip from --from to --to seconds.
 

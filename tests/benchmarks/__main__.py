@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cli import tables
-from cli.report import length, size
+from cli.text import length, size
 from tests.benchmarks.processes import Measured, environment, interleaved
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -122,7 +122,7 @@ def _starts(ours: str, peer: str | None, runs: int) -> None:
         "python -c pass": [*python, "pass"],
         "import typer": [*python, "import typer"],
         "import numpy": [*python, "import numpy"],
-        "import anim.gltf.read": [*python, "import anim.gltf.read"],
+        "import anim.gltf.reading.reader": [*python, "import anim.gltf.reading.reader"],
         f"{OURS} --help": [ours, "--help"],
         f"{OURS} resample --help": [ours, "resample", "--help"],
     }

@@ -12,8 +12,9 @@ import json as jsonlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from anim.gltf import layout, references
 from anim.gltf.document import Json, items
+from anim.gltf.validation import buffer_layout
+from anim.gltf.writing import references
 from tests.files import opened_path
 
 
@@ -64,11 +65,11 @@ def _of_others(content: Json) -> set[int]:
 
 
 def _stored(view: Json) -> int:
-    return int((layout.compression(view) or view)["byteLength"])
+    return int((buffer_layout.compression(view) or view)["byteLength"])
 
 
 def _size(accessor: Json) -> int:
-    return int(accessor["count"]) * layout.element_size(accessor["componentType"], accessor["type"])
+    return int(accessor["count"]) * buffer_layout.element_size(accessor["componentType"], accessor["type"])
 
 
 def _declarations(content: Json, views: list[Json]) -> int:
@@ -76,7 +77,7 @@ def _declarations(content: Json, views: list[Json]) -> int:
     used = {name for view in views for name in view.get("extensions", {})}
     names = [name for key in ("extensionsUsed", "extensionsRequired") for name in content.get(key, ()) if name in used]
     buffers = items(content, "buffers")
-    stand_ins = {view["buffer"] for view in views if layout.compression(view)}
+    stand_ins = {view["buffer"] for view in views if buffer_layout.compression(view)}
     fallback = [buffers[i] for i in stand_ins if used & set(buffers[i].get("extensions", {}))]
     return sum(_length(each) + 1 for each in [*names, *fallback])
 

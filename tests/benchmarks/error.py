@@ -9,16 +9,16 @@ import json
 import sys
 from pathlib import Path
 
-from anim.gltf import read
-from anim.measure.error import Ruler
+from anim.gltf.reading import reader
+from anim.measure.error.metric import Ruler
 from tests.files import opened_path
 
 
 def main(before: str, after: str) -> dict[str, float]:
     """Return the largest distance that any vertex moved in any clip; clips are matched by their number."""
     old, new = opened_path(Path(before)), opened_path(Path(after))
-    ruler = Ruler(read.scene(old))
-    errors = [ruler.error(*clips).max_error for clips in zip(read.clips(old), read.clips(new), strict=True)]
+    ruler = Ruler(reader.scene(old))
+    errors = [ruler.error(*clips).max_error for clips in zip(reader.clips(old), reader.clips(new), strict=True)]
     return {"max_error_m": max(errors), "share": max(errors) / ruler.diagonal}
 
 

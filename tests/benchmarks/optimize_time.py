@@ -15,10 +15,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from anim.gltf.assemble import assemble
 from anim.gltf.document import Document, items
+from anim.gltf.writing.insertion import assemble
 from cli import tables
-from cli.report import size
+from cli.text import size
 from tests.benchmarks import peers
 from tests.benchmarks.processes import environment
 from tests.files import glb_of, opened_path

@@ -15,14 +15,14 @@ BEGAN = time.perf_counter()
 
 # Module, function, phase. A phase inside another one is not counted twice.
 WATCHED = (
-    ("anim.gltf.container", "read", "read the container and check its structure"),
-    ("anim.gltf.read", "clips", "read clips (before and after)"),
-    ("anim.gltf.read", "skeleton", "read the skeleton"),
-    ("anim.gltf.read", "scene", "read meshes and skins"),
+    ("anim.gltf.io.container", "read", "read the container and check its structure"),
+    ("anim.gltf.reading.reader", "clips", "read clips (before and after)"),
+    ("anim.gltf.reading.reader", "skeleton", "read the skeleton"),
+    ("anim.gltf.reading.reader", "scene", "read meshes and skins"),
     ("anim.ops.resample", "resample", "resample"),
-    ("anim.gltf.write", "replace_clips", "write clips into the document"),
-    ("anim.gltf.container", "glb", "serialize"),
-    ("cli.streams", "_replace", "write the file"),
+    ("anim.gltf.writing.writer", "replace_clips", "write clips into the document"),
+    ("anim.gltf.io.container", "glb", "serialize"),
+    ("cli.io.documents", "_replace", "write the file"),
 )
 
 
@@ -64,7 +64,7 @@ def main(source: str, target: str, fps: str) -> dict[str, float]:
     for module, name, phase in WATCHED:
         owner = importlib.import_module(module)
         setattr(owner, name, clock.watched(getattr(owner, name), phase))
-    from anim.measure.error import Ruler
+    from anim.measure.error.metric import Ruler
 
     for method in ("__init__", "error"):
         setattr(Ruler, method, clock.watched(getattr(Ruler, method), "measure how far vertices move"))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.gltf import write
+from anim.gltf.writing import writer
 from tests import clips
 from tests.cli.conftest import Call, Find
 from tests.cli.inspecting import Json, only
@@ -104,7 +104,7 @@ def test_splines_that_turn_the_long_way(call: Call, tmp_path: Path) -> None:
     values = np.array([[0, 0, 0, 1], [0, 0.1, 0, -0.995], [0, 0.2, 0, 0.98]])
     zero = np.zeros((3, 4))
     turning = clips.track("rotation", [0, 1, 2], values, clips.CUBICSPLINE, tangents=(zero, zero))
-    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(turning, name="slide")})
+    document = writer.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(turning, name="slide")})
     path = tmp_path / "in.glb"
     path.write_bytes(glb_of(document))
     assert follow(call, path) >= {"sign-flips-in-splines"}
@@ -117,14 +117,16 @@ def _still(count: int) -> Any:
 @pytest.mark.parametrize(("count", "found"), [(1, False), (5, True)])
 def test_constant_tracks_are_those_of_several_keys(count: int, found: bool, call: Call, tmp_path: Path) -> None:
     moving = clips.track("translation", [0, 1, 5], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(moving, _still(count), name="slide")})
+    document = writer.replace_clips(
+        opened(built("gltf_embedded")), {0: clips.clip(moving, _still(count), name="slide")}
+    )
     path = tmp_path / "in.glb"
     path.write_bytes(glb_of(document))
     assert ("constant-tracks" in follow(call, path)) is found
 
 
 def test_a_track_that_holds_the_end_of_its_clip_is_needed(call: Call, tmp_path: Path) -> None:
-    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(_still(2), name="slide")})
+    document = writer.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(_still(2), name="slide")})
     path = tmp_path / "in.glb"
     path.write_bytes(glb_of(document))
     assert "constant-tracks" not in {each["name"] for each in only(call, path)["findings"]}
@@ -134,7 +136,7 @@ def test_keys_that_hold_are_never_on_the_way(call: Call, tmp_path: Path) -> None
     """A STEP track jumps from pose to pose: no player looks for a way between, however signs and angles lie."""
     values = np.array([[0, 0, 0, 1], [0, 1, 0, -1e-3], [0, 0, 0, -1]])
     jumping = clips.track("rotation", [0, 1, 2], values, clips.STEP)
-    document = write.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(jumping, name="slide")})
+    document = writer.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(jumping, name="slide")})
     path = tmp_path / "in.glb"
     path.write_bytes(glb_of(document))
     assert not {each["name"] for each in only(call, path)["findings"]} & {"wide-steps", "sign-flips"}

@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.gltf import read, write
 from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.sampling import pose, world_matrices
 from anim.sampling.times import grid
 from anim.skinning.bake import bake as baked
 from cli.progress import Progress
 from fixtures.broken.pieces import buffered, text
-from tests.anim.skinning.test_deviation import torn
+from tests.anim.skinning.analysis.test_method_deviation import torn
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal, shell
 from tests.clips import clip, track
@@ -30,8 +31,8 @@ def test_what_it_writes_is_what_the_library_bakes(call: Call, fixture: Fixture, 
     assert run.err.startswith(f"{out}  ")
     assert "dqs of 'twist', 25 frames of 530 vertices" in run.err
     document = opened_fixture("arm")
-    twist = next(clip for clip in read.clips(document) if clip.name == "twist")
-    cache = baked(read.scene(document, normals=True), twist, times=grid(0, 1, fps=24), method="dqs", normals=True)
+    twist = next(clip for clip in reader.clips(document) if clip.name == "twist")
+    cache = baked(reader.scene(document, normals=True), twist, times=grid(0, 1, fps=24), method="dqs", normals=True)
     found, whole = np.load(out), cache.whole()
     assert np.array_equal(found["positions"], whole.positions)
     assert np.array_equal(found["normals"], whole.normals)  # type: ignore[arg-type]
@@ -162,7 +163,7 @@ def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
 
 def test_a_method_that_loses_the_model_is_told_however_quiet(call: Call, tmp_path: Path) -> None:
     _, played = torn()
-    (tmp_path / "torn.glb").write_bytes(glb_of(write.replace_clips(opened_fixture("tube"), {0: played})))
+    (tmp_path / "torn.glb").write_bytes(glb_of(writer.replace_clips(opened_fixture("tube"), {0: played})))
     bake = ("bake", tmp_path / "torn.glb", tmp_path / "torn.npz", "--clip", "torn", "--fps", "8", "-q")
     assert call(*bake).err == ""
     run = call(*bake, "--method", "dqs")
@@ -176,7 +177,7 @@ def test_a_method_that_loses_the_model_is_told_however_quiet(call: Call, tmp_pat
 
 def test_joints_that_scale_unevenly_are_named_for_methods_that_turn(call: Call, tmp_path: Path) -> None:
     grown = clip(track("scale", [0, 1], [[1, 1, 1], [1, 1, 2]], node=1), name="grown")
-    (tmp_path / "grown.glb").write_bytes(glb_of(write.replace_clips(opened_fixture("tube"), {0: grown})))
+    (tmp_path / "grown.glb").write_bytes(glb_of(writer.replace_clips(opened_fixture("tube"), {0: grown})))
     bake = ("bake", tmp_path / "grown.glb", tmp_path / "grown.npz", "--clip", "grown")
     name = opened_fixture("tube").json["nodes"][1]["name"]
     assert f"note: '{name}': uneven scale, where tools define dqs differently" in call(*bake, "--method", "dqs").err
@@ -213,7 +214,7 @@ def test_tangents_of_a_real_file(call: Call, asset: Find, tmp_path: Path) -> Non
     source = asset("BusterDrone/busterDrone.gltf")
     call("bake", source, tmp_path / "a.npz", "--rigid", "--tangents", "--fps", "1").product()
     document = opened_path(source)
-    of, (played,) = read.scene(document, tangents=True), read.clips(document)
+    of, (played,) = reader.scene(document, tangents=True), reader.clips(document)
     with np.load(tmp_path / "a.npz") as arrays:
         found, times, handedness = arrays["tangents"], arrays["times"], arrays["handedness"]
     world = world_matrices(of.skeleton, pose(of.skeleton, played, times))
@@ -240,7 +241,7 @@ def test_bad_files_are_refused(name: str, call: Call, bad_input: Find, tmp_path:
 def test_a_real_file_with_every_clip(call: Call, asset: Find, tmp_path: Path) -> None:
     source = asset("Fox.glb")
     assert call("bake", source, tmp_path / "{clip}.npz", "--method", "dqs", "-q").code == 0
-    for each in read.clips(opened_path(source)):
+    for each in reader.clips(opened_path(source)):
         positions = np.load(tmp_path / f"{each.name}.npz")["positions"]
         assert positions.shape[1:] == (1728, 3)
         assert np.isfinite(positions).all()

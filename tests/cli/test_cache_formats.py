@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.beginnings import ending_of
-from anim.caches.formats import CACHE_FORMATS
-from anim.caches.frames import at_time
+from anim.caches.registry import CACHE_FORMATS
+from anim.caches.sniffing import ending_of
+from anim.caches.transforms.resample import at_time
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cli import links, streams
 from cli.errors import OutputError, UsageError
+from cli.io import documents, links
 
 
 def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -16,9 +16,9 @@ def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypat
 
     monkeypatch.setattr(links, "followed", refused)
     with pytest.raises(OutputError, match="permission denied"):
-        streams.check_file("closed/out.glb")
+        documents.check_file("closed/out.glb")
 
 
 def test_a_folder_that_is_not_there_is_one(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there is no folder"):
-        streams.check_file(str(tmp_path / "missing" / "out.glb"))
+        documents.check_file(str(tmp_path / "missing" / "out.glb"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.formats import CACHE_FORMATS
+from anim.caches.registry import CACHE_FORMATS
 from tests.anim.caches.making import FACES, cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal, shell

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.gltf import read, write
 from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.model import Clip
 from tests.anim.show.reading import words
 from tests.cli.conftest import Call, Find, Fixture
@@ -54,7 +55,7 @@ def test_where_and_when_in_numbers(lifted: tuple[Path, Path], call: Call) -> Non
     assert all(each["max_error_m"] == 0 for each in others)
     assert 0 < worst["mean_m"] < worst["p99_m"] <= worst["max_error_m"] * (1 + 1e-9)
     assert worst["max_angle_deg"] == 0
-    walk = next(each for each in read.clips(opened_path(lifted[0])) if each.name == "walk")
+    walk = next(each for each in reader.clips(opened_path(lifted[0])) if each.name == "walk")
     hips = next(each for each in walk.tracks if each.path == "translation")
     assert worst["time_s"] == hips.times[7]
     step = float(np.diff(hips.times).min())
@@ -123,8 +124,8 @@ def test_a_shell_shows_nodes_without_vertices(tmp_path: Path, call: Call) -> Non
     nodes = [*document.json["nodes"], {"name": "camera"}]
     number = len(nodes) - 1
     document = replace(document, json={**document.json, "nodes": nodes, "scenes": _with_root(document, number)})
-    turned = clip(*read.clips(document)[0].tracks, track("rotation", [0], about("y", [2]), node=number))
-    changed = write.replace_clips(document, {0: Clip(read.names(document)[0], turned.tracks)})
+    turned = clip(*reader.clips(document)[0].tracks, track("rotation", [0], about("y", [2]), node=number))
+    changed = writer.replace_clips(document, {0: Clip(reader.names(document)[0], turned.tracks)})
     paths = _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", changed)
     found = call("diff", *paths, "--format", "json").json
     chord = 2 * np.sin(np.radians(1))
@@ -150,8 +151,8 @@ def test_a_picture(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> Non
 def test_a_picture_counts_what_it_leaves_out(asset: Find, tmp_path: Path, call: Call) -> None:
     """Of Fox's three clips one is another."""
     document = opened_path(asset("Fox.glb"))
-    clips = read.clips(document)
-    other = write.replace_clips(document, {1: replace(clips[1], tracks=clips[1].tracks[:-3])})
+    clips = reader.clips(document)
+    other = writer.replace_clips(document, {1: replace(clips[1], tracks=clips[1].tracks[:-3])})
     changed = _saved(tmp_path / "b.glb", other)
     call("diff", asset("Fox.glb"), changed, "--plot", tmp_path / "e.svg", "-q").product()
     said = words((tmp_path / "e.svg").read_bytes())
@@ -237,13 +238,13 @@ def test_files_without_names_are_no_strangers(tmp_path: Path, call: Call) -> Non
 
 
 def _lifted(document: Document) -> Document:
-    number = read.names(document).index("walk")
-    walk = read.clips(document)[number]
+    number = reader.names(document).index("walk")
+    walk = reader.clips(document)[number]
     index = next(i for i, each in enumerate(walk.tracks) if each.path == "translation")
     values = walk.tracks[index].values.copy()
     values[7, 1] += LIFT
     tracks = (*walk.tracks[:index], replace(walk.tracks[index], values=values), *walk.tracks[index + 1 :])
-    return write.replace_clips(document, {number: Clip(walk.name, tracks)})
+    return writer.replace_clips(document, {number: Clip(walk.name, tracks)})
 
 
 def _with_root(document: Document, node: int) -> list[dict[str, Any]]:
@@ -261,12 +262,12 @@ def test_the_moment_before_a_key_counts(tmp_path: Path, call: Call) -> None:
     """Quaternions 1 % too long, played as three.js does: an arc as it is, too large, up to a key; from it on the chord,
     normalized. No time that is looked at first shows the end of the arc."""
     document = opened_fixture("biped")
-    joint = next(t.node for t in read.clips(document)[0].tracks if t.path == "rotation")
+    joint = next(t.node for t in reader.clips(document)[0].tracks if t.path == "rotation")
     keys = about("z", [0, 60, 61, 62])
     true = clip(track("rotation", [0, 0.5, 1, 1.5], keys, node=joint), name="walk")
     long = clip(track("rotation", [0, 0.5, 1, 1.5], keys * [[1], [1.01], [1.01], [1]], node=joint), name="walk")
     paths = [
-        _saved(tmp_path / f"{i}.glb", write.replace_clips(document, {0: each})) for i, each in enumerate((true, long))
+        _saved(tmp_path / f"{i}.glb", writer.replace_clips(document, {0: each})) for i, each in enumerate((true, long))
     ]
     options = ("--clip", "walk", "--format", "json", "--player")
     (three,) = call("diff", *paths, *options, "three").json["clips"]

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from anim.gltf import read
 from anim.gltf.document import Document
-from anim.measure.error import Ruler
+from anim.gltf.reading import reader
+from anim.measure.error.metric import Ruler
 from tests.cli.conftest import Call, Find
 from tests.cli.running import help_line, refusal
 from tests.draco import compressed
@@ -33,8 +33,8 @@ def without_package(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def error_on(surface: Document, before: Document, after: Document) -> float:
     """The largest error, in m, of the vertices of a third file."""
-    ruler = Ruler(read.scene(surface))
-    pairs = zip(read.clips(before), read.clips(after), strict=True)
+    ruler = Ruler(reader.scene(surface))
+    pairs = zip(reader.clips(before), reader.clips(after), strict=True)
     return max(ruler.error(*each).max_error for each in pairs)
 
 
@@ -93,7 +93,7 @@ def test_resample_measures_at_nodes_and_says_so_even_when_quiet(
 
 def test_inspect_reads_the_skin(packed: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     (skin,) = call("inspect", packed, "--format", "json").json["files"][0]["skins"]
-    assert skin["vertices"] == len(read.scene(opened_fixture("biped")).instances[0].mesh.positions)
+    assert skin["vertices"] == len(reader.scene(opened_fixture("biped")).instances[0].mesh.positions)
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     (file,) = call("inspect", packed, "--format", "json").json["files"]
     assert "vertices-unread" in [each["name"] for each in file["findings"]]
@@ -103,4 +103,4 @@ def test_reports_say_what_errors_are_measured_on(packed: Path, call: Call, fixtu
     assert call("diff", packed, packed, "--format", "json").json["measured_at"] == "surface"
     bare = fixture("interpolations")
     found = call("diff", bare, bare, "--format", "json").json["measured_at"]
-    assert found == ("surface" if read.scene(opened_path(bare)).vertex_count else "nodes")
+    assert found == ("surface" if reader.scene(opened_path(bare)).vertex_count else "nodes")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anim.curves.easing import EASINGS
+from anim.curves.easing.table import EASINGS
 from anim.model import Interpolation
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal

@@ -9,7 +9,7 @@ import pytest
 
 from anim.skinning.kernels import jit
 from cli.first_run import announce_compiling
-from cli.report import Voice
+from cli.text import Voice
 
 
 class Terminal(io.StringIO):

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.exchange import bvh
-from anim.gltf import read
-from anim.measure.error import Ruler
+from anim.exchange.formats import bvh_reader
+from anim.gltf.reading import reader
+from anim.measure.error.metric import Ruler
 from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import Run, help_line, refusal, shell
@@ -54,11 +54,11 @@ def test_a_bvh_through_a_pipe(call: Call, mesh: str) -> None:
     run = call("from-euler", "-", "-", "--mesh", mesh, stdin=SMALL)
     document = opened(run.product())
     _valid(run.out)
-    bones, clip = read.skeleton(document), read.clips(document)[0]
+    bones, clip = reader.skeleton(document), reader.clips(document)[0]
     assert bones.names[:3] == ("hip", "knee", "knee_end")
     assert clip.name == "motion"
     assert {(track.node, track.path) for track in clip.tracks} == {(0, "translation"), (0, "rotation"), (1, "rotation")}
-    assert len(read.scene(document).instances) == (mesh == "sticks")
+    assert len(reader.scene(document).instances) == (mesh == "sticks")
     assert document.json["asset"]["generator"].startswith("gltf-anim")
 
 
@@ -86,7 +86,7 @@ def test_it_says_what_it_guessed(call: Call) -> None:
 
 def test_scale_and_up(call: Call) -> None:
     document = opened(call("from-euler", "-", "-", "--scale", "0.5", "--up", "z", stdin=SMALL).product())
-    np.testing.assert_allclose(read.skeleton(document).translation[1], (0, 0, 42.5), atol=1e-6)
+    np.testing.assert_allclose(reader.skeleton(document).translation[1], (0, 0, 42.5), atol=1e-6)
 
 
 def test_a_giant_is_told(call: Call) -> None:
@@ -97,7 +97,7 @@ def test_a_giant_is_told(call: Call) -> None:
 def test_csv_keys_follow_the_motion(call: Call) -> None:
     run = call("from-euler", "-", "-", *XYZ, "--tolerance", "0.1deg", stdin=CURVES)
     _valid(run.out)
-    assert 3 < len(read.clips(opened(run.product()))[0].tracks[0].times) <= 17
+    assert 3 < len(reader.clips(opened(run.product()))[0].tracks[0].times) <= 17
 
 
 def test_the_range_of_angles_shows_a_wrong_unit(call: Call) -> None:
@@ -116,12 +116,12 @@ def test_an_order_in_small_letters_and_keys_before_zero(call: Call) -> None:
     early = CURVES.replace(b"\n0,", b"\n-0.04,")
     run = call("from-euler", "-", "-", "--order", "xyz", *XYZ[2:], stdin=early)
     assert "warning: the first key is at -0.04 s: all are moved by 0.04 s, to begin at 0" in run.err
-    assert read.clips(opened(run.product()))[0].end == pytest.approx(1.04)
+    assert reader.clips(opened(run.product()))[0].end == pytest.approx(1.04)
 
 
 def test_a_gltf_with_its_bin(call: Call, tmp_path: Path) -> None:
     assert call("from-euler", "-", tmp_path / "door.gltf", *XYZ, "--name", "open", stdin=CURVES).code == 0
-    assert read.clips(opened_path(tmp_path / "door.gltf"))[0].name == "open"
+    assert reader.clips(opened_path(tmp_path / "door.gltf"))[0].name == "open"
 
 
 @pytest.mark.parametrize("name", ["cmu_01_01.bvh", "freebvh.bvh", "example.bvh"])
@@ -129,8 +129,8 @@ def test_real_files_are_valid(name: str, call: Call, asset: Find) -> None:
     run = call("from-euler", asset(f"bvh/{name}"), "-", "--mesh", "sticks")
     document = opened(run.product())
     _valid(run.out)
-    assert read.clips(document)[0].name == name.removesuffix(".bvh")
-    nodes = bvh.read(asset(f"bvh/{name}").read_bytes()).nodes
+    assert reader.clips(document)[0].name == name.removesuffix(".bvh")
+    nodes = bvh_reader.read(asset(f"bvh/{name}").read_bytes()).nodes
     assert len(document.json["skins"][0]["joints"]) == sum(not node.end for node in nodes)
 
 
@@ -138,7 +138,7 @@ def test_onto_a_character(call: Call, asset: Find, fixture: Fixture) -> None:
     run = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", fixture("biped"), "-v")
     document = opened(run.product())
     _valid(run.out)
-    assert [clip.name for clip in read.clips(document)] == ["walk", "wave", "jump", "cmu_01_01"]
+    assert [clip.name for clip in reader.clips(document)] == ["walk", "wave", "jump", "cmu_01_01"]
     assert "onto: 21 of 31 joints matched; not: 'LHipJoint', 'RHipJoint'" in run.err
     assert "LeftUpLeg → left_upper_leg" in run.err
 
@@ -163,10 +163,10 @@ def test_a_name_that_is_taken_gets_a_number(call: Call, fixture: Fixture, tmp_pa
     (tmp_path / "names.csv").write_text("hip,hips\n")
     onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
     run = call("from-euler", *onto)
-    assert [clip.name for clip in read.clips(opened(run.product()))] == ["walk", "wave", "jump", "walk 2"]
+    assert [clip.name for clip in reader.clips(opened(run.product()))] == ["walk", "wave", "jump", "walk 2"]
     assert "warning: the character has a clip 'walk': this one is called 'walk 2'" in run.err
     told = call("from-euler", *onto, "--name", "walk")
-    assert [clip.name for clip in read.clips(opened(told.product()))] == ["walk", "wave", "jump", "walk"]
+    assert [clip.name for clip in reader.clips(opened(told.product()))] == ["walk", "wave", "jump", "walk"]
     assert "warning: a second clip 'walk': #3 beside #0, which players and diff find first (--replace '#0'" in told.err
 
 
@@ -176,8 +176,8 @@ def test_a_clip_gives_way(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
     by_name = call("from-euler", *onto, "--replace", "wave")
     document = opened(by_name.product())
-    assert [clip.name for clip in read.clips(document)] == ["walk", "wave", "jump"]
-    assert read.clips(document)[1].end == pytest.approx(1 / 30)
+    assert [clip.name for clip in reader.clips(document)] == ["walk", "wave", "jump"]
+    assert reader.clips(document)[1].end == pytest.approx(1 / 30)
     assert "the character has a clip" not in by_name.err
     assert call("from-euler", *onto, "--replace", "#1").out == by_name.out
     assert call("from-euler", *onto, "--replace", "w*").code == 5
@@ -194,11 +194,11 @@ def test_what_a_bvh_does_not_hold_stays_when_the_clip_gives_way(call: Call, asse
     character = asset("BitmojiRun.glb")
     call("to-euler", character, tmp_path / "run.bvh")
     run = call("from-euler", tmp_path / "run.bvh", "-", "--onto", character, "--replace", "#0")
-    before, after = (read.clips(opened(data))[0] for data in (character.read_bytes(), run.product()))
+    before, after = (reader.clips(opened(data))[0] for data in (character.read_bytes(), run.product()))
     now = {(track.node, track.path) for track in after.tracks}
     moved = {(t.node, t.path) for t in before.tracks if np.ptp(t.values, axis=0).max() > 1e-4 and t.path != "scale"}
     assert moved <= now
-    assert Ruler(read.scene(opened(run.product()))).error(before, after).max_error < 1e-4
+    assert Ruler(reader.scene(opened(run.product()))).error(before, after).max_error < 1e-4
     assert "tracks of 'lbr_run_normal_anm_default' that the motion has no node for stay" in run.err
     other = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", character, "--replace", "#0")
     assert "that the motion has no node for go with it" in other.err

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from anim.gltf import read, write
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.model import Clip, Interpolation, Track
 from tests.cli.conftest import Call
 from tests.clips import LINEAR, STEP, about, clip, track
@@ -17,14 +18,14 @@ from tests.judge import judge, needs_judge
 def _put_back(clip: Clip, call: Call, tmp_path: Path) -> tuple[Path, Path]:
     """The arm with this clip, and the same through curves and back."""
     truth, curves, back = tmp_path / "truth.glb", tmp_path / "curves.json", tmp_path / "back.glb"
-    truth.write_bytes(glb_of(write.replace_clips(opened_fixture("arm"), {0: clip})))
+    truth.write_bytes(glb_of(writer.replace_clips(opened_fixture("arm"), {0: clip})))
     assert call("to-euler", truth, curves, "--clip", "#0", "--order", "XYZ").code == 0
     assert call("from-euler", curves, back, "--onto", truth, "--replace", "#0").code == 0
     return truth, back
 
 
 def _tracks(file: Path) -> dict[tuple[int | None, str], Track]:
-    return {(each.node, each.path): each for each in read.clips(opened_path(file))[0].tracks}
+    return {(each.node, each.path): each for each in reader.clips(opened_path(file))[0].tracks}
 
 
 @needs_judge
@@ -40,7 +41,7 @@ def test_steps_stay_steps(call: Call, tmp_path: Path) -> None:
         (1, "rotation"): STEP,
         (1, "scale"): STEP,
     }
-    assert found[1, "scale"].times.tolist() == read.clips(opened_path(truth))[0].tracks[2].times.tolist()
+    assert found[1, "scale"].times.tolist() == reader.clips(opened_path(truth))[0].tracks[2].times.tolist()
     assert min(np.diff(each.times).min() for each in found.values()) > 0.01
     assert judge(truth, back).max_error < 1e-6
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from anim.arrays import AnyArray, Floats
-from anim.caches import extent, glb, play
-from anim.caches.order import ordered
-from anim.gltf import read
+from anim.caches.formats import gltf
+from anim.caches.transforms import bounds, document_playback
+from anim.caches.transforms.vertex_order import ordered
 from anim.gltf.document import Document
+from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
 from anim.sampling import grid
 from anim.skinning.bake import bake
@@ -39,9 +40,9 @@ def test_morph_targets_are_the_bake(
     run = call("bake", source, out, "--clip", clip, "--fps", 48, "--max-error", "0.0005%", *options)
     assert run.code == 0, run.err
     document = opened_path(source)
-    (chosen,) = (each for each in read.clips(document) if each.name == clip)
+    (chosen,) = (each for each in reader.clips(document) if each.name == clip)
     times = grid(chosen.start, chosen.end, fps=48)
-    truth = bake(read.scene(document), chosen, times=times, rigid=bool(options))
+    truth = bake(reader.scene(document), chosen, times=times, rigid=bool(options))
     assert _error(out, ordered(truth, "blender")) < BOUND
 
 
@@ -52,19 +53,19 @@ def test_morph_targets_play_as_we_play_them(
 ) -> None:
     out = tmp_path / "out.glb"
     assert call("bake", asset(name), out, "--clip", clip, "--fps", 24, *options, *more).code == 0
-    assert _error(out, ordered(play.play(opened_path(out)), "blender")) < BOUND
+    assert _error(out, ordered(document_playback.play(opened_path(out)), "blender")) < BOUND
 
 
 def test_a_flip_book(call: Call, asset: Find, tmp_path: Path) -> None:
     """All pages but one are scaled to a point at the origin, so their sum is that one."""
     out = tmp_path / "out.glb"
     assert call("bake", asset("Fox.glb"), out, "--clip", "Walk", "--fps", 24, "--layout", "flip-scale").code == 0
-    frames = glb.pages(opened_path(out))
+    frames = gltf.pages(opened_path(out))
     assert frames is not None
     ours = ordered(frames, "blender")
     pages = vertices(out, (ours.times + 1e-3).tolist())  # not at the very instant of turning over
     assert len(pages) == ours.frame_count
-    assert _apart(sum(pages.values(), np.zeros(())), ours.whole().positions) < BOUND * extent.diagonal(ours)
+    assert _apart(sum(pages.values(), np.zeros(())), ours.whole().positions) < BOUND * bounds.diagonal(ours)
 
 
 def test_a_point_cache_made_into_morph_targets(call: Call, asset: Find, tmp_path: Path) -> None:
@@ -84,19 +85,19 @@ def test_skinned_files(call: Call, asset: Find, tmp_path: Path, name: str, comma
     out = tmp_path / "out.glb"
     assert call(command, asset(name), out, *WRITERS[command]).code == 0
     document = opened_path(out)
-    clip = read.clips(document)[0]
+    clip = reader.clips(document)[0]
     assert _error(out, _at_keys(document, clip), clip.name or None) < BOUND
 
 
 def _at_keys(document: Document, clip: Clip) -> VertexCache:
     times = np.unique(np.concatenate(clip.axes))
-    return ordered(bake(read.scene(document), clip, times=times, rigid=True), "blender")
+    return ordered(bake(reader.scene(document), clip, times=times, rigid=True), "blender")
 
 
 def _error(path: Path, ours: VertexCache, clip: str | None = None) -> float:
     """How far Blender's vertices are from ours at most, as a share of the diagonal; one object is in the file."""
     (seen,) = vertices(path, ours.times.tolist(), clip=clip).values()
-    return _apart(seen, ours.whole().positions) / extent.diagonal(ours)
+    return _apart(seen, ours.whole().positions) / bounds.diagonal(ours)
 
 
 def _apart(a: Floats, b: AnyArray) -> float:

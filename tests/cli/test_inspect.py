@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import fixtures
-from anim.gltf import write
-from anim.gltf.pack import compressed
+from anim.gltf.meshopt.storage import compressed
+from anim.gltf.writing import writer
 from anim.model import Clip
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.inspecting import Json, by_name, only
@@ -110,7 +110,7 @@ def test_bytes_of_compressed_keys_are_those_in_the_file(call: Call) -> None:
     values[:, 0] = np.arange(5000) // 100
     moving = track("translation", np.arange(5000) / 64, values)
     packing = compressed("EXT_meshopt_compression", {})
-    document = write.replace_clips(opened(built("gltf_embedded")), {0: Clip("slide", (moving,))}, packing=packing)
+    document = writer.replace_clips(opened(built("gltf_embedded")), {0: Clip("slide", (moving,))}, packing=packing)
     data = glb_of(document)
     facts = only(call, data)
     assert facts["animation_data_bytes"] == 5000 * (4 + 12) > len(data)

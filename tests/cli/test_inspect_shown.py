@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import fixtures
-from anim.gltf.text import dump
+from anim.gltf.io.json_text import dump
 from tests.cli.conftest import Call, Fixture
 from tests.cli.inspecting import by_name, only
 from tests.cli.running import built, refusal, table

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from cli.lengths import lengths
-from cli.report import moment, span, took
+from cli.reports.clip_lengths import lengths
+from cli.text import moment, span, took
 from tests.cli.conftest import Call, Fixture
 from tests.clips import clip, track
 

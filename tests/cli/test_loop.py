@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.gltf import read, write
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.maths import quaternion
 from anim.model import Clip
 from tests.cli.conftest import Call, Find, Fixture
@@ -65,7 +66,7 @@ def test_find_says_where_no_part_is_better(clip: str, options: tuple[str, ...], 
     if clip in turns:
         rotation = track("rotation", 0.5 * np.arange(len(turns[clip])), about("x", turns[clip]), LINEAR, node=0)
         document = opened(data)
-        data = glb_of(write.replace_clips(document, {0: Clip("walk", (rotation,))}))
+        data = glb_of(writer.replace_clips(document, {0: Clip("walk", (rotation,))}))
         data = data.replace(b'"walk"', b'"%s"' % clip.encode())
     run = call("loop", "--find", "--clip", clip, *options, stdin=data)
     assert run.code == 0, run.err
@@ -139,15 +140,15 @@ def test_a_single_pose_is_called_so(call: Call, asset: Find, tmp_path: Path) -> 
 def _limping(walk: Path) -> bytes:
     """The biped's walk, whose left leg drifts away by 4° until the end: as a .glb."""
     document = opened(walk.read_bytes())
-    number = next(i for i, clip in enumerate(read.clips(document)) if clip.name == "walk")
-    clip, names = read.clips(document)[number], read.skeleton(document).names
+    number = next(i for i, clip in enumerate(reader.clips(document)) if clip.name == "walk")
+    clip, names = reader.clips(document)[number], reader.skeleton(document).names
     tracks = []
     for each in clip.tracks:
         if each.path == "rotation" and each.node is not None and names[each.node] == "left_upper_leg":
             drift = about("x", np.linspace(0, 4, len(each.times)))
             each = replace(each, values=quaternion.multiply(each.values, drift))
         tracks.append(each)
-    return glb_of(write.replace_clips(document, {number: Clip(clip.name, tuple(tracks))}))
+    return glb_of(writer.replace_clips(document, {number: Clip(clip.name, tuple(tracks))}))
 
 
 def test_a_joint_that_stays_open_is_named_and_alone_is_bent(call: Call, walk: Path) -> None:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from anim.gltf import read
-from anim.optimize.seal import KEY
-from cli import optimization
+from anim.gltf.reading import reader
+from anim.optimize.fingerprint import KEY
+from cli.reports import optimize_report
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.untouched import around
@@ -75,8 +75,8 @@ def test_a_kept_node_stays_exact(fixture: Fixture, tmp_path: Path, call: Call) -
     run = call("optimize", source, output, "--max-error", "1%", "--keep-node", "hips", "--clip", "w*", *FAST)
     assert run.code == 0, run.err
     document = opened_path(source)
-    number = read.skeleton(document).names.index("hips")
-    for old, new in zip(read.clips(document), read.clips(opened_path(output)), strict=True):
+    number = reader.skeleton(document).names.index("hips")
+    for old, new in zip(reader.clips(document), reader.clips(opened_path(output)), strict=True):
         kept = {track.target: track for track in new.tracks if track.node == number}
         for track in old.tracks:
             if track.node == number:
@@ -108,7 +108,7 @@ def test_nothing_else_changes(
     assert [each.get("name") for each in new.json["animations"]] == [
         each.get("name") for each in old.json["animations"]
     ]
-    for a, b in zip(read.scene(old).instances, read.scene(new).instances, strict=True):
+    for a, b in zip(reader.scene(old).instances, reader.scene(new).instances, strict=True):
         assert (a.node, a.mesh.name) == (b.node, b.mesh.name)
         for part in ("positions", "faces", "joints", "weights", "targets", "rest_weights"):
             assert (getattr(a.mesh, part) == getattr(b.mesh, part)).all(), part
@@ -130,7 +130,7 @@ def test_only_chosen_clips_change(fixture: Fixture, tmp_path: Path, call: Call) 
 def test_every_clip_survives(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     source, output = fixture("noop"), tmp_path / "out.glb"
     assert call("optimize", source, output, "--drop", "rest", "--max-error", "50%", *FAST).code == 0
-    old, new = (read.clips(opened_path(path)) for path in (source, output))
+    old, new = (reader.clips(opened_path(path)) for path in (source, output))
     assert [(each.name, each.start, each.end) for each in new] == [(each.name, each.start, each.end) for each in old]
     assert all(each.tracks for each in new)
 
@@ -250,7 +250,7 @@ def test_never_larger_than_without_loss(fixture: Fixture, tmp_path: Path, call: 
 def test_the_same_bytes_for_any_number_of_jobs(
     fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(optimization, "LONG", 0)  # several processes, however little there is to do
+    monkeypatch.setattr(optimize_report, "LONG", 0)  # several processes, however little there is to do
     for jobs in ("1", "2"):
         run = call("optimize", fixture("noop"), tmp_path / f"{jobs}.glb", "--max-error", "1%", "-j", jobs, *FAST)
         assert run.code == 0, run.err

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from anim.measure.error import MotionError
-from anim.optimize.limits import Bounds, Policy, Reference
+from anim.measure.error.metric import MotionError
+from anim.optimize.options import Bounds, Policy, Reference
 from anim.optimize.request import Request
-from anim.optimize.verify import Verdict
-from cli import optimize_proof
+from anim.optimize.verification import Verdict
+from cli.reports import optimize_bound
 
 REQUEST = Request(Bounds(1e-3, 0.01))
 KEYS = Request(Bounds(1e-3, 0.01), Policy(reference=Reference.KEYS))
@@ -29,13 +29,13 @@ def _verdict(certified: float | None, error: float = 9e-4) -> Verdict:
 )
 def test_of_all_clips(certified: tuple[float | None, ...], words: str) -> None:
     verdicts = [_verdict(each) for each in certified]
-    assert optimize_proof.summary(verdicts, REQUEST, SCALE) == words
-    assert optimize_proof.summary(verdicts, KEYS, SCALE) == ""
+    assert optimize_bound.summary(verdicts, REQUEST, SCALE) == words
+    assert optimize_bound.summary(verdicts, KEYS, SCALE) == ""
 
 
 def test_where_nothing_moved_nothing_is_said() -> None:
-    assert optimize_proof.summary([_verdict(None, 0.0)], REQUEST, SCALE) == ""
-    assert optimize_proof.summary([], REQUEST, SCALE) == ""
+    assert optimize_bound.summary([_verdict(None, 0.0)], REQUEST, SCALE) == ""
+    assert optimize_bound.summary([], REQUEST, SCALE) == ""
 
 
 @pytest.mark.parametrize(
@@ -50,11 +50,11 @@ def test_where_nothing_moved_nothing_is_said() -> None:
 )
 def test_of_a_clip(certified: float | None, words: str) -> None:
     """Rounded up: what is said is no less than what is proven."""
-    assert optimize_proof.of_clip(_verdict(certified), REQUEST) == words
-    assert optimize_proof.of_clip(_verdict(certified), KEYS) == ""
+    assert optimize_bound.of_clip(_verdict(certified), REQUEST) == words
+    assert optimize_bound.of_clip(_verdict(certified), KEYS) == ""
 
 
 def test_why_not() -> None:
-    assert optimize_proof.why_not(_verdict(1e-4), REQUEST) is None
-    assert optimize_proof.why_not(_verdict(None), REQUEST) == "not proven between the times looked at"
-    assert optimize_proof.why_not(_verdict(None), KEYS) == "only the source's keys count"
+    assert optimize_bound.why_not(_verdict(1e-4), REQUEST) is None
+    assert optimize_bound.why_not(_verdict(None), REQUEST) == "not proven between the times looked at"
+    assert optimize_bound.why_not(_verdict(None), KEYS) == "only the source's keys count"

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from anim.gltf import read
+from anim.gltf.reading import reader
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import refusal, shell, table
@@ -53,7 +53,7 @@ def test_the_report(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert found["bytes"]["after"]["file"] == output.stat().st_size
     assert found["bounds"]["max_error_m"] == pytest.approx(1e-3 * found["diagonal_m"])
     assert found["policy"]["drop"] == "rest"
-    old, new = (read.clips(opened_path(path)) for path in (source, output))
+    old, new = (reader.clips(opened_path(path)) for path in (source, output))
     by_clip = {each["clip"]: each for each in apart(call, source, output)["clips"]}
     assert [each["name"] for each in found["clips"]] == [each.name for each in old]
     for each, a, b in zip(found["clips"], old, new, strict=True):
@@ -123,7 +123,7 @@ def test_words(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert "dropped " in run.err
     assert "--drop rest)" in run.err
     lines = [line for line in run.err.splitlines() if line.startswith("  clip ")]
-    assert len(lines) == len(read.clips(opened_fixture("noop")))
+    assert len(lines) == len(reader.clips(opened_fixture("noop")))
     assert all(("p99 " in line and "mean " in line) is ("no vertex moved" not in line) for line in lines)
     assert any("p99 " in line for line in lines)
     assert all(("at any time" in line) is ("no vertex moved" not in line) for line in lines)

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.settings import Writing
-from anim.gltf import layout
-from anim.gltf.accessors import Accessors
+from anim.caches.options import Writing
 from anim.gltf.document import Document, Json, items
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.validation import buffer_layout
 from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import written
-from tests.anim.gltf.packing import found_by_three
+from tests.anim.gltf.meshopt.packing import found_by_three
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call
 from tests.files import glb_of, opened, opened_path
@@ -52,7 +52,7 @@ def test_more_targets_than_a_row_holds(count: int, mode: str, pointer: bool, tmp
 
 
 def _streams(document: Document) -> list[Json]:
-    return [each for view in items(document.json, "bufferViews") if (each := layout.compression(view))]
+    return [each for view in items(document.json, "bufferViews") if (each := buffer_layout.compression(view))]
 
 
 def _face(count: int, *, pointer: bool) -> bytes:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.output_names import expand
+from cli.io.output_names import expand
 from tests.cli.conftest import Call
 from tests.cli.running import help_line, refusal
 from tests.fixtures.reading import split
@@ -68,8 +68,8 @@ def test_all_names_are_settled_before_the_first_file_is_written(call: Call, walk
 def test_what_was_written_before_a_failure_is_said(
     call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cli import cache_files
     from cli.errors import OutputError
+    from cli.io import cache_files
 
     real = cache_files.save
 

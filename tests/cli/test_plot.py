@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.gltf.author import author
+from anim.gltf.authoring import author
 from anim.model import Clip
 from tests import clips
 from tests.anim.show.reading import png_size, words

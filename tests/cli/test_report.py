@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.report import change, digits, length, size, speed
+from cli.text import change, digits, length, size, speed
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from anim.curves.tangents import TANGENTS
+from anim.curves.tangents.table import TANGENTS
 from anim.model import Interpolation
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal, shell

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from anim.exchange import bvh
+from anim.exchange.formats import bvh_reader
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
 from tests.files import glb_of, opened
@@ -31,7 +31,7 @@ def test_the_ending_says_the_format(suffix: str, call: Call, fixture: Fixture, t
 
 def test_bvh_on_stdout(call: Call, fixture: Fixture) -> None:
     run = call("to-euler", fixture("biped"), "--clip", "walk", "--fps", "24", "--order", "YXZ", "--scale", "1")
-    motion = bvh.read(run.product())
+    motion = bvh_reader.read(run.product())
     assert [node.name for node in motion.nodes][:2] == ["hips", "spine"]
     assert {node.order for node in motion.nodes if not node.end} == {"YXZ"}
     assert motion.nodes[0].moves[1].values[0] == pytest.approx(0.93, abs=0.1)
@@ -39,7 +39,7 @@ def test_bvh_on_stdout(call: Call, fixture: Fixture) -> None:
 
 def test_each_joint_can_have_its_order(call: Call, fixture: Fixture) -> None:
     walk = (fixture("biped"), "--clip", "walk", "--fps", "24")
-    motion = bvh.read(call("to-euler", *walk, "--order", "hips=xzy,*leg=zyx,yxz").product())
+    motion = bvh_reader.read(call("to-euler", *walk, "--order", "hips=xzy,*leg=zyx,yxz").product())
     orders = {node.name: node.order for node in motion.nodes}
     assert [orders[name] for name in ("hips", "left_lower_leg", "head")] == ["XZY", "ZYX", "YXZ"]
     auto = json.loads(call("to-euler", *walk, "--order", "auto", "--format", "json").product())
@@ -98,7 +98,7 @@ def test_dry_run_writes_nothing(call: Call, fixture: Fixture, tmp_path: Path) ->
 
 def test_real_characters(call: Call, asset: Find) -> None:
     run = call("to-euler", asset("Fox.glb"), "-", "--clip", "Run", "--fps", "24")
-    assert len(bvh.read(run.product()).nodes) >= 24
+    assert len(bvh_reader.read(run.product()).nodes) >= 24
 
 
 @pytest.mark.parametrize("kind", ["bvh", "json"])

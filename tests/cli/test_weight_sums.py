@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.gltf import read
+from anim.gltf.reading import reader
 from tests.anim.skinning.odd_rigs import with_bad_sums
 from tests.cli.conftest import Call
 from tests.files import opened
@@ -21,7 +21,7 @@ def test_the_document_keeps_its_weights(call: Call, asset: Callable[[str], Path]
     run = call("resample", bad, tmp_path / "out.glb", "--fps", "10")
     assert run.code == 0, run.err
     first, second = (
-        read.scene(opened(path.read_bytes())).instances[0].mesh.weight_sums for path in (bad, tmp_path / "out.glb")
+        reader.scene(opened(path.read_bytes())).instances[0].mesh.weight_sums for path in (bad, tmp_path / "out.glb")
     )
     assert first is not None
     assert second is not None

@@ -9,9 +9,9 @@ import numpy as np
 import trimesh
 
 from anim.arrays import AnyArray
-from anim.caches.files import Memory
-from anim.caches.formats import reader_for, writer_for
-from anim.caches.settings import Reading, Writing, Written
+from anim.caches.options import Reading, Writing, Written
+from anim.caches.registry import reader_for, writer_for
+from anim.caches.storage import Memory
 from anim.model import Chunk, Part, VertexCache
 
 FACES = np.array([[0, 1, 2], [2, 1, 3], [4, 6, 5], [5, 6, 7]])

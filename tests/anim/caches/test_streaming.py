@@ -10,12 +10,12 @@ from typing import BinaryIO
 import numpy as np
 import pytest
 
-from anim.caches import raw
-from anim.caches.axes import turned
-from anim.caches.files import Memory
-from anim.caches.formats import reader_for, writer_for
-from anim.caches.frames import at_rate
-from anim.caches.settings import Reading, Writing
+from anim.caches import frame_blocks
+from anim.caches.options import Reading, Writing
+from anim.caches.registry import reader_for, writer_for
+from anim.caches.storage import Memory
+from anim.caches.transforms.resample import at_rate
+from anim.caches.transforms.up_axis import turned
 from anim.model import Chunk, VertexCache
 
 FRAMES, VERTICES = 1200, 4000
@@ -78,7 +78,7 @@ def test_writers_hold_a_chunk(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_readers_hold_a_chunk(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("raw", "npz"):
         monkeypatch.setattr(f"anim.caches.{module}.PIECE", 1 << 20)
-    assert raw.per_chunk(VERTICES) == 21
+    assert frame_blocks.per_chunk(VERTICES) == 21
     files = Memory(name)
     writer_for(name[1:])(SOURCE, files, Writing())
     cache = reader_for(name[1:])(files, Reading())

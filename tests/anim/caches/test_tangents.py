@@ -11,11 +11,11 @@ import pytest
 from pygltflib import GLTF2
 
 from anim.arrays import AnyArray
-from anim.caches.axes import turned
-from anim.caches.formats import CACHE_FORMATS
-from anim.caches.frames import at_time
-from anim.caches.order import ordered
-from anim.caches.settings import Writing
+from anim.caches.options import Writing
+from anim.caches.registry import CACHE_FORMATS
+from anim.caches.transforms.resample import at_time
+from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.vertex_order import ordered
 from anim.errors import FormatError
 from anim.model import VertexCache
 from tests.anim.caches.making import cache, opened, written

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange import bvh
-from anim.exchange.from_euler import Converted, from_euler
-from anim.exchange.local import extent, skeleton
-from anim.exchange.motion import scaled
-from anim.exchange.onto import Onto, onto
-from anim.exchange.retarget import Floor
-from anim.exchange.units import guess_unit
-from anim.gltf import read
+from anim.exchange.euler.evaluate import extent, skeleton
+from anim.exchange.euler.from_euler import Converted, from_euler
+from anim.exchange.euler.motion import scaled
+from anim.exchange.euler.unit_guess import guess_unit
+from anim.exchange.formats import bvh_reader
+from anim.exchange.retarget.apply import Onto, onto
+from anim.exchange.retarget.retarget import Floor
 from anim.gltf.document import Document
+from anim.gltf.reading import reader
 from anim.model import Skeleton
 from tests.files import opened_fixture, opened_path
 
@@ -25,7 +25,7 @@ Find = Callable[[str], Path]
 
 def recorded(name: str, asset: Find) -> Converted:
     """Return the motion of a recording in meters."""
-    motion = bvh.read(asset(f"bvh/{name}").read_bytes())
+    motion = bvh_reader.read(asset(f"bvh/{name}").read_bytes())
     return from_euler(scaled(motion, guess_unit(extent(skeleton(motion))).scale), tolerance=1e-3, name="cmu")
 
 
@@ -36,7 +36,7 @@ def character(name: str, asset: Find) -> Document:
 
 def put_on(document: Document, source: Converted, aliases: dict[str, str], floor: Floor = Floor.CONTACT) -> Onto:
     """Return a motion as a clip of the character."""
-    return onto(source, read.scene(document), aliases=aliases, nested=True, floor=floor)
+    return onto(source, reader.scene(document), aliases=aliases, nested=True, floor=floor)
 
 
 def tail(turn: Floats) -> Skeleton:

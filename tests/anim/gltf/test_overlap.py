@@ -7,12 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from anim.gltf import read, write
-from anim.gltf.encode import Numbers
 from anim.gltf.overlap import inside
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
+from anim.gltf.writing.encoding import Numbers
 from anim.model import Clip
 from fixtures.broken.pieces import animated, text
-from tests.anim.gltf.writing import check_same
+from tests.anim.gltf.writing.documents import check_same
 from tests.clips import track
 from tests.files import glb_of, opened
 
@@ -75,10 +76,10 @@ def test_a_file_holds_the_bytes_once() -> None:
             track("rotation", late, np.tile((0.0, 0, 0, 1), (2, 1))),
         ),
     )
-    after = opened(glb_of(write.replace_clips(opened(text(animated())), {0: clip})))
+    after = opened(glb_of(writer.replace_clips(opened(text(animated())), {0: clip})))
     inputs = [after.json["accessors"][s["input"]] for s in after.json["animations"][0]["samplers"]]
     axis = inputs[1].get("byteOffset", 0)
     assert [about.get("byteOffset", 0) - axis for about in inputs] == [0, 0, 8]
     assert len(after.buffers[0].data) == 4 * (4 + 2 * 3 + 4 * 3 + 2 * 4)
-    for mine, theirs in zip(clip.tracks, read.clips(after)[0].tracks, strict=True):
+    for mine, theirs in zip(clip.tracks, reader.clips(after)[0].tracks, strict=True):
         check_same(mine, theirs)

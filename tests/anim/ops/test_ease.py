@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.curves.easing import EASINGS, parse
+from anim.curves.easing.table import EASINGS, parse
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 import fixtures
-from anim.curves.tangents import TANGENTS
+from anim.curves.tangents.table import TANGENTS
 from anim.errors import RangeError
-from anim.gltf import read
+from anim.gltf.reading import reader
 from anim.maths import quaternion
-from anim.measure.loop import LoopKind, best_ranges
-from anim.measure.loop import loop as judged
-from anim.measure.seam import SkinMotion
-from anim.measure.travel import traveling_root
+from anim.measure.inspect.root_motion import traveling_root
+from anim.measure.loops.loop_analysis import LoopKind, best_ranges
+from anim.measure.loops.loop_analysis import loop as judged
+from anim.measure.loops.seam import SkinMotion
 from anim.model import Clip, Scene, Track
 from anim.ops.loop import loop, with_last_frame
 from anim.ops.spline import spline
 from anim.ops.trim import trim
-from anim.sampling.slopes import rates
+from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 from tests.anim.ops.tracks import TRACKS
 from tests.files import opened
@@ -26,7 +26,7 @@ from tests.files import opened
 
 def _walk() -> tuple[Scene, Clip]:
     document = opened(fixtures.build("biped"))
-    return read.scene(document), next(clip for clip in read.clips(document) if clip.name == "walk")
+    return reader.scene(document), next(clip for clip in reader.clips(document) if clip.name == "walk")
 
 
 SCENE, WALK = _walk()

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from anim.arrays import Floats
 from anim.errors import RangeError
-from anim.gltf import read, write
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.model import Interpolation, Kind, Storage, Track
 from anim.ops.resample import INTERPOLATIONS, resample
 from anim.sampling.times import grid, key_times
@@ -112,19 +113,19 @@ def test_steps_as_a_line_pass_through_what_each_frame_shows() -> None:
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)
 def test_bools_behind_pointers_stay_steps_and_bytes(interpolation: str) -> None:
     document = opened_fixture("pointer")
-    number = next(i for i, each in enumerate(read.clips(document)) if each.name == "blink")
+    number = next(i for i, each in enumerate(reader.clips(document)) if each.name == "blink")
     for snap in (False, True):
-        made = resample(read.clips(document)[number], fps=24, interpolation=interpolation, snap=snap)
+        made = resample(reader.clips(document)[number], fps=24, interpolation=interpolation, snap=snap)
         assert made.tracks[0].interpolation is STEP
         assert set(np.unique(made.tracks[0].values)) <= {0, 1}
-        written = read.clips(write.replace_clips(document, {number: made}))[number].tracks[0]
+        written = reader.clips(writer.replace_clips(document, {number: made}))[number].tracks[0]
         assert written.storage == BYTES
         assert (written.kind, written.interpolation) == (Kind.DISCRETE, STEP)
 
 
 @pytest.mark.parametrize("name", ["color", "turn", "light", "weights", "one_weight"])
 def test_pointers_are_resampled_like_any_track(name: str) -> None:
-    before = next(each for each in read.clips(opened_fixture("pointer")) if each.name == name)
+    before = next(each for each in reader.clips(opened_fixture("pointer")) if each.name == name)
     after = resample(before, fps=24)
     (a,), (b,) = before.tracks, after.tracks
     assert (a.target, a.pointer, a.path) == (b.target, b.pointer, b.path)

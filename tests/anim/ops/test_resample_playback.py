@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import fixtures
-from anim.gltf import read, write
 from anim.gltf.document import Document
-from anim.measure.error import Ruler
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
+from anim.measure.error.metric import Ruler
 from anim.model import Clip
 from anim.ops.resample import resample
 from tests.files import REAL, glb_of, opened, opened_fixture, opened_path
@@ -53,15 +54,15 @@ def test_the_validator_finds_no_new_fault(asset: Find) -> None:
 def test_every_fixture_takes_every_goal(name: str, interpolation: str) -> None:
     document = opened_fixture(name)
     after = opened(glb_of(_resampled(document, fps=12, interpolation=interpolation)))
-    for a, b in zip(read.clips(document), read.clips(after), strict=True):
+    for a, b in zip(reader.clips(document), reader.clips(after), strict=True):
         assert (a.start, a.end, len(a.tracks)) == (b.start, b.end, len(b.tracks))
 
 
 def _check_playback(document: Document, multiple: int, *, every: int) -> None:
-    ruler = Ruler(read.scene(document))
-    for number, before in list(enumerate(read.clips(document)))[::every]:
+    ruler = Ruler(reader.scene(document))
+    for number, before in list(enumerate(reader.clips(document)))[::every]:
         after = resample(before, fps=multiple * _source_rate(before))
-        written = read.clips(write.replace_clips(document, {number: after}))[number]
+        written = reader.clips(writer.replace_clips(document, {number: after}))[number]
         assert (written.start, written.end) == (before.start, before.end)
         played = np.append(np.arange(before.start, before.end, 1 / PLAYED), before.end)
         found = ruler.error_at(before, written, played)
@@ -80,8 +81,8 @@ def _source_rate(whole: Clip) -> int:
 
 
 def _resampled(document: Document, **options: Any) -> Document:
-    clips = {i: resample(each, **options) for i, each in enumerate(read.clips(document))}
-    return write.replace_clips(document, clips)
+    clips = {i: resample(each, **options) for i, each in enumerate(reader.clips(document))}
+    return writer.replace_clips(document, clips)
 
 
 def _error_codes(report: dict[str, Any]) -> Counter[str]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.curves.easing import parse
+from anim.curves.easing.table import parse
 from anim.errors import RangeError
 from anim.model import Clip, Track
 from anim.ops.retime import retime
-from anim.ops.warp import warp
+from anim.ops.time_warp import warp
 from anim.sampling.track import sample
 from tests.anim.ops.plain_eases import EASES
 from tests.anim.ops.tracks import ANCHOR, KEYS, TRACKS, distance

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anim.errors import NotFoundError
-from anim.gltf import read
+from anim.gltf.reading import reader
 from anim.model import Skeleton
 from anim.ops.selection import Selection
 from tests.clips import clip, skeleton, track
@@ -80,6 +80,6 @@ def test_tracks(nodes: list[str], paths: list[str], numbers: set[int]) -> None:
 
 def test_a_pointer_at_a_node_is_that_nodes_track() -> None:
     document = opened_fixture("pointer")
-    turn = next(each for each in read.clips(document) if each.name == "turn")
-    chosen = Selection(nodes=["turning"], paths=["rotation"]).chosen_tracks(turn, read.skeleton(document))
+    turn = next(each for each in reader.clips(document) if each.name == "turn")
+    chosen = Selection(nodes=["turning"], paths=["rotation"]).chosen_tracks(turn, reader.skeleton(document))
     assert chosen == {0}

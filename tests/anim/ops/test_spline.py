@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from anim.curves.tangents import TANGENTS, parse
+from anim.curves.tangents.table import TANGENTS, parse
 from anim.maths import quaternion
 from anim.model import Clip, Track
 from anim.ops.spline import departure, spline
-from anim.sampling.slopes import rates
+from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 from tests import clips
 from tests.anim.ops.tracks import KEYS, TRACKS

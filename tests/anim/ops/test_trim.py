@@ -10,7 +10,7 @@ import pytest
 from anim.errors import RangeError
 from anim.model import Clip, Track
 from anim.ops.trim import trim
-from anim.sampling.slopes import rates
+from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 from tests.anim.ops.tracks import ANCHOR, KEYS, TRACKS, distance
 

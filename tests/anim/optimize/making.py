@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.points import Points, of_scene
+from anim.measure.error.point_matrix import Points, of_scene
 from anim.model import Clip, Scene
-from anim.optimize.coding import PRICES, Coding
-from anim.optimize.limits import EFFORTS, Bounds, Objective, Packing, Policy, Reference
-from anim.optimize.setting import Setting, setting
-from anim.optimize.truth import Truth, truth
+from anim.optimize.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
+from anim.optimize.search.context import Setting, setting
+from anim.optimize.search.source_motion import Truth, truth
+from anim.optimize.tracks.quantization import PRICES, Coding
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import clip, track
 

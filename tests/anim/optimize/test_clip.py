@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anim.measure.error import Ruler, dense_times
+from anim.measure.error.metric import Ruler, dense_times
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.optimize.clip import Task, solve
-from anim.optimize.limits import Drop, Packing, Policy
-from anim.optimize.lossless import INT16
-from anim.optimize.solution import Solution
+from anim.optimize.options import Drop, Packing, Policy
+from anim.optimize.search.solution import Solution
+from anim.optimize.tracks.lossless import INT16
 from anim.sampling.track import sample
 from tests.anim.optimize.making import TIMES, scene, setting_of, turning, waving
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, track

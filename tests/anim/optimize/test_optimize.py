@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.gltf import read
 from anim.gltf.document import Document
-from anim.measure.error import Ruler, dense_times
-from anim.measure.players import PLAYERS
-from anim.measure.statistics import statistics
+from anim.gltf.reading import reader
+from anim.measure.error.metric import Ruler, dense_times
+from anim.measure.error.statistics import statistics
 from anim.model import Clip, Interpolation
-from anim.optimize.limits import Bounds, Drop, Objective, Packing, Policy
 from anim.optimize.optimize import Optimized, optimize
+from anim.optimize.options import Bounds, Drop, Objective, Packing, Policy
 from anim.optimize.request import Request
-from anim.optimize.verify import PLAYERS as VERIFIED
+from anim.optimize.verification import PLAYERS as VERIFIED
+from anim.sampling.players import PLAYERS
 from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.khronos import errors, needs_validator, validate_many
 
@@ -28,21 +28,21 @@ SMALL = ("arm", "interpolations", "morph_cube", "accessors", "pointer", "noop")
 
 
 def _request(document: Document, share: float, **more: Any) -> Request:
-    diagonal = Ruler(read.scene(document)).diagonal
+    diagonal = Ruler(reader.scene(document)).diagonal
     bounds = replace(more.pop("bounds", Bounds(0.0, 0.0)), max_error=share * diagonal, shell=0.01 * diagonal)
     return Request(bounds, **{"effort": "fast", **more})
 
 
 def _optimized(document: Document, request: Request, **more: Any) -> tuple[Optimized, Document]:
     """The outcome, and its document as read back from the bytes of a file."""
-    found = optimize(document, read.scene(document), read.clips(document), request, **more)
+    found = optimize(document, reader.scene(document), reader.clips(document), request, **more)
     return found, opened(glb_of(found.document))
 
 
 def _error(before: Document, after: Document, players: Sequence[str] = EVERY) -> float:
     """The largest distance in any clip for any player, as a share of the diagonal; all clips must be there."""
-    old, new = read.clips(before), read.clips(after)
-    ruler = Ruler(read.scene(before), read.scene(after), shell=0.01)
+    old, new = reader.clips(before), reader.clips(after)
+    ruler = Ruler(reader.scene(before), reader.scene(after), shell=0.01)
     worst = 0.0
     assert [each.name for each in new] == [each.name for each in old]
     for a, b in zip(old, new, strict=True):
@@ -68,7 +68,9 @@ def test_the_bound_is_true_on_what_was_written(name: str, share: float) -> None:
     assert _error(document, written) <= share
     assert all(each.holds for each in found.verdicts.values())
     worst = max(each.error.max_error for each in found.verdicts.values())
-    assert worst == pytest.approx(_error(document, written) * Ruler(read.scene(document)).diagonal, rel=5e-3, abs=1e-12)
+    assert worst == pytest.approx(
+        _error(document, written) * Ruler(reader.scene(document)).diagonal, rel=5e-3, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("packing", [Packing.EXT, Packing.KHR])
@@ -125,7 +127,7 @@ def test_models_of_any_size(factor: float) -> None:
 def test_the_same_bytes_for_any_number_of_processes() -> None:
     document = opened_fixture("noop")
     request = _request(document, 1e-3, packing=Packing.EXT)
-    assert len(read.clips(document)) > 2
+    assert len(reader.clips(document)) > 2
     first, second = (glb_of(_optimized(document, request, workers=n)[0].document) for n in (1, 2))
     assert first == second
 
@@ -150,7 +152,7 @@ def test_clips_that_were_not_chosen_were_not_optimized() -> None:
     request = _request(document, 1e-2)
     found, written = _optimized(document, request, chosen=[1])
     assert list(found.solutions) == list(found.verdicts) == [1]
-    for i, (a, b) in enumerate(zip(read.clips(document), read.clips(written), strict=True)):
+    for i, (a, b) in enumerate(zip(reader.clips(document), reader.clips(written), strict=True)):
         same = all(
             len(x.times) == len(y.times) and (x.values == y.values).all()
             for x, y in zip(a.tracks, b.tracks, strict=False)
@@ -165,7 +167,7 @@ def test_clips_that_were_not_chosen_were_not_optimized() -> None:
 def test_steps_stay_steps(share: float) -> None:
     document = opened_fixture("interpolations")
     _, written = _optimized(document, _request(document, share))
-    old, new = (read.clips(each)[0] for each in (document, written))
+    old, new = (reader.clips(each)[0] for each in (document, written))
     steps = {track.target: track for track in old.tracks if track.interpolation is Interpolation.STEP}
     found = {track.target: track for track in new.tracks if track.interpolation is Interpolation.STEP}
     assert len(steps) == 3
@@ -179,7 +181,7 @@ def test_steps_stay_steps(share: float) -> None:
 def test_weights_are_not_clamped(packing: Packing) -> None:
     document = opened_fixture("morph_cube")
     _, written = _optimized(document, _request(document, 1e-3, packing=packing))
-    weights = read.clips(written)[0].tracks[0].values
+    weights = reader.clips(written)[0].tracks[0].values
     assert weights.min() == pytest.approx(-0.5, abs=0.01)
     assert weights.max() == pytest.approx(1.5, abs=0.01)
 
@@ -190,7 +192,7 @@ def test_the_rest_pose_moves_and_nothing_is_seen_of_it() -> None:
     found, written = _optimized(document, request)
     assert found.moved
     assert _error(document, written) <= 1e-3
-    before, after = (read.skeleton(each) for each in (document, written))
+    before, after = (reader.skeleton(each) for each in (document, written))
     for node in range(len(before)):
         for path in ("translation", "rotation", "scale"):
             same = (getattr(before, path)[node] == getattr(after, path)[node]).all()
@@ -203,8 +205,8 @@ def test_further_bounds() -> None:
     for bounds in (Bounds(0.0, 0.0, max_angle=angle), Bounds(0.0, 0.0, max_speed_error=speed)):
         request = _request(document, 1e-2, bounds=bounds)
         _, written = _optimized(document, request)
-        ruler = Ruler(read.scene(document))
-        for a, b in zip(read.clips(document), read.clips(written), strict=True):
+        ruler = Ruler(reader.scene(document))
+        for a, b in zip(reader.clips(document), reader.clips(written), strict=True):
             about = statistics(ruler, a, b)
             if bounds.max_angle is not None:
                 assert about.angle.size <= angle
@@ -245,7 +247,7 @@ def test_progress_goes_up_to_the_end() -> None:
     _optimized(document, _request(document, 1e-2), progress=said.append)
     assert said == sorted(said)
     assert said[-1] == 1
-    assert len(said) == len(read.clips(document))
+    assert len(said) == len(reader.clips(document))
 
 
 def test_no_clips() -> None:
@@ -280,9 +282,9 @@ def test_policies_on_a_file_with_rests() -> None:
     counts = {}
     for drop in Drop:
         _, written = _optimized(document, _request(document, 1e-4, policy=Policy(drop)))
-        counts[drop] = [_tracks(each) for each in read.clips(written)]
+        counts[drop] = [_tracks(each) for each in reader.clips(written)]
         assert _error(document, written) <= 1e-4
-    source = [_tracks(each) for each in read.clips(document)]
+    source = [_tracks(each) for each in reader.clips(document)]
     assert counts[Drop.NEVER] == source
     assert sum(counts[Drop.REST]) < sum(counts[Drop.UNUSED]) < sum(source)
     assert min(counts[Drop.REST]) >= 1

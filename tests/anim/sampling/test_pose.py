@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from anim import arrays
 from anim.arrays import Floats
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
-from anim.gltf import read
-from anim.measure.players import PLAYERS, sampler
+from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton
 from anim.sampling import pose, rest, world_matrices
 from anim.sampling.batch import stacks
+from anim.sampling.players import PLAYERS, sampler
 from anim.sampling.pose import Poses
 from anim.sampling.track import locate, sample
 from fixtures.broken.pieces import text
@@ -37,9 +37,9 @@ def test_what_no_track_moves_is_at_rest() -> None:
 
 def test_every_track_lands_at_its_node_and_part() -> None:
     document = opened_fixture("interpolations")
-    (walk,) = read.clips(document)
+    (walk,) = reader.clips(document)
     at = np.linspace(0, 2.5, 26)
-    found = pose(read.skeleton(document), walk, at)
+    found = pose(reader.skeleton(document), walk, at)
     for each in walk.tracks:
         assert each.node is not None
         part: Floats = getattr(found, each.path)
@@ -48,16 +48,16 @@ def test_every_track_lands_at_its_node_and_part() -> None:
 
 def test_weights_are_by_node() -> None:
     document = opened_fixture("morph_cube")
-    for each in read.clips(document):
+    for each in reader.clips(document):
         at = np.array([0.0, 0.25, 0.75])
-        found = pose(read.skeleton(document), each, at)
+        found = pose(reader.skeleton(document), each, at)
         assert list(found.weights) == [each.tracks[0].node]
         np.testing.assert_array_equal(found.weights[0], sample(each.tracks[0], at))
 
 
 def test_pointers_at_node_properties_move_the_node_and_others_nothing() -> None:
     document = opened_fixture("pointer")
-    nodes, clips = read.skeleton(document), {each.name: each for each in read.clips(document)}
+    nodes, clips = reader.skeleton(document), {each.name: each for each in reader.clips(document)}
     at = np.array([0.0, 0.5])
     np.testing.assert_allclose(pose(nodes, clips["turn"], at).rotation[1, 0], about("y", 90), atol=1e-7)
     assert list(pose(nodes, clips["weights"], at).weights) == [0]
@@ -69,8 +69,8 @@ def test_pointers_at_node_properties_move_the_node_and_others_nothing() -> None:
 @pytest.mark.parametrize("name", ["biped", "interpolations", "arm"])
 def test_world_matrices_of_clips(name: str) -> None:
     document = opened_fixture(name)
-    nodes = read.skeleton(document)
-    for each in read.clips(document):
+    nodes = reader.skeleton(document)
+    for each in reader.clips(document):
         _check_world(nodes, each, np.linspace(each.start, each.end, 7))
 
 
@@ -97,7 +97,7 @@ def test_a_sheared_matrix_stands_whole_in_the_chain() -> None:
         {"translation": [0, 1, 0], "scale": [2, 2, 2]},
     ]
     document = opened(text({"nodes": nodes}))
-    found = world_matrices(read.skeleton(document), rest(read.skeleton(document)))[0]
+    found = world_matrices(reader.skeleton(document), rest(reader.skeleton(document)))[0]
     turned = np.array([[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
     child = np.array([[2, 0, 0, 0], [0, 2, 0, 1], [0, 0, 2, 0], [0, 0, 0, 1.0]])
     np.testing.assert_allclose(found[1], (turned @ sheared)[:3], atol=1e-15)
@@ -141,8 +141,8 @@ def _quaternions(n: int) -> Floats:
 def test_stretches_of_time_are_the_whole(name: str) -> None:
     """Few keys are stacked for themselves, then all: the same bits, outside the keys too."""
     document = opened_fixture(name)
-    skeleton = read.skeleton(document)
-    for played in read.clips(document):
+    skeleton = reader.skeleton(document)
+    for played in reader.clips(document):
         times = np.linspace(played.start - 0.1, played.end + 0.1, 301)
         for player in PLAYERS:
             wanted = Poses(skeleton, played, sampler(player)).at(times)

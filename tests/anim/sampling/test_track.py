@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
-from anim.gltf import read
+from anim.gltf.reading import reader
 from anim.model import Interpolation, Kind, Track
 from anim.sampling.batch import batches
 from anim.sampling.track import locate, sample
@@ -161,7 +161,7 @@ def test_locate_is_a_plain_search(keys: set[float], at: list[float]) -> None:
 
 def test_batches_give_what_tracks_give() -> None:
     for name in ("interpolations", "biped", "morph_cube", "pointer", "accessors"):
-        for clip in read.clips(opened_fixture(name)):
+        for clip in reader.clips(opened_fixture(name)):
             grouped = batches(clip.tracks)
             assert [t for t in clip.tracks if t in [x for b in grouped for x in b.tracks]] == list(clip.tracks)
             for batch in grouped:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from anim.curves.easing import EASINGS, parse
-from anim.curves.fit import cubic_pieces
-from anim.curves.tangents import TANGENTS
+from anim.curves.easing.table import EASINGS, parse
+from anim.curves.fitting.easing_fit import cubic_pieces
+from anim.curves.tangents.table import TANGENTS
 from anim.errors import RangeError, ShapeError, UnsupportedError
-from anim.show.eases import LIMIT, eases
-from anim.show.through import through
+from anim.show.plots.easing_plot import LIMIT, eases
+from anim.show.plots.tangent_plot import through
 from tests.anim.show.reading import png_size, words
 
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.gltf import read
-from anim.measure.surface import diagonal
+from anim.gltf.reading import reader
+from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.sampling import pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import grid
 from anim.skinning.bake import baker
-from anim.skinning.frames import Frames
-from anim.skinning.layer import Layer
+from anim.skinning.bound_mesh import Layer
+from anim.skinning.pose_blocks import Frames
 from tests.anim.skinning.odd_rigs import with_root_without_weight
 from tests.files import opened_path
 
@@ -30,13 +30,13 @@ Find = Callable[[str], Path]
 @pytest.mark.parametrize("method", ["lbs", "dqs"])
 def test_usd_agrees(name: str, method: str, asset: Find) -> None:
     document = opened_path(asset(name))
-    assert _compared(read.scene(document), read.clips(document)[::9], method) > 5
+    assert _compared(reader.scene(document), reader.clips(document)[::9], method) > 5
 
 
 @pytest.mark.parametrize("method", ["lbs", "dqs"])
 def test_usd_agrees_under_a_joint_without_weight_and_in_another_unit(method: str, asset: Find) -> None:
     document = opened_path(asset("CesiumMan.glb"))
-    assert _compared(with_root_without_weight(read.scene(document)), read.clips(document), method) > 5
+    assert _compared(with_root_without_weight(reader.scene(document)), reader.clips(document), method) > 5
 
 
 def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from anim.errors import FormatError, NotFoundError, RangeError
-from anim.gltf import read
 from anim.gltf.document import Json
+from anim.gltf.reading import reader
 from anim.maths import matrix
-from anim.measure.surface import placed, surfaces
+from anim.measure.error.surface import placed, surfaces
 from anim.model import Clip, Instance, Scene
 from anim.sampling import pose, world_matrices
-from anim.skinning import stream
+from anim.skinning import chunk_pipeline
+from anim.skinning.analysis.weight_sums import bad_sums
 from anim.skinning.bake import bake, baker
-from anim.skinning.methods import SKINNING_METHODS
-from anim.skinning.weights import bad_sums
+from anim.skinning.methods.registry import SKINNING_METHODS
 from fixtures.broken.pieces import buffered, text
+from tests.anim.skinning.methods.test_linear_blend import TIMES, moving
 from tests.anim.skinning.scenes import TRIANGLE, mesh, random_scene, scene
-from tests.anim.skinning.test_linear_blend import TIMES, moving
 from tests.clips import about, clip, skeleton, track
 from tests.files import ASSETS, opened, opened_fixture, opened_path
 
@@ -28,8 +28,8 @@ from tests.files import ASSETS, opened, opened_fixture, opened_path
 @pytest.mark.parametrize("name", ["biped", "morph_cube", "arm", "accessors", "interpolations", "pointer"])
 def test_every_mesh_in_order_as_the_ruler_places_it(name: str) -> None:
     """`measure.surface` places vertices by its own loop, for the error bound: both must mean the same."""
-    of = read.scene(opened_fixture(name))
-    for played in read.clips(opened_fixture(name)):
+    of = reader.scene(opened_fixture(name))
+    for played in reader.clips(opened_fixture(name)):
         times = np.linspace(played.start, played.end, 37)
         cache = bake(of, played, times=times, rigid=True)
         local = pose(of.skeleton, played, times)
@@ -45,7 +45,7 @@ def test_every_mesh_in_order_as_the_ruler_places_it(name: str) -> None:
 
 
 def test_parts_are_the_primitives_in_order() -> None:
-    of = read.scene(opened_fixture("biped"))
+    of = reader.scene(opened_fixture("biped"))
     cache = bake(of, Clip("", ()), times=np.zeros(1))
     assert [part.vertices[0] for part in cache.parts] == [0, *(part.vertices[1] for part in cache.parts[:-1])]
     assert cache.parts[-1].vertices[1] == cache.vertex_count
@@ -68,7 +68,7 @@ def test_nodes_depth_first() -> None:
         "nodes": [{"mesh": 0, "name": "last"}, {"mesh": 0, "name": "first"}, {"children": [1]}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}, {"attributes": {"POSITION": 0}, "mode": 6}]}],
     }
-    cache = bake(read.scene(opened(text(content))), Clip("", ()), times=np.zeros(1), rigid=True)
+    cache = bake(reader.scene(opened(text(content))), Clip("", ()), times=np.zeros(1), rigid=True)
     assert [part.name for part in cache.parts] == ["first", "first", "last", "last"]
     assert [part.vertices for part in cache.parts] == [(0, 3), (3, 6), (6, 9), (9, 12)]
     assert cache.faces.tolist() == [[0, 1, 2], [4, 5, 3], [6, 7, 8], [10, 11, 9]]
@@ -150,9 +150,9 @@ def test_same_bytes_for_any_chunk_and_number_of_threads(method: str, monkeypatch
     of = random_scene(7, stretch=0.3)
     played = moving(of, 3)
     once = bake(of, played, times=TIMES, method=method, threads=1).whole().positions
-    monkeypatch.setattr(stream, "MIN_VERTICES", 7)
+    monkeypatch.setattr(chunk_pipeline, "MIN_VERTICES", 7)
     assert np.array_equal(once, bake(of, played, times=TIMES, method=method, threads=5).whole().positions)
-    monkeypatch.setattr(stream, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
     cache = bake(of, played, times=TIMES, method=method)
     assert [(chunk.first, len(chunk.positions)) for chunk in cache.chunks()] == [(0, 32), (32, 13)]
     assert np.array_equal(cache.whole().positions, once)
@@ -162,7 +162,7 @@ def test_same_bytes_for_any_chunk_and_number_of_threads(method: str, monkeypatch
 
 
 def test_nothing_is_computed_before_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stream, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
     of = random_scene(7)
     done: list[int] = []
     made = baker(of)
@@ -175,7 +175,7 @@ def test_nothing_is_computed_before_it_is_asked_for(monkeypatch: pytest.MonkeyPa
 
 
 def test_only_what_skins_or_morphs_is_baked_unless_rigid_is_wanted() -> None:
-    of = read.scene(opened_fixture("interpolations"))
+    of = reader.scene(opened_fixture("interpolations"))
     with pytest.raises(NotFoundError, match="no mesh with a skin or morph targets") as refused:
         bake(of, clip(), times=np.zeros(1))
     assert "--rigid" in refused.value.help
@@ -238,17 +238,17 @@ def test_files_that_cant_be_skinned() -> None:
             "meshes": [{"primitives": [{"attributes": attributes, **primitive}]}],
         }
 
-    fine = read.scene(opened(text(skinned(points, joints, weights))))
+    fine = reader.scene(opened(text(skinned(points, joints, weights))))
     assert bake(fine, clip(), times=np.zeros(1)).vertex_count == 3
     with pytest.raises(FormatError, match="uses joint 9"):
-        read.scene(opened(text(skinned(points, ("VEC4", 5121, [[9, 0, 0, 0]] * 3), weights))))
+        reader.scene(opened(text(skinned(points, ("VEC4", 5121, [[9, 0, 0, 0]] * 3), weights))))
     with pytest.raises(FormatError, match="NaN"):
-        read.scene(opened(text(skinned(points, joints, ("VEC4", 5126, [[np.nan, 0, 0, 0]] * 3)))))
+        reader.scene(opened(text(skinned(points, joints, ("VEC4", 5126, [[np.nan, 0, 0, 0]] * 3)))))
     with pytest.raises(FormatError, match="no JOINTS_0"):
-        read.scene(opened(text(skinned(points))))
+        reader.scene(opened(text(skinned(points))))
     draco = {"extensions": {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}}}
     with pytest.raises(FormatError, match="Draco data"):
-        read.scene(opened(text(skinned(points, joints, weights, **draco))))
+        reader.scene(opened(text(skinned(points, joints, weights, **draco))))
 
 
 def test_bad_sums_are_told() -> None:
@@ -273,7 +273,7 @@ def test_a_mesh_on_two_nodes_is_baked_twice() -> None:
 def test_real_files_stay_whole(method: str) -> None:
     """No vertex of the walking man leaves the box of his bind pose by more than a stride."""
     document = opened_path(ASSETS / "CesiumMan.glb")
-    of, (walk,) = read.scene(document), read.clips(document)
+    of, (walk,) = reader.scene(document), reader.clips(document)
     found = bake(of, walk, times=np.linspace(walk.start, walk.end, 20), method=method).whole().positions
     rest = of.instances[0].mesh.positions
     assert np.isfinite(found).all()

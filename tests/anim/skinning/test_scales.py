@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.gltf import read
-from anim.measure.surface import diagonal
+from anim.gltf.reading import reader
+from anim.measure.error.surface import diagonal
 from anim.model import Instance, Mesh, Scene, Skin
 from anim.sampling.times import grid
 from anim.skinning.bake import bake
-from anim.skinning.methods import SKINNING_METHODS
+from anim.skinning.methods.registry import SKINNING_METHODS
+from tests.anim.skinning.methods.test_linear_blend import TIMES, baked, moving
 from tests.anim.skinning.odd_rigs import with_root_without_weight
 from tests.anim.skinning.scenes import mesh, random_scene, scene
-from tests.anim.skinning.test_linear_blend import TIMES, baked, moving
 from tests.clips import about, clip, track
 from tests.files import opened_path
 
@@ -30,7 +30,7 @@ CLOSE = 1e-5  # of the diagonal
 def test_a_joint_without_weight_may_have_any_bind_scale(method: str, asset: Callable[[str], Path]) -> None:
     """CesiumMan in hundredths, under a joint that carries nothing and is bound by the identity."""
     document = opened_path(asset("CesiumMan.glb"))
-    of, (walk,) = read.scene(document), read.clips(document)
+    of, (walk,) = reader.scene(document), reader.clips(document)
     times = grid(walk.start, walk.end, fps=12)
     plain = bake(of, walk, times=times, method=method).whole().positions
     odd = bake(with_root_without_weight(of), walk, times=times, method=method).whole().positions

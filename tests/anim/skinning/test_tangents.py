@@ -9,9 +9,9 @@ from anim.arrays import AnyArray, Floats
 from anim.errors import UnsupportedError
 from anim.model import Clip, Mesh, Scene
 from anim.skinning.bake import bake
-from anim.skinning.methods import SKINNING_METHODS
+from anim.skinning.methods.registry import SKINNING_METHODS
+from tests.anim.skinning.methods.test_linear_blend import TIMES, moving
 from tests.anim.skinning.scenes import mesh, random_scene, scene
-from tests.anim.skinning.test_linear_blend import TIMES, moving
 from tests.clips import about, clip, track
 
 STEP = 0.25  # m, from a vertex to its neighbors; the way there is straight, so it needn't be short

@@ -1,0 +1,94 @@
+"""VertexCache ↔ .glb, by layout: morph targets or a flip-book."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.caches.formats import gltf_flipbook, gltf_morph
+from anim.caches.options import Reading, Writing, Written
+from anim.caches.storage import Inputs, Outputs, whole
+from anim.caches.transforms import document_playback
+from anim.errors import FormatError, RangeError
+from anim.gltf.document import Document, items
+from anim.gltf.io import container
+from anim.gltf.reading.accessors import Accessors
+from anim.model import Chunk, VertexCache
+
+Write: TypeAlias = Callable[[VertexCache, Outputs, Writing], Written]
+
+LAYOUTS: dict[str, Write] = {
+    "morph": gltf_morph.write,
+    "flip-visibility": gltf_flipbook.write_visibility,
+    "flip-scale": gltf_flipbook.write_scale,
+}
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+    """Write a GLB in the layout that `writing.layout` names. Raises RangeError for another."""
+    if writing.layout not in LAYOUTS:
+        raise RangeError(f"layout is '{writing.layout}' (expected {', '.join(LAYOUTS)})")
+    return LAYOUTS[writing.layout](cache, outputs, writing)
+
+
+def read(inputs: Inputs, reading: Reading) -> VertexCache:
+    """Return the frames of a flip-book of ours, or what the first clip of any other glTF plays.
+
+    Morph targets and skins (linear blend) are played at the clip's own keys, or at `reading.fps`.
+    """
+    with whole(inputs, inputs.main) as data:
+        document = container.read(np.frombuffer(data, np.uint8))
+    found = pages(document)
+    if found is not None:
+        return found
+    played = document_playback.play(document, fps=reading.fps, note=reading.note)
+    if names := document_playback.directions(document):
+        reading.note(f"{' and '.join(names)} are not played (bake --{' or --'.join(names)} does that)")
+    return played
+
+
+def pages(document: Document) -> VertexCache | None:
+    """Return the frames of a flip-book of ours, None for any other document."""
+    for node in items(document.json, "nodes"):
+        said = (node.get("extras") or {}).get(gltf_flipbook.EXTRAS) if isinstance(node.get("extras"), dict) else None
+        if isinstance(said, dict) and said.get("cache") == gltf_flipbook.NAME:
+            return _pages(document, node.get("children", []), "z" if said.get("up") == "z" else "y")
+    return None
+
+
+def _pages(document: Document, children: list[int], up: str) -> VertexCache:
+    accessors = Accessors(document)
+    nodes, meshes = items(document.json, "nodes"), items(document.json, "meshes")
+    try:
+        pages = [meshes[nodes[child]["mesh"]]["primitives"][0] for child in children]
+        samplers = [sampler for clip in items(document.json, "animations") for sampler in clip["samplers"]]
+        times = [accessors.floats(samplers[0]["input"])[0, 0] if samplers else 0.0]
+        times += [accessors.floats(sampler["input"])[1, 0] for sampler in samplers[1:]]
+        indices = pages[0].get("indices")
+        attributes = [page["attributes"] for page in pages]
+        count = document.json["accessors"][attributes[0]["POSITION"]]["count"]
+    except (IndexError, KeyError):
+        raise FormatError("is no flip-book as we write them") from None
+    if len(times) != len(pages):
+        raise FormatError(f"flip-book has {len(pages)} pages and {len(times)} times")
+    faces: Ints = np.empty((0, 3), np.int64) if indices is None else accessors.integers(indices).reshape(-1, 3)
+    has_normals, has_tangents = (all(name in each for each in attributes) for name in ("NORMAL", "TANGENT"))
+    handedness = accessors.floats(attributes[0]["TANGENT"])[:, 3] if has_tangents else None
+
+    def chunks() -> Iterator[Chunk]:
+        for i, each in enumerate(attributes):
+            normals = _rows(accessors, each["NORMAL"], count) if has_normals else None
+            tangents = _rows(accessors, each["TANGENT"], count, 4)[..., :3] if has_tangents else None
+            yield Chunk(i, _rows(accessors, each["POSITION"], count), normals, tangents)
+
+    return VertexCache(np.array(times), count, faces, chunks, has_normals=has_normals, up=up, handedness=handedness)
+
+
+def _rows(accessors: Accessors, number: int, count: int, width: int = 3) -> Floats:
+    rows = accessors.floats(number)
+    if rows.shape != (count, width):
+        raise FormatError(f"a page of the flip-book has {len(rows)} vertices (the first has {count})")
+    return rows.astype(np.float32)[None]  # type: ignore[return-value]

@@ -1,0 +1,171 @@
+"""VertexCache → .glb with morph targets: every viewer plays it, smoothly between frames.
+
+Three forms are tried, and the smallest that keeps every vertex of every frame within the limit is written:
+`keyframes`, one target for each frame that straight lines between others don't give; `basis`, few shapes (principal
+components) with a weight each per frame; `both`, the shapes of the kept frames. Between frames weights go in straight
+lines, and so do vertices, so the worst over the frames is the worst over all times. All weights are within 0…1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats, Ints
+from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive, signed
+from anim.caches.formats.morph_encoding import SHORT, Form, stored
+from anim.caches.options import Writing, Written
+from anim.caches.storage import Outputs
+from anim.caches.transforms import bounds
+from anim.caches.transforms.frame_reduction import kept_frames
+from anim.caches.transforms.pca import basis
+from anim.errors import RangeError, UnsupportedError
+from anim.model import Chunk, VertexCache
+
+DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given
+MOST_BYTES = 1 << 30  # of positions, which are in memory here, three times over
+MOST_TARGETS = 1024
+SURE_TARGETS = 8  # what glTF promises; engines take more
+BATCH = 16  # frames compared at a time
+MARGINS = 0.98, 0.5  # of the limit, what rounding to float32 may not eat; the second where it did
+NAME, EXTRAS = "cache", "gltf_anim"
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+    """Write the smallest form within `writing.max_error` m, by default 0.1 % of the diagonal.
+
+    Raises UnsupportedError for caches over 1 GB, RangeError where no form keeps the limit.
+    """
+    if 12 * cache.frame_count * cache.vertex_count > MOST_BYTES:
+        raise UnsupportedError(
+            f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices are "
+            f"{12 * cache.frame_count * cache.vertex_count / 1e9:.1f} GB of positions (at most 1.1)",
+            help="choose fewer with --fps, or --layout flip-visibility, or .usdc, .npz, .pc2, .mdd: those are streamed",
+        )
+    whole = cache.whole()
+    limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * bounds.diagonal(cache)
+    best = _smallest(whole.positions, cache.times, limit, quantize=writing.quantize)
+    if best is None:
+        advice = "allow more --max-error" + (", or leave out --quantize" if writing.quantize else "")
+        raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help=advice)
+    form, worst = best
+    _write(cache, whole, form, outputs, quantize=writing.quantize)
+    return Written(worst, _notes(form, cache.frame_count))
+
+
+def _smallest(positions: AnyArray, times: Floats, limit: float, *, quantize: bool) -> tuple[Form, float] | None:
+    """The form of fewest bytes that keeps the limit as it is stored, and its error; None where none does."""
+
+    def within(forms: Iterable[Form]) -> list[tuple[Form, float]]:
+        changed = (stored(form, quantize=quantize) for form in forms)
+        errors = ((form, _worst(positions, times, form)) for form in changed)
+        return [(form, error) for form, error in errors if error <= limit]
+
+    kept = kept_frames(positions, times, limit * MARGINS[0])
+    most = len(kept) - 1
+    found: list[tuple[Form, float]] = []
+    for margin in MARGINS:
+        found = found or within(_combined(positions, times, limit * margin, most=most))
+    fewest = min((len(form.targets) for form, _ in found), default=most)
+    if most <= min(fewest + 1, MOST_TARGETS):
+        found += within([_one_hot(positions, kept)])
+    return min(found, key=lambda each: each[0].size(quantize=quantize), default=None)
+
+
+def _combined(positions: AnyArray, times: Floats, limit: float, *, most: int) -> Iterator[Form]:
+    """Forms of few shapes that may be the smallest; the number of targets decides, nearly."""
+    for name, share in (("basis", 0.0), ("both", 0.5)):
+        frames = kept_frames(positions, times, limit * share) if share else np.arange(len(positions))
+        if share and len(frames) == len(positions):
+            continue
+        found = basis(positions[frames], limit * (1 - share), most=min(most, MOST_TARGETS))
+        if found is not None:
+            most = len(found.shapes)
+            yield Form(name, found.base, found.shapes, frames, found.weights)
+
+
+def _one_hot(positions: AnyArray, kept: Ints) -> Form:
+    base = positions[kept[0]]
+    weights = np.concatenate((np.zeros((1, len(kept) - 1)), np.eye(len(kept) - 1)))
+    return Form("keyframes", base, positions[kept[1:]] - base, kept, weights)
+
+
+def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
+    """Farthest that a vertex of any frame is from where a viewer puts it."""
+    keys = times[form.frames].astype(np.float32)  # as the file has them
+    flat = form.targets.reshape(len(form.targets), form.base.size)
+    worst = 0.0
+    for first in range(0, len(positions), BATCH):
+        rows = slice(first, first + BATCH)
+        weights = np.empty((len(times[rows]), len(flat)), np.float32)
+        for i, column in enumerate(form.weights.T):
+            weights[:, i] = np.interp(times[rows], keys, column)
+        placed = form.base + (weights @ flat).reshape(-1, *form.base.shape)
+        off = (np.float32(form.scale) * placed - positions[rows]).astype(np.float64)
+        worst = max(worst, float(np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0))))
+    return worst
+
+
+def _write(cache: VertexCache, whole: Chunk, form: Form, outputs: Outputs, *, quantize: bool) -> None:
+    from pygltflib import Animation, AnimationChannel, AnimationChannelTarget, AnimationSampler, Mesh, Node
+
+    file = GlbFile()
+    gltf = file.gltf
+    indices = file.add_indices(cache.faces, cache.vertex_count)
+    attributes = {"POSITION": file.add(form.base.astype("<f4"), target=VERTICES, bounds=True)}
+    turns, along = _directions(whole.normals, form), _directions(whole.tangents, form)
+    if turns is not None:
+        attributes["NORMAL"] = file.add(turns[0].astype("<f4"), target=VERTICES)
+    if along is not None and cache.handedness is not None:
+        attributes["TANGENT"] = file.add(signed(along[0], cache.handedness), target=VERTICES)
+    targets = []
+    for i, target in enumerate(form.targets):
+        rows = np.rint(target * SHORT).astype("<i2") if quantize else target.astype("<f4")
+        entry = {"POSITION": file.add(rows, target=VERTICES, normalized=quantize, bounds=True)}
+        if turns is not None:
+            entry["NORMAL"] = file.add(turns[1 + i].astype("<f4"), target=VERTICES)
+        if along is not None:
+            entry["TANGENT"] = file.add(along[1 + i].astype("<f4"), target=VERTICES)
+        targets.append(entry)
+    first = [float(weight) for weight in form.weights[0]]
+    gltf.meshes.append(Mesh(primitives=[primitive(attributes, indices, targets)], weights=first or None))
+    scale = [form.scale] * 3 if form.scale != 1 else None
+    gltf.nodes.append(Node(name=NAME, mesh=0, scale=scale, extras={EXTRAS: {"cache": form.kind, "up": cache.up}}))
+    gltf.scenes[0].nodes.append(0)
+    if targets and len(form.frames) > 1:
+        sampler = AnimationSampler(
+            input=file.add(cache.times[form.frames].astype("<f4")[:, None], bounds=True),
+            output=file.add(form.weights.astype("<f4").reshape(-1, 1)),
+            interpolation="LINEAR",
+        )
+        channel = AnimationChannel(sampler=0, target=AnimationChannelTarget(node=0, path="weights"))
+        gltf.animations.append(Animation(name=NAME, channels=[channel], samplers=[sampler]))
+    if quantize and targets:
+        gltf.extensionsUsed = ["KHR_mesh_quantization"]
+        gltf.extensionsRequired = ["KHR_mesh_quantization"]
+    file.write(outputs, outputs.main)
+
+
+def _directions(normals: AnyArray | None, form: Form) -> AnyArray | None:
+    """Normals or tangents (1 + M, V, 3) of the base, unit, and of each target: the nearest that the weights allow."""
+    if normals is None:
+        return None
+    kept = normals[form.frames].astype(np.float64)
+    design = np.concatenate((np.ones((len(kept), 1)), form.weights), axis=1)
+    rcond = np.finfo(np.float64).eps * max(design.shape)
+    found = np.linalg.pinv(design, rcond) @ kept.reshape(len(kept), -1)  # as lstsq, a hundred times as fast
+    solved: AnyArray = found.reshape(-1, *normals.shape[1:])
+    length = np.maximum(np.linalg.norm(solved[0], axis=1, keepdims=True), 1e-3)
+    solved /= length  # a base normal has to be unit; scaling all of a vertex's normals turns none of them
+    up = np.where(np.abs(np.linalg.norm(solved[0], axis=1, keepdims=True) - 1) < 1e-6, solved[0], (0.0, 1.0, 0.0))
+    solved[0] = up
+    return solved
+
+
+def _notes(form: Form, frames: int) -> tuple[str, ...]:
+    words = {"keyframes": "a target per kept frame", "basis": "shapes and weights", "both": "shapes of kept frames"}
+    notes = [f"{len(form.targets)} morph targets ({words[form.kind]}), {len(form.frames)} keys for {frames} frames"]
+    if len(form.targets) > SURE_TARGETS:
+        notes.append(f"glTF promises {SURE_TARGETS} targets at a time; three.js, Babylon.js and Blender take hundreds")
+    return tuple(notes)

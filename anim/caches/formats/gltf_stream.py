@@ -1,0 +1,129 @@
+"""A GLB made from nothing by pygltflib, its numbers streamed into a file as they come."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import tempfile
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import anim
+from anim.arrays import AnyArray, Floats
+from anim.caches.storage import PIECE, Outputs
+from anim.errors import UnsupportedError
+from anim.gltf.io.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB
+
+if TYPE_CHECKING:
+    from pygltflib import GLTF2
+
+GENERATOR = f"gltf-anim {anim.__version__}"
+COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+VERTICES, INDICES = 34962, 34963  # targets of buffer views
+COLOR = (0.8, 0.55, 0.25, 1.0)  # of the body, linear RGBA
+
+
+class GlbFile:
+    """What a document needs to become a GLB. gltf: pygltflib's object, to which nodes, meshes and clips are added."""
+
+    def __init__(self) -> None:
+        from pygltflib import GLTF2, Asset, Material, PbrMetallicRoughness, Scene
+
+        surface = PbrMetallicRoughness(baseColorFactor=list(COLOR), metallicFactor=0.0, roughnessFactor=0.7)
+        self.gltf: GLTF2 = GLTF2(
+            asset=Asset(generator=GENERATOR, version="2.0"),
+            scene=0,
+            scenes=[Scene(nodes=[])],
+            materials=[Material(pbrMetallicRoughness=surface, doubleSided=True)],
+        )
+        self.size = 0
+        self._bin = tempfile.TemporaryFile()  # noqa: SIM115  closed by write()
+
+    def add(
+        self,
+        rows: AnyArray,
+        *,
+        target: int | None = None,
+        normalized: bool = False,
+        bounds: bool = False,
+        width: int | None = None,
+    ) -> int:
+        """Append rows (n, C), already of their stored type, and return the number of their accessor.
+
+        width: bytes from vertex to vertex where that is more than the row itself (rows of 3 shorts stand 8 apart).
+        """
+        from pygltflib import Accessor, BufferView
+
+        rows = np.ascontiguousarray(rows)
+        kind, stride = rows.dtype.str[1:], None
+        row_bytes = rows.shape[1] * rows.dtype.itemsize
+        if target == VERTICES and row_bytes % 4:
+            stride = row_bytes + -row_bytes % 4
+            wide = np.zeros((len(rows), stride // rows.dtype.itemsize), rows.dtype)
+            wide[:, : rows.shape[1]] = rows
+            data = wide.tobytes()
+        else:
+            data = rows.tobytes()
+        view = BufferView(buffer=0, byteOffset=self.size, byteLength=len(data), byteStride=stride, target=target)
+        self.gltf.bufferViews.append(view)
+        self._bin.write(data + bytes(-len(data) % 4))
+        self.size += len(data) + -len(data) % 4
+        accessor = Accessor(
+            bufferView=len(self.gltf.bufferViews) - 1,
+            byteOffset=None,
+            componentType=COMPONENTS[kind],
+            normalized=True if normalized else None,
+            count=len(rows),
+            type=TYPES[rows.shape[1]],
+        )
+        if bounds:
+            accessor.min, accessor.max = _numbers(rows.min(axis=0)), _numbers(rows.max(axis=0))
+        self.gltf.accessors.append(accessor)
+        return len(self.gltf.accessors) - 1
+
+    def add_indices(self, faces: AnyArray, vertices: int) -> int | None:
+        """Append triangles (T, 3) and return the number of their accessor, None where there are none."""
+        if not len(faces):
+            return None
+        return self.add(faces.reshape(-1, 1).astype("<u2" if vertices < 65535 else "<u4"), target=INDICES)
+
+    def write(self, outputs: Outputs, name: str) -> None:
+        """Write the GLB. Raises UnsupportedError beyond 4 GiB."""
+        from pygltflib import Buffer
+
+        self.gltf.buffers.append(Buffer(byteLength=self.size))
+        text = self.gltf.to_json(separators=(",", ":"), indent=None).encode()
+        text += b" " * (-len(text) % 4)
+        total = 12 + 8 + len(text) + 8 + self.size
+        if total > MAX_GLB:
+            raise UnsupportedError(f"a GLB can't hold {total} bytes (its limit is {MAX_GLB})")
+        with self._bin, outputs.create(name) as file:
+            file.write(struct.pack("<4sII", MAGIC, 2, total) + struct.pack("<II", len(text), JSON_CHUNK) + text)
+            file.write(struct.pack("<II", self.size, BIN_CHUNK))
+            self._bin.seek(0)
+            shutil.copyfileobj(self._bin, file, PIECE)
+
+
+def signed(tangents: AnyArray, handedness: Floats) -> AnyArray:
+    """Return TANGENT (V, 4) of unit tangents (V, 3) and their signs; one without a direction gets some, as it must."""
+    has = np.linalg.norm(tangents, axis=1, keepdims=True) > 0.5
+    return np.concatenate((np.where(has, tangents, (1, 0, 0)), handedness[:, None]), axis=1).astype("<f4")
+
+
+def primitive(attributes: dict[str, int], indices: int | None, targets: Sequence[dict[str, int]] = ()) -> Any:
+    """Return pygltflib's primitive with the file's only material: triangles, or points where there are no indices."""
+    from pygltflib import Attributes, Primitive
+
+    found = Primitive(attributes=Attributes(**attributes), indices=indices, material=0, mode=None)
+    if indices is None:
+        found.mode = 0
+    if targets:
+        found.targets = list(targets)
+    return found
+
+
+def _numbers(values: AnyArray) -> list[float]:
+    return [float(value) for value in values.tolist()]

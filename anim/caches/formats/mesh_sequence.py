@@ -1,0 +1,132 @@
+"""VertexCache ↔ a numbered file a frame: walk_00001.ply, walk_00002.ply, …; a single frame is walk.ply itself."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.caches import frame_blocks
+from anim.caches.formats import mesh_frame
+from anim.caches.options import Reading, Writing, Written
+from anim.caches.storage import Inputs, Outputs, whole
+from anim.caches.transforms import frame_spacing
+from anim.errors import FormatError
+from anim.model import Chunk, VertexCache
+
+DEFAULT_FPS = 24.0  # for files of others, which say nothing
+HEAD = 1024  # bytes in which our remark lies
+
+
+def read(inputs: Inputs, reading: Reading, *, ending: str) -> VertexCache:
+    """Return the frames that belong together: of walk.ply if it is there, else of all walk_*.ply in order.
+
+    All have the format that `ending` names, whatever they are called.
+    Frames that a longer sequence of ours left behind a shorter one are no part of it: the first file says how many are.
+    Raises FormatError where one of these is missing, as after a write that was killed.
+    Times are those that our own files say, else frames at `reading.fps` or 24 per second. The first frame gives the
+    faces; every other must have as many vertices.
+    """
+    names = members(inputs)
+    with whole(inputs, names[0]) as data:
+        first = mesh_frame.read(data, ending)
+    names = _of_one_sequence(inputs.main, names, first.remark.get("frames", ""))
+    return VertexCache(
+        _times(inputs, names, reading.fps),
+        len(first.positions),
+        first.faces,
+        lambda: _chunks(inputs, names, first, ending),
+        has_normals=first.normals is not None,
+        up=first.remark.get("up", "y"),
+    )
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+    """Write a file of the format `ending` for each frame, numbered from 1; the main file itself for the only one."""
+    faces: Ints = cache.faces
+    for chunk in cache.chunks():
+        for i, positions in enumerate(chunk.positions):
+            frame = chunk.first + i
+            normals = chunk.normals[i] if chunk.normals is not None and ending != ".stl" else None
+            remark = {"time": f"{cache.times[frame]:.9g}", "up": cache.up, "frames": str(cache.frame_count)}
+            name = outputs.main if cache.frame_count == 1 else numbered(outputs.main, frame + 1)
+            with outputs.create(name) as file:
+                file.write(mesh_frame.write(mesh_frame.Still(positions, faces, normals, remark), ending))
+    notes = ("STL keeps no order of vertices: each triangle has three of its own",) if ending == ".stl" else ()
+    return Written(notes=(*notes, *frame_spacing.notes(cache.times)))
+
+
+def numbered(name: str, number: int) -> str:
+    """Return the name of a frame's file: numbered("walk.ply", 7) → "walk_00007.ply"."""
+    return f"{_stem(name)}_{number:05d}{PurePath(name).suffix}"
+
+
+def belonging(main: str, names: Iterable[str]) -> Sequence[str]:
+    """Return those of the names that are numbered frames of `main`, in order."""
+    pattern = re.compile(re.escape(_stem(main)) + r"_(\d+)" + re.escape(PurePath(main).suffix))
+    found = sorted((int(match[1]), name) for name in names if (match := pattern.fullmatch(name)))
+    return [name for _, name in found]
+
+
+def members(inputs: Inputs) -> Sequence[str]:
+    """Return the files that are read for the main one: itself, or its frames. Raises FormatError where none is."""
+    names = inputs.names()
+    is_numbered = re.search(r"_\d+$", PurePath(inputs.main).stem) is not None
+    if inputs.main in names and not is_numbered:
+        return [inputs.main]
+    found = belonging(inputs.main, names)
+    if not found:
+        raise FormatError(f"is not there, nor is {numbered(inputs.main, 1)}")
+    return found
+
+
+def _of_one_sequence(main: str, names: Sequence[str], count: str) -> Sequence[str]:
+    """The frames that belong to the first of these files, of a sequence of ours; all, of others' (count is "")."""
+    if not count.isdecimal() or not int(count):
+        return names
+    if int(count) == 1:
+        return names[:1]
+    there = set(names)
+    wanted = [numbered(main, number) for number in range(1, min(int(count), len(names) + 1) + 1)]
+    if missing := next((name for name in wanted if name not in there), None):
+        raise FormatError(f"'{missing}' is not there (the sequence has {count} frames)", help="write all of it again")
+    return wanted
+
+
+def _stem(name: str) -> str:
+    return re.sub(r"_\d+$", "", PurePath(name).stem)
+
+
+def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
+    said = []
+    for name in names:
+        with inputs.open(name) as file:
+            said.append(mesh_frame.remark_of(file.read(HEAD)).get("time"))
+    if fps is None and None not in said:
+        try:
+            times = np.array(said, np.float64)
+        except ValueError:
+            times = np.zeros(len(names))
+        if np.isfinite(times).all() and times[0] >= 0 and (np.diff(times) > 0).all():
+            return times
+    return np.arange(len(names)) / (fps or DEFAULT_FPS)
+
+
+def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.Still, ending: str) -> Iterator[Chunk]:
+    vertices, has_normals = len(start.positions), start.normals is not None
+    step = frame_blocks.per_chunk(vertices)
+    for first in range(0, len(names), step):
+        stills = []
+        for name in names[first : first + step]:
+            with whole(inputs, name) as data:
+                frame = mesh_frame.read(data, ending)
+            if len(frame.positions) != vertices:
+                raise FormatError(f"'{name}' has {len(frame.positions)} vertices (the first has {vertices})")
+            if has_normals and frame.normals is None:
+                raise FormatError(f"'{name}' has no normals (the first has)")
+            stills.append(frame)
+        normals = np.stack([f.normals for f in stills if f.normals is not None]) if has_normals else None
+        yield Chunk(first, np.stack([frame.positions for frame in stills]), normals)

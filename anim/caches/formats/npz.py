@@ -1,0 +1,250 @@
+"""VertexCache ↔ .npz: the lossless hub, a zip of numpy arrays that `np.load` reads.
+
+| array | shape, type | what |
+|---|---|---|
+| positions | (F, V, 3) float32 | m |
+| normals | (F, V, 3) float32 | absent without normals |
+| tangents | (F, V, 3) float32 | absent without tangents |
+| handedness | (V,) int8 | ±1, of tangents: bitangent = normal × tangent · handedness |
+| times | (F,) float64 | s |
+| faces | (T, 3) int32 | triangles, counterclockwise |
+| rest | (V, 3) float32, float64 where that is too coarse | m; absent where unknown |
+| meta | () unicode, JSON | schema, up, parts: [{name, vertices: [first, end], faces: [first, end], node, material}] |
+
+Only positions, times and faces have to be there. Members are stored without compression, so that positions are written
+and read frame by frame; compressed members (`np.savez_compressed`) are read too.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from anim.arrays import AnyArray, Floats
+from anim.caches import frame_blocks
+from anim.caches.options import Reading, Writing, Written
+from anim.caches.storage import PIECE, Inputs, Outputs
+from anim.errors import AnimError, FormatError
+from anim.model import Chunk, Part, VertexCache
+
+SCHEMA = 1
+DIRECTIONS = ("normals", "tangents")
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every member: same cache, same bytes
+
+
+def read(inputs: Inputs, reading: Reading) -> VertexCache:
+    """Return the cache in the main file; frames are read when they are asked for, a chunk at a time."""
+    with inputs.open(inputs.main) as file, _opened(file) as archive:
+        shape = _shape(archive, "positions")
+        if shape is None:
+            raise FormatError("has no array 'positions' (expected positions, times and faces)")
+        present = tuple(name for name in DIRECTIONS if _shape(archive, name) is not None)
+        for name in present:
+            if _shape(archive, name) != shape:
+                raise FormatError(f"{name} have another shape than positions, {shape}")
+        times, faces, rest, signs = (_array(archive, name) for name in ("times", "faces", "rest", "handedness"))
+        meta = _meta(archive)
+    if times is None or faces is None:
+        raise FormatError(f"has no array '{'times' if times is None else 'faces'}'")
+    if len(times) != shape[0] or faces.shape[1:] != (3,) or (rest is not None and rest.shape != (shape[1], 3)):
+        raise FormatError(f"times {times.shape}, faces {faces.shape} and positions {shape} don't fit together")
+    if ("tangents" in present) != (signs is not None) or (signs is not None and signs.shape != (shape[1],)):
+        raise FormatError("tangents and handedness don't go together (expected both, a sign for each vertex)")
+    if faces.size and (faces.min() < 0 or faces.max() >= shape[1]):
+        raise FormatError(f"a face uses vertex {faces.max() if faces.min() >= 0 else faces.min()} of {shape[1]}")
+    return VertexCache(
+        times.astype(np.float64),
+        shape[1],
+        faces.astype(np.int64),
+        lambda: _chunks(inputs, shape, present),
+        rest=None if rest is None else rest.astype(np.float64),
+        has_normals="normals" in present,
+        parts=parts_of(meta),
+        up="z" if meta.get("up") == "z" else "y",
+        handedness=None if signs is None else signs.astype(np.float64),
+    )
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+    """Write the cache into the main file, frame by frame; nothing is lost."""
+    with (
+        outputs.create(outputs.main) as file,
+        zipfile.ZipFile(file, "w") as archive,
+        ExitStack() as stack,
+    ):
+        _put(archive, "times", cache.times)
+        _put(archive, "faces", cache.faces.astype("<i4"))
+        if cache.rest is not None:
+            _put(archive, "rest", _rest(cache.rest))
+        if cache.handedness is not None:
+            _put(archive, "handedness", np.where(cache.handedness < 0, -1, 1).astype("<i1"))
+        _put(archive, "meta", np.array(json.dumps(about(cache))))
+        shape = (cache.frame_count, cache.vertex_count, 3)
+        wanted = [name for name, has in zip(DIRECTIONS, (cache.has_normals, cache.has_tangents), strict=True) if has]
+        aside = {name: stack.enter_context(tempfile.TemporaryFile()) for name in wanted}  # they come with positions
+        with _member(archive, "positions", shape) as member:
+            for chunk in cache.chunks():
+                member.write(np.ascontiguousarray(chunk.positions, "<f4").data)
+                for name, file_aside in aside.items():
+                    file_aside.write(np.ascontiguousarray(getattr(chunk, name), "<f4").data)
+        for name, file_aside in aside.items():
+            file_aside.seek(0)
+            with _member(archive, name, shape) as member:
+                while piece := file_aside.read(PIECE):
+                    member.write(piece)
+    return Written()
+
+
+def _opened(file: BinaryIO) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(file)
+    except (zipfile.BadZipFile, OSError, ValueError) as error:
+        raise FormatError(f"is no .npz ({str(error).lower()})") from None
+
+
+def _reads(job: Callable[[], Any]) -> Any:
+    """The result of a job on a zip; whatever a broken one raises becomes a FormatError."""
+    try:
+        return job()
+    except AnimError:
+        raise
+    except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError, RuntimeError) as error:
+        raise FormatError(f"is damaged ({' '.join(str(error).lower().split())})") from None
+    except Exception as error:
+        if type(error).__name__ != "error":  # zlib.error
+            raise
+        raise FormatError(f"is damaged ({error})") from None
+
+
+def _header(member: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    version = npy.read_magic(member)
+    header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, fortran, dtype = header(member)
+    if (fortran and len(shape) > 1) or dtype.kind not in "fiuU":
+        raise FormatError(f"array '{name}' has an order or type that is not handled ({dtype})")
+    return shape, dtype
+
+
+def _shape(archive: zipfile.ZipFile, name: str) -> tuple[int, ...] | None:
+    if f"{name}.npy" not in archive.namelist():
+        return None
+
+    def shape() -> tuple[int, ...]:
+        with archive.open(f"{name}.npy") as member:
+            found, _ = _header(member, name)
+        if len(found) != 3 or found[2] != 3:
+            raise FormatError(f"array '{name}' has shape {found} (expected (F, V, 3))")
+        return found
+
+    return _reads(shape)  # type: ignore[no-any-return]
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> AnyArray | None:
+    if f"{name}.npy" not in archive.namelist():
+        return None
+
+    def array() -> AnyArray:
+        with archive.open(f"{name}.npy") as member:
+            shape, dtype = _header(member, name)
+            data = member.read()
+        if len(data) != dtype.itemsize * int(np.prod(shape)):
+            raise FormatError(f"array '{name}' has {len(data)} bytes for shape {shape}")
+        found: AnyArray = np.frombuffer(data, dtype).reshape(shape)
+        if dtype.kind == "f" and not np.isfinite(found).all():
+            raise FormatError(f"array '{name}' holds NaN or infinity")
+        return found
+
+    return _reads(array)  # type: ignore[no-any-return]
+
+
+def _meta(archive: zipfile.ZipFile) -> dict[str, Any]:
+    text = _array(archive, "meta")
+    try:
+        meta = json.loads(str(text)) if text is not None else {}
+    except ValueError:
+        raise FormatError("array 'meta' is no JSON") from None
+    return meta if isinstance(meta, dict) else {}
+
+
+def parts_of(meta: dict[str, Any]) -> tuple[Part, ...]:
+    """Return the parts that `meta` lists. Raises FormatError where they are not understood."""
+    try:
+        return tuple(
+            Part(str(p["name"]), _pair(p["vertices"]), _pair(p["faces"]), int(p["node"]), int(p["material"]))
+            for p in meta.get("parts", ())
+        )
+    except (KeyError, TypeError, ValueError):
+        raise FormatError("array 'meta' has parts that are not understood") from None
+
+
+def _pair(values: list[int]) -> tuple[int, int]:
+    first, end = values
+    return int(first), int(end)
+
+
+def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> Iterator[Chunk]:
+    frames, vertices = shape[:2]
+    with ExitStack() as stack:
+        following = {
+            name: _frames(_opened(stack.enter_context(inputs.open(inputs.main))), name, shape)
+            for name in ("positions", *present)
+        }
+        step = frame_blocks.per_chunk(vertices)
+        for start in range(0, frames, step):
+            count = min(step, frames - start)
+            yield Chunk(start, **{name: rows(count) for name, rows in following.items()})
+
+
+def _frames(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> Callable[[int], AnyArray]:
+    """What gives the next frames of a member, again and again."""
+    member = archive.open(f"{name}.npy")
+    _, dtype = _header(member, name)
+    per_frame = shape[1] * 3 * dtype.itemsize
+
+    def following(count: int) -> AnyArray:
+        data = _reads(lambda: member.read(count * per_frame))
+        if len(data) < count * per_frame:
+            raise FormatError(f"is truncated: array '{name}' ends early")
+        found = np.frombuffer(data, dtype).reshape(count, shape[1], 3).astype(np.float32, copy=False)
+        if not np.isfinite(found).all():
+            raise FormatError(f"array '{name}' holds NaN or infinity")
+        return found
+
+    return following
+
+
+def _put(archive: zipfile.ZipFile, name: str, array: AnyArray) -> None:
+    with archive.open(_info(name), "w") as member:
+        npy.write_array(member, np.ascontiguousarray(array).reshape(array.shape), allow_pickle=False)
+
+
+def _member(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> IO[bytes]:
+    """A member for float32 of this shape, its header written, open for the numbers."""
+    member = archive.open(_info(name), "w", force_zip64=True)
+    npy.write_array_header_1_0(member, {"descr": "<f4", "fortran_order": False, "shape": shape})
+    return member
+
+
+def _info(name: str) -> zipfile.ZipInfo:
+    return zipfile.ZipInfo(f"{name}.npy", EPOCH)
+
+
+def _rest(rest: Floats) -> AnyArray:
+    small = rest.astype("<f4")
+    return small if np.array_equal(small, rest) else rest
+
+
+def about(cache: VertexCache) -> dict[str, Any]:
+    """Return what `meta` says of a cache."""
+    parts = [
+        {"name": p.name, "vertices": list(p.vertices), "faces": list(p.faces), "node": p.node, "material": p.material}
+        for p in cache.parts
+    ]
+    return {"schema": SCHEMA, "up": cache.up, "parts": parts}

@@ -1,0 +1,78 @@
+"""VertexCache ↔ .pc2, the point cache of 3ds Max and Blender: little-endian, even steps, no frame rate.
+
+32 bytes: "POINTCACHE2\\0", int32 version 1, int32 points, float32 start frame, float32 frames per sample, int32
+samples; then float32 xyz of every point, sample by sample (as Blender's own exporter writes it). A rest mesh beside it
+has its vertices in the same order and keeps the frame rate in a comment.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.caches import frame_blocks, rest_mesh
+from anim.caches.options import Reading, Writing, Written
+from anim.caches.storage import Inputs, Outputs, read_exactly
+from anim.caches.transforms import frame_spacing
+from anim.errors import FormatError, RangeError
+from anim.model import VertexCache
+
+MAGIC = b"POINTCACHE2\0"
+HEADER = struct.Struct("<12siiffi")
+DEFAULT_FPS = 24.0  # Blender's own default, for files of others that say nothing
+
+
+def read(inputs: Inputs, reading: Reading) -> VertexCache:
+    """Return the cache in the main file, with the faces of the rest mesh beside it where there is one.
+
+    Frames per second: `reading.fps`, or what the rest mesh says, or 24.
+    """
+    with inputs.open(inputs.main) as file:
+        data = read_exactly(file, HEADER.size, "the header")
+        magic, version, points, start, step, samples = HEADER.unpack(data)
+        if magic != MAGIC or version != 1:
+            raise FormatError(f"is no PC2: starts with {magic!r}, version {version} (expected {MAGIC!r}, 1)")
+        if not (np.isfinite(start) and np.isfinite(step) and step > 0):
+            raise FormatError(f"header has start frame {start:g} and {step:g} frames per sample")
+        frame_blocks.check_size(file, HEADER.size, samples, points)
+    beside = rest_mesh.read(inputs, HEADER.size, samples, points, reading.note)
+    fps = reading.fps or beside.fps or DEFAULT_FPS
+    times = np.round((start + step * np.arange(samples)) / fps, 9)
+    return VertexCache(
+        times - min(times[0], 0.0),
+        points,
+        beside.faces,
+        lambda: frame_blocks.chunks(inputs, HEADER.size, samples, points, "<f4"),
+        rest=beside.positions,
+        up=beside.up,
+    )
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+    """Write the cache and a rest mesh beside it. Raises RangeError where frames don't come at even steps."""
+    fps, notes = _rate(cache.times)
+    notes += (f"PC2 keeps no frame rate: play it at {fps:g} frames per second",)
+    start = round(float(cache.times[0]) * fps, 6)
+    with outputs.create(outputs.main) as file:
+        file.write(HEADER.pack(MAGIC, 1, cache.vertex_count, start, 1.0, cache.frame_count))
+        mark = frame_blocks.write(cache, file, "<f4")
+    rest_mesh.write(cache, outputs, writing.rest, mark, fps=fps)
+    return Written(notes=notes)
+
+
+def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
+    """Frames per second, and what has to be said about the last frame, which may come early at a clip's end."""
+    if len(times) == 1:
+        return DEFAULT_FPS, ()
+    step, off = frame_spacing.pace(times)
+    if off[:-1].max() > frame_spacing.EVEN:
+        k = int(np.argmax(off[:-1] > frame_spacing.EVEN))
+        raise RangeError(
+            f"PC2 has frames at even steps, and frame {k} at {times[k]:.4g} s is off them", help="choose --fps"
+        )
+    fps = float(f"{1 / step:.6g}")
+    if off[-1] > frame_spacing.EVEN:
+        return fps, (f"{frame_spacing.late(times, off)}; PC2 shows it one step after the one before",)
+    return fps, ()

@@ -1,0 +1,183 @@
+"""USD → VertexCache: all meshes of a stage, through usd-core (extra `usd`)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.caches import frame_blocks, temporary_files
+from anim.caches.formats import usd_writer
+from anim.caches.formats.npz import parts_of
+from anim.caches.options import Reading
+from anim.caches.storage import Inputs
+from anim.errors import FormatError
+from anim.model import Chunk, VertexCache
+
+
+def read(inputs: Inputs, reading: Reading) -> VertexCache:
+    """Return all meshes of the stage in one cache, in metres, at every time at which one has points.
+
+    Meshes are placed by their transforms and follow each other in the order of the stage; polygons become triangles.
+    Raises UnsupportedError without usd-core, FormatError where the stage has no mesh.
+    """
+    with _opened(inputs) as stage:
+        codes, rate, faces, still = stage.codes(), reading.fps or stage.rate, stage.faces(), stage.positions(None)
+    parts = parts_of(stage.kept)
+    return VertexCache(
+        codes / rate - min(codes[0] / rate, 0.0),
+        stage.vertices,
+        faces,
+        lambda: _chunks(inputs, codes, stage.vertices, stage.has_normals, stage.handedness is not None),
+        rest=None if still is None else still * stage.unit,
+        has_normals=stage.has_normals,
+        parts=parts if parts and parts[-1].vertices[1] == stage.vertices else (),
+        up=stage.up,
+        handedness=stage.handedness,
+    )
+
+
+@contextmanager
+def _opened(inputs: Inputs) -> Iterator[_Stage]:
+    """Give the stage in the main file; whatever usd-core finds wrong with it becomes a FormatError."""
+    usd_writer.package()
+    from pxr import Tf
+
+    with temporary_files.readable(inputs, inputs.main, ".usd") as path:
+        try:
+            with temporary_files.hushed():
+                stage = _Stage(path)
+            yield stage
+        except (Tf.ErrorException, UnicodeDecodeError):  # its own words are about its source code, and not always text
+            raise FormatError("is no USD that can be read") from None
+
+
+class _Stage:
+    """The meshes of a stage, opened from an input."""
+
+    def __init__(self, path: str) -> None:
+        stages, geom, _ = usd_writer.package()
+        self._stage = stages.Stage.Open(path)
+        self._geom, self._default = geom, stages.TimeCode.Default()
+        self._meshes = [geom.Mesh(prim) for prim in self._stage.Traverse() if prim.IsA(geom.Mesh)]
+        counts = [len(self._points(mesh)) for mesh in self._meshes]
+        self._ends = np.cumsum([0, *counts])
+        self.vertices = int(self._ends[-1])
+        if not self.vertices:
+            raise FormatError("has no mesh with points")
+        self.rate = float(self._stage.GetTimeCodesPerSecond()) or usd_writer.DEFAULT_FPS
+        self.unit = float(geom.GetStageMetersPerUnit(self._stage))
+        self.up = "z" if geom.GetStageUpAxis(self._stage) == geom.Tokens.z else "y"
+        self.has_normals = all(self._normals(mesh, self._first(mesh)) is not None for mesh in self._meshes)
+        self.handedness = self._handedness()
+        try:
+            self.kept = json.loads(self._stage.GetRootLayer().customLayerData.get(usd_writer.KEY, "{}"))
+        except (ValueError, TypeError):
+            self.kept = {}
+
+    def codes(self) -> Floats:
+        """Time codes at which any mesh has points; one at 0 where nothing moves."""
+        found = {code for mesh in self._meshes for code in mesh.GetPointsAttr().GetTimeSamples()}
+        return np.array(sorted(found) or [0.0])
+
+    def faces(self) -> Ints:
+        """Triangles (T, 3) of all meshes."""
+        found = [np.empty((0, 3), np.int64)]
+        for mesh, first, end in zip(self._meshes, self._ends, self._ends[1:], strict=False):
+            counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], np.int64)
+            corners = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], np.int64)
+            fits = counts.sum() == len(corners) and counts.min(initial=0) >= 0
+            if not fits or (corners.size and not 0 <= corners.min() <= corners.max() < end - first):
+                raise FormatError(f"{mesh.GetPath()}: faces don't fit the points")
+            found.append(_fans(counts, corners) + first)
+        return np.concatenate(found)
+
+    def positions(self, code: float | None) -> Floats | None:
+        """Points of all meshes at a time code, None for the default ones where a mesh has none."""
+        rows = []
+        for mesh in self._meshes:
+            points = np.asarray(mesh.GetPointsAttr().Get(self._default if code is None else code) or (), np.float64)
+            if not len(points) and code is None:
+                return None
+            matrix = np.array(mesh.ComputeLocalToWorldTransform(self._default if code is None else code))
+            rows.append(points.reshape(-1, 3) @ matrix[:3, :3] + matrix[3, :3])
+        return np.concatenate(rows)
+
+    def normals(self, code: float) -> Floats:
+        """Normals of all meshes at a time code, turned as their meshes."""
+        return self._turned(self._normals, code, lambda matrix: np.asarray(np.linalg.inv(matrix).T, np.float64))
+
+    def tangents(self, code: float) -> Floats:
+        """Tangents of all meshes at a time code, turned as their meshes."""
+        return self._turned(self._tangents, code, lambda matrix: matrix)
+
+    def _turned(self, of: Callable[[Any, Any], Any], code: float, turn: Callable[[Floats], Floats]) -> Floats:
+        """Unit directions of all meshes, as rows times what `turn` makes of each mesh's matrix (3, 3)."""
+        rows = []
+        for mesh in self._meshes:
+            matrix = np.array(mesh.ComputeLocalToWorldTransform(code))[:3, :3]
+            turned = np.asarray(of(mesh, code), np.float64)[:, :3] @ turn(matrix)
+            rows.append(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30))
+        return np.concatenate(rows)
+
+    def _handedness(self) -> Floats | None:
+        found = [self._tangents(mesh, self._first(mesh)) for mesh in self._meshes]
+        signs = [np.asarray(each, np.float64)[:, 3] for each in found if each is not None]
+        return np.concatenate(signs) if len(signs) == len(found) else None
+
+    def _tangents(self, mesh: Any, code: Any) -> Any:
+        primvar = self._geom.PrimvarsAPI(mesh).GetPrimvar(usd_writer.TANGENTS)
+        found = primvar.Get(code) if primvar and primvar.GetInterpolation() == self._geom.Tokens.vertex else None
+        fits = found is not None and np.shape(found) == (len(self._points(mesh)), 4)
+        return found if fits else None
+
+    def _first(self, mesh: Any) -> Any:
+        samples = mesh.GetPointsAttr().GetTimeSamples()
+        return samples[0] if samples else self._default
+
+    def _points(self, mesh: Any) -> Any:
+        return mesh.GetPointsAttr().Get(self._first(mesh)) or ()
+
+    def _normals(self, mesh: Any, code: Any) -> Any:
+        if mesh.GetNormalsInterpolation() not in (self._geom.Tokens.vertex, self._geom.Tokens.varying):
+            return None
+        found = mesh.GetNormalsAttr().Get(code)
+        return found if found is not None and len(found) == len(self._points(mesh)) else None
+
+
+def _fans(counts: Ints, corners: Ints) -> Ints:
+    if (counts == 3).all():
+        return corners.reshape(-1, 3)
+    first = np.cumsum(counts) - counts
+    triangles = [
+        np.stack([np.full(n - 2, start), start + 1 + np.arange(n - 2), start + 2 + np.arange(n - 2)], axis=1)
+        for start, n in zip(first.tolist(), counts.tolist(), strict=True)
+        if n >= 3
+    ]
+    chosen: Ints = corners[np.concatenate([np.empty((0, 3), np.int64), *triangles])]
+    return chosen
+
+
+def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangents: bool) -> Iterator[Chunk]:
+    step = frame_blocks.per_chunk(vertices)
+    with _opened(inputs) as stage:
+        for first in range(0, len(codes), step):
+            some = codes[first : first + step].tolist()
+            with temporary_files.hushed():
+                rows = [_checked(stage.positions(code), vertices, code) for code in some]
+            positions = np.stack(rows) * stage.unit
+            wanted = ((normals, stage.normals), (tangents, stage.tangents))
+            turned = (np.stack([of(code) for code in some]).astype(np.float32) if want else None for want, of in wanted)
+            yield Chunk(first, positions.astype(np.float32), *turned)
+
+
+def _checked(rows: Floats | None, vertices: int, code: float) -> Floats:
+    if rows is None or len(rows) != vertices:
+        raise FormatError(f"has {0 if rows is None else len(rows)} points at time code {code:g} (expected {vertices})")
+    if not np.isfinite(rows).all():
+        raise FormatError(f"holds NaN or infinity at time code {code:g}")
+    return rows

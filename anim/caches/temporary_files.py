@@ -1,0 +1,52 @@
+"""Temporary files for packages that write and read only by path (usd-core, OpenEXR)."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+
+from anim.caches.storage import PIECE, Inputs, Outputs
+
+
+@contextmanager
+def written(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
+    """Give a path of this ending to write to; what lies there at the end becomes the output `name`."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"output{ending}"
+        yield str(path)
+        with path.open("rb") as source, outputs.create(name) as target:
+            shutil.copyfileobj(source, target, PIECE)
+
+
+@contextmanager
+def readable(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
+    """Give a path at which the bytes of an input can be read."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"input{ending}"
+        with inputs.open(name) as source, path.open("wb") as target:
+            shutil.copyfileobj(source, target, PIECE)
+        yield str(path)
+
+
+@contextmanager
+def hushed() -> Iterator[None]:
+    """Keep a package written in C++ from printing: what it finds wrong is said by us, in one line."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # stderr is closed: nothing to keep
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        with redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

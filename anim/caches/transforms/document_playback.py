@@ -1,0 +1,59 @@
+"""A glTF document as it plays → VertexCache: skins by linear blend, morph targets, nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import NotFoundError
+from anim.gltf.document import Document, items
+from anim.gltf.reading import reader
+from anim.model import Clip, VertexCache
+from anim.sampling import grid
+from anim.skinning.analysis.weight_sums import bad_sums
+from anim.skinning.bake import bake
+
+
+def play(
+    document: Document, *, clip: int = 0, fps: float | None = None, note: Callable[[str], None] = lambda _: None
+) -> VertexCache:
+    """Return every vertex of the file while a clip plays, in world space, nodes depth-first, primitives in order.
+
+    At `fps` frames per second, else at the clip's own keys; without clips the rest pose. The cache's `chosen` says
+    which clip it is. A file that we wrote says which axis is up. note: is told of skin weights that don't add up to 1.
+    Raises NotFoundError where the file has no vertices.
+    """
+    scene, clips = reader.scene(document), reader.clips(document)
+    for bad in bad_sums(scene.instances):
+        for words in bad.in_words():
+            note(words)
+    chosen = clips[clip] if clips else Clip("", ())
+    if not scene.vertex_count:
+        raise NotFoundError("has no mesh with vertices")
+    times = grid(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
+    said = f"{reader.label(chosen.name, clip)}, one of {len(clips)}" if len(clips) > 1 else ""
+    return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
+
+
+def directions(document: Document) -> tuple[str, ...]:
+    """Return "normals" and "tangents" where a mesh has them, which `play` leaves out."""
+    primitives = [each for mesh in items(document.json, "meshes") for each in mesh.get("primitives", [])]
+    return tuple(
+        word
+        for word, name in (("normals", "NORMAL"), ("tangents", "TANGENT"))
+        if any(name in each.get("attributes", {}) for each in primitives)
+    )
+
+
+def _keys(clip: Clip) -> Floats:
+    axes = clip.axes
+    return np.unique(np.concatenate(axes)) if axes else np.zeros(1)
+
+
+def _up(document: Document) -> str:
+    extras = [node.get("extras") for node in items(document.json, "nodes")]
+    said = [each.get("gltf_anim") for each in extras if isinstance(each, dict)]
+    return "z" if any(isinstance(each, dict) and each.get("up") == "z" for each in said) else "y"

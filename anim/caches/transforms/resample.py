@@ -1,0 +1,96 @@
+"""A cache at other times: vertices go in straight lines from frame to frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats, Ints
+from anim.caches.frame_blocks import per_chunk
+from anim.errors import RangeError
+from anim.model import Chunk, VertexCache
+from anim.sampling import grid
+
+Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents of one frame
+
+SAME = 1e-6  # s; times closer than this are the same frame
+
+
+def at_times(cache: VertexCache, times: Floats) -> VertexCache:
+    """Return the cache with frames at increasing `times` (F,) in seconds; outside the frames it holds still.
+
+    Memory: some frames of the old cache and a chunk of the new.
+    """
+    if len(times) == cache.frame_count and np.abs(times - cache.times).max() < SAME:
+        return cache
+    last = cache.frame_count - 1
+    left = np.clip(np.searchsorted(cache.times, times + SAME, side="right") - 1, 0, last)
+    right = np.minimum(left + 1, last)
+    span = cache.times[right] - cache.times[left]
+    share = np.clip((times - cache.times[left]) / np.where(span > 0, span, 1.0), 0.0, 1.0)
+    share[np.abs(times - cache.times[left]) < SAME] = 0.0
+    return replace(cache, times=times, chunks=lambda: _chunks(cache, left, right, share))
+
+
+def at_rate(cache: VertexCache, fps: float) -> VertexCache:
+    """Return the cache with frames at start + k / fps, and one at its end. Raises RangeError unless fps is above 0."""
+    return at_times(cache, grid(float(cache.times[0]), float(cache.times[-1]), fps=fps))
+
+
+def at_time(cache: VertexCache, time: float) -> VertexCache:
+    """Return the cache with one frame, at `time` in seconds. Raises RangeError for one outside the cache."""
+    first, last = float(cache.times[0]), float(cache.times[-1])
+    if not first - SAME <= time <= last + SAME:
+        raise RangeError(f"there is no frame at {time:g} s (the cache goes from {first:g} s to {last:g} s)")
+    return at_times(cache, np.array([min(max(time, first), last)]))
+
+
+def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Iterator[Chunk]:
+    """New frames in chunks, from one pass over the old ones."""
+    step = per_chunk(cache.vertex_count)
+    window = _Window(cache)
+    for first in range(0, len(left), step):
+        rows = range(first, min(first + step, len(left)))
+        found = [window.between(int(left[i]), int(right[i]), np.float32(share[i])) for i in rows]
+        positions, normals, tangents = (_stacked(arrays) for arrays in zip(*found, strict=True))
+        assert positions is not None
+        yield Chunk(first, positions, normals, tangents)
+
+
+class _Window:
+    """The last frames that were read of a cache."""
+
+    def __init__(self, cache: VertexCache) -> None:
+        self._chunks = cache.chunks()
+        self._kept: dict[int, Frame] = {}
+        self._read = 0
+
+    def between(self, left: int, right: int, share: np.float32) -> Frame:
+        while self._read <= right:
+            chunk = next(self._chunks)
+            self._kept = {frame: arrays for frame, arrays in self._kept.items() if frame >= left}
+            for i in range(len(chunk.positions)):
+                self._kept[chunk.first + i] = tuple(None if each is None else each[i] for each in _arrays(chunk))
+            self._read = chunk.first + len(chunk.positions)
+        start, end = self._kept[left], self._kept[right]
+        if share == 0 or left == right:
+            return start
+        mixed = [None if a is None or b is None else a + share * (b - a) for a, b in zip(start, end, strict=True)]
+        return mixed[0], *(None if each is None else _unit(each) for each in mixed[1:])
+
+
+def _stacked(arrays: tuple[AnyArray | None, ...]) -> AnyArray | None:
+    there = [each for each in arrays if each is not None]
+    return np.stack(there) if len(there) == len(arrays) else None
+
+
+def _arrays(chunk: Chunk) -> Frame:
+    return chunk.positions, chunk.normals, chunk.tangents
+
+
+def _unit(vectors: AnyArray) -> AnyArray:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1)

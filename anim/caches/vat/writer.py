@@ -1,0 +1,190 @@
+"""VertexCache ↔ textures: a vertex is a column, a frame a row (or some rows), for shaders to read.
+
+| file | what |
+|---|---|
+| NAME.exr or .png | positions: pixel x, y of vertex v in frame f: x = v % width, y = f · rows_per_frame + v // width |
+| NAME.exr-normal.exr | normals in the same pixels, n · ½ + ½ in a PNG; only where the cache has them |
+| NAME.exr.json | what a shader needs to know: see `texture_about` |
+| NAME.exr-mesh.glb | the mesh at rest; its TEXCOORD_1 is the middle of each vertex's pixel in frame 0 |
+
+Beside a NAME.png they are NAME.png-normal.png, NAME.png.json and NAME.png-mesh.glb.
+
+Row 0 is at the top of the file. A pixel p means position = offset + scale · p, plus the mesh at rest where `encoding`
+is "offset"; PNG numbers count from 0 to 1. EXR of floats is lossless and absolute; half floats and PNG are offsets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.caches import rest_mesh
+from anim.caches.formats import exr, png
+from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive
+from anim.caches.options import Writing, Written
+from anim.caches.storage import Outputs, beside
+from anim.caches.transforms import frame_spacing
+from anim.caches.vat import metadata, presets
+from anim.caches.vat.presets import Preset
+from anim.errors import RangeError
+from anim.model import VertexCache
+
+MAX_WIDTH, MAX_HEIGHT = 4096, 8192  # pixels that desktop engines take
+UNORM = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Where vertices lie. width: pixels. rows: of a frame."""
+
+    width: int
+    rows: int
+    frames: int
+
+    @property
+    def height(self) -> int:
+        """Pixels from top to bottom."""
+        return self.rows * self.frames
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """How numbers become pixels: number = offset + scale · pixel, (3,) each; kind: float, half or unorm16."""
+
+    kind: str
+    offset: Floats
+    scale: Floats
+
+    def pixels(self, numbers: AnyArray) -> AnyArray:
+        """Return the pixels that stand for numbers (..., 3)."""
+        if self.kind == "unorm16":
+            return np.rint((numbers - self.offset) / self.scale * UNORM).clip(0, UNORM).astype(np.uint16)
+        return numbers.astype(exr.TYPES[self.kind])
+
+    def numbers(self, pixels: AnyArray) -> Floats:
+        """Return what pixels (..., 3) stand for."""
+        shares = pixels / UNORM if self.kind == "unorm16" else pixels.astype(np.float64)
+        return self.offset + self.scale * shares
+
+
+def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+    """Write textures as ".exr" or ".png", JSON and mesh. Raises RangeError for more than 4096 × 8192 pixels."""
+    engine = presets.preset(writing.preset, ending)
+    grid = _grid(cache)
+    kind = "unorm16" if ending == ".png" else writing.depth
+    if kind not in ("unorm16", *exr.TYPES):
+        raise RangeError(f"depth is '{kind}' (expected {', '.join(exr.TYPES)})")
+    still = rest_mesh.positions(cache)
+    base = np.zeros_like(still) if kind == "float" else presets.to_engine(still, engine)
+    packed = _packed(cache, engine, base, kind)
+    worst = _write_image(_bands(cache, engine, base, packed), outputs, outputs.main, grid, packed)
+    about = metadata.About(
+        writing.preset, outputs.main, None, beside(outputs.main, "-mesh.glb"), packed.kind, grid.width, grid.rows,
+        "absolute" if kind == "float" else "offset", tuple(packed.offset.tolist()), tuple(packed.scale.tolist()),
+        cache.vertex_count, tuple(cache.times.tolist()), cache.up,
+    )  # fmt: skip
+    if cache.has_normals:
+        name = beside(outputs.main, f"-normal{ending}")
+        turned = of_directions(kind)
+        _write_image(_normal_bands(cache, engine, turned), outputs, name, grid, turned)
+        about = about.with_normals(name)
+    _write_mesh(cache, still, grid, engine, outputs, about.mesh)
+    with outputs.create(f"{outputs.main}.json") as file:
+        file.write(metadata.text(about, engine))
+    return Written(worst / engine.per_meter, (*engine.advice, *frame_spacing.notes(cache.times)))
+
+
+def _grid(cache: VertexCache) -> Grid:
+    rows = max(-(-cache.vertex_count // MAX_WIDTH), 1)
+    found = Grid(-(-cache.vertex_count // rows), rows, cache.frame_count)
+    if found.height > MAX_HEIGHT:
+        most = MAX_HEIGHT // rows
+        raise RangeError(
+            f"{cache.frame_count} frames of {rows} rows don't fit into a texture (at most {most})",
+            help="choose fewer frames with --fps, or cut the clip",
+        )
+    return found
+
+
+def of_directions(kind: str) -> Packed:
+    """Return how numbers from −1 to 1 become pixels."""
+    return Packed(kind, np.full(3, -1.0), np.full(3, 2.0)) if kind == "unorm16" else _plain(kind)
+
+
+def _plain(kind: str) -> Packed:
+    return Packed(kind, np.zeros(3), np.ones(3))
+
+
+def _packed(cache: VertexCache, engine: Preset, base: AnyArray, kind: str) -> Packed:
+    if kind != "unorm16":
+        return _plain(kind)
+    least, most = np.full(3, np.inf), np.full(3, -np.inf)
+    for chunk in cache.chunks():
+        moved = presets.to_engine(chunk.positions, engine) - base
+        least = np.minimum(least, moved.min(axis=(0, 1), initial=np.inf))
+        most = np.maximum(most, moved.max(axis=(0, 1), initial=-np.inf))
+    span = most - least
+    return Packed(kind, least, np.where(span > 0, span, 1.0))
+
+
+Band = tuple[AnyArray, float]  # pixels (n, V, 3) of some frames, and the farthest that a number is off
+
+
+def _bands(cache: VertexCache, engine: Preset, base: AnyArray, packed: Packed) -> Iterator[Band]:
+    for chunk in cache.chunks():
+        moved = presets.to_engine(chunk.positions, engine) - base
+        pixels = packed.pixels(moved)
+        off = packed.numbers(pixels) - moved
+        yield pixels, float(np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0)))
+
+
+def _normal_bands(cache: VertexCache, engine: Preset, packed: Packed) -> Iterator[Band]:
+    for chunk in cache.chunks():
+        if chunk.normals is not None:
+            yield packed.pixels(presets.to_engine(chunk.normals, engine, lengths=False)), 0.0
+
+
+def _write_image(bands: Iterator[Band], outputs: Outputs, name: str, grid: Grid, packed: Packed) -> float:
+    worst = [0.0]
+
+    def images() -> Iterator[AnyArray]:
+        for pixels, off in bands:
+            worst[0] = max(worst[0], off)
+            image = np.zeros((len(pixels), grid.rows * grid.width, 3), pixels.dtype)
+            image[:, : pixels.shape[1]] = pixels
+            yield image.reshape(-1, grid.width, 3)
+
+    if packed.kind == "unorm16":
+        with outputs.create(name) as file:
+            png.write(images(), file, width=grid.width, height=grid.height)
+    else:
+        exr.write(np.concatenate(list(images())), outputs, name)
+    return worst[0]
+
+
+def _write_mesh(cache: VertexCache, still: Floats, grid: Grid, engine: Preset, outputs: Outputs, name: str) -> None:
+    """The mesh at rest as a GLB, in glTF's axes: the engine's importer turns it as the preset turns the texture."""
+    from pygltflib import Mesh, Node
+
+    file = GlbFile()
+    v = np.arange(cache.vertex_count)
+    uv = np.stack(((v % grid.width + 0.5) / grid.width, (v // grid.width + 0.5) / grid.height), axis=1)
+    if engine.is_flipped:
+        uv[:, 1] = 1 - uv[:, 1]
+    attributes = {
+        "POSITION": file.add(still.astype("<f4"), target=VERTICES, bounds=True),
+        "TEXCOORD_0": file.add(uv.astype("<f4"), target=VERTICES),
+        "TEXCOORD_1": file.add(uv.astype("<f4"), target=VERTICES),
+    }
+    if cache.has_normals:
+        normals = next(cache.chunks()).normals
+        assert normals is not None
+        attributes["NORMAL"] = file.add(normals[0].astype("<f4"), target=VERTICES)
+    indices = file.add_indices(cache.faces, cache.vertex_count)
+    file.gltf.meshes.append(Mesh(name="rest", primitives=[primitive(attributes, indices)]))
+    file.gltf.nodes.append(Node(name="rest", mesh=0))
+    file.gltf.scenes[0].nodes.append(0)
+    file.write(outputs, name)

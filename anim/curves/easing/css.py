@@ -1,0 +1,125 @@
+"""The eases of CSS: cubic Béziers in the time-value plane, and steps.
+
+Source: W3C CSS Easing Functions Level 2, sections 2.2 and 2.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.easing.function import Easing, Piece, spelled
+from anim.errors import RangeError
+
+JUMPS = ("jump-start", "jump-end", "jump-both", "jump-none")
+MAX_STEPS = 10_000  # more than any display has frames for one ease
+THIRD = 1e-12  # how near to 1/3 and 2/3 the handles lie where the Bézier is a cubic of time
+SOLVED = 4e-16  # a step, or a relative error, this small is rounding
+SOLVER_ROUNDS = 60  # halving alone takes 46; Newton's method about 3
+TABLE = 128  # places that the solver starts from
+
+
+def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") -> Easing:
+    """Return the ease along the Bézier (0, 0), (x1, y1), (x2, y2), (1, 1), x as time and y as the share of the way.
+
+    x1 and x2 lie in 0 … 1, y1 and y2 are any finite numbers; RangeError otherwise. Handles at thirds of the time make
+    an exact cubic, handles on the diagonal a line. The slope is ±inf where a handle is upright.
+    cubic_bezier(0.25, 0.1, 0.25, 1) → CSS `ease`
+    """
+    if not (0 <= x1 <= 1 and 0 <= x2 <= 1):
+        raise RangeError(f"x1 and x2 are {x1:g} and {x2:g} (expected 0 … 1, time can't run backwards)")
+    if not np.isfinite((y1, y2)).all():
+        raise RangeError(f"y1 and y2 are {y1:g} and {y2:g} (expected finite numbers)")
+
+    def value(u: Floats) -> Floats:
+        return _bernstein(_parameter(u, x1, x2), y1, y2)
+
+    def derivative(u: Floats) -> Floats:
+        return _slope(_parameter(u, x1, x2), (x1, y1), (x2, y2))
+
+    exact = None
+    if max(abs(x1 - 1 / 3), abs(x2 - 2 / 3)) < THIRD:
+        exact = (Piece(0, 1, 0, 1, 3 * y1, 3 * (1 - y2)),)
+    elif x1 == y1 and x2 == y2:
+        exact = (Piece(0, 1, 0, 1, 1, 1),)
+    upright = (0.5,) if exact is None and x1 == 1 and x2 == 0 else ()
+    return Easing(name or spelled("cubic-bezier", x1, y1, x2, y2), value, derivative, upright, exact)
+
+
+def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
+    """Return the ease that holds on `count` levels of equal length and jumps between them; its exact form holds too.
+
+    jump: where the first and last jump lie: "jump-start" jumps at u = 0, "jump-end" at u = 1, "jump-both" at both,
+    "jump-none" at neither (count ≥ 2). At a jump the value is the one after it: value(0) > 0 for the first and third.
+    Raises RangeError for a count outside 1 … 10 000 or another word.
+    steps(2) → 0 on 0 … ½, ½ on ½ … 1, 1 at 1
+    """
+    if jump not in JUMPS:
+        raise RangeError(f"jump is {jump!r} (expected {', '.join(JUMPS)})")
+    least = 2 if jump == "jump-none" else 1
+    if not (least <= count <= MAX_STEPS):
+        raise RangeError(f"number of steps is {count} (expected {least} … {MAX_STEPS})")
+    first = 1 if jump in ("jump-start", "jump-both") else 0
+    whole = count + {"jump-both": 1, "jump-none": -1}.get(jump, 0)
+    levels = np.append((np.arange(count) + first) / whole, 1.0)
+    edges = np.arange(1, count + 1) / count
+
+    def value(u: Floats) -> Floats:
+        return np.asarray(levels[np.searchsorted(edges, u, side="right")])
+
+    breaks = tuple(edges[:-1].tolist())
+    exact = [
+        Piece(a, b, v, v, 0, 0) for a, b, v in zip((0.0, *breaks), (*breaks, 1.0), levels[:-1].tolist(), strict=True)
+    ]
+    return Easing(name or f"steps({count}, {jump})", value, np.zeros_like, breaks, tuple(exact))
+
+
+def _parameter(u: Floats, x1: float, x2: float) -> Floats:
+    """Return s (any shape) with x(s) = u: Newton's method, kept between halving bounds (x never falls)."""
+    goal = np.asarray(u, dtype=np.float64).ravel()
+    grid = np.linspace(0, 1, TABLE + 1)
+    table = _bernstein(grid, x1, x2)
+    at = np.clip(np.searchsorted(table, goal, side="right") - 1, 0, TABLE - 1)
+    low, high, solution = grid[at], grid[at + 1], np.interp(goal, table, grid)
+    open_ones = np.arange(goal.size)
+    for _ in range(SOLVER_ROUNDS):
+        s, least, most = solution[open_ones], low[open_ones], high[open_ones]
+        off, rate = _bernstein(s, x1, x2) - goal[open_ones], _bernstein_slope(s, x1, x2)
+        least, most = np.where(off <= 0, s, least), np.where(off >= 0, s, most)
+        step = s - off / np.where(rate > 0, rate, 1.0)
+        inside = (rate > 0) & (step >= least) & (step <= most)
+        following = np.where(off == 0, s, np.where(inside, step, (least + most) / 2))
+        solution[open_ones], low[open_ones], high[open_ones] = following, least, most
+        open_ones = open_ones[(np.abs(following - s) > SOLVED) & (np.abs(off) > SOLVED * goal[open_ones])]
+        if not open_ones.size:
+            break
+    return solution.reshape(np.shape(u))
+
+
+def _slope(s: Floats, first: tuple[float, float], second: tuple[float, float]) -> Floats:
+    """Return dy/dx at s; at the ends that of the first handle with a length."""
+    run = _bernstein_slope(s, first[0], second[0])
+    rise = _bernstein_slope(s, first[1], second[1])
+    upright = np.where(rise == 0, 0.0, np.copysign(np.inf, rise))
+    with np.errstate(over="ignore"):  # a handle that leans by a denormal number is upright too
+        slope = np.where(run > 0, rise / np.where(run > 0, run, 1.0), upright)
+    start = _handle_slope(first, second)
+    end = _handle_slope((1 - second[0], 1 - second[1]), (1 - first[0], 1 - first[1]))
+    return np.where(s <= 0, start, np.where(s >= 1, end, slope))
+
+
+def _handle_slope(near: tuple[float, float], far: tuple[float, float]) -> float:
+    """Return the slope towards the nearest control point that is not the end itself."""
+    x, y = next(handle for handle in (near, far, (1.0, 1.0)) if handle != (0, 0))
+    return y / x if x else float(np.copysign(np.inf, y))
+
+
+def _bernstein(s: Floats, p1: float, p2: float) -> Floats:
+    """Return the coordinate at s of the Bézier 0, p1, p2, 1; exactly 0 and 1 at the ends."""
+    r = 1 - s
+    return 3 * r * r * s * p1 + 3 * r * s * s * p2 + s * s * s
+
+
+def _bernstein_slope(s: Floats, p1: float, p2: float) -> Floats:
+    r = 1 - s
+    return 3 * r * r * p1 + 6 * r * s * (p2 - p1) + 3 * s * s * (1 - p2)

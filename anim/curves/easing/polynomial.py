@@ -1,0 +1,55 @@
+"""Eases that are one polynomial: linear, smoothstep, smootherstep, and the cubic with chosen end slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.easing.function import Easing, Piece, spelled
+from anim.errors import RangeError
+from anim.maths import hermite as cubic
+
+ZERO, ONE = np.zeros(()), np.ones(())
+
+
+def hermite(slope0: float, slope1: float, *, name: str = "") -> Easing:
+    """Return the cubic ease that leaves with `slope0` and arrives with `slope1`, both relative to constant speed.
+
+    Any finite slopes: negative ones pull back, large ones overshoot. Raises RangeError for others.
+    hermite(0, 0) → smoothstep, hermite(1, 1) → linear, hermite(0, 3) → cubic-in
+    """
+    if not np.isfinite((slope0, slope1)).all():
+        raise RangeError(f"slopes are {slope0:g} and {slope1:g} (expected finite numbers)")
+    m0, m1 = np.asarray(slope0, dtype=np.float64), np.asarray(slope1, dtype=np.float64)
+    return Easing(
+        name or spelled("hermite", slope0, slope1),
+        lambda u: cubic.evaluate(u, ZERO, m0, ONE, m1),
+        lambda u: cubic.first_derivative(u, ZERO, m0, ONE, m1),
+        exact=(Piece(0, 1, 0, 1, float(slope0), float(slope1)),),
+    )
+
+
+def linear() -> Easing:
+    """Return constant speed."""
+    return Easing("linear", lambda u: 1.0 * u, np.ones_like, exact=(Piece(0, 1, 0, 1, 1, 1),))
+
+
+def smoothstep() -> Easing:
+    """Return 3u² − 2u³: at rest at both ends, the cubic with the least acceleration squared."""
+
+    def value(u: Floats) -> Floats:
+        return u * u * (3 - 2 * u)
+
+    return Easing("smoothstep", value, lambda u: 6 * u * (1 - u), exact=(Piece(0, 1, 0, 1, 0, 0),))
+
+
+def smootherstep() -> Easing:
+    """Return 10u³ − 15u⁴ + 6u⁵: at rest and unaccelerated at both ends, the path with the least jerk squared.
+
+    Source: Flash & Hogan 1985 (minimum jerk); Perlin 2002 (the same polynomial, for noise).
+    """
+
+    def value(u: Floats) -> Floats:
+        return u * u * u * (10 + u * (6 * u - 15))
+
+    return Easing("smootherstep", value, lambda u: 30 * u * u * (1 - u) * (1 - u))

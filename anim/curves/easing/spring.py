@@ -1,0 +1,87 @@
+"""The ease of a damped spring let go at 0 and pulled to 1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.easing.function import Easing, spelled
+from anim.errors import RangeError
+
+SETTLED = 1e-3  # the spring has settled when it stays this near to 1
+MIN_DAMPING_RATIO = 0.005  # 200 swings until it settles: as many as anyone can want to key
+CRITICAL_SETTLING = 9.233413476451586  # the root of (1 + x) e^−x = SETTLED
+
+
+def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
+    """Return the motion of a mass of 1 kg on a spring until it has settled, as an ease: starts at rest, ends at 1.
+
+    stiffness: k in N/m, > 0. damping: c in N·s/m, > 0. Only the ratio ζ = c / (2 √k) shapes the ease, since u = 1 is
+    the time of settling whatever it is: ζ < 1 swings, ζ ≥ 1 creeps. Ends exactly at 1 by a factor within 0.1 % of 1.
+    Raises RangeError if one of them is not positive, or if ζ < 0.005 (more than 200 swings).
+    spring(100, 10) → one swing past the end by 16 %, u = 1 at settle_time(100, 10) = 1.41 s
+    """
+    end = settle_time(stiffness, damping)
+    last = float(_position(np.array(end), stiffness, damping))
+    return Easing(
+        name or spelled("spring", stiffness, damping),
+        lambda u: _position(u * end, stiffness, damping) / last,
+        lambda u: _speed(u * end, stiffness, damping) * end / last,
+    )
+
+
+def settle_time(stiffness: float, damping: float) -> float:
+    """Return the time in seconds after which the spring stays within 0.1 % of its end. Raises RangeError as spring.
+
+    The bound is on the envelope of the swing, so the time does not jump when the damping changes a little.
+    """
+    if not (stiffness > 0 and damping > 0 and np.isfinite((stiffness, damping)).all()):
+        raise RangeError(f"stiffness and damping are {stiffness:g} and {damping:g} (expected finite and above 0)")
+    omega, decay = np.sqrt(stiffness), damping / 2
+    ratio = decay / omega
+    if ratio < MIN_DAMPING_RATIO:
+        raise RangeError(
+            f"the spring hardly settles: damping ratio {ratio:.2g} (expected {MIN_DAMPING_RATIO} or more)",
+            help=f"a damping of {2 * omega * MIN_DAMPING_RATIO:.3g} or more",
+        )
+    if ratio > 1:
+        return _settle_creeping(stiffness, damping)
+    swinging = -np.log(SETTLED * np.sqrt(1 - ratio * ratio)) if ratio < 1 else np.inf
+    return float(min(swinging, CRITICAL_SETTLING) / decay)
+
+
+def _settle_creeping(stiffness: float, damping: float) -> float:
+    """Return the settling time of an over-damped spring, by halving: its distance only falls."""
+    low, high = 0.0, 2 * CRITICAL_SETTLING * damping / stiffness
+    for _ in range(60):
+        middle = (low + high) / 2
+        if 1 - float(_position(np.array(middle), stiffness, damping)) > SETTLED:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _position(t: Floats, stiffness: float, damping: float) -> Floats:
+    """Return x(t), from 0 at rest to 1: x″ + c x′ + k x = k."""
+    decay, gap = damping / 2, damping * damping / 4 - stiffness
+    if gap <= 0:
+        return np.asarray(1 - np.exp(-decay * t) * np.cos(np.sqrt(-gap) * t) - decay * _swing(t, stiffness, damping))
+    beta = np.sqrt(gap)
+    slow = stiffness / (decay + beta)
+    even = (np.exp(-slow * t) + np.exp(-(decay + beta) * t)) / 2
+    return np.asarray(1 - even - decay * _swing(t, stiffness, damping))
+
+
+def _speed(t: Floats, stiffness: float, damping: float) -> Floats:
+    return stiffness * _swing(t, stiffness, damping)
+
+
+def _swing(t: Floats, stiffness: float, damping: float) -> Floats:
+    """Return e^(−ct/2) sin(ωt) / ω, ω² = k − c²/4, and its limits where ω is 0 (t e^(−ct/2)) or imaginary (sinh)."""
+    decay, gap = damping / 2, damping * damping / 4 - stiffness
+    if gap <= 0:
+        return np.asarray(np.exp(-decay * t) * t * np.sinc(np.sqrt(-gap) * t / np.pi))
+    beta = np.sqrt(gap)
+    slow = stiffness / (decay + beta)
+    return np.asarray(np.exp(-slow * t) * -np.expm1(-2 * beta * t) / (2 * beta))

@@ -1,0 +1,67 @@
+"""Eases that are not cubic, as the fewest cubic or straight pieces within a tolerance."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.easing.function import Easing, Function, Piece, evaluate
+from anim.curves.fitting.hermite_fit import SAFETY, SAMPLES, Path, errors, slopes
+from anim.curves.fitting.subdivision import subdivide
+
+
+@lru_cache(maxsize=256)
+def cubic_pieces(easing: Easing, *, tolerance: float) -> tuple[Piece, ...]:
+    """Return an ease as cubics: its exact ones if it has them, else the fewest within `tolerance` (share of the way).
+
+    cubic_pieces(EASINGS["bounce-out"], tolerance=1e-3) → its four parabolas
+    Raises RangeError as fit_cubic does.
+    """
+    if easing.exact is not None:
+        return easing.exact
+    return fit_cubic(easing.value, easing.derivative, easing.breakpoints, tolerance)
+
+
+def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], tolerance: float) -> tuple[Piece, ...]:
+    """Return the fewest cubics that follow f over 0 … 1 with values and slopes of its own at their ends.
+
+    f, df: a continuous function of u (any shape) and its slope, which may be ±inf: there the best finite slope is used.
+    breakpoints: interior u where the slope jumps or the function is not smooth; each gets an end of pieces.
+    tolerance: the greatest |error|, 1e-7 or more; RangeError otherwise. Where slopes are finite the result is C1.
+    fit_cubic(smootherstep, 30u²(1−u)², (), 1e-3) → 4 pieces
+    Source: notes/algorithms.md C2; Hermite error h⁴/384 · max|f⁗| sets the lengths, but here it is measured.
+    """
+    path = Path(lambda u: f(u)[..., None], lambda u: np.ones((*u.shape, 1)), df, _difference, breakpoints)
+    ends = np.array(subdivide(lambda a, b: errors(path, a, b), (0.0, *breakpoints, 1.0), tolerance))
+    a, b = ends[:-1], ends[1:]
+    rate0, rate1 = slopes(path, a, b)
+    columns = (a, b, f(a), f(b), rate0, rate1)
+    return tuple(Piece(*row) for row in np.stack(columns, axis=1).tolist())
+
+
+def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) -> Floats:
+    """Return the fewest u (K,), 0 and 1 among them, between whose values f is straight within `tolerance`.
+
+    f must be continuous. Breakpoints are among the result. Raises RangeError for a tolerance below 1e-7.
+    For an eased slerp by θ give tolerance / θ: its angle is f · θ.
+    fit_linear(u², (), 1e-3) → 17 u, evenly spaced
+    """
+
+    def chord_errors(a: Floats, b: Floats) -> Floats:
+        u = a[:, None] + (b - a)[:, None] * SAMPLES
+        chord = f(a)[:, None] * (1 - SAMPLES) + f(b)[:, None] * SAMPLES
+        return np.asarray(np.abs(f(u) - chord).max(axis=1) * SAFETY)
+
+    return np.array(subdivide(chord_errors, (0.0, *breakpoints, 1.0), tolerance))
+
+
+def fit_error(f: Function, pieces: tuple[Piece, ...]) -> float:
+    """Return the greatest |error| of cubics that cover 0 … 1 against f: what a fit promises, measured."""
+    u = np.concatenate([p.start + (p.end - p.start) * SAMPLES for p in pieces])
+    return float(np.abs(evaluate(pieces, u) - f(u)).max() * SAFETY)
+
+
+def _difference(fitted: Floats, true: Floats) -> Floats:
+    return np.abs(fitted - true)[..., 0]

@@ -1,0 +1,87 @@
+"""How well single Hermite pieces follow a path: their end slopes, and the error that is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.curves.easing.function import Function
+from anim.maths import hermite
+
+SAMPLES = (
+    1 - np.cos(np.pi * np.arange(1, 40) / 40)
+) / 2  # in each piece, closer towards its ends, where roots are steep
+SAFETY = 1.01  # the greatest error lies between samples: less than 1 % above the greatest sample
+NUDGE = 1e-12  # the slope at a breakpoint is taken this far inside the piece
+VERTICAL = 1e4  # slopes above are not followed but chosen: least squares
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A path (..., D) that turns u (...) into points, moving along `direction` (..., D) at `rate` (...) per u.
+
+    distance: the error (...) of a point (..., D) against the true one (..., D).
+    breakpoints: where the rate may differ on both sides.
+    """
+
+    point: Function
+    direction: Function
+    rate: Function
+    distance: Callable[[Floats, Floats], Floats]
+    breakpoints: tuple[float, ...] = ()
+
+
+def slopes(path: Path, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return the rates (B,) at which pieces from u = a (B,) to b (B,) leave and arrive.
+
+    They are the path's own, from inside the piece. If one is vertical, both are those of the least squared error:
+    to keep the other one would make the piece thirty times shorter, for a kink where nobody can see one.
+    """
+    rate0, rate1 = path.rate(_nudged(a, path, NUDGE)), path.rate(_nudged(b, path, -NUDGE))
+    free = np.maximum(np.abs(rate0), np.abs(rate1)) > VERTICAL
+    if not free.any():
+        return rate0, rate1
+    best0, best1 = _free_slopes(path, a, b)
+    return np.where(free, best0, rate0), np.where(free, best1, rate1)
+
+
+def errors(path: Path, a: Floats, b: Floats, rates: tuple[Floats, Floats] | None = None) -> Floats:
+    """Return the greatest distances (B,) of Hermite pieces from a (B,) to b (B,) from the path.
+
+    rates: those (B,) at both ends, if not the ones that `slopes` finds.
+    """
+    u = a[:, None] + (b - a)[:, None] * SAMPLES
+    fitted = _pieces(path, a, b, *(rates or slopes(path, a, b)))
+    return np.asarray(path.distance(fitted, path.point(u)).max(axis=1) * SAFETY)
+
+
+def _pieces(path: Path, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
+    """Return the points (B, S, D) of the pieces at SAMPLES."""
+    m0 = ((b - a) * rate0)[:, None] * path.direction(a)
+    m1 = ((b - a) * rate1)[:, None] * path.direction(b)
+    return hermite.evaluate(SAMPLES[:, None], path.point(a)[:, None], m0[:, None], path.point(b)[:, None], m1[:, None])
+
+
+def _free_slopes(path: Path, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return the rates (B,) at both ends that together leave the least squared error at SAMPLES."""
+    none = np.zeros_like(a)
+    left = path.point(a[:, None] + (b - a)[:, None] * SAMPLES) - _pieces(path, a, b, none, none)
+    length, s = (b - a)[:, None, None], SAMPLES[:, None]
+    shape0 = length * s * (1 - s) ** 2 * path.direction(a)[:, None]
+    shape1 = -length * s * s * (1 - s) * path.direction(b)[:, None]
+    p00, p01, p11 = _product(shape0, shape0), _product(shape0, shape1), _product(shape1, shape1)
+    r0, r1 = _product(left, shape0), _product(left, shape1)
+    determinant = p00 * p11 - p01 * p01
+    return (r0 * p11 - r1 * p01) / determinant, (r1 * p00 - r0 * p01) / determinant
+
+
+def _product(x: Floats, y: Floats) -> Floats:
+    return np.asarray((x * y).sum(axis=(1, 2)))
+
+
+def _nudged(u: Floats, path: Path, by: float) -> Floats:
+    at_break: Bools = np.isin(u, path.breakpoints)
+    return np.where(at_break, u + by, u)

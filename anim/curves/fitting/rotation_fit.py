@@ -1,0 +1,118 @@
+"""An eased turn as the fewest quaternion cubics within a tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from anim.arrays import Floats, read_only
+from anim.curves.easing.function import Easing
+from anim.curves.fitting.hermite_fit import Path, errors, slopes
+from anim.curves.fitting.subdivision import subdivide
+from anim.errors import RangeError
+from anim.maths import quaternion as quat
+
+WIDEST = np.radians(120)  # turn of one piece; above, the chord of unit quaternions gets short
+ANGLE_STEP = np.pi / 32  # fits are shared by turns up to the next multiple
+
+
+@dataclass(frozen=True, slots=True)
+class RotationKeys:
+    """Keys of a turn: u (K,) from 0 to 1, unit quaternions (K, 4) in one hemisphere, tangents (K, 4) per u.
+
+    The tangents before the first and after the last key are 0. error: the greatest angle in radians off the true turn.
+    """
+
+    u: Floats
+    rotations: Floats
+    in_tangents: Floats
+    out_tangents: Floats
+    error: float
+
+
+def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> RotationKeys:
+    """Return the fewest CUBICSPLINE keys that turn q0 to q1 (4,) along the shorter arc with the tempo of an ease.
+
+    tolerance: the greatest angle off the eased slerp, radians, 1e-7 or more; the result's `error` says what it is.
+    No piece turns by more than 120°. The result's signs follow q0's, so its last key may be −q1. Tangents are
+    ½ q ⊗ ω, ω = axis · θ · e′(u); divide them by the segment's duration.
+    Raises RangeError for a tolerance out of range, or for steps: they jump, and are a STEP sampler's.
+    90° with smoothstep at 0.1° → 4 keys
+    """
+    if easing.stepped:
+        raise RangeError(f"'{easing.name}' jumps (expected a continuous ease; write STEP keys)")
+    turn = quat.rotation_vector(quat.multiply(quat.conjugate(q0), q1))
+    angle = float(np.sqrt(turn @ turn))
+    ends, rate0, rate1, error = turn_pieces(easing, float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP, tolerance)
+    if angle > 0:
+        error = _error(easing, angle, ends, rate0, rate1)
+    if error > tolerance:
+        ends, rate0, rate1, error = turn_pieces(easing, angle, tolerance)
+    rotations = quat.multiply(q0, quat.from_rotation_vector(easing.value(ends)[:, None] * turn))
+    rotations[0], rotations[-1] = q0, q1 if quat.dot(q0, q1) >= 0 else -q1
+    in_tangents = quat.derivative(rotations, np.append(0.0, rate1)[:, None] * turn)
+    out_tangents = quat.derivative(rotations, np.append(rate0, 0.0)[:, None] * turn)
+    return RotationKeys(ends, rotations, in_tangents, out_tangents, error)
+
+
+@dataclass(frozen=True, slots=True)
+class TurnPieces:
+    """Cubics for turns of up to one angle: key u (P + 1,), rates e′ (P,) at which pieces leave and arrive, and error.
+
+    Tangents per u are ½ q ⊗ (rate · turn). error: the greatest angle in radians off the eased turn.
+    """
+
+    u: Floats
+    leaving: Floats
+    arriving: Floats
+    error: float
+
+
+def turn_pieces_for(easing: Easing, angle: float, tolerance: float) -> TurnPieces:
+    """Return the fewest cubics for a turn by `angle` radians; turns up to the next multiple of π/32 share one fit."""
+    rounded = float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP
+    return TurnPieces(*turn_pieces(easing, rounded, tolerance))
+
+
+@lru_cache(maxsize=1024)
+def turn_pieces(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
+    """Return key u (K,), the rates e′ (K − 1,) at which pieces leave and arrive, and the angle that they are off."""
+    edges = (0.0, *easing.breakpoints, 1.0)
+    if angle == 0:
+        none = np.zeros(len(edges) - 1)
+        return read_only(np.array(edges)), none, none, 0.0
+    path = _circle(easing, angle)
+
+    def turn_errors(a: Floats, b: Floats) -> Floats:
+        wide = np.abs(easing.value(b) - easing.value(a)) * angle > WIDEST + 1e-9
+        return np.where(wide, np.inf, errors(path, a, b))
+
+    ends = read_only(np.array(subdivide(turn_errors, edges, tolerance)))
+    rate0, rate1 = slopes(path, ends[:-1], ends[1:])
+    return ends, rate0, rate1, _error(easing, angle, ends, rate0, rate1)
+
+
+def _error(easing: Easing, angle: float, ends: Floats, rate0: Floats, rate1: Floats) -> float:
+    return float(errors(_circle(easing, angle), ends[:-1], ends[1:], (rate0, rate1)).max())
+
+
+def _circle(easing: Easing, angle: float) -> Path:
+    """Return the turn's path in the plane of its two quaternions: a circle, run through at half the angle."""
+
+    def point(u: Floats) -> Floats:
+        half = easing.value(u) * angle / 2
+        return np.stack((np.cos(half), np.sin(half)), axis=-1)
+
+    def direction(u: Floats) -> Floats:
+        half = easing.value(u) * angle / 2
+        return np.stack((-np.sin(half), np.cos(half)), axis=-1) * (angle / 2)
+
+    return Path(point, direction, easing.derivative, _angle, easing.breakpoints)
+
+
+def _angle(fitted: Floats, true: Floats) -> Floats:
+    """Return the rotation angle (...) between points (..., 2) of the plane, whatever their length."""
+    across = fitted[..., 0] * true[..., 1] - fitted[..., 1] * true[..., 0]
+    return np.asarray(2 * np.abs(np.arctan2(across, (fitted * true).sum(axis=-1))))

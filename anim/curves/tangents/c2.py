@@ -1,0 +1,76 @@
+"""Tangents of curves with continuous acceleration (C2): scipy solves for all keys at once.
+
+A piecewise cubic is exact as CUBICSPLINE keys of its values and slopes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.tangents.rule import SplineKeys, extended
+
+
+def natural(times: Floats, values: Floats) -> SplineKeys:
+    """Return the C2 curve through the keys with no acceleration at its ends: the one that bends least."""
+    return _cubic(times, values, ends="natural")
+
+
+def clamped(times: Floats, values: Floats) -> SplineKeys:
+    """Return the C2 curve through the keys that starts and ends at rest."""
+    return _cubic(times, values, ends="clamped")
+
+
+def periodic(times: Floats, values: Floats) -> SplineKeys:
+    """Return the C2 curve through the keys whose speed and acceleration at the end are those at the start.
+
+    If the last value is not the first, the difference is the way made in a lap: the loop goes on from there.
+    """
+    duration, way = times[-1] - times[0], values[-1] - values[0]
+    still = values - (times - times[0])[:, None] / duration * way
+    still[-1] = still[0]
+    slopes = _cubic(times, still, ends="periodic").out_tangents + way / duration
+    slopes[-1] = slopes[0]
+    return SplineKeys(values, slopes, slopes)
+
+
+def bspline(times: Floats, values: Floats) -> SplineKeys:
+    """Return the C2 curve that the keys pull at: it meets the first and last, and passes the others by.
+
+    With even spacing the keys are the control points of the uniform cubic B-spline, value (v₋ + 4v + v₊) / 6. With any,
+    the control points lie on the straight lines between keys at means of three times, so straight runs stay straight.
+    Source: Schoenberg 1967 (variation diminishing spline); scipy's BSpline.
+    """
+    knots = np.concatenate((times[:1].repeat(3), times, times[-1:].repeat(3)))
+    return _approximated(knots, times, values, times, values)
+
+
+def cyclic_bspline(times: Floats, values: Floats) -> SplineKeys:
+    """Return the same for a loop: its ends are passed by too, and meet each other."""
+    more_times, more_values = extended(times, values, 3)
+    keys = _approximated(more_times, more_times, more_values, times, values)
+    keys.values[-1] = keys.values[0] + (values[-1] - values[0])
+    keys.out_tangents[-1] = keys.out_tangents[0]
+    return keys
+
+
+def _cubic(times: Floats, values: Floats, *, ends: str) -> SplineKeys:
+    from scipy.interpolate import CubicSpline
+
+    if len(times) == 2 and ends != "clamped":
+        slopes = np.repeat((values[1:] - values[:1]) / (times[1] - times[0]), 2, axis=0)
+    else:
+        slopes = np.asarray(CubicSpline(times, values, axis=0, bc_type=ends)(times, 1))
+    return SplineKeys(values, slopes, slopes)
+
+
+def _approximated(knots: Floats, lines_t: Floats, lines_v: Floats, times: Floats, values: Floats) -> SplineKeys:
+    """Return the B-spline on `knots`, its control points on the lines through lines_t, lines_v, seen at `times`."""
+    from scipy.interpolate import BSpline
+
+    centers = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3
+    controls = np.stack([np.interp(centers, lines_t, column) for column in lines_v.T], axis=1)
+    spline = BSpline(knots, controls, 3)
+    passed, slopes = np.asarray(spline(times)), np.asarray(spline(times, 1))
+    off = passed - values
+    return SplineKeys(passed, slopes, slopes, float(np.sqrt((off * off).sum(axis=1).max())))

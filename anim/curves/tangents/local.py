@@ -1,0 +1,127 @@
+"""Tangents from a key's neighbors: h_k and d_k are the duration and the mean speed from key k to k + 1.
+
+Source: notes/algorithms.md C4. scipy's splines do monotone and Akima.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.tangents.rule import TangentRule, local_rule
+from anim.errors import RangeError
+
+SHORTEST_KNOT = 1e-9  # of the longest: keeps repeated points apart in the centripetal parameter
+
+
+def time_aware(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return the slopes of the parabolas through three keys; those at the ends go through the first and last three.
+
+    (h_k d_{k−1} + h_{k−1} d_k) / (h_{k−1} + h_k). Exact for parabolas, whatever the spacing.
+    """
+    slopes = _parabola_slopes(times, values)
+    return slopes, slopes
+
+
+def catmull_rom(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return (v_{k+1} − v_{k−1}) / (t_{k+1} − t_{k−1}); at the ends the slopes of time_aware."""
+    slopes = _parabola_slopes(times, values).copy()
+    slopes[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])[:, None]
+    return slopes, slopes
+
+
+def flat(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return 0: a stop at every key."""
+    none = np.zeros_like(values)
+    return none, none
+
+
+def centripetal(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return the slopes of time_aware in the parameter √distance, so that the path has no cusps and no loops.
+
+    Smooth in that parameter; in time the direction is, but the speed jumps at a key unless the spacing follows it.
+    A repeated point is a rest. Source: Yuksel et al. 2011; Barry & Goldman 1988.
+    """
+    steps = np.diff(values, axis=0)
+    knots = np.sqrt(np.sqrt((steps * steps).sum(axis=1)))
+    if not knots.any():
+        return flat(times, values)
+    knots = np.maximum(knots, SHORTEST_KNOT * knots.max())
+    slopes = _parabola_slopes(np.append(0.0, np.cumsum(knots)), values)
+    rates = (knots / np.diff(times))[:, None]
+    return slopes * np.concatenate((rates[:1], rates)), slopes * np.concatenate((rates, rates[-1:]))
+
+
+def monotone(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return slopes that never leave the range between two keys: weights stay in 0 … 1, feet on the floor.
+
+    Source: Fritsch & Butland 1984, by scipy's PchipInterpolator.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    with np.errstate(over="ignore"):  # 1 / a denormal slope, whose inverse is 0 as it should be
+        slopes = np.asarray(PchipInterpolator(times, values, axis=0).derivative()(times))
+    return slopes, slopes
+
+
+def akima(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return slopes that lean to the steadier side, so that one odd key disturbs little (Akima 1970, scipy)."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    if len(times) == 2:
+        return time_aware(times, values)
+    slopes = np.asarray(Akima1DInterpolator(times, values, axis=0).derivative()(times))
+    return slopes, slopes
+
+
+def cardinal(tension: float) -> TangentRule:
+    """Return the rule of Catmull-Rom slopes times 1 − tension: 0 is catmull-rom, 1 is flat, below 0 is livelier.
+
+    Raises RangeError for a tension outside −1 … 1.
+    """
+    _check(tension=tension)
+
+    def slopes(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+        scaled = catmull_rom(times, values)[0] * (1 - tension)
+        return scaled, scaled
+
+    return local_rule(f"cardinal({tension:g})", slopes)
+
+
+def tcb(tension: float, continuity: float, bias: float) -> TangentRule:
+    """Return the rule with tension (1 tight), continuity (other than 0: a corner) and bias (1 overshoots, −1 is early).
+
+    Each in −1 … 1, RangeError otherwise; (0, 0, 0) is catmull-rom. The ends take its slopes, times 1 − tension.
+    Source: Kochanek & Bartels 1984, with their correction for uneven spacing.
+    """
+    _check(tension=tension, continuity=continuity, bias=bias)
+    t, c, b = tension, continuity, bias
+
+    def slopes(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+        ends = _parabola_slopes(times, values) * (1 - t)
+        span = (times[2:] - times[:-2])[:, None]
+        left, right = (values[1:-1] - values[:-2]) / span, (values[2:] - values[1:-1]) / span
+        before, after = ends.copy(), ends.copy()
+        before[1:-1] = (1 - t) * ((1 - c) * (1 + b) * left + (1 + c) * (1 - b) * right)
+        after[1:-1] = (1 - t) * ((1 + c) * (1 + b) * left + (1 - c) * (1 - b) * right)
+        return before, after
+
+    return local_rule(f"tcb({t:g}, {c:g}, {b:g})", slopes)
+
+
+def _parabola_slopes(times: Floats, values: Floats) -> Floats:
+    """Return the slopes (K, C) at the keys of parabolas through three; of the chord if there are only two."""
+    h = np.diff(times)[:, None]
+    d = np.diff(values, axis=0) / h
+    if len(times) == 2:
+        return np.repeat(d, 2, axis=0)
+    inner = (h[1:] * d[:-1] + h[:-1] * d[1:]) / (h[:-1] + h[1:])
+    first = d[:1] + (d[0] - d[1]) * h[0] / (h[0] + h[1])
+    last = d[-1:] + (d[-1] - d[-2]) * h[-1] / (h[-1] + h[-2])
+    return np.concatenate((first, inner, last))
+
+
+def _check(**parameters: float) -> None:
+    for name, number in parameters.items():
+        if not -1 <= number <= 1:
+            raise RangeError(f"{name} is {number:g} (expected -1 … 1)")

@@ -1,0 +1,123 @@
+"""The table of tangent rules, and what they make of raw keys."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from anim import arrays
+from anim.arrays import Floats
+from anim.curves.easing.expression import Maker, numbers, resolve
+from anim.curves.tangents import c2 as smooth
+from anim.curves.tangents import local
+from anim.curves.tangents.rule import SplineKeys, TangentRule, local_rule
+from anim.errors import RangeError, ShapeError
+from anim.maths import quaternion as quat
+
+CLOSED = 1e-3  # radians: how near the ends of a loop of rotations must be for a C2 rule
+
+TANGENTS: dict[str, TangentRule] = {
+    rule.name: rule
+    for rule in (
+        local_rule("time-aware", local.time_aware),
+        local_rule("catmull-rom", local.catmull_rom),
+        local_rule("centripetal", local.centripetal),
+        local_rule("monotone", local.monotone),
+        local_rule("akima", local.akima),
+        local_rule("flat", local.flat),
+        TangentRule("natural", smooth.natural, smooth.periodic, smooth=True),
+        TangentRule("clamped", smooth.clamped, smooth.clamped, smooth=True),
+        TangentRule("periodic", smooth.periodic, smooth.periodic, smooth=True, loop=True),
+        TangentRule("bspline", smooth.bspline, smooth.cyclic_bspline, smooth=True),
+    )
+}
+
+TANGENT_MAKERS: dict[str, Maker[TangentRule]] = {
+    "cardinal": Maker("cardinal(tension)", lambda args: local.cardinal(*numbers(args, 1))),
+    "tcb": Maker("tcb(tension, continuity, bias)", lambda args: local.tcb(*numbers(args, 3))),
+}
+
+DEFAULT = "time-aware"
+
+
+def parse(text: str) -> TangentRule:
+    """Return the rule that a text names: one of TANGENTS, or one of TANGENT_MAKERS with its arguments.
+
+    Raises RangeError for an unknown name, with the nearest ones in its help, and for arguments that do not fit.
+    parse("tcb(0, 0, 0.5)"), parse("akima")
+    """
+    return resolve(text, TANGENTS, TANGENT_MAKERS, kind="tangent rule")
+
+
+def spline_keys(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
+    """Return CUBICSPLINE keys for times (K,) s and values (K, C): the values and the rule's tangents per second.
+
+    cyclic: the last key is the first one of the next lap, so speed has no seam there (nor acceleration, for C2 rules:
+    natural becomes periodic). A last value that differs from the first is the way made in a lap.
+    The unused tangents, before the first and after the last key, are 0; so are all of a single key.
+    Raises RangeError or ShapeError for arrays that are no keys.
+    keys 0, 1, 2 s with 0, 1, 0 by time-aware → out-tangents 2, 0, (0), in-tangents (0), 0, −2
+    """
+    t, v = _checked(times, arrays.floats(values, "K C", name="values"))
+    return _bounded(_keys(t, v, rule, cyclic))
+
+
+def rotation_keys(times: ArrayLike, rotations: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
+    """Return CUBICSPLINE keys for times (K,) s and quaternions (K, 4): signs aligned, the rule's tangents per second.
+
+    Local rules work on the turns from key to key, rolled out into a curve of rotation vectors in the body's own axes:
+    its slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when
+    the player normalizes them; bspline's values are normalized here, which leaves it nearly C2. Best below 120° between
+    keys. cyclic: as in spline_keys; for C2 rules the last key must be the first one, or its negative.
+    Raises RangeError for a loop that is open, for C2 rules, or a quaternion of length 0.
+    Source: notes/algorithms.md C4, rotations (b).
+    """
+    t, checked = _checked(times, arrays.floats(rotations, "K 4", name="rotations"))
+    q = quat.align_signs(quat.normalize(checked))
+    if rule.smooth:
+        return _bounded(_component_keys(t, q, rule, rule.loop or (cyclic and rule.cyclic is not rule.open)))
+    turns = quat.rotation_vector(quat.multiply(quat.conjugate(q[:-1]), q[1:]))
+    rolled_out = np.concatenate((np.zeros((1, 3)), np.cumsum(turns, axis=0)))
+    rates = _keys(t, rolled_out, rule, cyclic)
+    return _bounded(
+        SplineKeys(q, quat.derivative(q, rates.in_tangents), quat.derivative(q, rates.out_tangents), rates.departure)
+    )
+
+
+def _checked(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
+    t = arrays.times(times)
+    if len(t) != len(values):
+        raise ShapeError(f"{len(values)} values for {len(t)} times (expected as many)")
+    return t, values
+
+
+def _keys(times: Floats, values: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
+    if len(times) == 1:
+        return SplineKeys(values, np.zeros_like(values), np.zeros_like(values))
+    return (rule.cyclic if cyclic else rule.open)(times, values)
+
+
+def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
+    """Return the rule's keys of quaternion components, at unit length. A loop that ends at −q runs twice to close."""
+    if cyclic and quat.angle_between(q[0], q[-1]) > CLOSED:
+        degrees = float(np.degrees(quat.angle_between(q[0], q[-1])))
+        raise RangeError(
+            f"the loop is open: its last key is {degrees:.3g}° from its first (expected the same rotation)"
+        )
+    count = len(q)
+    if cyclic and quat.dot(q[0], q[-1]) < 0:
+        times, q = np.concatenate((times, times[1:] + times[-1] - times[0])), np.concatenate((q, -q[1:]))
+    keys = _keys(times, q, rule, cyclic)
+    if keys.departure == 0:
+        return SplineKeys(q[:count], keys.in_tangents[:count], keys.out_tangents[:count])
+    length = np.sqrt(quat.dot(keys.values, keys.values))[:count, None]
+    unit, rates = keys.values[:count] / length, keys.out_tangents[:count] / length
+    rates = rates - quat.dot(unit, rates)[:, None] * unit
+    return SplineKeys(unit, rates, rates, float(quat.angle_between(unit, q[:count]).max()))
+
+
+def _bounded(keys: SplineKeys) -> SplineKeys:
+    """Return the keys with no tangents where no piece is, as the format wishes."""
+    before, after = keys.in_tangents.copy(), keys.out_tangents.copy()
+    before[0], after[-1] = 0.0, 0.0
+    return SplineKeys(keys.values, before, after, keys.departure)

@@ -1,0 +1,77 @@
+"""Are curves frames of a recording, or keys that somebody set? And key times as a glTF can hold them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import StrEnum
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.exchange.euler.curve import Curve, Mode
+from anim.exchange.euler.motion import EulerMotion, EulerNode
+
+MIN_RATE = 10.0  # keys per second
+MIN_KEYS = 4
+EVEN = 0.01  # share of a step by which steps may differ
+
+
+class Keys(StrEnum):
+    """Where the keys of what is written stand."""
+
+    AUTO = "auto"
+    GRID = "grid"
+    ADAPTIVE = "adaptive"
+
+
+def stays_on_grid(motion: EulerMotion, node: EulerNode, keys: Keys) -> bool:
+    """Return whether a node keeps the source's key times and gets no others.
+
+    AUTO: recordings do: BVH, or straight curves on one even grid of ten keys a second or more.
+    """
+    if keys != Keys.AUTO:
+        return keys == Keys.GRID
+    if motion.sampled is not None:
+        return motion.sampled
+    changing = [curve for curve in curves_of(node) if not curve.is_constant]
+    return bool(changing) and all(_is_recorded(curve, changing[0]) for curve in changing)
+
+
+def curves_of(node: EulerNode) -> list[Curve]:
+    """Return all curves of a node."""
+    return [c for c in (*node.rotation, *node.moves.values(), *node.scales.values()) if c is not None]
+
+
+class StoredTimes:
+    """Rounds key times to float32, once per array, so that curves that share their times go on sharing them."""
+
+    def __init__(self) -> None:
+        self._found: dict[int, tuple[Floats, Floats, Ints]] = {}
+
+    def node(self, node: EulerNode) -> EulerNode:
+        """Return the node with the times of all its curves rounded."""
+        return replace(
+            node,
+            rotation=tuple(None if curve is None else self._curve(curve) for curve in node.rotation),
+            moves={axis: self._curve(curve) for axis, curve in node.moves.items()},
+            scales={axis: self._curve(curve) for axis, curve in node.scales.items()},
+        )
+
+    def _curve(self, curve: Curve) -> Curve:
+        found = self._found.get(id(curve.times))
+        if found is None:
+            stored = curve.times.astype(np.float32).astype(np.float64)
+            last: Ints = np.flatnonzero(np.append(np.diff(stored) > 0, True))  # of keys that fall together
+            found = self._found[id(curve.times)] = (curve.times, stored[last], last)
+        _, times, kept = found
+        if len(kept) == len(curve.times):
+            return replace(curve, times=times)
+        return curve.kept(kept, times)
+
+
+def _is_recorded(curve: Curve, first: Curve) -> bool:
+    if len(curve.times) < MIN_KEYS or (curve.modes[:-1] != Mode.LINEAR).any():
+        return False
+    steps = np.diff(curve.times)
+    even = np.ptp(steps) < EVEN * steps.mean()
+    return bool(even and steps.mean() <= 1.001 / MIN_RATE and np.array_equal(curve.times, first.times))

@@ -1,0 +1,91 @@
+"""Which of the 24 conventions a source means, and the unit: said by the file or by the options, never guessed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from anim.errors import FormatError, RangeError
+from anim.exchange.euler.motion import Convention, Unit
+from anim.maths.euler import ORDERS, Frame, check_order
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What one side says; None where it says nothing."""
+
+    order: str | None = None
+    frame: Frame | None = None
+    unit: Unit | None = None
+
+
+NOTHING = Stated()
+
+
+def stated(values: dict[str, Any], where: str) -> Stated:
+    """Return what a file says under "order", "frame" and "unit", in letters of any case.
+
+    Raises FormatError for words that are none.
+    """
+    order = values.get("order")
+    frame, unit = (word.casefold() if isinstance(word, str) else word for word in map(values.get, ("frame", "unit")))
+    if order is not None and str(order).upper() not in ORDERS:
+        raise FormatError(f"order is '{order}' (expected one of {', '.join(ORDERS)})", where=where)
+    if frame is not None and frame not in list(Frame):
+        raise FormatError(f"frame is '{frame}' (expected {' or '.join(Frame)})", where=where)
+    if unit is not None and unit not in list(Unit):
+        raise FormatError(f"unit is '{unit}' (expected {' or '.join(Unit)})", where=where)
+    return Stated(
+        None if order is None else str(order).upper(),
+        None if frame is None else Frame(frame),
+        None if unit is None else Unit(unit),
+    )
+
+
+def agreed(file: Stated, options: Stated) -> Stated:
+    """Return what file and options say together. Raises RangeError where both name a part of it and differ."""
+    if options.order is not None:
+        options = Stated(check_order(options.order), options.frame, options.unit)
+    for name in ("order", "frame", "unit"):
+        here, there = getattr(file, name), getattr(options, name)
+        if here is not None and there is not None and here != there:
+            raise RangeError(f"the file says {name} {here}, the options say {there}")
+    return merged(file, options)
+
+
+def complete(said: Stated) -> Convention:
+    """Return the convention in full. Raises RangeError where nobody names a part of it."""
+    if said.order is not None and said.frame is not None and said.unit is not None:
+        return Convention(said.order, said.frame, said.unit)
+    missing = next(name for name in ("order", "frame", "unit") if getattr(said, name) is None)
+    raise RangeError(
+        f"nobody says the {missing} of the angles",
+        help="give order, frame and unit; what FBX and Maya call XYZ is the order XYZ in the frame extrinsic",
+    )
+
+
+def merged(first: Stated, otherwise: Stated) -> Stated:
+    """Return what `first` says, and where it says nothing what `otherwise` does."""
+    return Stated(
+        first.order if first.order is not None else otherwise.order,
+        first.frame if first.frame is not None else otherwise.frame,
+        first.unit if first.unit is not None else otherwise.unit,
+    )
+
+
+def place_of_axis(axis: str, order: str) -> int | None:
+    """Return which angle of the order an axis name means: "x" … "z" by axis, "1" … "3" by place; None where unclear.
+
+    place_of_axis("y", "ZXY") → 2
+    place_of_axis("z", "ZXZ") → None
+    """
+    if axis in "123":
+        return int(axis) - 1
+    letter = axis.upper()
+    return order.index(letter) if order.count(letter) == 1 else None
+
+
+def axis_names(order: str) -> tuple[str, str, str]:
+    """Return what the three angles of an order are called: their axes, or their places where an axis comes twice."""
+    names = tuple(order.lower()) if len(set(order)) == 3 else ("1", "2", "3")
+    return names[0], names[1], names[2]

@@ -1,0 +1,160 @@
+"""Curve: one number over time with keys of its own, as Maya and FBX keep them; and its value at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim import arrays
+from anim.arrays import Floats, Ints
+from anim.errors import RangeError, ShapeError
+from anim.exchange.euler import weighted_bezier
+from anim.maths import hermite
+
+WEIGHTS = ("in_weights", "out_weights")
+HANDLES = ("in_tangents", "out_tangents", *WEIGHTS)
+
+
+class Mode(IntEnum):
+    """How a curve goes on from a key to the next."""
+
+    STEP = 0
+    LINEAR = 1
+    CUBIC = 2
+
+
+MODES = {mode.name.lower(): mode for mode in Mode}
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Keys of one number. Outside its keys a curve holds its end values.
+
+    times: (K,) s, ≥ 0, strictly increasing. values: (K,) radians, metres or factors.
+    modes: (K,) Mode after each key. in_tangents, out_tangents: (K,) per second, for CUBIC; None means none are.
+    in_weights, out_weights: (K,) lengths of the handles as shares of their piece, 0 … 1; None means a third.
+    """
+
+    times: Floats
+    values: Floats
+    modes: NDArray[np.uint8]
+    in_tangents: Floats | None = None
+    out_tangents: Floats | None = None
+    in_weights: Floats | None = None
+    out_weights: Floats | None = None
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__
+        set_field(self, "times", arrays.times(self.times))
+        for name in ("values", *HANDLES):
+            given = getattr(self, name)
+            if given is not None:
+                set_field(self, name, arrays.floats(given, str(len(self.times)), name=name))
+            if given is not None and name in WEIGHTS and not ((given >= 0) & (given <= 1)).all():
+                raise RangeError(f"{name} go from {given.min():g} to {given.max():g} (expected shares, 0 … 1)")
+        arrays.check_shape(self.modes, str(len(self.times)), name="modes")
+        if (self.modes == Mode.CUBIC).any() and (self.in_tangents is None or self.out_tangents is None):
+            raise ShapeError("a cubic curve lacks tangents")
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it never changes."""
+        if len(self.values) == 1:
+            return True
+        flat = (
+            self.in_tangents is None
+            or self.out_tangents is None
+            or not (self.in_tangents[1:].any() or self.out_tangents[:-1].any())
+        )
+        return flat and bool((self.values == self.values[0]).all())
+
+    def scaled(self, factor: float) -> Curve:
+        """Return the curve with values and tangents multiplied."""
+        arriving = None if self.in_tangents is None else self.in_tangents * factor
+        leaving = None if self.out_tangents is None else self.out_tangents * factor
+        return replace(self, values=self.values * factor, in_tangents=arriving, out_tangents=leaving)
+
+    def kept(self, keys: Ints, times: Floats) -> Curve:
+        """Return the curve with these keys (K,) only, at other times (K,)."""
+        parts = {name: getattr(self, name) for name in HANDLES}
+        handles = {name: None if part is None else part[keys] for name, part in parts.items()}
+        return Curve(times, self.values[keys], self.modes[keys], **handles)
+
+    def weights(self, left: Ints, right: Ints) -> tuple[Floats, Floats]:
+        """Return how far the handles after keys `left` and before keys `right` reach, as shares of the piece."""
+        third = np.full(len(self.times), weighted_bezier.PLAIN)
+        leaving = third if self.out_weights is None else self.out_weights
+        arriving = third if self.in_weights is None else self.in_weights
+        return leaving[left], arriving[right]
+
+
+def constant(value: float) -> Curve:
+    """Return a curve that holds one value: a single key at 0 s."""
+    return linear(np.zeros(1), np.array([value]))
+
+
+def linear(times: Floats, values: Floats) -> Curve:
+    """Return a curve of straight lines through keys (K,)."""
+    return Curve(times, values, uniform_modes(len(times), Mode.LINEAR))
+
+
+def uniform_modes(count: int, mode: Mode) -> NDArray[np.uint8]:
+    """Return the same mode for every key."""
+    return np.full(count, mode, np.uint8)
+
+
+def evaluate(curve: Curve, at: Floats, *, before: bool = False) -> Floats:
+    """Return the value at times `at` (any shape) in seconds; at a key its own value, also where it jumps there.
+
+    before: the value just before instead, which differs at the jumps of steps.
+    (0 s: 1, 2 s: 3, linear) at 0.5 → 1.5
+    """
+    place: Ints = np.searchsorted(curve.times, at, side="left" if before else "right")
+    left = np.clip(place - 1, 0, len(curve.times) - 1)
+    if len(curve.times) == 1:
+        return curve.values[left]
+    right = np.minimum(left + 1, len(curve.times) - 1)
+    duration = curve.times[right] - curve.times[left]
+    inside = (at > curve.times[left]) & (duration > 0) & (curve.modes[left] != Mode.STEP)
+    u = np.where(inside, (at - curve.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
+    start, end = curve.values[left], curve.values[right]
+    values: Floats = np.where(u == 1, end, start + u * (end - start))
+    cubic: Any = inside & (curve.modes[left] == Mode.CUBIC)
+    if cubic.any():
+        assert curve.in_tangents is not None
+        assert curve.out_tangents is not None
+        leaving, arriving = duration * curve.out_tangents[left], duration * curve.in_tangents[right]
+        if curve.in_weights is None and curve.out_weights is None:
+            values = np.where(cubic, hermite.evaluate(u, start, leaving, end, arriving), values)
+        else:
+            bent = weighted_bezier.evaluate(u, start, leaving, end, arriving, curve.weights(left, right))
+            values = np.where(cubic, bent, values)
+    return values
+
+
+def travel(curve: Curve, a: Floats, b: Floats) -> Floats:
+    """Return a bound (B,) of how far the value runs, there and back added up, from times a to b (B,).
+
+    a, b: between the same two keys, or outside all. The bound of a cubic is that of the whole piece between its keys.
+    """
+    straight = np.abs(evaluate(curve, b, before=True) - evaluate(curve, a))
+    if not (curve.modes == Mode.CUBIC).any():
+        return straight
+    assert curve.in_tangents is not None
+    assert curve.out_tangents is not None
+    left = np.clip(np.searchsorted(curve.times, a, side="right") - 1, 0, len(curve.times) - 1)
+    right = np.minimum(left + 1, len(curve.times) - 1)
+    duration, (leaving, arriving) = curve.times[right] - curve.times[left], curve.weights(left, right)
+    points = (
+        curve.values[left],
+        curve.values[left] + leaving * duration * curve.out_tangents[left],
+        curve.values[right] - arriving * duration * curve.in_tangents[right],
+        curve.values[right],
+    )
+    bound = sum(np.abs(q - p) for p, q in pairwise(points))
+    return np.where((curve.modes[left] == Mode.CUBIC) & (a >= curve.times[0]), bound, straight)

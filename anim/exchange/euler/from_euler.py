@@ -1,0 +1,135 @@
+"""Euler curves → a skeleton and a clip of quaternion tracks that is right between its keys too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, sorted_unique
+from anim.errors import AnimError, RangeError
+from anim.exchange.euler import adaptive_keys as placing
+from anim.exchange.euler.adaptive_keys import Path
+from anim.exchange.euler.baked_keys import Keys, StoredTimes, curves_of, stays_on_grid
+from anim.exchange.euler.curve import Curve, Mode, travel
+from anim.exchange.euler.evaluate import extent, rotation_at, scale_at, skeleton, translation_at
+from anim.exchange.euler.motion import PLAIN, EulerMotion, EulerNode
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Skeleton, Track
+
+MIN_TOLERANCE = 1e-6  # rad; float32 quaternions resolve no less
+STILL = 1e-9  # share of the skeleton's size
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """A skeleton in its rest pose, and its motion.
+
+    ends: numbers of nodes that only mark where their parent ends. tolerance: rad, within which the clip follows the
+    source between its keys; None for recordings, which keep their grid.
+    """
+
+    skeleton: Skeleton
+    clip: Clip
+    ends: frozenset[int]
+    tolerance: float | None = None
+
+
+def from_euler(motion: EulerMotion, *, tolerance: float, keys: Keys = Keys.AUTO, name: str = "") -> Converted:
+    """Return the skeleton of the motion, and a clip in which slerp follows the Euler motion.
+
+    Every axis curve is evaluated on its own keys, then the axes are combined; source key times are kept (rounded to
+    float32, as glTF holds them), and keys are added where slerp would leave the path, or a piece would turn by more
+    than 120°. Steps stay steps. Signs are continuous.
+
+    tolerance: rad; translations are held within tolerance × the skeleton's size, scales within tolerance × 1.
+    keys: ADAPTIVE as above; GRID adds no key, and takes angles that jump by whole turns for the same; AUTO takes GRID
+    for recordings: BVH, or straight curves on one even grid of 10 keys a second or more.
+    Raises RangeError for a tolerance below 1e-6 or above pi.
+    XYZ (0, 0, 0) at 0 s → (90°, 90°, 0) at 1 s, tolerance 0.1° → a rotation track of 15 keys
+    """
+    if not MIN_TOLERANCE <= tolerance <= np.pi:
+        raise RangeError(f"tolerance is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
+    bones = skeleton(motion)
+    size = extent(bones) or 1.0
+    stored, axes = StoredTimes(), _Axes()
+    tracks: list[Track] = []
+    adaptive = False
+    for number, node in enumerate(motion.nodes):
+        on_grid = stays_on_grid(motion, node, keys)
+        adaptive |= not on_grid and any(not curve.is_constant for curve in curves_of(node))
+        try:
+            tracks += _tracks(number, stored.node(node), None if on_grid else tolerance, size, axes)
+        except AnimError as error:
+            raise error.at(f"node '{node.name}'") from None
+    ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
+    return Converted(bones, Clip(name, tuple(tracks)), ends, tolerance if adaptive else None)
+
+
+class _Axes:
+    """Time axes, one array for each content, so that tracks share them."""
+
+    def __init__(self) -> None:
+        self._unions: dict[tuple[int, ...], Floats] = {}
+        self._by_content: dict[bytes, Floats] = {}
+
+    def union(self, curves: Sequence[Curve]) -> Floats:
+        arrays = {id(curve.times): curve.times for curve in curves}
+        found = self._unions.get(tuple(arrays))
+        if found is None:
+            found = self._unions[tuple(arrays)] = self.shared(sorted_unique(np.concatenate([*arrays.values()])))
+        return found
+
+    def shared(self, times: Floats) -> Floats:
+        return self._by_content.setdefault(times.tobytes(), times)
+
+
+def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, axes: _Axes) -> list[Track]:
+    """Tracks of one node; tolerance None keeps the keys where they are."""
+    turning = [curve for curve in node.rotation if curve is not None]
+    moving, scaling = [*node.moves.values()], [*node.scales.values()]
+    if node.pivots is not PLAIN:
+        moving = curves_of(node)
+    parts: list[tuple[str, list[Curve], Path, float]] = [
+        ("translation", moving, Path(lambda at, before: translation_at(node, at, before), _no_travel, False), size),
+        ("rotation", turning, Path(lambda at, before: rotation_at(node, at, before), _travel(turning), True), 1.0),
+        ("scale", scaling, Path(lambda at, before: scale_at(node, at, before), _no_travel, False), 1.0),
+    ]
+    tracks = [
+        _track(number, name, curves, path, None if tolerance is None else tolerance * unit, axes)
+        for name, curves, path, unit in parts
+        if curves
+    ]
+    return [track for track in tracks if not _says_nothing(track, node, size)]
+
+
+def _track(number: int, name: str, curves: list[Curve], path: Path, tolerance: float | None, axes: _Axes) -> Track:
+    knots = axes.union(curves)
+    changing = [curve for curve in curves if not curve.is_constant]
+    stepped = bool(changing) and all((curve.modes[:-1] == Mode.STEP).all() for curve in changing)
+    if stepped or tolerance is None:
+        values = path.value(knots, False)
+        values = quaternion.align_signs(values) if path.turns else values
+        return Track(number, name, Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
+    times, values = placing.keys(path, knots, tolerance=tolerance)
+    return Track(number, name, Interpolation.LINEAR, axes.shared(times), values)
+
+
+def _says_nothing(track: Track, node: EulerNode, size: float) -> bool:
+    """Whether it holds what is at rest there anyway: many recorders write six channels for every joint."""
+    if track.path != "translation" or (node.parent < 0 and node.pivots is PLAIN):
+        return False
+    still = translation_at(node, track.times[:1])[0] if node.pivots is not PLAIN else node.translation
+    return bool((np.abs(track.values - still) <= STILL * size).all())
+
+
+def _travel(curves: list[Curve]) -> placing.Travel:
+    def bound(a: Floats, b: Floats) -> Floats:
+        return np.asarray(sum((travel(curve, a, b) for curve in curves), np.zeros(len(a))))
+
+    return bound
+
+
+def _no_travel(a: Floats, b: Floats) -> Floats:
+    return np.zeros(len(a))

@@ -1,0 +1,122 @@
+"""How near a motion comes to gimbal lock, joint by joint, and which order would keep farthest from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange.euler.motion import PLAIN, EulerMotion, Pivots
+from anim.maths import euler, quaternion
+from anim.maths.euler import ORDERS, Frame
+from anim.model import Clip, Interpolation, Track
+from anim.sampling.track import sample
+
+NEAR = np.radians(5.0)  # from lock: rates are 23 times amplified there
+MANY, BETWEEN = 500, 29  # keys that are enough; times looked at between two where they are not
+SAME = 1e-9  # rad; nearer than this nothing is nearer: the first counts
+CELLS = 200_000  # quaternions looked at together
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalRow:
+    """One joint under its own order.
+
+    nearest_deg: least distance from lock, and when (at_s). near_s: time within 5° of it.
+    worst_condition: greatest ratio of singular values of the map from rates of angles to angular velocity; 1 is best.
+    aligned: the two axes that fall together at lock. best_order: of all 12 (intrinsic, or extrinsic read backwards)
+    the one whose nearest distance, best_nearest_deg, is greatest for this motion.
+    """
+
+    node: str
+    order: str
+    frame: str
+    nearest_deg: float
+    at_s: float
+    near_s: float
+    worst_condition: float
+    aligned: str
+    best_order: str
+    best_nearest_deg: float
+
+
+def gimbal(motion: EulerMotion, clip: Clip) -> tuple[GimbalRow, ...]:
+    """Return a row for each node that turns about three axes, in the order of nodes.
+
+    clip: the motion as quaternions, whose node numbers are the motion's. Looked at are its keys; where they are few,
+    also what lies between them. Pre and post rotations are taken off: the three angles are between them.
+    Source: the Jacobian's singular values are 1, √(1 + s), √(1 − s), s the cosine of the distance from lock.
+    """
+    turning = [(t.node, t) for t in clip.tracks if t.path == "rotation" and t.node is not None]
+    rows = []
+    for times, nodes, values in _stacked(
+        [_looked_at(motion, node, t) for node, t in turning if _has_lock(motion, node)]
+    ):
+        by_order = {order: euler.distance_to_lock(values, order=order) for order in ORDERS}
+        nearest = {order: distance.min(axis=0) for order, distance in by_order.items()}
+        for i, node in enumerate(nodes):
+            about = motion.nodes[node]
+            order = about.order if about.frame == Frame.INTRINSIC else about.order[::-1]
+            best = max(ORDERS, key=lambda each: float(nearest[each][i]))
+            if nearest[best][i] <= nearest[order][i] + 1e-9:
+                best = order
+            own = by_order[order][:, i]
+            rows.append((node, _row(motion, node, times, own, best, float(nearest[best][i]))))
+    return tuple(row for _, row in sorted(rows, key=lambda each: each[0]))
+
+
+def _has_lock(motion: EulerMotion, node: int) -> bool:
+    return motion.nodes[node].order in ORDERS
+
+
+def _looked_at(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
+    """Node, times and the rotations of its angles: at the track's keys, or with BETWEEN more in each piece."""
+    if len(track.times) > MANY or track.interpolation is Interpolation.STEP or len(track.times) == 1:
+        return node, track.times, _of_angles(motion.nodes[node].pivots, track.values)
+    shares = np.arange(BETWEEN + 1) / (BETWEEN + 1)
+    pieces = track.times[:-1, None] + np.diff(track.times)[:, None] * shares
+    at = np.append(pieces.ravel(), track.times[-1])
+    return node, at, _of_angles(motion.nodes[node].pivots, sample(track, at))
+
+
+def _of_angles(pivots: Pivots, q: Floats) -> Floats:
+    """R (K, 4) from Rpre · R · Rpost⁻¹."""
+    if pivots is PLAIN:
+        return q
+    return quaternion.multiply(quaternion.multiply(quaternion.conjugate(pivots.pre_rotation), q), pivots.post_rotation)
+
+
+def _stacked(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, list[int], Floats]]:
+    """Tracks on one time axis together: times (K,), node numbers, values (K, G, 4), of a size that caches like."""
+    groups: dict[int, list[tuple[int, Floats, Floats]]] = {}
+    for track in tracks:
+        groups.setdefault(id(track[1]), []).append(track)
+    stacked = []
+    for group in groups.values():
+        count = max(CELLS // len(group[0][1]), 1)
+        for start in range(0, len(group), count):
+            part = group[start : start + count]
+            stacked.append((part[0][1], [node for node, _, _ in part], np.stack([v for _, _, v in part], axis=1)))
+    return stacked
+
+
+def _row(motion: EulerMotion, node: int, times: Floats, distance: Floats, best: str, best_nearest: float) -> GimbalRow:
+    about = motion.nodes[node]
+    least = int((distance <= distance.min() + SAME).argmax())
+    spans = np.zeros(len(times))  # each key stands for half the way to its neighbors
+    spans[1:] += np.diff(times) / 2
+    spans[:-1] += np.diff(times) / 2
+    sine = min(float(np.cos(distance[least])), 1 - 1e-12)
+    return GimbalRow(
+        about.name,
+        about.order,
+        str(about.frame),
+        float(np.degrees(distance[least])),
+        float(times[least]),
+        float(spans[distance < NEAR].sum()),
+        float(np.sqrt((1 + sine) / (1 - sine))),
+        f"{about.order[0]} and {about.order[2]}" if about.order[0] != about.order[2] else f"both {about.order[0]}",
+        best if about.frame == Frame.INTRINSIC else best[::-1],
+        float(np.degrees(best_nearest)),
+    )

@@ -1,0 +1,153 @@
+"""EulerMotion: what every track format is read into: nodes with one curve per axis, and how the axes combine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange.euler.curve import Curve
+from anim.maths.euler import Frame
+
+ZERO = np.zeros(3)
+NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
+
+
+class Unit(StrEnum):
+    """What angles are measured in."""
+
+    DEG = "deg"
+    RAD = "rad"
+
+    @property
+    def radians(self) -> float:
+        """One of it in radians."""
+        return np.pi / 180 if self is Unit.DEG else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Convention:
+    """How three angles make a rotation: one of 24 conventions, and the unit. See `anim.maths.euler`."""
+
+    order: str
+    frame: Frame
+    unit: Unit
+
+    def __str__(self) -> str:
+        return f"{self.order} {self.frame} {self.unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class Pivots:
+    """What FBX and Maya put around the rotation: T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹.
+
+    pre_rotation, post_rotation: unit quaternions (4,). The others: offsets (3,) in metres.
+    """
+
+    pre_rotation: Floats = field(default_factory=lambda: NO_TURN)
+    post_rotation: Floats = field(default_factory=lambda: NO_TURN)
+    rotation_offset: Floats = field(default_factory=lambda: ZERO)
+    rotation_pivot: Floats = field(default_factory=lambda: ZERO)
+    scaling_offset: Floats = field(default_factory=lambda: ZERO)
+    scaling_pivot: Floats = field(default_factory=lambda: ZERO)
+
+
+PLAIN = Pivots()
+OFFSETS = ("rotation_offset", "rotation_pivot", "scaling_offset", "scaling_pivot")
+
+
+@dataclass(frozen=True, slots=True)
+class EulerNode:
+    """One node: its place in the tree, its rest, and the curves that move it.
+
+    parent: number of the parent, −1 for a root. translation, scale: (3,) at rest.
+    order, frame: how `angles` and the rotation curves combine; as many axes as angles. Angles at rest are in radians.
+    rotation: a curve per axis of the order, None where the axis keeps its angle at rest.
+    moves, scales: curves by 0, 1, 2 for x, y, z; metres and factors.
+    end: whether it only marks where its parent ends: an End Site of BVH.
+    """
+
+    name: str
+    parent: int
+    translation: Floats
+    order: str
+    frame: Frame
+    angles: Floats
+    rotation: tuple[Curve | None, ...]
+    moves: Mapping[int, Curve] = field(default_factory=dict)
+    scale: Floats = field(default_factory=lambda: np.ones(3))
+    scales: Mapping[int, Curve] = field(default_factory=dict)
+    pivots: Pivots = PLAIN
+    end: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class EulerMotion:
+    """All nodes, parents before children, and what a reader wants to be known.
+
+    sampled: whether the curves are frames of a recording: between them there is nothing to follow, and an angle that
+    jumps by whole turns does not turn. None where only the keys themselves can tell.
+    nested: whether the source says which node belongs to which; if not, `parent` is −1 everywhere.
+    notes: lines for a person about oddities that were put right.
+    """
+
+    nodes: tuple[EulerNode, ...]
+    sampled: bool | None = None
+    nested: bool = True
+    notes: tuple[str, ...] = ()
+
+
+def scaled(motion: EulerMotion, factor: float) -> EulerMotion:
+    """Return the motion with every length multiplied: offsets, pivots and translation curves."""
+    return motion if factor == 1 else replace(motion, nodes=tuple(_scaled(node, factor) for node in motion.nodes))
+
+
+def turned_up(motion: EulerMotion) -> EulerMotion:
+    """Return a motion with Z up as one with Y up: every coordinate (x, y, z) becomes (x, z, −y).
+
+    Axes change their names, rotations stay Euler rotations: about Z becomes about Y, about Y becomes about −Z.
+    """
+    return replace(motion, nodes=tuple(_turned_up(node) for node in motion.nodes))
+
+
+def _scaled(node: EulerNode, factor: float) -> EulerNode:
+    pivots = node.pivots
+    if pivots is not PLAIN:
+        pivots = replace(pivots, **{name: getattr(pivots, name) * factor for name in OFFSETS})
+    moves = {axis: curve.scaled(factor) for axis, curve in node.moves.items()}
+    return replace(node, translation=node.translation * factor, moves=moves, pivots=pivots)
+
+
+def _turned_up(node: EulerNode) -> EulerNode:
+    sign = [-1.0 if axis == "Y" else 1.0 for axis in node.order]
+    rotation = tuple(
+        curve.scaled(-1.0) if curve is not None and s < 0 else curve
+        for curve, s in zip(node.rotation, sign, strict=True)
+    )
+    moves = {(0, 2, 1)[axis]: curve.scaled(-1.0) if axis == 1 else curve for axis, curve in node.moves.items()}
+    pivots = node.pivots
+    if pivots is not PLAIN:
+        turned = {name: _up(getattr(pivots, name)) for name in OFFSETS}
+        turned |= {
+            name: np.append(_up(getattr(pivots, name)[:3]), getattr(pivots, name)[3])
+            for name in ("pre_rotation", "post_rotation")
+        }
+        pivots = replace(pivots, **turned)
+    return replace(
+        node,
+        translation=_up(node.translation),
+        order=node.order.translate(str.maketrans("YZ", "ZY")),
+        angles=node.angles * sign,
+        rotation=rotation,
+        moves=moves,
+        scale=node.scale[[0, 2, 1]],
+        scales={(0, 2, 1)[axis]: curve for axis, curve in node.scales.items()},
+        pivots=pivots,
+    )
+
+
+def _up(vector: Floats) -> Floats:
+    return np.array((vector[0], vector[2], -vector[1]))

@@ -1,0 +1,48 @@
+"""More keys between keys, for many joints at once, where slerp and straight lines would leave a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.exchange.euler import adaptive_keys
+from anim.exchange.euler.adaptive_keys import MAX_TURN, MOST_PIECES, SAFETY
+from anim.maths import quaternion
+
+SAMPLES = np.arange(1, 8) / 8
+
+Motion: TypeAlias = Callable[[Floats], tuple[dict[int, Floats], Floats]]
+
+
+def refined(times: Floats, motion: Motion, *, tolerance: float, size: float) -> Floats:
+    """Return key times, `times` among them, between which slerp and lerp stay within the tolerance of the motion.
+
+    times: (K,) s, float32-exact. motion: at times (F,) → unit quaternions (F, 4) by node, and paths (F, P, 3), m.
+    tolerance: rad for each rotation; paths are held within tolerance × size. No joint turns by over 120° in a piece.
+    Raises RangeError for over two million keys.
+    """
+    return adaptive_keys.refined(times, lambda a, b: _wanted(motion, a, b, tolerance, size))
+
+
+def _wanted(motion: Motion, a: Floats, b: Floats, tolerance: float, size: float) -> Ints:
+    """How many pieces (B,) each should become; 1 where it is good."""
+    shares = np.concatenate(([0.0], SAMPLES, [1.0]))
+    at = a[:, None] + (b - a)[:, None] * shares
+    at[:, -1] = b
+    rotations, paths = motion(at.ravel())
+    places = paths.reshape(*at.shape, *paths.shape[1:])
+    chord = places[:, :1] + (places[:, -1:] - places[:, :1]) * SAMPLES[None, :, None, None]
+    error = np.linalg.norm(chord - places[:, 1:-1], axis=-1).max(axis=(1, 2), initial=0.0) / size
+    turns = np.ones(len(a))
+    for flat in rotations.values():
+        q = flat.reshape(*at.shape, 4)
+        straight = quaternion.slerp(q[:, :1], q[:, -1:], SAMPLES[None])
+        error = np.maximum(error, quaternion.angle_between(straight, q[:, 1:-1]).max(axis=1))
+        turned = quaternion.angle_between(q[:, 1:], q[:, :-1]).sum(axis=1)
+        turns = np.maximum(turns, np.ceil(turned / MAX_TURN - 1e-4))
+    bent = np.ceil(np.sqrt(error * SAFETY / tolerance) - 1e-9)
+    pieces: Ints = np.clip(np.maximum(turns, bent), 1, MOST_PIECES).astype(np.int64)
+    return pieces

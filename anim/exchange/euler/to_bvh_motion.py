@@ -1,0 +1,188 @@
+"""A glTF clip → a motion such as BVH holds: no rest rotation, no scale, frames on an even grid, End Sites."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from anim.arrays import Floats, sorted_unique
+from anim.errors import RangeError, UnsupportedError
+from anim.exchange.euler.curve import Curve, linear
+from anim.exchange.euler.motion import NO_TURN, ZERO, EulerMotion, EulerNode
+from anim.exchange.euler.rotation_order import Orders
+from anim.exchange.euler.to_euler import FILE_LOCK
+from anim.exchange.formats.labels import label_of, labels, left_out, unique
+from anim.exchange.retarget.world_rotations import world_rotations
+from anim.maths import euler, quaternion
+from anim.maths.euler import Frame
+from anim.model import Clip, Skeleton
+from anim.sampling import pose, rest, world_matrices
+
+EVEN = 1e-3  # share of a frame by which frames may be off an even grid
+MAX_FRAMES = 10_000_000
+ROUNDING = 2e-7  # share of a time that float32 may be off
+STILL = 1e-6  # share of the skeleton's size by which an offset may differ and still be one
+BRACES = "{}"
+END = "_end"  # a leaf of this name that nothing moves is where its parent ends
+
+
+def to_bvh(
+    skeleton: Skeleton,
+    clip: Clip,
+    *,
+    order: str | Orders,
+    fps: float | None = None,
+    joints: Collection[int] = (),
+    meters_per_unit: float = 1.0,
+) -> EulerMotion:
+    """Return the clip with angles seen from the rest pose along world axes, so that all zero is the rest pose.
+
+    Every joint stands where it stands in the glTF, at every frame: joints that move in their parent, and roots, have
+    translation curves too; what BVH has no place for is in the notes. Frame k lies at the clip's start + k / fps, the
+    last at or behind its end.
+    order: one of the twelve for all joints, or `Orders`. fps: None for the grid of the keys. Raises RangeError where
+    they have none.
+    joints: nodes to write, with what lies between them; empty for all. Lengths are divided by meters_per_unit.
+    """
+    orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
+    chosen, names = _chosen(skeleton, clip, joints), _names(skeleton)
+    if not chosen:
+        raise UnsupportedError("there is no node to write")
+    orders.check([names[node] for node in chosen])
+    shown, times = _frames(clip, fps)
+    figure = _Figure(skeleton, clip, chosen, times)
+    nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
+    notes = left_out(_lost(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen) + _begun(clip)
+    return EulerMotion(tuple(nodes), sampled=True, notes=notes)
+
+
+Placed = tuple[Floats, Floats, Floats]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
+
+
+class _Figure:
+    """The nodes to write, numbered in their order, and where they are at times (F,) and at rest."""
+
+    def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
+        moving, still = pose(skeleton, clip, times), rest(skeleton)
+        self.skeleton, self.clip = skeleton, clip
+        self.numbers = {node: i for i, node in enumerate(chosen)}
+        self._places, self._home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
+        turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
+        self._turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
+        self.size = float(np.ptp(self._home[chosen], axis=0).max()) or 1.0
+
+    def placed(self, node: int) -> Placed:
+        """Where a node is in the world; −1 is the world itself."""
+        if node < 0:
+            return ZERO, NO_TURN[None], ZERO
+        return self._home[node], self._turns[node], self._places[:, node]
+
+
+def _node(figure: _Figure, node: int, name: str, orders: Orders, shown: Floats, meters_per_unit: float) -> EulerNode:
+    """A joint with the curves that it needs; lengths in the file's unit, keys at times `shown`."""
+    parent = _above(figure.skeleton, node, figure.numbers)
+    offset, turn, path = _seen_from(figure.placed(node), figure.placed(parent))
+    moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * figure.size)
+    end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
+    order = orders.of(name, turn)
+    angles = euler.continuous(turn, order=order, frame=Frame.INTRINSIC, lock=FILE_LOCK)
+    return EulerNode(
+        name,
+        figure.numbers.get(parent, -1),
+        offset / meters_per_unit,
+        order,
+        Frame.INTRINSIC,
+        np.zeros(3),
+        (None, None, None) if end else tuple(_curves(shown, angles)),
+        dict(enumerate(_curves(shown, path / meters_per_unit))) if moved else {},
+        end=end,
+    )
+
+
+def _seen_from(node: Placed, parent: Placed) -> Placed:
+    """The same from the parent: offset at rest, turn, and offset at all times."""
+    back = quaternion.conjugate(parent[1])
+    return node[0] - parent[0], quaternion.multiply(back, node[1]), quaternion.rotate(back, node[2] - parent[2])
+
+
+def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
+    """Frame times (F,) on an even grid from 0, and where to sample the clip for them: at its keys where they meet."""
+    start, end = clip.start, clip.end
+    arrays = {id(track.times): track.times for track in clip.tracks}
+    keys: Floats = sorted_unique(np.concatenate([*arrays.values()])) if arrays else np.zeros(1)
+    if fps is not None:
+        if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
+            raise RangeError(f"fps is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
+        shown = np.arange(int(np.ceil((end - start) * fps - EVEN)) + 1) / fps
+    else:
+        step = (end - start) / max(len(keys) - 1, 1)
+        shown = np.asarray(np.arange(len(keys)) * step, np.float64)
+        if np.abs(keys - start - shown).max() > EVEN * step + ROUNDING * end:
+            raise RangeError("keys stand on no even grid, as a BVH needs", help="give --fps")
+        return shown, keys
+    at = start + shown
+    nearest = keys[np.clip(np.searchsorted(keys, at - ROUNDING * at), 0, len(keys) - 1)]
+    return shown, np.where(np.abs(nearest - at) <= ROUNDING * at, nearest, at)
+
+
+def _chosen(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
+    """Nodes to write, parents first: the joints, what lies between them, and leaves that mark where they end."""
+    wanted = set(joints) or set(range(len(skeleton)))
+    top = set(wanted)
+    for node in list(wanted):
+        path = []
+        at = int(skeleton.parents[node])
+        while at >= 0 and at not in top:
+            path.append(at)
+            at = int(skeleton.parents[at])
+        if at >= 0:
+            wanted.update(path)
+    wanted |= {n for n in range(len(skeleton)) if _is_end(skeleton, clip, n, wanted)}
+    return [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
+
+
+def _is_end(skeleton: Skeleton, clip: Clip, node: int, among: Collection[int]) -> bool:
+    parent = int(skeleton.parents[node])
+    leaf = not (skeleton.parents == node).any()
+    named = parent >= 0 and skeleton.names[node].casefold().endswith(END)
+    return named and leaf and parent in among and all(track.node != node for track in clip.tracks)
+
+
+def _names(skeleton: Skeleton) -> list[str]:
+    """Names of all nodes; braces, between which a BVH has its joints, become parentheses."""
+    return unique([name.translate(str.maketrans(BRACES, "()")) for name in labels(skeleton)])
+
+
+def _renamed(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:
+    changed = [names[node] for node in sorted(chosen) if set(skeleton.names[node]) & set(BRACES)]
+    return (f"braces in names became parentheses: {', '.join(changed)}",) if changed else ()
+
+
+def _begun(clip: Clip) -> tuple[str, ...]:
+    return (f"the first key is at {clip.start:.6g} s: a BVH begins there, at 0",) if clip.start > 0 else ()
+
+
+def _lost(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
+    """What of the clip a BVH of the chosen nodes doesn't show, in words."""
+    carrying = set(chosen)
+    for node in chosen:
+        while (node := int(skeleton.parents[node])) >= 0 and node not in carrying:
+            carrying.add(node)
+    names = labels(skeleton)
+    return [
+        label_of(track, names)
+        for track in clip.tracks
+        if track.path not in ("translation", "rotation") or track.node not in carrying
+    ]
+
+
+def _above(skeleton: Skeleton, node: int, among: Collection[int]) -> int:
+    parent = int(skeleton.parents[node])
+    while parent >= 0 and parent not in among:
+        parent = int(skeleton.parents[parent])
+    return parent
+
+
+def _curves(times: Floats, values: Floats) -> list[Curve]:
+    return [linear(times, column) for column in values.T]

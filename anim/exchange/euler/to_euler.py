@@ -1,0 +1,184 @@
+"""A glTF clip → Euler curves of every node, in any order, that run on without jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats, sorted_unique
+from anim.errors import RangeError
+from anim.exchange.euler.curve import Curve, Mode, uniform_modes
+from anim.exchange.euler.motion import EulerMotion, EulerNode
+from anim.exchange.euler.rotation_order import Orders
+from anim.exchange.formats.labels import label_of, labels, left_out
+from anim.maths import euler, quaternion
+from anim.maths.euler import Frame
+from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.sampling import grid
+from anim.sampling.times import key_times
+from anim.sampling.track import sample
+
+FILE_LOCK = 1e-6  # rad; what a file's float32 quaternions leave of a lock
+BETWEEN = np.array((0.25, 0.5, 0.75))
+MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
+ROUNDS, MOST_PIECES, MAX_KEYS = 24, 32, 500_000
+
+
+@dataclass(frozen=True, slots=True)
+class EulerCurves:
+    """Curves of all nodes, in local space; what has no place in them is in the notes.
+
+    deviation: rad, the most that straight curves leave the motion between keys.
+    """
+
+    motion: EulerMotion
+    deviation: float
+
+
+def to_euler(
+    skeleton: Skeleton,
+    clip: Clip,
+    *,
+    order: str | Orders,
+    frame: Frame = Frame.INTRINSIC,
+    fps: float | None = None,
+    tolerance: float | None = None,
+    without: Collection[int] = (),
+) -> EulerCurves:
+    """Return the clip as Euler curves in radians, straight between keys, and the rest of all nodes.
+
+    Each key gets the equivalent triple nearest to the key before; at lock see `euler.continuous`. Keys stand where the
+    tracks have theirs, or at `fps` frames per second; steps stay steps, at their times. Translations and scales keep
+    their cubics where no `fps` is given.
+    order: one of the twelve for all nodes, or `Orders`; auto looks at the clip's keys and half way between.
+    tolerance: rad; keys are added where straight curves would leave the motion by more. Raises RangeError below 1e-6.
+    without: nodes to leave out where nothing moves them and nothing hangs on them, such as those that hold a skin.
+    """
+    orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
+    if tolerance is not None and not 1e-6 <= tolerance < np.inf:
+        raise RangeError(f"tolerance is {tolerance:g} rad (expected 1e-06 or more)")
+    frames = key_times(grid(clip.start, clip.end, fps=fps)) if fps is not None else None
+    names = labels(skeleton)
+    orders.check(names)
+    by_node, lost = _by_node(clip, names)
+    asked = _Asked(orders, frame, frames, tolerance)
+    found = [_node(skeleton, number, name, by_node.get(number, {}), asked) for number, name in enumerate(names)]
+    nodes, deviation = [node for node, _ in found], max((off for _, off in found), default=0.0)
+    kept = [n for n in range(len(nodes)) if n not in without or n in by_node or (skeleton.parents == n).any()]
+    return EulerCurves(EulerMotion(_renumbered(nodes, kept), notes=left_out(lost)), deviation)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """How curves shall be. frames: (F,) s, where their keys stand; None for the tracks' own. tolerance: rad."""
+
+    orders: Orders
+    frame: Frame
+    frames: Floats | None
+    tolerance: float | None
+
+
+def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]], list[str]]:
+    """Tracks by node and path, and words for those that have no place in Euler curves."""
+    by_node: dict[int, dict[str, Track]] = {}
+    lost = []
+    for track in clip.tracks:
+        if track.node is None or track.path not in ("translation", "rotation", "scale"):
+            lost.append(label_of(track, names))
+        else:
+            by_node.setdefault(track.node, {})[track.path] = track
+    return by_node, lost
+
+
+def _node(
+    skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Asked
+) -> tuple[EulerNode, float]:
+    """A node with curves of its tracks by path, and how far those of its rotation leave it between keys, rad."""
+    turn, still, frame = tracks.get("rotation"), skeleton.rotation[number], asked.frame
+    order = asked.orders.of(name, still if turn is None else _seen(turn), frame)
+    rotation: tuple[Curve | None, ...] = (None, None, None)
+    deviation = 0.0
+    if turn is not None:
+        rotation, deviation = _rotation(turn, order, asked)
+    node = EulerNode(
+        name,
+        int(skeleton.parents[number]),
+        skeleton.translation[number],
+        order,
+        frame,
+        euler.from_quaternion(still, order=order, frame=frame),
+        rotation,
+        _axes(tracks.get("translation"), asked.frames),
+        skeleton.scale[number],
+        _axes(tracks.get("scale"), asked.frames),
+    )
+    return node, deviation
+
+
+def _renumbered(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...]:
+    places = {-1: -1, **{node: place for place, node in enumerate(kept)}}
+    return tuple(replace(nodes[node], parent=places[nodes[node].parent]) for node in kept)
+
+
+def _seen(track: Track) -> Floats:
+    """Rotations at the keys and half way between."""
+    halves = (track.times[1:] + track.times[:-1]) / 2
+    return sample(track, sorted_unique(np.concatenate((track.times, halves))))
+
+
+def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...], float]:
+    """The three curves of a rotation, and how far they leave it between keys."""
+    stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
+    times = track.times if asked.frames is None or stepped else asked.frames
+    for _ in range(ROUNDS):
+        angles = euler.continuous(sample(track, times), order=order, frame=frame, lock=FILE_LOCK)
+        if stepped or len(times) == 1:
+            mode = Mode.STEP if stepped else Mode.LINEAR
+            return _curves(times, angles, mode), 0.0
+        errors = _between(track, times, angles, order, frame)
+        if tolerance is None or errors.max() <= tolerance:
+            break
+        finer = _refined(times, errors, tolerance)
+        if len(finer) == len(times) or len(finer) > MAX_KEYS:
+            break
+        times = finer
+    return _curves(times, angles, Mode.LINEAR), float(errors.max())
+
+
+def _between(track: Track, times: Floats, angles: Floats, order: str, frame: Frame) -> Floats:
+    """How far straight curves leave the motion in each piece (K − 1,), rad; 0 in a jump, where no float32 time lies."""
+    u = BETWEEN[:, None]
+    at = times[:-1] + (times[1:] - times[:-1]) * u
+    straight = angles[:-1] + (angles[1:] - angles[:-1]) * u[..., None]
+    true = sample(track, at.ravel()).reshape(*at.shape, 4)
+    made = euler.to_quaternion(straight, order=order, frame=frame)
+    jumps = np.nextafter(times[:-1].astype(np.float32), np.float32(np.inf)) >= times[1:]
+    return np.where(jumps, 0.0, quaternion.angle_between(made, true).max(axis=0))
+
+
+def _refined(times: Floats, errors: Floats, tolerance: float) -> Floats:
+    pieces = np.clip(np.ceil(np.sqrt(errors / tolerance)), 1, MOST_PIECES).astype(np.int64)
+    new = [
+        times[k] + (times[k + 1] - times[k]) * np.arange(1, pieces[k]) / pieces[k] for k in np.flatnonzero(pieces > 1)
+    ]
+    return key_times(np.concatenate([times, *new]))
+
+
+def _axes(track: Track | None, frames: Floats | None) -> dict[int, Curve]:
+    if track is None:
+        return {}
+    if frames is not None and track.interpolation is not Interpolation.STEP:
+        return dict(enumerate(_curves(frames, sample(track, frames), Mode.LINEAR)))
+    mode = MODES[track.interpolation]
+    if mode is not Mode.CUBIC or track.in_tangents is None or track.out_tangents is None:
+        return dict(enumerate(_curves(track.times, track.values, mode)))
+    modes = uniform_modes(len(track.times), mode)
+    parts = zip(track.values.T, track.in_tangents.T, track.out_tangents.T, strict=True)
+    return {axis: Curve(track.times, part[0], modes, part[1], part[2]) for axis, part in enumerate(parts)}
+
+
+def _curves(times: Floats, values: Floats, mode: Mode) -> tuple[Curve, ...]:
+    modes = uniform_modes(len(times), mode)
+    return tuple(Curve(times, column, modes) for column in values.T)

@@ -1,0 +1,115 @@
+"""The MOTION of a BVH: frame time and rows of numbers, read by count and not by what the header claims."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange.formats.bvh_hierarchy import fail
+from anim.exchange.formats.text import GROUPED, LIMIT
+from anim.exchange.formats.text import number as number_of
+
+RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100,
+         120, 144, 150, 200, 240, 250, 300, 480, 500, 1000)  # fmt: skip
+SNAP = 1e-3  # share of a frame; a frame time is written with few digits
+ROUNDED = 1e-7  # share of a frame that nine digits leave
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Rows (F, C) in file units and degrees, frames per second, and lines about what was odd."""
+
+    rows: Floats
+    fps: float
+    notes: tuple[str, ...]
+
+
+def frames(lines: list[str], start: int, column: int, channels: int) -> Frames:
+    """Return what stands behind MOTION, which is in line `start` (from 0) and ends at `column`.
+
+    channels: numbers in a row. Rows may be wrapped. Another number of rows than claimed is noted; fewer than half of
+    it is a truncated file. Raises FormatError with the line.
+    """
+    claimed, seconds, body = _head(lines, start, column)
+    numbers = _numbers(lines, body)
+    if not channels:
+        fail(start + 1, "no joint has a channel: there is no motion")
+    _check_columns(lines, body, len(numbers), channels, claimed)
+    rows = numbers.reshape(-1, channels)
+    notes = []
+    if not len(rows) and not claimed:
+        fail(len(lines), "there are no frames")
+    if len(rows) != claimed:
+        if not len(rows) or 2 * len(rows) < claimed:
+            fail(len(lines), f"the file holds {len(rows)} of {claimed} claimed frames (truncated?)")
+        notes.append(f"Frames says {claimed}, the file holds {len(rows)}: all of them are read")
+    fps = _snapped(seconds)
+    if abs(fps * seconds - 1) > ROUNDED:
+        notes.append(f"frame time {seconds:g} s is taken for 1/{fps:g} s")
+    return Frames(rows, fps, tuple(notes))
+
+
+def _head(lines: list[str], start: int, column: int) -> tuple[int, float, int]:
+    """Claimed frames, seconds per frame, and the first line (from 0) of rows, of which the rest is cut off before."""
+    lines[start] = lines[start][column:]
+    line, found = _find(lines, start, r"\s*Frames\s*:?\s*(\d+)(?!\.?\d)", "Frames: and a whole number")
+    claimed = int(found)
+    line, found = _find(lines, line, rf"\s*Frame\s*Time\s*:?\s*({NUMBER})(?!\S)", "Frame Time: and seconds")
+    seconds = float(found)
+    if not 1e-6 <= seconds <= 1e6:
+        fail(line + 1, f"Frame Time is {found} (expected seconds above 0)")
+    return claimed, seconds, line
+
+
+def _find(lines: list[str], start: int, pattern: str, expected: str) -> tuple[int, str]:
+    number = start
+    while number < len(lines) and not lines[number].strip():
+        number += 1
+    if number == len(lines):
+        fail(number, f"the file ends here (expected {expected}; truncated?)")
+    match = re.match(pattern, lines[number], re.IGNORECASE)
+    if match is None:
+        fail(number + 1, f"'{lines[number].strip()[:40]}' (expected {expected})")
+    lines[number] = lines[number][match.end() :]
+    return number, match[1]
+
+
+def _numbers(lines: list[str], body: int) -> Floats:
+    words = " ".join(lines[body:])
+    try:
+        numbers: Floats = np.array([*map(float, words.split())], np.float64)
+        if GROUPED not in words and (not len(numbers) or np.abs(numbers).max() <= LIMIT):  # NaN is not
+            return numbers
+    except ValueError:
+        pass
+    for number, line in enumerate(lines[body:], body + 1):
+        for place, text in enumerate(line.split(), 1):
+            if number_of(text) is None:
+                fail(number, f"number {place} is '{text[:40]}' (expected a finite number)")
+    raise AssertionError
+
+
+def _check_columns(lines: list[str], body: int, count: int, channels: int, claimed: int) -> None:
+    """Refuse rows that are not as long as all channels together; wrapped ones may break anywhere."""
+    per_line = [(number, len(line.split())) for number, line in enumerate(lines[body:], body + 1) if line.strip()]
+    lengths = {length for _, length in per_line}
+    one_per_line = len(per_line) == claimed and len(lengths) == 1
+    if not per_line or (count % channels == 0 and not (one_per_line and lengths != {channels})):
+        return
+    right = sum(length == channels for _, length in per_line)
+    for number, length in per_line:
+        if length != channels and (2 * right > len(per_line) or len(per_line) == claimed):
+            cut_off = number == per_line[-1][0] and length < channels
+            hint = "; truncated?" if cut_off else ""
+            fail(number, f"{length} numbers in a row (expected {channels}, one per channel{hint})")
+    fail(per_line[-1][0], f"the last frame has {count % channels} of {channels} numbers (truncated?)")
+
+
+def _snapped(seconds: float) -> float:
+    """Frames per second: a usual rate where the frame time is one to within its digits."""
+    rate = min(RATES, key=lambda rate: abs(rate * seconds - 1))
+    return rate if abs(rate * seconds - 1) < SNAP else 1 / seconds

@@ -1,0 +1,71 @@
+"""BVH ↔ EulerMotion. Angles are degrees, intrinsic, in the order in which each joint lists its channels."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import UnsupportedError
+from anim.exchange.euler import curve
+from anim.exchange.euler.curve import Curve, Mode
+from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
+from anim.exchange.formats import bvh_frames, bvh_hierarchy, bvh_writer
+from anim.exchange.formats.bvh_hierarchy import BvhJoint
+from anim.exchange.formats.labels import unique
+from anim.exchange.formats.text import text_of
+from anim.maths.euler import Frame
+
+
+class BvhPosition(StrEnum):
+    """What position channels do with the OFFSET of their joint."""
+
+    REPLACE = "replace"
+    ADD = "add"
+
+
+def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMotion:
+    """Return the motion in a BVH file, lengths in the file's own unit, times at whole frames.
+
+    position: whether position channels replace the OFFSET, as in Blender, or are added to it, as in three.js.
+    Names that appear twice get a number: "Hand", "Hand.2". Line ends of any system, UTF-8, UTF-16 or Latin-1.
+    Raises FormatError with the line.
+    """
+    lines = text_of(data).split("\n")
+    while len(lines) > 1 and not lines[-1].strip():
+        lines.pop()
+    joints, start, column = bvh_hierarchy.hierarchy(lines)
+    found = bvh_frames.frames(lines, start, column, sum(len(joint.channels) for joint in joints))
+    names = unique([joint.name for joint in joints])
+    renamed = [name for name, joint in zip(names, joints, strict=True) if name != joint.name]
+    times = np.arange(len(found.rows)) / found.fps
+    nodes, first = [], 0
+    for joint, name in zip(joints, names, strict=True):
+        last = first + len(joint.channels)
+        nodes.append(_node(joint, name, times, found.rows[:, first:last], position))
+        first = last
+    notes = found.notes + ((f"names that appear twice got numbers: {', '.join(renamed)}",) if renamed else ())
+    return EulerMotion(tuple(nodes), sampled=True, notes=notes)
+
+
+def write(motion: EulerMotion, convention: Convention) -> bytes:
+    """Return the motion as a BVH, see `bvh_write`. Raises UnsupportedError for extrinsic angles: BVH has none."""
+    if convention.frame != Frame.INTRINSIC:
+        raise UnsupportedError("a BVH's angles are intrinsic", help="give --frame intrinsic; the order reads backwards")
+    return bvh_writer.write(motion)
+
+
+def _node(joint: BvhJoint, name: str, times: Floats, rows: Floats, position: BvhPosition) -> EulerNode:
+    offset = np.array(joint.offset)
+    modes = curve.uniform_modes(len(times), Mode.LINEAR)
+    order, rotation, moves = "", list[Curve | None](), dict[int, Curve]()
+    for (axis, kind), values in zip(joint.channels, rows.T, strict=True):
+        if kind == "rotation":
+            order += axis
+            rotation.append(Curve(times, np.radians(values), modes))
+        else:
+            at = "XYZ".index(axis)
+            moves[at] = Curve(times, values + (offset[at] if position == BvhPosition.ADD else 0.0), modes)
+    angles = np.zeros(len(order))
+    return EulerNode(name, joint.parent, offset, order, Frame.INTRINSIC, angles, tuple(rotation), moves, end=joint.end)

@@ -1,0 +1,89 @@
+"""EulerMotion → the text of a BVH."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import UnsupportedError
+from anim.exchange.euler.curve import evaluate
+from anim.exchange.euler.motion import EulerMotion, EulerNode
+
+DIGITS = 6  # behind the point, of degrees and of the file's unit of length
+
+
+def write(motion: EulerMotion) -> bytes:
+    """Return a BVH of the motion: degrees, positions that replace the OFFSET, lengths as they are.
+
+    Nodes that move have six channels, others three; order is each node's own. Frames stand at the even grid of the
+    first curve's times. Raises UnsupportedError where there is none, or a node's angles are extrinsic or pivoted.
+    """
+    times = _frame_times(motion)
+    lines = ["HIERARCHY"]
+    children: dict[int, list[int]] = {}
+    for number, node in enumerate(motion.nodes):
+        children.setdefault(node.parent, []).append(number)
+    columns: list[Floats] = []
+    waiting: list[tuple[int, int] | str] = [(root, 0) for root in reversed(children.get(-1, []))]
+    while waiting:  # a rope may have more joints in a row than Python lets functions call each other
+        item = waiting.pop()
+        if isinstance(item, str):
+            lines.append(item)
+            continue
+        number, depth = item
+        node, below = motion.nodes[number], children.get(number, [])
+        lines += _opened(node, depth, is_leaf=not below)
+        if not node.end:
+            columns += _columns(node, times, _has_position(node))
+            waiting.append("\t" * depth + "}")
+            waiting += [(child, depth + 1) for child in reversed(below)]
+    step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1 / 30
+    lines += ["MOTION", f"Frames: {len(times)}", f"Frame Time: {step:.9f}".rstrip("0")]
+    rows = np.round(np.stack(columns, axis=-1), DIGITS) + 0.0
+    pattern = " ".join([f"%.{DIGITS}f"] * rows.shape[1])
+    lines += [pattern % tuple(row) for row in rows.tolist()]
+    return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # half a surrogate pair, which JSON can name
+
+
+def _frame_times(motion: EulerMotion) -> Floats:
+    curves = [c for node in motion.nodes for c in (*node.rotation, *node.moves.values()) if c is not None]
+    if not curves:
+        raise UnsupportedError("nothing moves: a BVH needs frames")
+    times = max((curve.times for curve in curves), key=len)
+    steps = np.diff(times)
+    if len(steps) and np.ptp(steps) > 1e-3 * steps.mean():
+        raise UnsupportedError("keys stand on no even grid, as a BVH needs", help="give --fps")
+    return times
+
+
+def _opened(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
+    """The lines of a node up to where its children stand; an End Site, also that of a joint without children, whole."""
+    tab = "\t" * depth
+    offset = f"OFFSET {_numbers(node.translation)}"
+    if node.end:
+        return [f"{tab}End Site", f"{tab}{{", f"{tab}\t{offset}", f"{tab}}}"]
+    positions = [f"{axis}position" for axis in "XYZ"] if _has_position(node) else []
+    names = positions + [f"{axis}rotation" for axis in node.order]
+    lines = [f"{tab}{'JOINT' if depth else 'ROOT'} {node.name}", f"{tab}{{", f"{tab}\t{offset}"]
+    lines.append(f"{tab}\tCHANNELS {len(names)} {' '.join(names)}")
+    end = [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\tOFFSET 0 0 0", f"{tab}\t}}"]
+    return lines + end if is_leaf else lines
+
+
+def _has_position(node: EulerNode) -> bool:
+    return bool(node.moves) or node.parent < 0
+
+
+def _columns(node: EulerNode, times: Floats, with_position: bool) -> list[Floats]:
+    columns = []
+    for axis in range(3) if with_position else ():
+        curve = node.moves.get(axis)
+        columns.append(np.full(len(times), node.translation[axis]) if curve is None else evaluate(curve, times))
+    for angle, turn in zip(node.angles.tolist(), node.rotation, strict=True):
+        columns.append(np.degrees(np.full(len(times), angle) if turn is None else evaluate(turn, times)))
+    return columns
+
+
+def _numbers(vector: Floats) -> str:
+    rounded = (np.round(vector, DIGITS) + 0.0).tolist()
+    return " ".join(str(int(x)) if x == int(x) else f"{x:.{DIGITS}f}" for x in rounded)

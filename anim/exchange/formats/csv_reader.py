@@ -1,0 +1,201 @@
+"""CSV curves ↔ EulerMotion, in two forms that the header tells apart.
+
+Frames: a row per time, a column per channel; an empty cell is no key of that channel.
+
+    # order=ZXY frame=intrinsic unit=deg
+    #node,hips,,0,0.93,0
+    #node,spine,hips,0,0.12,0
+    time,hips.tx,hips.ty,hips.tz,hips.rz,hips.rx,hips.ry,spine.rz
+    0,0,0.93,0,0,0,0,5
+    0.0333,0,0.93,0.04,1,0,0,
+
+Keys: a row per key.
+
+    node,channel,time,value,interpolation,in_tangent,out_tangent,in_weight,out_weight
+    hips,rx,0,0,linear,,,,
+    hips,rx,1,720,cubic,0,90,,0.5
+
+Channels are tx ty tz (metres, or the file's unit by `# meters_per_unit=0.01`), rx ry rz, sx sy sz; where an axis comes
+twice in the order (ZXZ) angles are r1 r2 r3. Times are seconds; where the first is before 0, all are moved by as much.
+Tangents are per second, at both ends of every cubic piece; weights are the handles' lengths as shares of the time to
+the next key, a third if empty. Lines that begin with # state the convention, or the hierarchy and the rest, if they are
+known: `#node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]`. Without interpolation curves are linear; in the
+frames form `# interpolation=step` makes all of them steps.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from anim.errors import FormatError
+from anim.exchange.euler.convention import Stated, agreed, complete, stated
+from anim.exchange.euler.curve import MODES, Curve, Mode, uniform_modes
+from anim.exchange.euler.motion import Convention, EulerMotion
+from anim.exchange.euler.start_time import start
+from anim.exchange.formats.csv_keys import Row, keyed
+from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
+from anim.exchange.formats.node_builder import KINDS, MAX_UNIT, Draft, checked, finished
+from anim.exchange.formats.text import check_times, number, number_in, text_of, wrong
+
+__all__ = ["read", "write"]
+
+
+@dataclass(slots=True)
+class _File:
+    """What a CSV says before its numbers: words of the comments and their lines, nodes, the header; and its rows."""
+
+    words: dict[str, str] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
+    nodes: list[tuple[int, list[str]]] = field(default_factory=list)
+    header: list[str] = field(default_factory=list)
+    header_line: int = 1
+    rows: list[tuple[int, list[str]]] = field(default_factory=list)
+
+    def hear(self, line: int, comment: str) -> None:
+        """Take the words "key=value" out of a comment."""
+        found = {key.casefold(): value for key, value in re.findall(r"(\w+)\s*=\s*(\S+)", comment)}
+        self.words |= found
+        self.lines |= dict.fromkeys(found, line)
+
+    def meters_per_unit(self) -> float:
+        """Return what the comments say of the unit of length; 1 if nothing. Raises FormatError with the line."""
+        if "meters_per_unit" not in self.words:
+            return 1.0
+        line = self.lines["meters_per_unit"]
+        unit = number_in(self.words["meters_per_unit"], line, "meters_per_unit")
+        if not 0 < unit < MAX_UNIT:
+            raise wrong(line, f"meters_per_unit is {unit:g} (expected a number above 0)")
+        return unit
+
+
+def read(data: bytes, options: Stated) -> EulerMotion:
+    """Return the motion in CSV curves, see above; lengths in metres, angles in radians.
+
+    options: what the command line says about the convention. Raises FormatError with the line.
+    """
+    file = _parsed(data)
+    convention = complete(agreed(stated(file.words, "the # lines"), options))
+    drafts = _Drafts(convention)
+    for line, cells in file.nodes:
+        drafts.describe(line, cells)
+    later, notes = start(_times(file))
+    if tuple(file.header[:1]) == ("time",):
+        _read_frames(file, drafts, later)
+    elif set(KEY_COLUMNS) <= set(file.header):
+        _read_keys(file, drafts, later)
+    else:
+        header = ",".join(file.header)
+        hint = "; columns are separated by commas" if len(file.header) == 1 and re.search(r"[;\t]", header) else ""
+        expected = f"expected time,NAME.rx,… or {','.join(KEY_COLUMNS)}{hint}"
+        raise wrong(file.header_line, f"the header is {header[:60]!r} ({expected})")
+    nodes, nested = finished([*drafts.by_name.values()], file.meters_per_unit())
+    return EulerMotion(nodes, nested=nested, notes=notes)
+
+
+class _Drafts:
+    """Nodes by name, made where they first appear."""
+
+    def __init__(self, convention: Convention) -> None:
+        self.by_name: dict[str, Draft] = {}
+        self._convention = convention
+
+    def named(self, name: str) -> Draft:
+        if name not in self.by_name:
+            self.by_name[name] = Draft(name, self._convention)
+        return self.by_name[name]
+
+    def describe(self, line: int, cells: list[str]) -> None:
+        if len(cells) not in (5, 8, 11) or not cells[0]:
+            raise wrong(line, "expected #node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]")
+        if cells[0] in self.by_name:
+            raise wrong(line, f"a second #node line for '{cells[0]}'")
+        draft = self.named(cells[0])
+        draft.parent = cells[1] or None
+        numbers = np.array([number_in(cell, line, "a rest") for cell in cells[2:]])
+        draft.translation = numbers[:3]
+        if len(numbers) > 3:
+            draft.angles = numbers[3:6]
+        if len(numbers) > 6:
+            draft.scale = numbers[6:]
+
+    def channel(self, name: str, channel: str, line: int) -> tuple[Draft, tuple[str, int]]:
+        if not name or len(channel) != 2 or channel[0] not in KINDS:
+            raise wrong(line, f"unknown channel '{channel}' of '{name}' (expected tx … tz, rx … rz, sx … sz)")
+        draft = self.named(name)
+        try:
+            return draft, draft.place(KINDS[channel[0]], channel[1])
+        except FormatError as error:
+            raise wrong(line, error.problem) from None
+
+
+def _parsed(data: bytes) -> _File:
+    file = _File()
+    rows = csv.reader(io.StringIO(text_of(data)), strict=True)
+    try:
+        for cells in rows:
+            cells = [cell.strip() for cell in cells]
+            if not any(cells):
+                continue
+            if re.fullmatch(r"#\s*node", cells[0]):
+                file.nodes.append((rows.line_num, cells[1:]))
+            elif cells[0].startswith("#"):
+                file.hear(rows.line_num, " ".join(cells))
+            elif not file.header:
+                file.header, file.header_line = cells, rows.line_num
+                if len(set(cells)) != len(cells):
+                    raise wrong(rows.line_num, f"column '{next(c for c in cells if cells.count(c) > 1)}' twice")
+            else:
+                if len(cells) != len(file.header):
+                    raise wrong(rows.line_num, f"{len(cells)} columns (expected {len(file.header)}, as in the header)")
+                file.rows.append((rows.line_num, cells))
+    except csv.Error as error:
+        raise wrong(rows.line_num, f"broken CSV ({error})") from None
+    if not file.header or not file.rows:
+        raise FormatError("has no rows of keys" if file.header else "is empty (expected a CSV of curves)")
+    return file
+
+
+def _times(file: _File) -> Iterator[float]:
+    """All key times that are numbers."""
+    if "time" in file.header:
+        column = file.header.index("time")
+        found = (number(cells[column]) for _, cells in file.rows)
+        yield from (time for time in found if time is not None)
+
+
+def _read_frames(file: _File, drafts: _Drafts, later: float) -> None:
+    mode = MODES.get(file.words.get("interpolation", "linear"), Mode.CUBIC)
+    if mode is Mode.CUBIC:
+        raise FormatError(f"interpolation is '{file.words['interpolation']}' (frames have no tangents: step or linear)")
+    times = np.array([number_in(cells[0], line, "time") for line, cells in file.rows])
+    check_times(times, [line for line, _ in file.rows])
+    times = times + later
+    for column, title in enumerate(file.header[1:], 1):
+        name, _, channel = title.rpartition(".")
+        draft, slot = drafts.channel(name, channel, file.header_line)
+        there = [i for i, (_, cells) in enumerate(file.rows) if cells[column]]
+        if not there:
+            continue
+        values = np.array([number_in(file.rows[i][1][column], file.rows[i][0], title) for i in there])
+        own = times if len(there) == len(times) else times[there]
+        draft.add(slot, Curve(own, values, uniform_modes(len(own), mode)))
+
+
+def _read_keys(file: _File, drafts: _Drafts, later: float) -> None:
+    unknown = set(file.header) - {*KEY_COLUMNS, *EXTRA_COLUMNS}
+    if unknown:
+        raise FormatError(f"unknown column '{min(unknown)}' (expected {', '.join((*KEY_COLUMNS, *EXTRA_COLUMNS))})")
+    found: dict[tuple[str, tuple[str, int]], list[Row]] = {}
+    for line, cells in file.rows:
+        row = dict(zip(file.header, cells, strict=True))
+        draft, slot = drafts.channel(row["node"], row["channel"], line)
+        found.setdefault((draft.name, slot), []).append((line, row))
+    for (name, slot), rows in found.items():
+        checked(drafts.named(name), slot, partial(keyed, rows, later))

@@ -1,0 +1,78 @@
+"""EulerMotion → CSV: frames where every curve is straight, keys where one is not. See `csv` for both forms."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import sorted_unique
+from anim.errors import UnsupportedError
+from anim.exchange.euler.convention import axis_names
+from anim.exchange.euler.curve import HANDLES, Curve, Mode
+from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
+
+KEY_COLUMNS = ("node", "channel", "time", "value")
+EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
+DIGITS = 9  # behind the point
+
+Column = tuple[str, str, Curve]  # node, channel, its curve in the unit to write
+
+
+def write(motion: EulerMotion, convention: Convention) -> bytes:
+    """Return the motion as CSV; the convention is that of its nodes, with the unit to use.
+
+    Raises UnsupportedError where a node's order is another: a CSV has one.
+    """
+    if any(node.order != convention.order for node in motion.nodes):
+        raise UnsupportedError("a CSV has one order for all nodes", help="write .json or .bvh")
+    out = io.StringIO()
+    out.write(f"# order={convention.order} frame={convention.frame} unit={convention.unit}\n")
+    rows = csv.writer(out, lineterminator="\n")
+    for node in motion.nodes:
+        parent = motion.nodes[node.parent].name if node.parent >= 0 else ""
+        rest = np.concatenate((node.translation, node.angles / convention.unit.radians, node.scale))
+        rows.writerow(["#node", node.name, parent, *map(_text, rest.tolist())])
+    columns = [column for node in motion.nodes for column in _columns(node, convention)]
+    straight = all((curve.modes == Mode.LINEAR).all() for _, _, curve in columns)
+    (_write_frames if straight else _write_keys)(rows, columns)
+    return out.getvalue().encode(errors="backslashreplace")  # half a surrogate pair, which JSON can name
+
+
+def _columns(node: EulerNode, convention: Convention) -> list[Column]:
+    columns = [(node.name, f"t{'xyz'[axis]}", curve) for axis, curve in sorted(node.moves.items())]
+    for axis_name, turn in zip(axis_names(node.order), node.rotation, strict=True):
+        if turn is not None:
+            columns.append((node.name, f"r{axis_name}", turn.scaled(1 / convention.unit.radians)))
+    return columns + [(node.name, f"s{'xyz'[axis]}", curve) for axis, curve in sorted(node.scales.items())]
+
+
+def _write_frames(rows: Any, columns: list[Column]) -> None:
+    rows.writerow(["time", *(f"{node}.{channel}" for node, channel, _ in columns)])
+    arrays = {id(curve.times): curve.times for _, _, curve in columns}
+    times = sorted_unique(np.concatenate([*arrays.values()])) if arrays else np.zeros(0)
+    cells = [[_text(time)] + [""] * len(columns) for time in times.tolist()]
+    places = {key: np.searchsorted(times, axis).tolist() for key, axis in arrays.items()}
+    for number, (_, _, curve) in enumerate(columns, 1):
+        for place, value in zip(places[id(curve.times)], curve.values.tolist(), strict=True):
+            cells[place][number] = _text(value)
+    rows.writerows(cells)
+
+
+def _write_keys(rows: Any, columns: list[Column]) -> None:
+    words = [mode.name.lower() for mode in Mode]
+    would_be_comments = any(node.startswith("#") for node, _, _ in columns)
+    first, second = (1, 0) if would_be_comments else (0, 1)
+    rows.writerow([KEY_COLUMNS[first], KEY_COLUMNS[second], *KEY_COLUMNS[2:], *EXTRA_COLUMNS])
+    for *named, curve in columns:
+        handles = [getattr(curve, name) for name in HANDLES]
+        extra = [[""] * len(curve.times) if h is None else [*map(_text, h.tolist())] for h in handles]
+        keys = zip(curve.times.tolist(), curve.values.tolist(), curve.modes.tolist(), *extra, strict=True)
+        for time, value, mode, *cells in keys:
+            rows.writerow([named[first], named[second], _text(time), _text(value), words[mode], *cells])
+
+
+def _text(value: float) -> str:
+    return f"{round(value, DIGITS) + 0.0:.12g}"

@@ -1,0 +1,194 @@
+"""JSON curves ↔ EulerMotion: every axis of every node with keys of its own, as FBX and Maya keep them.
+
+    {
+      "schema": "euler-curves/1",
+      "order": "XYZ", "frame": "extrinsic", "unit": "deg",     how angles combine; a node may say otherwise
+      "meters_per_unit": 0.01,                                 of translations, offsets and pivots; 1 if left out
+      "nodes": [
+        {
+          "name": "arm",
+          "parent": "body",                                    none for a root
+          "translation": [0, 12, 0],                           at rest; so "rotation" (angles, in the order's
+          "rotation": [0, 0, 90], "scale": [1, 1, 1],          sequence) and "scale"
+          "pre_rotation": [0, 0, 45],                          three angles, extrinsic XYZ as in FBX, or [x, y, z, w]
+          "post_rotation": [0, 0, 0],
+          "rotation_offset": [0, 0, 0], "rotation_pivot": [0, 0, 0],
+          "scaling_offset": [0, 0, 0], "scaling_pivot": [0, 0, 0],
+          "curves": {
+            "rotation.x": {"times": [0, 1], "values": [0, 720]},
+            "rotation.y": {"times": [0, 0.5, 2], "values": [0, 30, 0], "interpolation": "cubic",
+                           "in_tangents": [0, 0, 0], "out_tangents": [60, 0, 0]},
+            "translation.z": {"times": [0, 1], "values": [0, 5], "interpolation": ["step", "linear"]}
+          }
+        }
+      ]
+    }
+
+Times are seconds; where the first is before 0, all are moved by as much. Interpolation is step, linear (if left out) or
+cubic, for the curve or after each key; tangents are per second in the value's own unit. in_weights and out_weights say
+how far handles reach, as shares of the time to the next key (Maya's and FBX's weighted tangents, Blender's handles); a
+third if left out. Where an axis comes twice in the order (ZXZ), angles are rotation.1, .2, .3. Other keys are refused.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import FormatError
+from anim.exchange.euler.convention import Stated, agreed, complete, merged, stated
+from anim.exchange.euler.curve import HANDLES, MODES, WEIGHTS, Curve, Mode
+from anim.exchange.euler.motion import OFFSETS, Convention, EulerMotion, Pivots
+from anim.exchange.euler.start_time import start
+from anim.exchange.formats.json_writer import SCHEMA, write
+from anim.exchange.formats.node_builder import MAX_UNIT, Draft, checked, finished
+from anim.exchange.formats.text import LIMIT
+from anim.gltf.io import json_text
+from anim.maths import euler, quaternion
+from anim.maths.euler import Frame
+
+__all__ = ["read", "write"]
+
+CONVENTION_KEYS = ("order", "frame", "unit")
+FILE_KEYS = ("schema", *CONVENTION_KEYS, "meters_per_unit", "nodes")
+TURNS = ("pre_rotation", "post_rotation")
+NODE_KEYS = ("name", "parent", *CONVENTION_KEYS, "translation", "rotation", "scale", *TURNS, *OFFSETS, "curves")
+CURVE_KEYS = ("times", "values", "interpolation", *HANDLES)
+
+
+def read(data: bytes, options: Stated) -> EulerMotion:
+    """Return the motion in a JSON of curves, see above; lengths in metres, angles in radians.
+
+    options: what the command line says about the convention. Raises FormatError with the place.
+    """
+    content = json_text.parse(data)
+    if "asset" in content and "schema" not in content:
+        raise FormatError(f"is a glTF already (expected a JSON of curves, schema '{SCHEMA}')")
+    if content.get("schema") != SCHEMA:
+        raise FormatError(f"schema is {content.get('schema')!r} (expected '{SCHEMA}')")
+    _check_keys(content, FILE_KEYS, "")
+    said = agreed(stated(content, ""), options)
+    nodes = content.get("nodes")
+    if not isinstance(nodes, list) or not nodes:
+        raise FormatError("has no nodes")
+    later, notes = start(_times(nodes))
+    drafts, names = [], set[str]()
+    for i, node in enumerate(nodes):
+        where = f"nodes[{i}]"
+        draft = _draft(node, said, later, where)
+        if draft.name in names:
+            raise FormatError(f"a second node '{draft.name}'", where=where)
+        names.add(draft.name)
+        drafts.append(draft)
+    unit = content.get("meters_per_unit", 1.0)
+    if type(unit) not in (int, float) or not 0 < unit < MAX_UNIT:
+        raise FormatError(f"meters_per_unit is {unit!r} (expected a number above 0)")
+    finished_nodes, nested = finished(drafts, float(unit))
+    return EulerMotion(finished_nodes, nested=nested, notes=notes)
+
+
+def _times(nodes: list[Any]) -> Iterator[float]:
+    """All key times that are numbers; what else stands there is told later."""
+    for node in nodes:
+        curves = node.get("curves") if isinstance(node, dict) else None
+        for about in curves.values() if isinstance(curves, dict) else ():
+            times = about.get("times") if isinstance(about, dict) else None
+            if isinstance(times, list):
+                yield from (time for time in times if type(time) in (int, float) and abs(time) <= LIMIT)
+
+
+def _draft(node: Any, said: Stated, later: float, where: str) -> Draft:
+    if not isinstance(node, dict) or not isinstance(node.get("name"), str) or not node["name"]:
+        raise FormatError("has no name", where=where)
+    _check_keys(node, NODE_KEYS, where)
+    parent = node.get("parent")
+    if parent is not None and not isinstance(parent, str):
+        raise FormatError(f"parent is {parent!r} (expected a name)", where=where)
+    convention = complete(merged(stated(node, where), said))
+    draft = Draft(node["name"], convention, parent)
+    draft.translation = _numbers(node, "translation", (3,), np.zeros(3), where)
+    draft.angles = _numbers(node, "rotation", (3,), np.zeros(3), where)
+    draft.scale = _numbers(node, "scale", (3,), np.ones(3), where)
+    if any(key in node for key in (*OFFSETS, *TURNS)):
+        draft.pivots = _pivots(node, convention, where)
+    curves = node.get("curves", {})
+    if not isinstance(curves, dict):
+        raise FormatError("curves is no object", where=where)
+    for channel, about in curves.items():
+        at = f"{where}.curves['{channel}']"
+        try:
+            kind, _, axis = channel.partition(".")
+            slot = draft.place(kind, axis)
+            checked(draft, slot, partial(_curve, about, later, at))
+        except FormatError as error:
+            raise (error if error.where.startswith(at) else error.at(at)) from None
+    return draft
+
+
+def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivots:
+    turns = {}
+    for key in TURNS:
+        given = _numbers(node, key, (3, 4), np.zeros(3), where)
+        if len(given) == 4:
+            if not given.any():
+                raise FormatError(f"{key} is zero (expected a unit quaternion)", where=where)
+            turns[key] = quaternion.normalize(given)
+        else:
+            turns[key] = euler.to_quaternion(given * convention.unit.radians, order="XYZ", frame=Frame.EXTRINSIC)
+    offsets = {key: _numbers(node, key, (3,), np.zeros(3), where) for key in OFFSETS}
+    return Pivots(**turns, **offsets)
+
+
+def _curve(about: Any, later: float, where: str) -> Curve:
+    if not isinstance(about, dict) or not about.keys() >= {"times", "values"}:
+        raise FormatError("expected an object with times and values")
+    _check_keys(about, CURVE_KEYS, where)
+    times = _numbers(about, "times", None, np.zeros(0), where)
+    count = len(times)
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
+        raise FormatError(f"times not increasing at key {k} ({times[k]:g} s after {times[k - 1]:g} s)")
+    values = _numbers(about, "values", (count,), np.zeros(0), where)
+    given = about.get("interpolation", "linear")
+    words = given if isinstance(given, list) else [given] * count
+    if len(words) != count or not all(isinstance(word, str) and word in MODES for word in words):
+        raise FormatError(
+            f"interpolation is {given!r} (expected {', '.join(MODES)}, for all or for each of {count} keys)"
+        )
+    modes = np.array([MODES[word] for word in words], np.uint8)
+    tangents: list[Floats | None] = [None, None]
+    if (modes == Mode.CUBIC).any():
+        for i, key in enumerate(("in_tangents", "out_tangents")):
+            if key not in about:
+                raise FormatError(f"a cubic curve lacks {key}")
+            tangents[i] = _numbers(about, key, (count,), np.zeros(0), where)
+    weights = [_numbers(about, key, (count,), np.zeros(0), where) if key in about else None for key in WEIGHTS]
+    return Curve(times + later, values, modes, *tangents, *weights)
+
+
+def _check_keys(about: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    """Refuse a key that is none: what is misspelled would be left out in silence."""
+    for key in about:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            help = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+            raise FormatError(f"unknown key '{key}'", where=where, help=help)
+
+
+def _numbers(
+    about: Mapping[str, Any], key: str, lengths: tuple[int, ...] | None, default: Floats, where: str
+) -> Floats:
+    if key not in about:
+        return default
+    given = about[key]
+    good = isinstance(given, list) and all(type(x) is int or isinstance(x, float) for x in given)
+    if not good or (lengths is not None and len(given) not in lengths):
+        count = "" if lengths is None else " or ".join(map(str, lengths)) + " "
+        raise FormatError(f"{key} is not a list of {count}numbers", where=where)
+    if not all(-LIMIT <= x <= LIMIT for x in given):
+        raise FormatError(f"{key} holds a number beyond {LIMIT:g}", where=where)
+    return np.array(given, np.float64)

@@ -1,0 +1,63 @@
+"""EulerMotion → JSON curves. See `json` for the schema."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange.euler.convention import axis_names
+from anim.exchange.euler.curve import HANDLES, Curve, Mode
+from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
+from anim.gltf.io import json_text
+
+SCHEMA = "euler-curves/1"
+
+
+def write(motion: EulerMotion, convention: Convention) -> bytes:
+    """Return the motion as a JSON of curves, see `json`; the convention has the unit to use, and most nodes' order."""
+    nodes = [_described(node, motion, convention) for node in motion.nodes]
+    content = {
+        "schema": SCHEMA,
+        "order": convention.order,
+        "frame": str(convention.frame),
+        "unit": str(convention.unit),
+        "nodes": nodes,
+    }
+    return json_text.dump(content, indent=1) + b"\n"
+
+
+def _described(node: EulerNode, motion: EulerMotion, convention: Convention) -> dict[str, Any]:
+    about: dict[str, Any] = {"name": node.name}
+    if node.order != convention.order:
+        about["order"] = node.order
+    if node.parent >= 0:
+        about["parent"] = motion.nodes[node.parent].name
+    about["translation"] = _short(node.translation)
+    about["rotation"] = _short(node.angles / convention.unit.radians)
+    about["scale"] = _short(node.scale)
+    curves: dict[str, Any] = {}
+    for axis, curve in sorted(node.moves.items()):
+        curves[f"translation.{'xyz'[axis]}"] = _curve_json(curve)
+    for axis_name, turn in zip(axis_names(node.order), node.rotation, strict=True):
+        if turn is not None:
+            curves[f"rotation.{axis_name}"] = _curve_json(turn.scaled(1 / convention.unit.radians))
+    for axis, curve in sorted(node.scales.items()):
+        curves[f"scale.{'xyz'[axis]}"] = _curve_json(curve)
+    return {**about, "curves": curves} if curves else about
+
+
+def _curve_json(curve: Curve) -> dict[str, Any]:
+    about: dict[str, Any] = {"times": _short(curve.times), "values": _short(curve.values)}
+    if (curve.modes != Mode.LINEAR).any():
+        words = [Mode(mode).name.lower() for mode in curve.modes.tolist()]
+        about["interpolation"] = words[0] if len(set(words)) == 1 else words
+    handles = {name: getattr(curve, name) for name in HANDLES}
+    return about | {name: _short(handle) for name, handle in handles.items() if handle is not None}
+
+
+def _short(values: Floats) -> list[float]:
+    """Numbers with ten digits behind the point: far below float32, without the noise of binary fractions."""
+    rounded: list[float] = (np.round(values, 10) + 0.0).tolist()
+    return rounded

@@ -1,0 +1,103 @@
+"""Channels of nodes as CSV and JSON name them, gathered one by one, then made into EulerNodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError, FormatError
+from anim.exchange.euler.convention import place_of_axis
+from anim.exchange.euler.curve import Curve
+from anim.exchange.euler.motion import PLAIN, Convention, EulerNode, Pivots
+
+MAX_UNIT = 1e9  # m; of a file's unit of length
+KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
+
+
+@dataclass(slots=True)
+class Draft:
+    """A node that is being read. Angles and rotation curves are in the file's unit, lengths in the file's."""
+
+    name: str
+    convention: Convention
+    parent: str | None = None
+    translation: Floats = field(default_factory=lambda: np.zeros(3))
+    angles: Floats = field(default_factory=lambda: np.zeros(3))
+    scale: Floats = field(default_factory=lambda: np.ones(3))
+    pivots: Pivots = PLAIN
+    curves: dict[tuple[str, int], Curve] = field(default_factory=dict)
+
+    def place(self, kind: str, axis: str) -> tuple[str, int]:
+        """Return the slot of a channel such as ("rotation", "x"). Raises FormatError where it names none."""
+        if kind == "rotation" and axis in tuple("xyz123"):
+            number = place_of_axis(axis, self.convention.order)
+            if number is None:
+                raise FormatError(
+                    f"axis '{axis}' has no single place in order {self.convention.order} (expected 1, 2, 3 by place)"
+                )
+            return kind, number
+        if kind in KINDS.values() and axis in tuple("xyz"):
+            return kind, "xyz".index(axis)
+        raise FormatError(f"unknown channel '{kind}.{axis}' (expected translation, rotation or scale, and x, y or z)")
+
+    def add(self, slot: tuple[str, int], curve: Curve) -> None:
+        """Put a curve into its slot, rotations in radians. Raises FormatError where there is one already."""
+        if slot in self.curves:
+            raise FormatError(f"a second curve for {slot[0]} {slot[1] + 1} of node '{self.name}'")
+        self.curves[slot] = curve.scaled(self.convention.unit.radians) if slot[0] == "rotation" else curve
+
+
+def finished(drafts: list[Draft], meters_per_unit: float) -> tuple[tuple[EulerNode, ...], bool]:
+    """Return the nodes, parents first, lengths in metres, and whether any has a parent.
+
+    Raises FormatError for a parent that is missing, or a circle of parents.
+    """
+    by_name = {draft.name: draft for draft in drafts}
+    ordered: list[Draft] = []
+    numbers: dict[str, int] = {}
+    for draft in drafts:
+        chain = [draft]
+        while chain[-1].parent is not None and chain[-1].name not in numbers:
+            parent = by_name.get(chain[-1].parent)
+            if parent is None:
+                raise FormatError(f"node '{chain[-1].name}' has the parent '{chain[-1].parent}', which is not there")
+            if parent in chain:
+                raise FormatError(f"node '{parent.name}' is its own ancestor")
+            chain.append(parent)
+        for each in reversed(chain):
+            if each.name not in numbers:
+                numbers[each.name] = len(ordered)
+                ordered.append(each)
+    nodes = tuple(_node(d, -1 if d.parent is None else numbers[d.parent], meters_per_unit) for d in ordered)
+    return nodes, any(node.parent >= 0 for node in nodes)
+
+
+def checked(draft: Draft, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
+    """Put the curve that `build()` makes into a node's slot. Raises FormatError for what is wrong with it."""
+    try:
+        draft.add(slot, build())
+    except FormatError:
+        raise
+    except AnimError as error:
+        raise FormatError(error.problem, where=error.where, help=error.help) from None
+
+
+def _node(draft: Draft, parent: int, meters_per_unit: float) -> EulerNode:
+    curves, convention = draft.curves, draft.convention
+    moves = {axis: curve.scaled(meters_per_unit) for (kind, axis), curve in curves.items() if kind == "translation"}
+    return EulerNode(
+        draft.name,
+        parent,
+        draft.translation * meters_per_unit,
+        convention.order,
+        convention.frame,
+        draft.angles * convention.unit.radians,
+        tuple(curves.get(("rotation", place)) for place in range(3)),
+        moves,
+        draft.scale,
+        {axis: curve for (kind, axis), curve in curves.items() if kind == "scale"},
+        draft.pivots,
+    )

@@ -1,0 +1,73 @@
+"""The formats of Euler tracks: by name, by file ending, and by their first bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from anim.errors import FormatError, RangeError
+from anim.exchange.euler.convention import NOTHING, Stated
+from anim.exchange.euler.motion import Convention, EulerMotion
+from anim.exchange.formats import bvh_reader, csv_reader, json_reader
+from anim.exchange.formats.bvh_reader import BvhPosition
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a reader may need to be told: the convention, and what BVH's position channels mean."""
+
+    stated: Stated = NOTHING
+    bvh_position: BvhPosition = BvhPosition.REPLACE
+
+
+@dataclass(frozen=True, slots=True)
+class TrackFormat:
+    """One format: bytes → motion and motion → bytes.
+
+    suffix: of its files. begins: whether these first bytes are of it, asked in the table's order.
+    has_units: whether lengths come out in metres; otherwise in the file's own, unknown unit.
+    """
+
+    suffix: str
+    read: Callable[[bytes, Reading], EulerMotion]
+    write: Callable[[EulerMotion, Convention], bytes]
+    begins: Callable[[bytes], bool]
+    has_units: bool
+
+
+def _read_bvh(data: bytes, reading: Reading) -> EulerMotion:
+    if reading.stated != NOTHING:
+        raise RangeError("a BVH says the order of every joint itself (no --order, --frame or --unit)")
+    return bvh_reader.read(data, position=reading.bvh_position)
+
+
+def _curves(read: Callable[[bytes, Stated], EulerMotion]) -> Callable[[bytes, Reading], EulerMotion]:
+    def read_curves(data: bytes, reading: Reading) -> EulerMotion:
+        if reading.bvh_position is not BvhPosition.REPLACE:
+            raise RangeError("these curves have no OFFSET (--bvh-position is about BVH)")
+        return read(data, reading.stated)
+
+    return read_curves
+
+
+TRACK_FORMATS = {
+    "bvh": TrackFormat(".bvh", _read_bvh, bvh_reader.write, lambda head: head.upper().startswith(b"HIERARCHY"), False),
+    "json": TrackFormat(".json", _curves(json_reader.read), json_reader.write, lambda head: head[:1] == b"{", True),
+    "csv": TrackFormat(".csv", _curves(csv_reader.read), csv_reader.write, lambda head: b"," in head, True),
+}
+
+
+def of_path(path: str) -> TrackFormat | None:
+    """Return the format that a file's ending names, None where it names none."""
+    return next((each for each in TRACK_FORMATS.values() if path.lower().endswith(each.suffix)), None)
+
+
+def of_content(data: bytes) -> TrackFormat:
+    """Return the format of a file by its first bytes. Raises FormatError where it is none of them."""
+    if data[:4] == b"glTF":
+        raise FormatError(f"is a glTF already (expected {', '.join(TRACK_FORMATS)})")
+    head = data[:4096].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+    for each in TRACK_FORMATS.values():
+        if each.begins(head):
+            return each
+    raise FormatError(f"starts with {data[:12]!r} (expected {', '.join(TRACK_FORMATS)})" if data else "is empty")

@@ -1,0 +1,126 @@
+"""A converted motion on a character: match joints by name, then retarget, or bind curves that are the nodes' own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from anim.errors import NotFoundError
+from anim.exchange.euler.from_euler import Converted
+from anim.exchange.retarget.bind_pose import bind_pose, completed
+from anim.exchange.retarget.ground_contact import has_feet
+from anim.exchange.retarget.joint_matching import Matching, match
+from anim.exchange.retarget.rest_alignment import Measure
+from anim.exchange.retarget.retarget import Floor, retarget
+from anim.exchange.retarget.same_hierarchy import same_tree
+from anim.model import Clip, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Onto:
+    """The clip for the character, and what became of the motion's joints.
+
+    scale: of the path, character by motion. lowered: least and most that hips went down, metres.
+    measure: what the scale is taken from; None for curves that are the nodes' own. without: what of a person the path
+    and the floor need and is not matched, "hips", "legs" or "feet".
+    num_bound: joints whose rest was taken from the skins, because the nodes rest elsewhere.
+    """
+
+    clip: Clip
+    matching: Matching
+    scale: float
+    lowered: tuple[float, float]
+    num_bound: int = 0
+    measure: Measure | None = None
+    without: tuple[str, ...] = ()
+
+
+def onto(
+    source: Converted,
+    target: Scene,
+    *,
+    aliases: Mapping[str, str],
+    nested: bool,
+    stated: Mapping[str, int] = MappingProxyType({}),
+    floor: Floor = Floor.CONTACT,
+    rest_at: float | None = None,
+) -> Onto:
+    """Return the motion as a clip of the character.
+
+    Joints are those of the character's skins, then nodes without mesh in their tree; all its nodes where it has none,
+    or where the motion is of its own tree.
+    See `same_tree`, `match` and `retarget`.
+    stated: the character's nodes by role, where its file states them (`humanoid.stated_roles`).
+    nested: whether the motion has a hierarchy; if not, its curves are the nodes' own and go to them as they are.
+    Raises NotFoundError where no joint is matched, or there is none.
+    """
+    joints = _skin_joints(target)
+    moving, moved = to_match(source, target, nested=nested)
+    matching = match(
+        source.skeleton.names,
+        target.skeleton.names,
+        aliases=aliases,
+        of_source=moving,
+        of_target=moved,
+        others=_others(target, joints) if nested else [],
+        same=same_tree(source.skeleton, target.skeleton, moving) if nested else {},
+        stated=stated,
+    )
+    if not target.skeleton.names:
+        raise NotFoundError("the character has no nodes that a motion could move")
+    if not matching.pairs:
+        tops = [int(n) for level in target.skeleton.levels() for n in level if not joints or int(n) in joints]
+        first = source.skeleton.names[moving[0]], target.skeleton.names[tops[0]]
+        raise NotFoundError(
+            "no joint of the motion is one of the character",
+            help=f"pair them in an --alias file, in lines such as '{first[0]},{first[1]}'",
+        )
+    if nested:
+        bound = bind_pose(
+            target.skeleton, [(each.node, each.skin) for each in target.instances if each.skin is not None]
+        )
+        done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, rest_at=rest_at)
+        clip = completed(done.clip, bound.skeleton, target.skeleton)
+        return Onto(clip, matching, done.scale, done.lowered, bound.num_joints, done.measure, _without(matching))
+    tracks = [
+        replace(track, node=matching.pairs[track.node])
+        for track in source.clip.tracks
+        if track.node is not None and track.node in matching.pairs
+    ]
+    return Onto(Clip(source.clip.name, tuple(tracks)), matching, 1.0, (0.0, 0.0))
+
+
+def to_match(source: Converted, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
+    """Return the nodes of the motion, parents first, and those of the character that are matched with each other.
+
+    nested: as for `onto`.
+    """
+    joints = _skin_joints(target)
+    moved = sorted(joints) if joints and nested else list(range(len(target.skeleton)))
+    return _parents_first(source), moved
+
+
+def _skin_joints(scene: Scene) -> set[int]:
+    return {int(node) for each in scene.instances if each.skin is not None for node in each.skin.joints}
+
+
+def _without(matching: Matching) -> tuple[str, ...]:
+    found = set(matching.target_roles)
+    legs = any({f"{side}_{role}" for role in ("upper_leg", "lower_leg")} <= found for side in ("left", "right"))
+    here = {"hips": "hips" in found, "legs": legs, "feet": has_feet(found)}
+    return tuple(name for name, known in here.items() if not known)
+
+
+def _parents_first(source: Converted) -> list[int]:
+    return [int(n) for level in source.skeleton.levels() for n in level if int(n) not in source.ends]
+
+
+def _others(target: Scene, joints: Set[int]) -> list[int]:
+    """Nodes without mesh below the parents of topmost joints: limbs that the skin of a head, or of armor, lacks."""
+    parents = target.skeleton.parents
+    holders = {each.node for each in target.instances}
+    inside = set(joints) | {int(parents[node]) for node in joints}
+    for level in target.skeleton.levels():
+        inside |= {node for node in level.tolist() if int(parents[node]) in inside}
+    return sorted(inside - joints - holders - {-1})

@@ -1,0 +1,117 @@
+"""Which joint of a character is which joint of a motion's skeleton."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TypeAlias
+
+from anim.errors import NotFoundError
+from anim.exchange.retarget.joint_names import plain
+from anim.exchange.retarget.joint_roles import roles
+
+Way: TypeAlias = Callable[[int], int | None]  # from a source node to the target node, where there is one
+
+
+@dataclass(frozen=True, slots=True)
+class Matching:
+    """Pairs of nodes, source → target, in the source's order; source nodes left over; and what persons' joints are.
+
+    source_roles, target_roles: nodes by role ("left_foot"), for alignment; a role is in both or in none.
+    """
+
+    pairs: Mapping[int, int]
+    unmatched: tuple[int, ...]
+    source_roles: Mapping[str, int]
+    target_roles: Mapping[str, int]
+
+
+def match(
+    source: Sequence[str],
+    target: Sequence[str],
+    *,
+    aliases: Mapping[str, str],
+    of_source: Sequence[int],
+    of_target: Sequence[int],
+    others: Sequence[int] = (),
+    same: Mapping[int, int] = MappingProxyType({}),
+    stated: Mapping[str, int] = MappingProxyType({}),
+) -> Matching:
+    """Return the pairs of nodes whose names mean the same, each node in one pair at most.
+
+    In this order: aliases (source name → target name; "" for none), `same` (source → target node, see `same_tree`), the
+    joint that the target's file states (`stated`, target node by role), the same name, the same name without namespace,
+    prefix, ending, case, separators and spelling of sides, then the same joint of a person (`roles`).
+    of_source, of_target: nodes that take part, the surest first. others: nodes of the target for what finds no partner
+    among those. Raises NotFoundError for an alias of a missing name.
+    """
+    left = {source[node]: node for node in reversed(of_source)}
+    everywhere = {target[node]: node for node in (*range(len(target))[::-1], *reversed(of_target))}
+    pairs, excluded = _named(aliases, left, everywhere)
+    plain_source, plain_target = plain(source), plain(target)
+    source_roles = roles(plain_source, of_source)
+    by_role = {node: role for role, node in source_roles.items()}
+
+    def by_names(nodes: Sequence[int]) -> tuple[Way, ...]:
+        """Partners among these nodes: of the same name, of the same one taken apart, of the same role.
+
+        Numbers mean other joints in other rigs ("spine1"): roles win over names that were taken apart.
+        """
+        right = {target[node]: node for node in reversed(nodes)}
+        by_own_role = roles(plain_target, [node for node in nodes if node not in stated.values()])
+        shared = source_roles.keys() & by_own_role.keys()
+        in_role = {source_roles[role] for role in shared}
+        of_role = {by_own_role[role] for role in shared}
+        free = {plain_target[node]: node for node in reversed(nodes) if node not in of_role}
+        return (
+            lambda node: right.get(source[node]),
+            lambda node: None if node in in_role else free.get(plain_source[node]),
+            lambda node: by_own_role.get(by_role.get(node, "")),
+        )
+
+    ways = (
+        same.get,
+        lambda node: stated.get(by_role.get(node, "")),
+        *by_names(of_target),
+        *by_names(others),
+    )
+    for way in ways:
+        taken = set(pairs.values())
+        for node in of_source:
+            found = way(node)
+            if node not in pairs and node not in excluded and found is not None and found not in taken:
+                pairs[node] = found
+                taken.add(found)
+    ordered = {node: pairs[node] for node in sorted(pairs)}
+    shared = {role: node for role, node in source_roles.items() if node in ordered}
+    return Matching(
+        ordered,
+        tuple(node for node in sorted(of_source) if node not in ordered),
+        shared,
+        {role: ordered[node] for role, node in shared.items()},
+    )
+
+
+def _named(
+    aliases: Mapping[str, str], left: Mapping[str, int], right: Mapping[str, int]
+) -> tuple[dict[int, int], set[int]]:
+    """The pairs that aliases name, and the source nodes that they leave out."""
+    pairs: dict[int, int] = {}
+    excluded: set[int] = set()
+    for name, other in aliases.items():
+        if name not in left:
+            raise NotFoundError(f"alias for '{name}', which the motion does not have", help=_near(name, left))
+        if not other:
+            excluded.add(left[name])
+        elif other not in right:
+            raise NotFoundError(f"alias '{name}' → '{other}', which is not there", help=_near(other, right))
+        else:
+            pairs[left[name]] = right[other]
+    return pairs, excluded
+
+
+def _near(name: str, names: Mapping[str, int]) -> str:
+    found = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean '{found[0]}'?" if found else ""

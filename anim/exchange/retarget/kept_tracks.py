@@ -1,0 +1,64 @@
+"""What of a clip stays when a motion takes its place: tracks of nodes that the motion says nothing of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange.retarget.anchors import above
+from anim.exchange.retarget.apply import Onto
+from anim.exchange.retarget.rest_alignment import Measure
+from anim.maths import matrix, quaternion
+from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.sampling import pose
+from anim.sampling.pose import world_by_node
+from anim.sampling.times import key_times
+
+
+def left_over(old: Clip, done: Onto) -> tuple[tuple[Track, ...], int]:
+    """Return the tracks of a clip that gives way which stay, and how many go though the motion has no node for them.
+
+    Those are of nodes that no joint of the motion is matched to, of morph weights and of pointers. They stay where the
+    motion is the figure's own (of its build), for there they belong to it; beside another figure's motion they go.
+    """
+    known = set(done.matching.pairs.values())
+    found = tuple(t for t in old.tracks if t.node is None or t.path == "weights" or t.node not in known)
+    return (found, 0) if done.measure is Measure.BUILD else ((), len(found))
+
+
+def with_left_over(done: Onto, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
+    """Return the motion's clip with tracks that stay. Joints keep their way in the world below nodes that move now."""
+    moving = {track.node for track in stay if track.path != "weights"}
+    known = set(done.matching.pairs.values())
+    below = [node for node in known if moving & set(_between(skeleton, node, known))]
+    if not below:
+        return Clip(done.clip.name, (*done.clip.tracks, *stay))
+    times = key_times(np.concatenate([track.times for track in done.clip.tracks]))
+    wanted = world_by_node(skeleton, pose(skeleton, done.clip, times))
+    world = world_by_node(skeleton, pose(skeleton, Clip("", (*stay, *done.clip.tracks)), times))
+    tracks = {(track.node, track.path): track for track in done.clip.tracks}
+    for node in below:
+        parent = int(skeleton.parents[node])
+        top = next((up for up in above(skeleton, node) if up in known), -1)
+        carried = world[parent]
+        if top >= 0:  # where the parent is once its matched joint is back in its place
+            carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
+        local = matrix.multiply(matrix.inverse(carried), wanted[node])
+        tracks |= {(node, track.path): track for track in _tracks(node, times, local)}
+    return Clip(done.clip.name, (*tracks.values(), *stay))
+
+
+def _between(skeleton: Skeleton, node: int, known: set[int]) -> Iterator[int]:
+    for up in above(skeleton, node):
+        if up in known:
+            return
+        yield up
+
+
+def _tracks(node: int, times: Floats, local: Floats) -> Iterator[Track]:
+    translation, rotation, scale = matrix.decompose(local)[:3]
+    yield Track(node, "translation", Interpolation.LINEAR, times, translation)
+    yield Track(node, "rotation", Interpolation.LINEAR, times, quaternion.align_signs(rotation))
+    yield Track(node, "scale", Interpolation.LINEAR, times, scale)

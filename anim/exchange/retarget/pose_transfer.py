@@ -1,0 +1,259 @@
+"""What another skeleton does at any time while a motion plays: rotations, offsets and scales, seen from both rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+from anim.exchange.retarget.anchors import NONE, Pair, above, anchors, placing_order
+from anim.exchange.retarget.joint_matching import Matching
+from anim.exchange.retarget.rest_alignment import Alignment, alignment, raised
+from anim.exchange.retarget.rest_pose import UP, RestPose, corrections
+from anim.exchange.retarget.same_hierarchy import same_tree
+from anim.exchange.retarget.world_rotations import world_rotations
+from anim.maths import matrix, quaternion
+from anim.model import Clip, Pose, Skeleton
+from anim.sampling import pose as posed
+from anim.sampling import rest, world_matrices
+from anim.sampling.pose import local_by_node, world_by_node
+
+FLAT = 1e-9  # of a unit cube's volume, below which a scale leaves nothing of an axis
+LOOKS = 64  # times at which the height of the motion is looked at
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """The target at times (F,), by node: local rotations (F, 4), translations (F, 3) and scales (F, 3).
+
+    source, world: world matrices (N, F, 3, 4) of both skeletons.
+    """
+
+    rotations: dict[int, Floats]
+    translations: dict[int, Floats]
+    scales: dict[int, Floats]
+    source: Floats
+    world: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """How a target follows a source.
+
+    aligned: the target's rest pose as a whole, from the source's. fixes: by target node, the world rotation (4,) that
+    puts its rest pose into the source's. anchors: the pair that each matched target node is placed from. order: the
+    target's nodes as they can be placed. top: the target's topmost joint of a person, or of all. lifted: nodes that go
+    up and down with it, whatever they are placed from. origin: (N, 3) of the source, where paths are measured from.
+    """
+
+    source: Skeleton
+    clip: Clip
+    target: Skeleton
+    pairs: Mapping[int, int]
+    of_source: RestPose
+    at_rest: RestPose
+    aligned: Alignment
+    fixes: Mapping[int, Floats]
+    anchors: Mapping[int, Pair]
+    order: tuple[int, ...]
+    top: int
+    lifted: frozenset[int]
+    origin: Floats
+
+    def at(self, times: Floats, lowered: Floats | None = None) -> Followed:
+        """Return what the target does at times (F,) in seconds, as far down (F,) as `lowered` says, in metres."""
+        motion = posed(self.source, self.clip, times)
+        of_source = world_by_node(self.source, motion)
+        rotations = self._rotations(world_rotations(self.source, motion.rotation))
+        scales = {b: self._scale(a, b, motion.scale[:, a]) for a, b in self.pairs.items()}
+        still = rest(self.target)
+        local = local_by_node(self.target, _with(still, len(times), rotations, scales))
+        world = self._place(local, of_source, motion, lowered)
+        return Followed(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, of_source, world)
+
+    def _rotations(self, of_source: dict[int, Floats]) -> dict[int, Floats]:
+        """Local rotations (F, 4): in the world as the source's away from rest, between rest poses that agree."""
+        turn, wanted = self.aligned.rotation, dict[int, Floats]()
+        for a, b in self.pairs.items():
+            moved = quaternion.multiply(of_source[a], quaternion.conjugate(self.of_source.rotations[a]))
+            moved = quaternion.multiply(quaternion.multiply(turn, moved), quaternion.conjugate(turn))
+            wanted[b] = quaternion.multiply(moved, quaternion.multiply(self.fixes[b], self.at_rest.rotations[b]))
+        return _local_rotations(self.target, wanted)
+
+    def _scale(self, a: int, b: int, scale: Floats) -> Floats:
+        """Local scale (F, 3): the source's by its rest, along the axes of the target's joint that lie nearest."""
+        own = quaternion.multiply(self.fixes[b], self.at_rest.rotations[b])
+        other = quaternion.multiply(self.aligned.rotation, self.of_source.rotations[a])
+        axes = quaternion.to_matrix(quaternion.multiply(quaternion.conjugate(own), other))
+        still = self.of_source.scales[a]
+        factor = np.where(still != 0, scale / np.where(still != 0, still, 1.0), scale)
+        return np.asarray(self.target.scale[b] * (factor @ (axes * axes).T))
+
+    def _place(self, local: Floats, of_source: Floats, motion: Pose, lowered: Floats | None) -> Floats:
+        """World matrices (N, F, 3, 4) of the target; translations of matched nodes are filled into `local`."""
+        back = {b: a for a, b in self.pairs.items()}
+        world = np.empty_like(local)
+        for node in self.order:
+            parent = int(self.target.parents[node])
+            if node in back:
+                place = self._path(back[node], node, of_source, motion, world)
+                if lowered is not None and node in self.lifted:
+                    place = place - lowered[:, None] * [0, 1, 0]
+                still = local[node, :, :, 3]
+                local[node, :, :, 3] = place if parent < 0 else _inside(world[parent], place, still)
+            world[node] = local[node] if parent < 0 else matrix.multiply(world[parent], local[node])
+        return world
+
+    def _path(self, a: int, b: int, of_source: Floats, motion: Pose, world: Floats) -> Floats:
+        """World positions (F, 3) of a target node.
+
+        From its anchor: the source's offset, scaled and turned, and what both rest poses differ by there, which turns
+        with the anchor. Where they agree, nothing is left of that, and the offset is the source's.
+        """
+        turn, scale = self.aligned.rotation, self.aligned.scale
+        from_a, from_b = self.anchors[b]
+        if from_b < 0:
+            moved = quaternion.rotate(turn, of_source[a, :, :, 3] - self.origin[a]) * scale
+            return np.asarray(self.at_rest.positions[b] + moved)
+        offset = quaternion.rotate(turn, self._offset(a, from_a, of_source, motion)) * scale
+        still_a = self.of_source.positions[a] - self.of_source.positions[from_a]
+        still_b = self.at_rest.positions[b] - self.at_rest.positions[from_b]
+        fix = quaternion.conjugate(self.fixes[from_b])
+        excess = still_b - scale * quaternion.rotate(fix, quaternion.rotate(turn, still_a))
+        excess = quaternion.rotate(quaternion.conjugate(turn), quaternion.rotate(self.fixes[from_b], excess))
+        moved = of_source[from_a, :, :, :3] @ (self.of_source.to_node[from_a] @ excess)
+        return np.asarray(world[from_b, :, :, 3] + offset + quaternion.rotate(turn, moved))
+
+    def _offset(self, a: int, anchor: int, of_source: Floats, motion: Pose) -> Floats:
+        """Offset (F, 3) of a source node from its anchor, in the world.
+
+        What nodes without a partner turn between the two does not count: the target has no joint there that bends.
+        """
+        between = above(self.source, a)
+        if anchor not in between:
+            return np.asarray(of_source[a, :, :, 3] - of_source[anchor, :, :, 3])
+        inside = motion.translation[:, a]
+        for node in between[: between.index(anchor)]:
+            inside = motion.translation[:, node] + inside @ self.of_source.local[node].T
+        return np.asarray((of_source[anchor, :, :, :3] @ inside[..., None])[..., 0])
+
+
+def transfer(source: Skeleton, clip: Clip, target: Skeleton, matching: Matching, *, rest_at: float | None) -> Transfer:
+    """Return how the target's matched joints follow the source's.
+
+    World rotations are taken over as turns away from the rest pose, between rest poses that are made to agree
+    (`rest_pose.corrections`); unmatched nodes of the target keep their own. Each joint keeps its offset from the joint
+    that it is placed from (see `anchors`), and moves in it as the source's does, scaled; the topmost follow the
+    source's path from where they rest. Scales are taken over as factors of the rest's. So where the rest poses agree,
+    moved, turned and scaled as a whole, the target does exactly what the source does.
+    rest_at: s, when the source stands in its rest pose; None for the pose in which every angle is zero. Raises
+    RangeError where the clip is not running then.
+    """
+    if rest_at is not None and not clip.start <= rest_at <= clip.end:
+        raise RangeError(f"rest at {rest_at:g} s (the motion runs from {clip.start:g} to {clip.end:.4g} s)")
+    still = rest(source) if rest_at is None else posed(source, clip, np.array([rest_at]))
+    of_source, at_rest = _rest_pose(source, still), _rest_pose(target, rest(target))
+    of_one_tree = not matching.unmatched and bool(same_tree(source, target, [*matching.pairs]))
+    aligned = alignment(of_source, at_rest, matching, of_one_tree=of_one_tree)
+    chosen = anchors(source, target, matching.pairs)
+    order = placing_order(target, chosen, matching.pairs)
+    top_of_source, top = _topmost(source, matching)
+    return Transfer(
+        source=source,
+        clip=clip,
+        target=target,
+        pairs=matching.pairs,
+        of_source=of_source,
+        at_rest=at_rest,
+        aligned=aligned,
+        fixes=corrections(of_source, at_rest, matching, aligned.rotation),
+        anchors=chosen,
+        order=tuple(order),
+        top=top,
+        lifted=_lifted(chosen, top),
+        origin=_origin(source, clip, at_rest, top_of_source),
+    )
+
+
+def _rest_pose(skeleton: Skeleton, still: Pose) -> RestPose:
+    world = world_matrices(skeleton, still)[0]
+    rotations = world_rotations(skeleton, still.rotation)
+    return RestPose(
+        world[:, :, 3],
+        np.array([rotations[node][0] for node in range(len(skeleton))]),
+        tuple(skeleton.parents.tolist()),
+        still.scale[0],
+        local_by_node(skeleton, still)[:, 0, :, :3],
+        matrix.inverse(world)[:, :, :3],
+    )
+
+
+def _inside(parent: Floats, place: Floats, still: Floats) -> Floats:
+    """World positions (F, 3) in a parent's space; as they rest (F, 3) along what the parent's scale flattens."""
+    linear, beyond = parent[:, :, :3], place - matrix.apply(parent, still[:, None])[:, 0]
+    largest = np.sqrt((linear * linear).sum(axis=-2)).max(axis=-1)
+    flat = np.abs(np.linalg.det(linear)) <= FLAT * largest**3
+    back = np.empty_like(linear)
+    back[~flat], back[flat] = np.linalg.inv(linear[~flat]), np.linalg.pinv(linear[flat], rcond=FLAT)
+    return np.asarray(still + (back @ beyond[..., None])[..., 0])
+
+
+def _with(still: Pose, frames: int, rotations: Mapping[int, Floats], scales: Mapping[int, Floats]) -> Pose:
+    """A rest pose for many frames, with other rotations and scales of some nodes."""
+    rotation, scale = np.repeat(still.rotation, frames, axis=0), np.repeat(still.scale, frames, axis=0)
+    for node, values in rotations.items():
+        rotation[:, node] = values
+    for node, values in scales.items():
+        scale[:, node] = values
+    return Pose(np.zeros(frames), np.repeat(still.translation, frames, axis=0), rotation, scale)
+
+
+def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int, Floats]:
+    """Local rotations (F, 4) of the nodes whose world rotations are wanted; the others stay at rest."""
+    world: dict[int, Floats] = {}
+    found: dict[int, Floats] = {}
+    for level in skeleton.levels():
+        for node in level.tolist():
+            parent = int(skeleton.parents[node])
+            if node in wanted:
+                world[node] = wanted[node]
+                parent_world = world[parent] if parent >= 0 else None
+                found[node] = (
+                    wanted[node]
+                    if parent_world is None
+                    else quaternion.normalize(quaternion.multiply(quaternion.conjugate(parent_world), wanted[node]))
+                )
+            else:
+                own = skeleton.rotation[node]
+                world[node] = own if parent < 0 else quaternion.multiply(world[parent], own)
+    return found
+
+
+def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
+    """Positions (N, 3) of the source's nodes at rest, standing on the floor."""
+    at_rest = world_matrices(source, rest(source))[0, :, :, 3]
+    looks = np.linspace(clip.start, clip.end, LOOKS)
+    heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
+    return at_rest + raised(at_rest, target.positions, heights, top) * UP
+
+
+def _lifted(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
+    """The topmost joint, and what is placed from joints above it: all that the floor lifts but those themselves."""
+    chain, node = [-1], top
+    while (node := chosen.get(node, NONE)[1]) >= 0:
+        chain.append(node)
+    return frozenset(node for node, (_, anchor) in chosen.items() if anchor in chain and node not in chain)
+
+
+def _topmost(source: Skeleton, matching: Matching) -> tuple[int, int]:
+    """The hips, or the matched source node nearest to the root, and its partner."""
+    if "hips" in matching.source_roles:
+        return matching.source_roles["hips"], matching.target_roles["hips"]
+    for level in source.levels():
+        for node in level.tolist():
+            if node in matching.pairs:
+                return node, matching.pairs[node]
+    raise AssertionError

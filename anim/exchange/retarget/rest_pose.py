@@ -1,0 +1,145 @@
+"""What lies between two rest poses: which way each skeleton faces, and how its limbs are held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.exchange.euler.motion import NO_TURN
+from anim.exchange.retarget.joint_matching import Matching
+from anim.exchange.retarget.joint_roles import PERSON
+from anim.maths import quaternion
+
+UP = np.array((0.0, 1.0, 0.0))
+SNAP = np.radians(30)  # nearer to a quarter turn than this is one: rest poses are made along axes
+LIMBS = {"upper_arm": "lower_arm", "lower_arm": "hand", "upper_leg": "lower_leg", "lower_leg": "foot"}
+
+
+@dataclass(frozen=True, slots=True)
+class RestPose:
+    """A skeleton at rest in world space: positions (N, 3), rotations (N, 4), and parents (N,).
+
+    scales: (N, 3) in the parent's space. local: (N, 3, 3), parent_from_node, and to_node: (N, 3, 3), node_from_world,
+    both without translation.
+    """
+
+    positions: Floats
+    rotations: Floats
+    parents: tuple[int, ...]
+    scales: Floats
+    local: Floats
+    to_node: Floats
+
+
+def facing(source: RestPose, target: RestPose, matching: Matching) -> Floats:
+    """Return the turn (4,) about the vertical from where the source faces to where the target does.
+
+    A skeleton faces where its right-to-left crosses up; without pairs of sides the two face the same way.
+    """
+    headings = []
+    for pose, roles in ((source, matching.source_roles), (target, matching.target_roles)):
+        across = np.zeros(3)
+        for role, node in roles.items():
+            other = roles.get(role.replace("left_", "right_"))
+            if role.startswith("left_") and other is not None:
+                across += pose.positions[node] - pose.positions[other]
+        headings.append(np.arctan2(across[0], across[2]) if np.hypot(across[0], across[2]) > 1e-9 else np.nan)
+    angle = float(headings[1] - headings[0])
+    if not np.isfinite(angle):
+        angle = 0.0
+    quarter = np.pi / 2 * np.rint(angle / (np.pi / 2))
+    if abs(angle - quarter) < SNAP:
+        angle = float(quarter)
+    return quaternion.from_rotation_vector(UP * angle)
+
+
+def corrections(source: RestPose, target: RestPose, matching: Matching, turn: Floats) -> dict[int, Floats]:
+    """Return for each matched target node the world rotation (4,) that puts its rest pose into the source's.
+
+    turn: the source's heading to the target's. Of persons, arms and legs are turned by the shortest way to point as
+    the source's do; hands and fingers go with the arm. Trunk, head, shoulders, feet and toes stay: those differ in
+    build, not in pose, and feet that are flat at rest stay flat. Other chains point as the source's do.
+    """
+    person = all(role in matching.source_roles for role in PERSON)
+    ends = _limb_ends(matching) if person else _chain_ends(source, target, matching)
+    found: dict[int, Floats] = {}
+    for node in _parents_first(target, matching.pairs.values()):
+        if node in ends:
+            (a, b), end = ends[node]
+            goal = quaternion.rotate(turn, source.positions[b] - source.positions[a])
+            found[node] = shortest(target.positions[end] - target.positions[node], goal)
+        elif person and node in _upright(matching):
+            found[node] = NO_TURN
+        else:
+            above = _matched_above(target, node, found)
+            found[node] = found[above] if above >= 0 else NO_TURN
+    return found
+
+
+def shortest(a: Floats, b: Floats) -> Floats:
+    """Return the smallest turn (4,) that points direction a (3,) along b (3,); none where one has no length."""
+    lengths = np.linalg.norm(a) * np.linalg.norm(b)
+    if lengths < 1e-12:
+        return NO_TURN
+    axis, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -0.999999 * lengths:
+        side = np.cross(a, (1.0, 0, 0) if abs(a[0]) < 0.9 * np.linalg.norm(a) else (0, 0, 1.0))
+        return np.append(side / np.linalg.norm(side), 0.0)
+    return quaternion.normalize(np.append(axis, lengths + cosine))
+
+
+Ends = dict[int, tuple[tuple[int, int], int]]  # target node → source start and end, target end
+
+
+def _limb_ends(matching: Matching) -> Ends:
+    ends: Ends = {}
+    for side in ("left", "right"):
+        for role, outer in LIMBS.items():
+            start, end = f"{side}_{role}", f"{side}_{outer}"
+            if start in matching.source_roles and end in matching.source_roles:
+                pair = matching.source_roles[start], matching.source_roles[end]
+                ends[matching.target_roles[start]] = pair, matching.target_roles[end]
+    return ends
+
+
+def _upright(matching: Matching) -> set[int]:
+    moved = (*LIMBS, "hand")
+    return {node for role, node in matching.target_roles.items() if not role.endswith(moved)}
+
+
+def _chain_ends(source: RestPose, target: RestPose, matching: Matching) -> Ends:
+    """Joints with one matched joint next below in both skeletons."""
+    below_source = _next_below(source, set(matching.pairs))
+    below_target = _next_below(target, set(matching.pairs.values()))
+    ends: Ends = {}
+    for a, node in matching.pairs.items():
+        children = below_source.get(a, [])
+        if len(children) == 1 and below_target.get(node) == [matching.pairs[children[0]]]:
+            ends[node] = (a, children[0]), matching.pairs[children[0]]
+    return ends
+
+
+def _next_below(pose: RestPose, nodes: set[int]) -> dict[int, list[int]]:
+    below: dict[int, list[int]] = {}
+    for node in sorted(nodes):
+        below.setdefault(_matched_above(pose, node, dict.fromkeys(nodes)), []).append(node)
+    return below
+
+
+def _matched_above(pose: RestPose, node: int, nodes: Mapping[int, object]) -> int:
+    above = pose.parents[node]
+    while above >= 0 and above not in nodes:
+        above = pose.parents[above]
+    return above
+
+
+def _parents_first(pose: RestPose, nodes: Iterable[int]) -> list[int]:
+    depth = {}
+    for node in nodes:
+        at, depth[node] = node, 0
+        while pose.parents[at] >= 0:
+            at, depth[node] = pose.parents[at], depth[node] + 1
+    return sorted(depth, key=lambda node: depth[node])

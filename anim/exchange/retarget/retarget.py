@@ -1,0 +1,177 @@
+"""A motion put on another skeleton: joints turn in world space as the source's do, seen from both rest poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from anim.arrays import Floats, sorted_unique
+from anim.errors import NotFoundError, RangeError
+from anim.exchange.euler import refinement
+from anim.exchange.euler.from_euler import Converted
+from anim.exchange.retarget.ground_contact import at_or_below, has_feet, heights_above_contact, soles
+from anim.exchange.retarget.joint_matching import Matching
+from anim.exchange.retarget.pose_transfer import Followed, Transfer, transfer
+from anim.exchange.retarget.rest_alignment import Measure
+from anim.exchange.retarget.step_keys import is_held, just_before, linear, step, within
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Scene, Track
+from anim.sampling import rest, world_matrices
+
+LONGEST = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
+STILL = 1e-7  # rad, factor, and share of the target's size: what rounding leaves of no motion
+CONTACT_STEP = 1 / 30  # s between times at which soles are looked at, where keys stand farther apart
+
+
+class Floor(StrEnum):
+    """What heights the hips get."""
+
+    CONTACT = "contact"
+    KEEP = "keep"
+
+
+@dataclass(frozen=True, slots=True)
+class Retargeted:
+    """The clip for the target, the target's size by the source's, and the least and most that hips went down, in m.
+
+    measure: what the scale is taken from.
+    """
+
+    clip: Clip
+    scale: float
+    lowered: tuple[float, float]
+    measure: Measure
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What the target does at times (K,), and which keys its tracks get.
+
+    before: those of the times that stand before steps. inside: what it does at `within(knots)`; None without steps.
+    thin: whether keys may be left out where nothing changes; recordings keep their grid.
+    """
+
+    times: Floats
+    found: Followed
+    before: Floats
+    knots: Floats
+    inside: Followed | None
+    thin: bool
+
+    def track(self, node: int, path: str, tolerance: float) -> Track:
+        """STEP where the value holds between all knots of the source, LINEAR otherwise."""
+        values = _of(self.found, node, path)
+        if self.inside is not None and is_held(_of(self.inside, node, path), tolerance=tolerance):
+            at = np.isin(self.times, self.knots)
+            return step(node, path, self.times[at], values[at])
+        return linear(node, path, self.times, values, before=self.before, thin=self.thin)
+
+
+def _of(found: Followed, node: int, path: str) -> Floats:
+    if path == "rotation":
+        return quaternion.align_signs(found.rotations[node])
+    return found.translations[node] if path == "translation" else found.scales[node]
+
+
+def retarget(
+    source: Converted,
+    target: Scene,
+    matching: Matching,
+    *,
+    floor: Floor = Floor.CONTACT,
+    rest_at: float | None = None,
+) -> Retargeted:
+    """Return a clip that moves the target's matched joints as the source's move; see `transfer` for how.
+
+    Keys stand at all times of the source, and between them where what a player makes there would leave the motion by
+    more than the source's tolerance, of the target's size for its path; recordings keep their grid.
+    floor: CONTACT moves the hips up or down so that the soles stand where they stand at rest while a foot of the
+    source is down; KEEP scales heights only, and so does CONTACT where no foot is matched.
+    rest_at: s, the time at which the source stands in its rest pose; None for the pose in which every angle is zero.
+    Raises NotFoundError where no joint is matched, RangeError for CONTACT in a motion of over a day.
+    """
+    if not matching.pairs:
+        raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
+    if floor == Floor.CONTACT and source.clip.end - source.clip.start > LONGEST:
+        seconds = source.clip.end - source.clip.start
+        raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
+    follow = transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
+    size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
+    knots, before = _times(source.clip)
+    times = sorted_unique(np.concatenate((knots, before)))
+    looked_at, lowered = times, np.zeros(len(times))
+    if floor == Floor.CONTACT and not follow.aligned.alike and has_feet(matching.target_roles):
+        looked_at = times if source.tolerance is None else _no_farther(times, CONTACT_STEP)
+        lowered = _too_high(follow, target, matching, looked_at)
+
+    def at(when: Floats) -> Followed:
+        return follow.at(when, np.interp(when, looked_at, lowered))
+
+    if source.tolerance is not None:
+        lengths = _lengths(follow)
+        times = refinement.refined(
+            times, lambda when: _rotations_and_paths(at(when), lengths, size), tolerance=source.tolerance, size=size
+        )
+    inside = at(within(knots)) if len(before) else None
+    wanted = _Wanted(times, at(times), before, knots, inside, thin=source.tolerance is not None)
+    clip = Clip(source.clip.name, tuple(_tracks(follow, wanted, size)))
+    return Retargeted(clip, follow.aligned.scale, (float(lowered.min()), float(lowered.max())), follow.aligned.measure)
+
+
+def _times(clip: Clip) -> tuple[Floats, Floats]:
+    """All key times (T,), and float32 times just before those at which a step may jump."""
+    arrays = {id(track.times): track.times for track in clip.tracks}
+    steps = {id(t.times): just_before(t.times[1:]) for t in clip.tracks if t.interpolation is Interpolation.STEP}
+    return sorted_unique(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
+
+
+def _no_farther(times: Floats, step: float) -> Floats:
+    """Times with others between them so that none is farther from the next than `step`."""
+    grid = np.arange(times[0], times[-1], step)
+    return sorted_unique(np.concatenate((times, grid)))
+
+
+def _too_high(follow: Transfer, target: Scene, matching: Matching, times: Floats) -> Floats:
+    """How far (F,) above the floor the target would be with heights scaled only, in metres."""
+    found = follow.at(times)
+    feet = soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
+    roles = matching.source_roles
+    of_source = [at_or_below(follow.source, {roles[f]}) for f in ("left_foot", "right_foot") if f in roles]
+    heights, world = found.source[:, :, 1, 3].T, found.world.transpose(1, 0, 2, 3)
+    return heights_above_contact(times, heights, of_source, feet.heights(world), feet.floor, follow.aligned.scale)
+
+
+def _lengths(follow: Transfer) -> dict[int, float]:
+    """Meters per unit of the space that each matched node of the target moves in, at rest."""
+    skeleton = follow.target
+    world = world_matrices(skeleton, rest(skeleton))[0]
+    lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
+    return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
+
+
+def _rotations_and_paths(
+    found: Followed, lengths: Mapping[int, float], size: float
+) -> tuple[dict[int, Floats], Floats]:
+    """What must be followed between keys: rotations, and as metres (F, P, 3) translations and scales."""
+    places = [found.translations[node] * length for node, length in lengths.items()]
+    return found.rotations, np.stack([*places, *(scale * size for scale in found.scales.values())], axis=1)
+
+
+def _tracks(follow: Transfer, wanted: _Wanted, size: float) -> list[Track]:
+    """Tracks of the matched nodes; none for what stays at rest and has no track in the source either."""
+    moved = {(track.node, track.path) for track in follow.clip.tracks}
+    lengths, still, found = _lengths(follow), follow.target, wanted.found
+    tracks = []
+    for a, b in sorted(follow.pairs.items(), key=lambda pair: pair[1]):
+        rotation = quaternion.align_signs(found.rotations[b])
+        if (a, "rotation") in moved or quaternion.angle_between(rotation, still.rotation[b]).max() > STILL:
+            tracks.append(wanted.track(b, "rotation", STILL))
+        far = np.abs(found.translations[b] - still.translation[b]).max() * lengths[b]
+        if (b == follow.top and (a, "translation") in moved) or far > STILL * size:
+            tracks.append(wanted.track(b, "translation", STILL * size / lengths[b]))
+        if np.abs(found.scales[b] - still.scale[b]).max() > STILL:
+            tracks.append(wanted.track(b, "scale", STILL))
+    return tracks or [wanted.track(follow.top, "translation", STILL)]

@@ -1,0 +1,26 @@
+"""Whether a motion's nodes are a part of a character's own tree: then each node is the one of its name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from anim.exchange.formats.labels import labels
+from anim.model import Skeleton
+
+
+def same_tree(source: Skeleton, target: Skeleton, chosen: Sequence[int]) -> dict[int, int]:
+    """Return the target node of each chosen source node, by name; none at all where the trees differ.
+
+    They agree where every chosen node, and its parent where it has one, has the label (see `labels`) of a target node
+    and its parent: as in what was written from this very file. Nodes that are no joints, and those whose names come
+    twice, then have their partners too.
+    """
+    found: dict[int, int] = {}
+    by_label = {label: node for node, label in enumerate(labels(target))}
+    for node in chosen:
+        other, parent = by_label.get(source.names[node], -1), int(source.parents[node])
+        other_parent = -1 if other < 0 else int(target.parents[other])
+        if other < 0 or (parent >= 0 and by_label.get(source.names[parent], -1) != other_parent):
+            return {}
+        found[node] = other
+    return found

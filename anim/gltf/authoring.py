@@ -1,0 +1,142 @@
+"""A Document made from nothing: a skeleton, its clips, and skinned bodies on it. Built with pygltflib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import anim
+from anim.arrays import Floats
+from anim.gltf.document import Document, Json, items
+from anim.gltf.io import container
+from anim.gltf.writing import writer
+from anim.model import Clip, Mesh, Skeleton, Skin
+
+if TYPE_CHECKING:
+    from pygltflib import GLTF2
+
+GENERATOR = f"gltf-anim {anim.__version__}"
+BYTE, SHORT, INT, FLOAT = 5121, 5123, 5125, 5126
+VERTICES, INDICES = 34962, 34963  # targets of buffer views
+TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+COLOR = (0.8, 0.55, 0.25, 1.0)  # of bodies, linear RGBA
+
+
+def author(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[tuple[Mesh, Skin]] = ()) -> Document:
+    """Return a new document with the nodes of the skeleton, then a node for each body, and the clips.
+
+    Node numbers are those of the skeleton, which the clips and skins use. Parts of nodes that are the identity are
+    left out. bodies: a mesh and its skin; joints of the mesh are places among the skin's joints.
+    """
+    from pygltflib import GLTF2, Asset, Node, Scene
+
+    gltf = GLTF2(asset=Asset(generator=GENERATOR, version="2.0"), scene=0, scenes=[Scene(nodes=[])])
+    for number, name in enumerate(skeleton.names):
+        gltf.nodes.append(Node(name=name or None, **_placed(skeleton, number)))
+    for number, parent in enumerate(skeleton.parents.tolist()):
+        (gltf.scenes[0].nodes if parent < 0 else gltf.nodes[parent].children).append(number)
+    blob = bytearray()
+    for mesh, skin in bodies:
+        _add_body(gltf, blob, mesh, skin)
+    return add_clips(_document(gltf, bytes(blob)), clips)
+
+
+def add_clips(document: Document, clips: Sequence[Clip]) -> Document:
+    """Return the document with the clips behind its animations; nothing else changes. Clips without tracks stay out."""
+    clips = [clip for clip in clips if clip.tracks]
+    if not clips:
+        return document
+    there = items(document.json, "animations")
+    blank: list[Json] = [
+        {**({"name": clip.name} if clip.name else {}), "channels": [], "samplers": []} for clip in clips
+    ]
+    longer = replace(document, json={**document.json, "animations": [*there, *blank]})
+    return writer.replace_clips(longer, {len(there) + i: clip for i, clip in enumerate(clips)})
+
+
+def _placed(skeleton: Skeleton, number: int) -> dict[str, list[float]]:
+    parts = {
+        "translation": (skeleton.translation[number], (0.0, 0.0, 0.0)),
+        "rotation": (skeleton.rotation[number], (0.0, 0.0, 0.0, 1.0)),
+        "scale": (skeleton.scale[number], (1.0, 1.0, 1.0)),
+    }
+    return {
+        key: (np.round(value, 9) + 0.0).tolist()
+        for key, (value, none) in parts.items()
+        if not np.array_equal(value, none)
+    }
+
+
+def _add_body(gltf: GLTF2, blob: bytearray, mesh: Mesh, skin: Skin) -> None:
+    from pygltflib import Attributes, Material, Node, PbrMetallicRoughness, Primitive
+    from pygltflib import Mesh as GltfMesh
+    from pygltflib import Skin as GltfSkin
+
+    wide = len(skin.joints) > 256
+    joints = mesh.joints.astype("<u2" if wide else "<u1")
+    attributes = Attributes(
+        POSITION=_add(gltf, blob, mesh.positions.astype("<f4"), FLOAT, VERTICES, bounds=True),
+        JOINTS_0=_add(gltf, blob, joints, SHORT if wide else BYTE, VERTICES),
+        WEIGHTS_0=_add(gltf, blob, mesh.weights.astype("<f4"), FLOAT, VERTICES),
+    )
+    if mesh.normals is not None:
+        attributes.NORMAL = _add(gltf, blob, mesh.normals.astype("<f4"), FLOAT, VERTICES)
+    large = len(mesh.positions) > 65535
+    faces = mesh.faces.reshape(-1, 1).astype("<u4" if large else "<u2")
+    indices = _add(gltf, blob, faces, INT if large else SHORT, INDICES)
+    surface = PbrMetallicRoughness(baseColorFactor=list(COLOR), metallicFactor=0.0, roughnessFactor=0.7)
+    gltf.materials.append(Material(name=mesh.name, pbrMetallicRoughness=surface))
+    primitive = Primitive(attributes=attributes, indices=indices, material=len(gltf.materials) - 1)
+    gltf.meshes.append(GltfMesh(name=mesh.name, primitives=[primitive]))
+    bind = _add(gltf, blob, _columns(skin.inverse_bind), FLOAT)
+    gltf.skins.append(GltfSkin(name=mesh.name, joints=skin.joints.tolist(), inverseBindMatrices=bind))
+    gltf.nodes.append(Node(name=mesh.name, mesh=len(gltf.meshes) - 1, skin=len(gltf.skins) - 1))
+    gltf.scenes[0].nodes.append(len(gltf.nodes) - 1)
+
+
+def _columns(matrices: Floats) -> NDArray[np.float32]:
+    """Affine (J, 3, 4) as whole matrices (J, 16), column by column."""
+    whole = np.zeros((len(matrices), 4, 4))
+    whole[:, :3], whole[:, 3, 3] = matrices, 1.0
+    return whole.transpose(0, 2, 1).reshape(-1, 16).astype("<f4")
+
+
+def _add(
+    gltf: GLTF2,
+    blob: bytearray,
+    rows: NDArray[Any],
+    component: int,
+    target: int | None = None,
+    *,
+    bounds: bool = False,
+) -> int:
+    """Append rows (n, C) to the blob and return the number of their accessor."""
+    from pygltflib import Accessor, BufferView
+
+    data = np.ascontiguousarray(rows).tobytes()
+    gltf.bufferViews.append(BufferView(buffer=0, byteOffset=len(blob), byteLength=len(data), target=target))
+    blob += data + bytes(-len(data) % 4)
+    kind = TYPES[rows.shape[1]]
+    accessor = Accessor(
+        bufferView=len(gltf.bufferViews) - 1, componentType=component, count=len(rows), type=kind, byteOffset=None
+    )
+    if bounds:
+        accessor.min, accessor.max = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
+    gltf.accessors.append(accessor)
+    return len(gltf.accessors) - 1
+
+
+def _document(gltf: GLTF2, blob: bytes) -> Document:
+    """The document, read back by the same door as any other file, so that it is checked too."""
+    from pygltflib import Buffer
+
+    data = gltf.to_json().encode()
+    if blob:
+        gltf.buffers.append(Buffer(byteLength=len(blob)))
+        gltf.set_binary_blob(blob)
+        data = b"".join(bytes(piece) for piece in gltf.save_to_bytes())
+    return container.read(np.frombuffer(data, np.uint8))

@@ -1,0 +1,289 @@
+"""Bytes ↔ Document: GLB and .gltf text, read without copying buffers and written as pieces that are never joined."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Callable, Iterator
+from itertools import count
+from typing import TypeAlias, TypeGuard
+
+import numpy as np
+
+from anim.errors import FormatError, ShapeError, UnsupportedError
+from anim.gltf.document import Buffer, Bytes, Document, Json, items
+from anim.gltf.io import json_text, uri
+from anim.gltf.reading.node_matrix import expand_matrices
+from anim.gltf.validation import structure
+
+MAGIC = b"glTF"
+JSON_CHUNK = 0x4E4F534A
+BIN_CHUNK = 0x004E4942
+MAX_GLB = 2**32 - 1  # the header's length field has 32 bits
+LFS_POINTER = b"version https://git-lfs"
+
+Resolve: TypeAlias = Callable[[str], Bytes | bytes | bytearray | memoryview]
+Choose: TypeAlias = Callable[[int, str, Bytes], str]
+
+
+def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None = None) -> Document:
+    """Return the document in `data`, a GLB or a .gltf text.
+
+    data: uint8 array, best a memory map: nothing of a GLB's BIN chunk is copied or even touched; or bytes.
+    resolve: gives the bytes of a file beside the input by its relative path, when they are first needed; None where
+    there is no such place.
+    Raises FormatError with what is wrong and where, ShapeError for what are no bytes.
+    """
+    if isinstance(data, (bytes, bytearray, memoryview)):
+        data = np.frombuffer(data, np.uint8)
+    if not _is_bytes(data):
+        raise ShapeError(
+            f"data is no bytes (got {_kind(data)}, expected a uint8 array or bytes)",
+            help='the library opens no files: container.read(np.fromfile("walk.glb", np.uint8))',
+        )
+    if resolve is not None and not callable(resolve):
+        raise ShapeError(
+            f"resolve is {_kind(resolve)} (expected a function from a relative path to bytes)",
+            help='container.read(data, resolve=lambda name: np.fromfile(f"folder/{name}", np.uint8))',
+        )
+    head = data[:4096].tobytes()
+    if head[:4] == MAGIC:
+        return _read_glb(data, resolve)
+    if head.startswith(LFS_POINTER):
+        raise FormatError("is a Git LFS pointer, not the file itself", help="git lfs pull")
+    if not len(data):
+        raise FormatError("is empty (expected glTF)")
+    if head.lstrip()[:1] != b"{":
+        raise FormatError(f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)")
+    raw = data.tobytes()
+    parsed, expanded = _parse(raw)
+    return Document(parsed, buffers_of(parsed, None, resolve, glb=False), (), json_text.indent_of(raw), expanded)
+
+
+def is_glb(data: Bytes) -> bool:
+    """Return whether bytes are a GLB from the first to the last, by its header."""
+    return data[:4].tobytes() == MAGIC and int.from_bytes(data[8:12].tobytes(), "little") == len(data)
+
+
+def glb(document: Document) -> list[Bytes]:
+    """Return the pieces of a self-contained GLB: buffer 0 as BIN, any further buffer as a data URI.
+
+    Raises UnsupportedError beyond 4 GiB, FormatError where a buffer's bytes can't be had.
+    """
+    content = dict(document.json)
+    described = items(content, "buffers")
+    if described:
+        content["buffers"] = [
+            _in_glb(i, d, b) for i, (d, b) in enumerate(zip(described, document.buffers, strict=True))
+        ]
+    pieces = [_chunk_head(0, JSON_CHUNK), *_padded(json_text.dump(content), b" ")]
+    pieces[0] = _chunk_head(_size(pieces[1:]), JSON_CHUNK)
+    chunks: list[tuple[int, list[Bytes]]] = []
+    if described and document.buffers[0].byte_length > MAX_GLB:
+        raise _too_large(document.buffers[0].byte_length)
+    if described:
+        chunks.append((BIN_CHUNK, _padded(document.buffers[0].data, b"\0")))
+    chunks += [(kind, [_bytes(content)]) for kind, content in document.chunks]
+    for kind, body in chunks:
+        pieces += [_chunk_head(_size(body), kind), *body]
+    total = 12 + _size(pieces)
+    if total > MAX_GLB:
+        raise _too_large(total)
+    return [_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
+
+
+def gltf(
+    document: Document, stem: str, *, keep_external: bool = False, choose: Choose = lambda _, name, __: name
+) -> dict[str, list[Bytes]]:
+    """Return the files of a .gltf by name: `stem`.gltf last, before it the .bin files that it needs.
+
+    A buffer that was a data URI stays one; others become `stem`.bin, `stem`-1.bin, … With `keep_external` a buffer
+    that was a file of its own and has not changed stays that file. choose: gets the index, this name and the bytes of
+    each buffer that is to be a file, and returns its name.
+    """
+    content = dict(document.json)
+    described = items(content, "buffers")
+    files: dict[str, list[Bytes]] = {}
+    taken = {uri.relative_path(b.uri) for b in document.buffers if keep_external and _stays(b) and b.uri is not None}
+    beside = []
+    for i, (about, buffer) in enumerate(zip(described, document.buffers, strict=True)):
+        about = dict(about)
+        if buffer.uri is not None and uri.is_data(buffer.uri):
+            about["uri"] = _kept_data_uri(buffer)
+        elif buffer.has_data and not (keep_external and _stays(buffer)):
+            name = choose(i, next(n for n in _names(stem, i) if n not in taken), buffer.data)
+            taken.add(name)
+            about["uri"] = uri.from_path(name)
+            files[name] = [buffer.data]
+        beside.append(about)
+    if described:
+        content["buffers"] = beside
+    files[f"{stem}.gltf"] = [_bytes(json_text.dump(content, indent=document.indent) + b"\n")]
+    return files
+
+
+def _is_bytes(data: object) -> TypeGuard[Bytes]:
+    return isinstance(data, np.ndarray) and data.dtype == np.uint8 and data.ndim == 1
+
+
+def _kind(value: object) -> str:
+    """How messages call what some value is: "an array of float64 with shape (2, 3)", "str"."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} with shape {value.shape}"
+    return "None" if value is None else type(value).__name__
+
+
+def _too_large(size: int) -> UnsupportedError:
+    return UnsupportedError(f"a GLB can't hold {size} bytes (its limit is {MAX_GLB})", help="write a .gltf")
+
+
+def _stays(buffer: Buffer) -> bool:
+    """Whether a buffer is a file of its own that has not changed."""
+    return buffer.uri is not None and not uri.is_data(buffer.uri) and not buffer.replaced
+
+
+def _names(stem: str, number: int) -> Iterator[str]:
+    """File names for a buffer, the best first."""
+    yield f"{stem}.bin" if number == 0 else f"{stem}-{number}.bin"
+    yield from (f"{stem}-{number}-{k}.bin" for k in count(1))
+
+
+def _read_glb(data: Bytes, resolve: Resolve | None) -> Document:
+    if len(data) < 12:
+        raise FormatError(f"GLB header is cut off ({len(data)} bytes of 12)")
+    version, total = struct.unpack("<II", data[4:12].tobytes())
+    if version != 2:
+        raise FormatError(f"GLB version is {version} (expected 2)")
+    if not 12 <= total <= len(data):
+        state = "is truncated" if total > len(data) else "has a wrong length in its header"
+        raise FormatError(f"GLB {state} ({len(data)} bytes, the header says {total})")
+    parsed: Json | None = None
+    expanded: tuple[int, ...] = ()
+    binary: Bytes | None = None
+    others: list[tuple[int, bytes]] = []
+    for number, (kind, body) in enumerate(_chunks(data[:total])):
+        if number == 0:
+            if kind != JSON_CHUNK:
+                raise FormatError(f"GLB's first chunk has type {kind:#010x} (expected JSON, {JSON_CHUNK:#010x})")
+            parsed, expanded = _parse(body.tobytes())
+        elif kind == BIN_CHUNK and number == 1:
+            binary = body
+        elif kind in (JSON_CHUNK, BIN_CHUNK):
+            raise FormatError(f"GLB chunk {number} is a second or misplaced {'JSON' if kind == JSON_CHUNK else 'BIN'}")
+        else:
+            others.append((kind, body.tobytes()))
+    if parsed is None:
+        raise FormatError("GLB has no JSON chunk")
+    return Document(parsed, buffers_of(parsed, binary, resolve, glb=True), tuple(others), None, expanded)
+
+
+def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
+    chunks = []
+    at = 12
+    while at < len(data):
+        if at + 8 > len(data):
+            raise FormatError(f"GLB chunk header at byte {at} is cut off")
+        size, kind = struct.unpack("<II", data[at : at + 8].tobytes())
+        if size % 4:
+            raise FormatError(f"GLB chunk at byte {at} has {size} bytes (expected a multiple of 4)")
+        if at + 8 + size > len(data):
+            raise FormatError(f"GLB chunk at byte {at} is truncated ({len(data) - at - 8} bytes of {size})")
+        chunks.append((kind, data[at + 8 : at + 8 + size]))
+        at += 8 + size
+    return chunks
+
+
+def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
+    """The JSON, and the nodes that had a matrix in it although they are animated."""
+    parsed = json_text.parse(raw)
+    structure.check(parsed)
+    return expand_matrices(parsed)
+
+
+def buffers_of(
+    parsed: Json, binary: Bytes | None, resolve: Resolve | None, *, glb: bool, check: bool = True
+) -> tuple[Buffer, ...]:
+    """Return the buffers of a JSON. check: refuse a BIN chunk that is missing or too short for the first one."""
+    buffers = []
+    for i, about in enumerate(items(parsed, "buffers")):
+        load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
+        buffers.append(Buffer(about["byteLength"], about.get("uri"), load, where=where))
+        if check and glb and i == 0 and "uri" not in about:
+            _check_binary(about, binary)
+    return tuple(buffers)
+
+
+def _loader(about: Json, binary: Bytes | None, resolve: Resolve | None) -> Callable[[], Bytes] | None:
+    address = about.get("uri")
+    if address is None:
+        return None if binary is None else lambda: binary
+    if uri.is_data(address):
+        return lambda: _bytes(uri.decode_data(address))
+    return lambda: _beside(address, resolve)
+
+
+def _beside(address: str, resolve: Resolve | None) -> Bytes:
+    path = uri.relative_path(address)
+    if resolve is None:
+        raise FormatError(
+            f"the bytes of '{path}' are not given",
+            help="container.read(data, resolve=…) takes a function that reads it",
+        )
+    data = resolve(path)
+    if isinstance(data, (bytes, bytearray, memoryview)):
+        data = np.frombuffer(data, np.uint8)
+    if not _is_bytes(data):
+        raise ShapeError(
+            f"resolve gives {_kind(data)} for '{path}' (expected a uint8 array or bytes)",
+            help="raise FormatError in resolve where there is no such file",
+        )
+    return data
+
+
+def _check_binary(about: Json, binary: Bytes | None) -> None:
+    if binary is None:
+        if about.get("extensions") or "fallback" in json.dumps(about):
+            return
+        raise FormatError("has no uri and the GLB has no BIN chunk", where="buffer 0")
+    if len(binary) < about["byteLength"]:
+        raise FormatError(
+            f"BIN chunk holds {len(binary)} bytes (expected at least byteLength, {about['byteLength']})",
+            where="buffer 0",
+        )
+
+
+def _in_glb(number: int, about: Json, buffer: Buffer) -> Json:
+    if number == 0:
+        if not buffer.has_data:
+            raise UnsupportedError("has no data, so it can't be a GLB's BIN chunk", where="buffer 0")
+        return {key: value for key, value in about.items() if key != "uri"}
+    if buffer.uri is None:
+        return about
+    return {**about, "uri": _kept_data_uri(buffer)}
+
+
+def _kept_data_uri(buffer: Buffer) -> str:
+    """The URI as it was where it already holds these bytes, else a new one with its media type."""
+    if buffer.uri is not None and uri.is_data(buffer.uri) and not buffer.replaced:
+        return buffer.uri
+    media = re.match(r"data:([^;,]+)", buffer.uri or "", re.IGNORECASE)
+    return uri.encode_data(buffer.data.tobytes(), media[1] if media else uri.BUFFER_TYPES[0])
+
+
+def _chunk_head(size: int, kind: int) -> Bytes:
+    return _bytes(struct.pack("<II", size, kind))
+
+
+def _padded(content: bytes | Bytes, filler: bytes) -> list[Bytes]:
+    rest = -len(content) % 4
+    body = _bytes(content) if isinstance(content, bytes) else content
+    return [body, _bytes(filler * rest)] if rest else [body]
+
+
+def _size(pieces: list[Bytes]) -> int:
+    return sum(len(piece) for piece in pieces)
+
+
+def _bytes(content: bytes) -> Bytes:
+    return np.frombuffer(content, np.uint8)

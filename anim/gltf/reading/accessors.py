@@ -1,0 +1,191 @@
+"""Numbers out of a document: every component type, stride, normalized, sparse, zero-filled, compressed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Floats, Ints
+from anim.errors import AnimError, FormatError, UnsupportedError
+from anim.gltf.document import Bytes, Document, Json, items
+from anim.gltf.meshopt import codec
+from anim.gltf.validation import buffer_layout
+
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+FLOAT = 5126
+T = TypeVar("T")
+
+
+class Accessors:
+    """Reads accessors of one document; views are opened, and decompressed, once."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._accessors = items(document.json, "accessors")
+        self._views = items(document.json, "bufferViews")
+        self._bytes: dict[int, Bytes] = {}
+        self._given: Mapping[int, NDArray[Any]] = {}
+
+    def over(self, given: Mapping[int, NDArray[Any]]) -> Accessors:
+        """Return accessors in which some, by number, hold these numbers (count, components) instead of their own."""
+        other = copy(self)
+        other._given = {**self._given, **given}
+        return other
+
+    def about(self, index: int) -> Json:
+        """Return the JSON of an accessor."""
+        return self._accessors[index]
+
+    def raw(self, index: int) -> NDArray[Any]:
+        """Return the stored numbers (count, components) in their own type, matrices column by column; read-only.
+
+        Sparse values are put in, accessors without data are zeros. Raises FormatError, UnsupportedError.
+        """
+        return self._located(index, self._raw)
+
+    def floats(self, index: int) -> Floats:
+        """Return the numbers (count, components) as float64, normalized integers as fractions (glTF 2.0, 3.11).
+
+        Raises FormatError for NaN or infinity.
+        """
+        with np.errstate(invalid="ignore"):  # a signaling NaN is found below
+            values = self._located(index, self._floats)
+        if not np.isfinite(values).all():
+            row = int(np.argwhere(~np.isfinite(values))[0][0])
+            raise FormatError(f"holds NaN or infinity (element {row})", where=f"accessor {index}")
+        return values
+
+    def unchecked(self, index: int) -> Floats:
+        """Return what `floats` does, without looking for NaN: for callers whose own types do.
+
+        numpy warns of a signaling NaN; callers that read many accessors turn that off once, which is not free.
+        """
+        return self._located(index, self._floats)
+
+    def integers(self, index: int) -> Ints:
+        """Return the numbers (count, components) as int64. Raises FormatError where they are floats."""
+        raw = self.raw(index)
+        if raw.dtype.kind == "f":
+            raise FormatError("holds floats (expected integers)", where=f"accessor {index}")
+        return raw.astype(np.int64)
+
+    def numbers_of_things(self, index: int) -> Ints:
+        """Return what `integers` does. Raises FormatError for signed types, which can't number vertices or joints."""
+        if self.raw(index).dtype.kind == "i":
+            raise FormatError("holds signed integers (expected unsigned ones)", where=f"accessor {index}")
+        return self.integers(index)
+
+    def matrices(self, index: int) -> Floats:
+        """Return MAT4 as (count, 4, 4) for column vectors: glTF's column-major order is transposed here only."""
+        return self.floats(index).reshape(-1, 4, 4).transpose(0, 2, 1)
+
+    def _located(self, index: int, read: Callable[[int], T]) -> T:
+        try:
+            return read(index)
+        except AnimError as error:
+            raise error.at(f"accessor {index}") from None
+
+    def _raw(self, index: int) -> NDArray[Any]:
+        if index in self._given:
+            return self._given[index]
+        about = self._accessors[index]
+        form = _form(about["componentType"], about["type"])
+        if "bufferView" in about:
+            number = about["bufferView"]
+            stride = self._views[number].get("byteStride", form.columns * form.column)
+            base = _strided(self.view(number), about.get("byteOffset", 0), about["count"], stride, form)
+        else:
+            base = np.broadcast_to(np.zeros((), form.dtype), (about["count"], form.columns * form.rows))
+        return self._with_sparse(base, about, form) if "sparse" in about else base
+
+    def _with_sparse(self, base: NDArray[Any], about: Json, form: Form) -> NDArray[Any]:
+        sparse = about["sparse"]
+        count, where, values = sparse["count"], sparse["indices"], sparse["values"]
+        whole = _form(where["componentType"], "SCALAR")
+        view = self.view(where["bufferView"])
+        places = _strided(view, where.get("byteOffset", 0), count, whole.column, whole)[:, 0].astype(np.int64)
+        if places[-1] >= about["count"] or (np.diff(places) <= 0).any():
+            raise FormatError("sparse indices are not increasing, or beyond its count")
+        view = self.view(values["bufferView"])
+        full = base.copy()
+        full[places] = _strided(view, values.get("byteOffset", 0), count, form.columns * form.column, form)
+        full.flags.writeable = False
+        return full
+
+    def _floats(self, index: int) -> Floats:
+        raw = self._raw(index)
+        values = raw.astype(np.float64)
+        if raw.dtype.kind != "f" and self._accessors[index].get("normalized"):
+            return denormalized(values, raw.dtype)
+        return values
+
+    def view(self, number: int) -> Bytes:
+        """Return the bytes of a buffer view, decompressed. Raises FormatError, UnsupportedError."""
+        found = self._bytes.get(number)
+        if found is None:
+            found = self._bytes[number] = self._opened(number)
+        return found
+
+    def _opened(self, number: int) -> Bytes:
+        view = self._views[number]
+        try:
+            if "extensions" not in view:
+                return _slice(self._document.buffers[view["buffer"]].data, view)
+            compressed = buffer_layout.compression(view)
+            if compressed is not None:
+                stored = _slice(self._document.buffers[compressed["buffer"]].data, compressed)
+                plain = codec.decode(stored, compressed)
+                if len(plain) < view["byteLength"]:
+                    raise FormatError(f"decodes to {len(plain)} bytes (expected {view['byteLength']})")
+                return plain
+            if view["extensions"] and not self._document.buffers[view["buffer"]].has_data:
+                names = ", ".join(view["extensions"])
+                raise UnsupportedError(f"its data is hidden by {names}, which is not handled")
+            return _slice(self._document.buffers[view["buffer"]].data, view)
+        except AnimError as error:
+            raise error.at(f"bufferView {number}") from None
+
+
+def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:
+    """Return stored normalized integers as the fractions that they mean: c / max, signed ones not below −1."""
+    scaled = values / float(np.iinfo(dtype).max)
+    return np.maximum(scaled, -1.0) if dtype.kind == "i" else scaled
+
+
+def _slice(data: Bytes, place: Json) -> Bytes:
+    start = place.get("byteOffset", 0)
+    return data[start : start + place["byteLength"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """How one element lies in memory: columns of rows numbers, `column` bytes from column to column."""
+
+    dtype: np.dtype[Any]
+    columns: int
+    rows: int
+    column: int
+
+
+@cache
+def _form(component_type: int, kind: str) -> Form:
+    if kind not in buffer_layout.COMPONENTS:
+        raise FormatError(f"has type '{kind}' (expected one of {', '.join(buffer_layout.COMPONENTS)})")
+    return Form(np.dtype(DTYPES[component_type]), *buffer_layout.element(component_type, kind))
+
+
+def _strided(view: Bytes, offset: int, count: int, stride: int, form: Form) -> NDArray[Any]:
+    """Elements (count, columns × rows) as a view into the bytes; `stride` in bytes from element to element."""
+    size = form.dtype.itemsize
+    if form.columns == 1:
+        array: NDArray[Any] = np.ndarray((count, form.rows), form.dtype, view, offset, (stride, size))
+        return array
+    shape = (count, form.columns, form.rows)
+    array = np.ndarray(shape, form.dtype, view, offset, (stride, form.column, size))
+    return array.reshape(count, form.columns * form.rows)

@@ -1,0 +1,185 @@
+"""Primitives → Mesh: vertices, faces, influences and morph targets, whatever form the file keeps them in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import AnimError, FormatError
+from anim.gltf.document import Document, Json, items
+from anim.gltf.reading import draco
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.skin_weights import read_influences
+from anim.model import Mesh, Primitive
+
+POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
+
+
+class Meshes:
+    """Reads meshes of one document, each once per skin size. normals, tangents: whether to read those too."""
+
+    def __init__(
+        self, document: Document, accessors: Accessors, *, normals: bool = False, tangents: bool = False
+    ) -> None:
+        self._meshes = items(document.json, "meshes")
+        self._views = len(items(document.json, "bufferViews"))
+        self._accessors = accessors
+        self._wanted = {"NORMAL": normals, "TANGENT": tangents}
+        self._done: dict[tuple[int, int], Mesh] = {}
+
+    def mesh(self, number: int, *, joint_count: int) -> Mesh:
+        """Return a mesh, its primitives one after another. joint_count: of the skin it is used with, 0 without one.
+
+        Raises FormatError for influences outside the skin, UnsupportedError for Draco without DracoPy.
+        """
+        key = (number, joint_count)
+        if key not in self._done:
+            about = self._meshes[number]
+            name = about.get("name", "")
+            try:
+                self._done[key] = self._read(about, joint_count)
+            except AnimError as error:
+                raise error.at(f"mesh {number}{f' {name!r}' if name else ''}") from None
+        return self._done[key]
+
+    def _read(self, about: Json, joint_count: int) -> Mesh:
+        parts = []
+        for i, primitive in enumerate(about["primitives"]):
+            try:
+                parts.append(self._primitive(primitive, joint_count))
+            except AnimError as error:
+                raise error.at(f"primitive {i}") from None
+        offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
+        influences = max((part.joints.shape[1] for part in parts), default=0)
+        faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=False)]
+        count = len(about["primitives"][0].get("targets", ())) if about["primitives"] else 0
+        return Mesh(
+            about.get("name", ""),
+            np.concatenate([np.empty((0, 3)), *(part.positions for part in parts)]),
+            np.concatenate([np.empty((0, 3), np.int64), *faces]),
+            _stacked([part.joints for part in parts], influences, np.int64),
+            _stacked([part.weights for part in parts], influences, np.float64),
+            np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
+            np.array(about.get("weights", [0.0] * count), float),
+            _of_all([part.normals for part in parts]),
+            _targets_of_all([(part.normal_targets, part.targets) for part in parts]),
+            tuple(primitive for part in parts for primitive in part.primitives),
+            _of_all([part.tangents for part in parts]),
+            _targets_of_all([(part.tangent_targets, part.targets) for part in parts]),
+            _sums_of_all(parts),
+        )
+
+    def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
+        accessors, faces = self._accessors, None
+        if draco.EXTENSION in primitive.get("extensions", {}):
+            accessors, faces = draco.read_primitive(primitive, accessors, views=self._views)
+        attributes = primitive["attributes"]
+        if "POSITION" not in attributes:
+            return _nothing(len(primitive.get("targets", ())))
+        positions = accessors.floats(attributes["POSITION"])
+        if positions.shape[1] != 3:
+            raise FormatError(f"POSITION has {positions.shape[1]} components (expected 3)")
+        held = read_influences(accessors, attributes, len(positions), joint_count)
+        about = primitive.get("targets", ())
+        targets = self._displacements(about, "POSITION", len(positions))
+        faces = self._faces(primitive, len(positions)) if faces is None else faces
+        part = Primitive(len(positions), len(faces), primitive.get("material", -1))
+        return Mesh(
+            "",
+            positions,
+            faces,
+            held.joints,
+            held.weights,
+            targets,
+            np.zeros(len(targets)),
+            self._directions(accessors, attributes, "NORMAL", (len(positions), 3)),
+            self._turns(about, "NORMAL", len(positions)),
+            (part,),
+            self._directions(accessors, attributes, "TANGENT", (len(positions), 4)),
+            self._turns(about, "TANGENT", len(positions)),
+            held.sums,
+        )
+
+    def _directions(self, accessors: Accessors, attributes: Json, name: str, shape: tuple[int, int]) -> Floats | None:
+        if not self._wanted[name] or name not in attributes:
+            return None
+        found = accessors.floats(attributes[name])
+        if found.shape != shape:
+            raise FormatError(f"{name} has shape {found.shape} for {shape[0]} vertices (expected {shape})")
+        return found
+
+    def _turns(self, targets: Sequence[Json], name: str, vertices: int) -> Floats | None:
+        if not self._wanted[name] or not any(name in target for target in targets):
+            return None
+        return self._displacements(targets, name, vertices)
+
+    def _displacements(self, targets: Sequence[Json], attribute: str, vertices: int) -> Floats:
+        """What targets add to an attribute (M, V, 3); nothing where one doesn't have it."""
+        result = np.zeros((len(targets), vertices, 3))
+        for i, target in enumerate(targets):
+            if attribute in target:
+                moved = self._accessors.floats(target[attribute])
+                if moved.shape != (vertices, 3):
+                    noun = f"{attribute.lower()}s"
+                    raise FormatError(f"a morph target has {len(moved)} {noun} for {vertices} vertices")
+                result[i] = moved
+        return result
+
+    def _faces(self, primitive: Json, vertices: int) -> Ints:
+        if "indices" in primitive:
+            indices = self._accessors.numbers_of_things(primitive["indices"])[:, 0]
+        else:
+            indices = np.arange(vertices)
+        return _triangles(indices, primitive.get("mode", TRIANGLES))
+
+
+def _triangles(indices: Ints, mode: int) -> Ints:
+    """Faces (T, 3) of triangles, a strip (every second one turned round) or a fan; none of points and lines."""
+    if mode == TRIANGLES:
+        return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    if mode in (TRIANGLE_STRIP, TRIANGLE_FAN) and len(indices) >= 3:
+        i = np.arange(len(indices) - 2)
+        if mode == TRIANGLE_FAN:
+            return np.stack([indices[i + 1], indices[i + 2], np.broadcast_to(indices[0], i.shape)], axis=1)
+        odd = i % 2
+        return np.stack([indices[i], indices[i + 1 + odd], indices[i + 2 - odd]], axis=1)
+    return np.empty((0, 3), np.int64)
+
+
+def _stacked(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarray:
+    """Parts (V, I) under each other, filled up with zeros to the same number of influences."""
+    filled = [np.pad(part, ((0, 0), (0, influences - part.shape[1]))) for part in parts]
+    return np.concatenate([np.empty((0, influences), dtype), *filled])
+
+
+def _of_all(parts: list[Floats | None]) -> Floats | None:
+    """Normals or tangents of all primitives, None where one has none: normals then come from the faces."""
+    found = [part for part in parts if part is not None]
+    return np.concatenate(found) if found and len(found) == len(parts) else None
+
+
+def _sums_of_all(parts: list[Mesh]) -> Floats | None:
+    """Sums of skin weights as stored of all primitives, None where all are 1."""
+    if all(part.weight_sums is None for part in parts):
+        return None
+    sums = (np.ones(len(part.positions)) if part.weight_sums is None else part.weight_sums for part in parts)
+    return np.concatenate(list(sums))
+
+
+def _targets_of_all(parts: list[tuple[Floats | None, Floats]]) -> Floats | None:
+    """What targets add to directions in all primitives, with what they add to positions: 0 where one says nothing."""
+    if all(turns is None for turns, _ in parts):
+        return None
+    return np.concatenate([np.zeros(moves.shape) if turns is None else turns for turns, moves in parts], axis=1)
+
+
+def _nothing(targets: int) -> Mesh:
+    none = np.empty((0, 0))
+    faces = np.empty((0, 3), np.int64)
+    joints, positions = none.astype(np.int64), np.empty((0, 3))
+    displacements, part = np.empty((targets, 0, 3)), Primitive(0, 0)
+    return Mesh(
+        "", positions, faces, joints, none, displacements, np.zeros(targets), positions, None, (part,), np.empty((0, 4))
+    )

@@ -1,0 +1,76 @@
+"""Nodes whose pose is a `matrix`: taken apart where a channel animates them, since glTF animates only TRS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError, FormatError
+from anim.gltf.document import Json, items, node_label
+from anim.gltf.validation import channel_targets
+from anim.maths import matrix
+
+MAX_SHEAR = 1e-4  # relative; what float32 products of rotations and scales leave behind is below
+DIGITS = 9  # significant ones of what is written: enough for any float32
+IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+
+
+def animated_matrices(animations: Iterable[Json], nodes: list[Json]) -> list[int]:
+    """Return the numbers of the nodes with a `matrix` whose translation, rotation or scale a channel animates."""
+    found = (channel_targets.of_channel(channel) for animation in animations for channel in animation["channels"])
+    numbers = {target[0] for target in found if target is not None and target[1] != "weights"}
+    return sorted(n for n in numbers if n is not None and "matrix" in nodes[n])
+
+
+def expand_matrices(json: Json) -> tuple[Json, tuple[int, ...]]:
+    """Return the JSON with TRS in place of the `matrix` of every animated node, and the numbers of those nodes.
+
+    What is the identity is left out, as everywhere in glTF; nodes that nothing animates keep their matrix.
+    Raises FormatError for a matrix that no translation, rotation and scale give.
+    {"matrix": [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 1, 0, 0, 1]} → {"translation": [1, 0, 0], "scale": [2, 2, 2]}
+    """
+    nodes = items(json, "nodes")
+    numbers = animated_matrices(items(json, "animations"), nodes)
+    if not numbers:
+        return json, ()
+    new = list(nodes)
+    for number in numbers:
+        try:
+            new[number] = _expanded(nodes[number])
+        except AnimError as error:
+            raise error.at(node_label(json, number)) from None
+    return {**json, "nodes": new}, tuple(numbers)
+
+
+def decompose(values: list[float]) -> tuple[Floats, Floats, Floats, Floats | None]:
+    """Return translation (3,), rotation (4,) and scale (3,) of a node's `matrix`; and itself (3, 4) if it is sheared.
+
+    values: 16 numbers, column by column. Sheared: no translation, rotation and scale give it within float32.
+    """
+    whole = np.array(values, float).reshape(4, 4).T
+    translation, rotation, scale, shear = matrix.decompose(whole[:3])
+    is_sheared = bool(shear > MAX_SHEAR) or bool(np.abs(whole[3] - (0, 0, 0, 1)).max() > MAX_SHEAR)
+    return translation, rotation, scale, whole[:3] if is_sheared else None
+
+
+def _expanded(node: Json) -> Json:
+    """The node with TRS where its matrix stood."""
+    translation, rotation, scale, sheared = decompose(node["matrix"])
+    if sheared is not None:
+        raise FormatError(
+            "is animated and has a sheared matrix (expected a product of translation, rotation and scale)",
+            help="remove the shear where the file was made: apply the scale of the nodes above this one, then export",
+        )
+    rotation = -rotation if rotation[3] < 0 else rotation  # both mean the same; w ≥ 0 is what most tools write
+    pose = {key: _rounded(part) for key, part in zip(IDENTITY, (translation, rotation, scale), strict=True)}
+    pose = {key: part for key, part in pose.items() if part != list(IDENTITY[key])}
+    new: Json = {}
+    for key, value in node.items():
+        new |= pose if key == "matrix" else {key: value}
+    return new
+
+
+def _rounded(part: Floats) -> list[float]:
+    return [float(f"{value:.{DIGITS}g}") + 0.0 for value in part.tolist()]

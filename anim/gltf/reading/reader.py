@@ -1,0 +1,191 @@
+"""Document → Skeleton, Clips, Scene: what the file's numbers mean, every fault named with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import AnimError, FormatError, ShapeError
+from anim.gltf.document import Document, Json, items
+from anim.gltf.reading import animations, node_matrix
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.meshes import Meshes
+from anim.gltf.validation import hierarchy
+from anim.model import Clip, Instance, Scene, Skeleton, Skin
+
+LISTED = 3  # clips that a message names
+
+
+def skeleton(document: Document) -> Skeleton:
+    """Return all nodes in their rest pose; a `matrix` is taken apart, and kept whole where it is sheared."""
+    _check(document)
+    nodes = items(document.json, "nodes")
+    n = len(nodes)
+    translation, rotation, scale = np.zeros((n, 3)), np.tile((0.0, 0.0, 0.0, 1.0), (n, 1)), np.ones((n, 3))
+    sheared: dict[int, Floats] = {}
+    for i, node in enumerate(nodes):
+        if "matrix" in node:
+            translation[i], rotation[i], scale[i], whole = node_matrix.decompose(node["matrix"])
+            if whole is not None:
+                sheared[i] = whole
+            continue
+        if "translation" in node:
+            translation[i] = node["translation"]
+        if "rotation" in node:
+            rotation[i] = _unit(node["rotation"], i)
+        if "scale" in node:
+            scale[i] = node["scale"]
+    return Skeleton(
+        tuple(node.get("name", "") for node in nodes),
+        np.array(hierarchy.parents(document.json), np.int64),
+        translation,
+        rotation,
+        scale,
+        np.array(list(sheared), np.int64),
+        np.array(list(sheared.values())).reshape(-1, 3, 4),
+    )
+
+
+def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip, ...]:
+    """Return the animations of the file in its order; channels without any target are left out, as glTF says.
+
+    Raises FormatError with clip, track and target for the first fault.
+    """
+    _check(document)
+    accessors = accessors or Accessors(document)
+    reader = animations.Reader(document, accessors)
+    with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
+        return tuple(_clip(i, animation, reader) for i, animation in enumerate(items(document.json, "animations")))
+
+
+def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, Clip], list[AnimError]]:
+    """Return the animations that can be read, by number, and what is wrong with each of the others."""
+    reader = animations.Reader(document, accessors)
+    found: dict[int, Clip] = {}
+    faults: list[AnimError] = []
+    with np.errstate(invalid="ignore"):
+        for i, animation in enumerate(items(document.json, "animations")):
+            try:
+                found[i] = _clip(i, animation, reader)
+            except AnimError as error:
+                faults.append(error)
+    return found, faults
+
+
+def names(document: Document) -> tuple[str, ...]:
+    """Return the names of the animations, empty where one has none, without reading them."""
+    _check(document)
+    return tuple(animation.get("name", "") for animation in items(document.json, "animations"))
+
+
+def scene(
+    document: Document, accessors: Accessors | None = None, *, normals: bool = False, tangents: bool = False
+) -> Scene:
+    """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
+
+    normals, tangents: read those of vertices and morph targets too.
+    Raises UnsupportedError where vertices can't be had: Draco without the package DracoPy, an unknown compression.
+    """
+    _check(document)
+    accessors = accessors or Accessors(document)
+    meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
+    skins = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
+    nodes = items(document.json, "nodes")
+    instances = []
+    for number in depth_first(document.json):
+        node = nodes[number]
+        if "mesh" not in node:
+            continue
+        skin = skins[node["skin"]] if "skin" in node else None
+        mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
+        instances.append(Instance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
+    return Scene(skeleton(document), tuple(instances))
+
+
+def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
+    """Return the nodes that hold a skinned mesh, each with its skin, without reading any vertex."""
+    accessors = Accessors(document)
+    found = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
+    return tuple((i, found[node["skin"]]) for i, node in enumerate(items(document.json, "nodes")) if "skin" in node)
+
+
+def depth_first(json: Json) -> Iterator[int]:
+    """Yield node numbers depth-first: from the roots of the scenes, each once, then from roots in no scene."""
+    nodes = items(json, "nodes")
+    parents = hierarchy.parents(json)
+    roots = [root for scene in items(json, "scenes") for root in scene.get("nodes", ())]
+    roots += [i for i, parent in enumerate(parents) if parent < 0]
+    seen: set[int] = set()
+    stack = list(reversed(roots))
+    while stack:
+        node = stack.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        yield node
+        stack.extend(reversed(nodes[node].get("children", ())))
+
+
+def label(name: str, number: int, what: str = "clip") -> str:
+    """Return how messages call a clip (or another thing): "clip 'walk'", or "clip #3" where it has no name."""
+    return f"{what} '{name}'" if name else f"{what} {clip_name(name, number)}"
+
+
+def labels(clips: Sequence[tuple[str, int]]) -> str:
+    """Return how messages call several clips, by names and numbers: "clips 'walk', #3, 'run' and 4 more"."""
+    if len(clips) == 1:
+        return label(*clips[0])
+    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:LISTED]]
+    more = f" and {len(clips) - LISTED} more" if len(clips) > LISTED else ""
+    return f"clips {', '.join(names)}{more}"
+
+
+def clip_name(name: str, number: int) -> str:
+    """Return how tables and lists call a clip: its name, or "#3" without one, as selections take it."""
+    return name or f"#{number}"
+
+
+def _check(document: object) -> None:
+    if not isinstance(document, Document):
+        raise ShapeError(
+            f"document is {type(document).__name__} (expected a Document)",
+            help='container.read(np.fromfile("walk.glb", np.uint8)) gives one',
+        )
+
+
+def _clip(number: int, animation: Json, reader: animations.Reader) -> Clip:
+    name = animation.get("name", "")
+    try:
+        tracks = [reader.track(animation, i) for i in range(len(animation["channels"]))]
+        return Clip(name, tuple(track for track in tracks if track is not None))
+    except AnimError as error:
+        if not error.where.startswith("clip"):
+            error.at(label(name, number))
+        raise
+
+
+def _skin(number: int, skin: Json, accessors: Accessors) -> Skin:
+    joints: Ints = np.array(skin["joints"], np.int64)
+    try:
+        if "inverseBindMatrices" not in skin:
+            return Skin(joints, np.broadcast_to(np.eye(4)[:3], (len(joints), 3, 4)))
+        return Skin(joints, accessors.matrices(skin["inverseBindMatrices"])[: len(joints), :3])
+    except AnimError as error:
+        raise error.at(f"skin {number}") from None
+
+
+def _weights_at_rest(node: Json, of_mesh: Floats) -> Floats:
+    weights = np.array(node.get("weights", of_mesh), float)
+    if len(weights) != len(of_mesh):
+        raise FormatError(f"node has {len(weights)} weights for {len(of_mesh)} morph targets")
+    return weights
+
+
+def _unit(rotation: list[float], node: int) -> Floats:
+    q: Floats = np.array(rotation, float)
+    length = float(np.sqrt(q @ q))
+    if length == 0:
+        raise FormatError("rotation is zero (expected a unit quaternion)", where=f"nodes[{node}]")
+    return q / length

@@ -1,0 +1,75 @@
+"""JOINTS_n and WEIGHTS_n → the joints that move each vertex, and weights that add up to 1."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import FormatError
+from anim.gltf.document import Json
+from anim.gltf.reading.accessors import Accessors
+
+SUM_TOLERANCE = 1e-4  # of a sum of floats; what a careful exporter rounds stays far below
+
+
+class Influences(NamedTuple):
+    """Joints and weights (V, I), I = 0 without a skin; each vertex's weights add up to 1.
+
+    sums: (V,) what they add up to as stored, 1 where they are only rounded; None where that is all of them.
+    """
+
+    joints: Ints
+    weights: Floats
+    sums: Floats | None
+
+
+def read_influences(accessors: Accessors, attributes: Json, vertices: int, joint_count: int) -> Influences:
+    """Return the influences of a primitive's vertices, all sets of four together. joint_count: of the skin, 0 for none.
+
+    Weights are divided by their sum, as players do that get any others (three.js, Babylon.js, Blender); a vertex
+    without weight follows the first joint of its first set, as in three.js and Babylon.js.
+    weights 0.5, 0.25, 0, 0 → 2/3, 1/3, 0, 0 and a sum of 0.75
+    Raises FormatError for influences outside the skin, or none where a skin needs them.
+    """
+    joints: list[Ints] = []
+    weights: list[Floats] = []
+    steps: list[float] = []
+    while joint_count and f"JOINTS_{len(joints)}" in attributes and f"WEIGHTS_{len(joints)}" in attributes:
+        k = len(joints)
+        stored = attributes[f"WEIGHTS_{k}"]
+        joints.append(accessors.numbers_of_things(attributes[f"JOINTS_{k}"]))
+        weights.append(accessors.floats(stored))
+        steps.append(_step(accessors.raw(stored).dtype))
+        if joints[k].shape != (vertices, 4) or weights[k].shape != (vertices, 4):
+            raise FormatError(f"JOINTS_{k} or WEIGHTS_{k} don't have 4 numbers for each of {vertices} vertices")
+    if joint_count and not joints:
+        raise FormatError("is used with a skin but has no JOINTS_0 and WEIGHTS_0")
+    if not joints:
+        return Influences(np.empty((vertices, 0), np.int64), np.empty((vertices, 0)), None)
+    all_joints, all_weights = np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
+    outside = (all_joints >= joint_count) & (all_weights != 0)
+    if outside.any():
+        raise FormatError(
+            f"vertex {int(np.argmax(outside.any(axis=1)))} uses joint {int(all_joints[outside][0])} "
+            f"(the skin has {joint_count})"
+        )
+    return _normalized(np.where(all_joints < joint_count, all_joints, 0), all_weights, SUM_TOLERANCE + 4 * sum(steps))
+
+
+def _normalized(joints: Ints, weights: Floats, tolerance: float) -> Influences:
+    """Weights as shares of their sum. Rows with a negative one are left for `Mesh` to refuse."""
+    sums = weights.sum(axis=1)
+    whole = weights.copy()
+    none = ~weights.any(axis=1)
+    whole[none, 0] = 1
+    some = (sums > 0) & (weights >= 0).all(axis=1)
+    whole[some] /= sums[some, None]
+    off = np.abs(sums - 1) > tolerance
+    return Influences(np.where(whole != 0, joints, 0), whole, np.where(off, sums, 1.0) if off.any() else None)
+
+
+def _step(dtype: np.dtype[Any]) -> float:
+    """The step between two weights as stored, which is as much as one can be rounded; 0 of floats."""
+    return 0.0 if dtype.kind == "f" else 1 / float(np.iinfo(dtype).max)

@@ -1,0 +1,155 @@
+"""What glTF's schema asks of each kind of object, as far as animation, skinning and buffers rest on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+from anim.errors import FormatError
+from anim.gltf.document import Json
+from anim.gltf.validation import buffer_layout
+from anim.gltf.validation.rules import Check, Rule, at_least, boolean, index, list_of, map_of, numbers, one_of, text
+
+Counts: TypeAlias = Mapping[str, int]  # how many of each kind the file has
+ANYTHING = Rule({})  # an object, whatever is in it
+
+
+def rules(counts: Counts) -> dict[str, Check]:
+    """Return the check of each kind of object, by the name of its array in the file; "asset" is none."""
+    return {
+        "asset": Rule({"version": _version, "minVersion": text}, ("version",)),
+        "accessors": _accessor(counts),
+        "animations": _animation(counts),
+        "buffers": Rule({"byteLength": at_least(1), "uri": text, "extensions": ANYTHING}, ("byteLength",)),
+        "bufferViews": _view(counts),
+        "images": Rule({"uri": text, "bufferView": _index("bufferViews", counts)}),
+        "meshes": _mesh(counts),
+        "nodes": _node(counts),
+        "scenes": Rule({"nodes": list_of(_index("nodes", counts))}),
+        "skins": _skin(counts),
+    }
+
+
+def _accessor(counts: Counts) -> Rule:
+    view = _index("bufferViews", counts)
+    indices: dict[str, Check] = {
+        "bufferView": view,
+        "byteOffset": at_least(0),
+        "componentType": one_of(5121, 5123, 5125),
+    }
+    sparse: dict[str, Check] = {
+        "count": at_least(1),
+        "indices": Rule(indices, ("bufferView", "componentType")),
+        "values": Rule({"bufferView": view, "byteOffset": at_least(0)}, ("bufferView",)),
+    }
+    properties: dict[str, Check] = {
+        "bufferView": view,
+        "byteOffset": at_least(0),
+        "componentType": one_of(*buffer_layout.COMPONENT_SIZES),
+        "count": at_least(1),
+        "type": text,
+        "normalized": boolean,
+        "sparse": Rule(sparse, ("count", "indices", "values")),
+    }
+    return Rule(properties, ("componentType", "count", "type"))
+
+
+def _view(counts: Counts) -> Rule:
+    properties: dict[str, Check] = {
+        "buffer": _index("buffers", counts),
+        "byteOffset": at_least(0),
+        "byteLength": at_least(1),
+        "byteStride": at_least(1),
+        "extensions": ANYTHING,
+    }
+    return Rule(properties, ("buffer", "byteLength"))
+
+
+def _animation(counts: Counts) -> Rule:
+    accessor = _index("accessors", counts)
+    target = Rule({"node": _index("nodes", counts), "path": text, "extensions": ANYTHING}, ("path",))
+    channel = Rule({"sampler": at_least(0), "target": target}, ("sampler", "target"))
+    sampler = Rule({"input": accessor, "output": accessor, "interpolation": text}, ("input", "output"))
+    properties: dict[str, Check] = {"channels": list_of(channel), "samplers": list_of(sampler), "name": text}
+    return Rule(properties, ("channels", "samplers"), _check_channels)
+
+
+def _mesh(counts: Counts) -> Rule:
+    attributes = map_of(_index("accessors", counts))
+    primitive: dict[str, Check] = {
+        "attributes": attributes,
+        "indices": _index("accessors", counts),
+        "targets": list_of(attributes),
+        "mode": at_least(0),
+        "extensions": ANYTHING,
+    }
+    properties: dict[str, Check] = {
+        "primitives": list_of(Rule(primitive, ("attributes",))),
+        "weights": numbers(None),
+        "name": text,
+    }
+    return Rule(properties, ("primitives",), _check_mesh)
+
+
+def _node(counts: Counts) -> Rule:
+    properties: dict[str, Check] = {
+        "children": list_of(_index("nodes", counts)),
+        "matrix": numbers(16),
+        "translation": numbers(3),
+        "rotation": numbers(4),
+        "scale": numbers(3),
+        "weights": numbers(None),
+        "mesh": _index("meshes", counts),
+        "skin": _index("skins", counts),
+        "name": text,
+        "extensions": ANYTHING,
+    }
+    return Rule(properties, whole=_check_node)
+
+
+def _skin(counts: Counts) -> Rule:
+    properties: dict[str, Check] = {
+        "joints": list_of(_index("nodes", counts)),
+        "inverseBindMatrices": _index("accessors", counts),
+        "skeleton": _index("nodes", counts),
+        "name": text,
+    }
+    return Rule(properties, ("joints",), _check_skin)
+
+
+def _index(of: str, counts: Counts) -> Check:
+    return index(of, counts[of])
+
+
+def _version(value: Any) -> None:
+    text(value)
+    if value.split(".")[0] != "2":
+        raise FormatError(f"is '{value}' (expected 2.x)")
+
+
+def _check_channels(animation: Json) -> None:
+    samplers = len(animation["samplers"])
+    for i, channel in enumerate(animation["channels"]):
+        if channel["sampler"] >= samplers:
+            raise FormatError(
+                f"is {channel['sampler']} (the animation has {samplers} samplers)", where=f"channels[{i}].sampler"
+            )
+
+
+def _check_node(node: Json) -> None:
+    if "matrix" in node and any(key in node for key in ("translation", "rotation", "scale")):
+        raise FormatError("has both a matrix and translation, rotation or scale")
+
+
+def _check_mesh(mesh: Json) -> None:
+    counts = {len(primitive.get("targets", ())) for primitive in mesh["primitives"]}
+    if len(counts) > 1:
+        raise FormatError(f"primitives have different numbers of morph targets ({sorted(counts)})")
+    targets_there = max(counts, default=0)
+    if len(mesh.get("weights", ())) not in (0, targets_there):
+        raise FormatError(f"has {len(mesh['weights'])} weights for {targets_there} morph targets")
+
+
+def _check_skin(skin: Json) -> None:
+    if not skin["joints"]:
+        raise FormatError("has no joints")

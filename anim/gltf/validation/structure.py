@@ -1,0 +1,37 @@
+"""Is the JSON what glTF's schema says? Checked once at the door, so that nothing behind it meets a missing key.
+
+Only what animation, skinning and buffers rest on is checked, and only faults that leave no single meaning: an empty
+array, a wrong min/max or an unknown property does no harm and is left to `inspect`'s findings.
+"""
+
+from __future__ import annotations
+
+from anim.errors import FormatError
+from anim.gltf.document import Json
+from anim.gltf.validation import buffer_layout, channel_targets, hierarchy
+from anim.gltf.validation.rules import each, list_of, named, of_type, text
+from anim.gltf.validation.schema import rules
+
+TOP_ARRAYS = frozenset(
+    """
+    accessors animations buffers bufferViews cameras images materials meshes nodes samplers scenes skins textures
+    """.split()  # noqa: SIM905 (a list of one name per line would hide the words)
+)
+
+
+def check(json: Json) -> None:
+    """Raise FormatError, with the place as a path into the JSON, at the first thing that is not glTF 2.0."""
+    for key in TOP_ARRAYS:
+        of_type(json.get(key, []), list, "an array", key)
+    counts = {key: len(json.get(key, [])) for key in TOP_ARRAYS}
+    checks = rules(counts)
+    if "asset" not in json:
+        raise FormatError("has no 'asset' (every glTF names its version there)")
+    named("asset", checks.pop("asset"), json["asset"])
+    for key in ("extensionsUsed", "extensionsRequired"):
+        named(key, list_of(text), json.get(key, []))
+    for key, check_one in checks.items():
+        each(json.get(key, []), check_one, key)
+    buffer_layout.check(json)
+    hierarchy.check(json)
+    channel_targets.check(json)

@@ -1,0 +1,150 @@
+"""Contents → views: which lie together and in which order, and which views are compressed because that pays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.gltf import overlap
+from anim.gltf.document import Json
+from anim.gltf.io import json_text
+from anim.gltf.meshopt import codec, stream_order
+from anim.gltf.meshopt.storage import Packing
+from anim.gltf.writing.encoding import Numbers
+
+TYPICAL = 10_000  # stands for an offset or a length where the price of their digits is asked
+PLAIN_VIEW = 50  # bytes of the JSON of the one plain view
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A new view: the bytes to store, and what a reader makes of them.
+
+    length: bytes when decoded. stride: bytes of an element of a compressed stream, 0 for a plain view.
+    """
+
+    stored: bytes
+    length: int
+    stride: int = 0
+    filter: str = "NONE"
+
+    def about(self, place: tuple[int, int], decoded: tuple[int, int], extension: str) -> Json:
+        """Return the JSON. place, decoded: (buffer, offset) of the stored bytes, and of what they become."""
+        if not self.stride:
+            return {**_at(place), "byteLength": self.length}
+        stream = {**_at(place), "byteLength": len(self.stored), "byteStride": self.stride}
+        stream |= {"count": self.length // self.stride, "mode": "ATTRIBUTES"}
+        if self.filter != "NONE":
+            stream["filter"] = self.filter
+        return {**_at(decoded), "byteLength": self.length, "extensions": {extension: stream}}
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """New views, and for each content (place among them, byte offset)."""
+
+    views: tuple[View, ...]
+    places: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Stream:
+    """A view to be, and the contents in it, in order."""
+
+    view: View
+    members: tuple[int, ...]
+
+
+def laid_out(contents: Sequence[Numbers], packing: Packing, overhead: int) -> Layout:
+    """Return where all contents go: one plain view, and under an extension those compressed ones that pay.
+
+    overhead: bytes that the first compressed view costs beside its own JSON and data.
+    """
+    aliases = overlap.inside(contents)
+    own = [i for i in range(len(contents)) if i not in aliases]
+    streams = _paying(contents, own, packing, overhead) if packing.extension else []
+    apart = {i for stream in streams for i in stream.members}
+    rest = tuple(i for i in own if i not in apart)
+    if rest:
+        data = b"".join(_padded(contents[i].data) for i in rest)
+        streams = [_Stream(View(data, len(data)), rest), *streams]
+    places: dict[int, tuple[int, int]] = {}
+    for number, stream in enumerate(streams):
+        at = 0
+        for i in stream.members:
+            places[i] = (number, at)
+            at += len(_padded(contents[i].data))
+    for i, (owner, offset) in aliases.items():
+        number, at = places[owner]
+        places[i] = (number, at + offset)
+    return Layout(tuple(each.view for each in streams), tuple(places[i] for i in range(len(contents))))
+
+
+def _paying(contents: Sequence[Numbers], own: Sequence[int], packing: Packing, overhead: int) -> list[_Stream]:
+    """The compressed streams with which all data and JSON take fewest bytes."""
+    groups: dict[tuple[str, int], list[int]] = {}
+    for i in own:
+        groups.setdefault(_kind(contents[i]), []).append(i)
+    streams = [s for members in groups.values() for s in _streams(contents, members, packing.extension)]
+    gains = [stream.view.length - _price(stream.view, packing.extension) for stream in streams]
+    good = [stream for stream, gain in zip(streams, gains, strict=True) if gain > 0]
+    # Where nothing at all is left for the plain view, its JSON is saved too.
+    candidates = [([], 0), (good, sum(gain for gain in gains if gain > 0) - overhead)]
+    candidates.append((streams, sum(gains) - overhead + PLAIN_VIEW))
+    return max(candidates, key=lambda candidate: candidate[1])[0]
+
+
+def _kind(content: Numbers) -> tuple[str, int]:
+    """The filter, and the bytes of an element, whole fours."""
+    return content.filtered.name if content.filtered else "NONE", content.element_size + -content.element_size % 4
+
+
+def _streams(contents: Sequence[Numbers], members: Sequence[int], extension: str) -> list[_Stream]:
+    """One stream of elements; or several, of whole keys, so that a weight stands above the same one of the last key."""
+    name, stride = _kind(contents[members[0]])
+    one = [_encoded(contents, members, name, stride, extension)]
+    by_key: dict[int, list[int]] = {}
+    for i in members:
+        by_key.setdefault(codec.row_size(contents[i].key_size, stride), []).append(i)
+    if list(by_key) == [stride]:
+        return one
+    several = [_encoded(contents, each, name, wide, extension) for wide, each in by_key.items()]
+    return min(one, several, key=lambda streams: sum(_price(each.view, extension) for each in streams))
+
+
+def _encoded(contents: Sequence[Numbers], members: Sequence[int], name: str, stride: int, extension: str) -> _Stream:
+    codes = [_codes(contents[i]) for i in members]
+    order = stream_order.ordered(codes, stride, extension)
+    data = b"".join(codes[k] for k in order)
+    stored = codec.encode(np.frombuffer(data, np.uint8).reshape(-1, stride), extension)
+    return _Stream(View(stored, len(data), stride, name), tuple(members[k] for k in order))
+
+
+def _codes(content: Numbers) -> bytes:
+    return content.filtered.codes if content.filtered else _padded(content.data)
+
+
+def _price(view: View, extension: str) -> int:
+    """Bytes of a compressed view, its JSON with the comma included."""
+    about = view.about((0, TYPICAL), (1, TYPICAL), extension)
+    return _size(view.stored) + len(json_text.dump(about)) + 1
+
+
+def _size(data: bytes) -> int:
+    return len(data) + -len(data) % 4
+
+
+def _padded(data: bytes) -> bytes:
+    return data + bytes(-len(data) % 4)
+
+
+def _at(place: tuple[int, int]) -> Json:
+    buffer, offset = place
+    return {"buffer": buffer, "byteOffset": offset} if offset else {"buffer": buffer}
+
+
+def total(views: Iterable[View]) -> int:
+    """Return the bytes that the views take in a buffer, each on a multiple of four."""
+    return sum(_size(view.stored) for view in views)

@@ -1,0 +1,173 @@
+"""Bytes that nobody uses any more are taken out of buffers; views and accessors behind them move up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Set
+
+import numpy as np
+
+from anim.gltf.document import Buffer, Bytes, Document, Json, items
+from anim.gltf.validation import buffer_layout
+from anim.gltf.writing import byte_ranges
+from anim.gltf.writing.byte_ranges import Range, Shift
+from anim.gltf.writing.references import References, views_of
+
+
+def unused_views(document: Document, freed: Set[int], outside: References) -> set[int]:
+    """Return the views that only the accessors in `freed` lie in."""
+    accessors = items(document.json, "accessors")
+    theirs = {view for number in freed for view in views_of(accessors[number])}
+    others = {view for i, accessor in enumerate(accessors) if i not in freed for view in views_of(accessor)}
+    return theirs - others - outside.views
+
+
+def shifts(
+    document: Document, freed: Set[int], unused: Set[int], outside: References, movable: Set[int]
+) -> list[Shift]:
+    """Return, for each buffer, where its bytes go when freed accessors and unused views are dropped.
+
+    A view that freed accessors share with others loses their bytes too, unless someone refers to the view itself.
+    movable: buffers in which bytes may move; those of other buffers stay.
+    """
+    dropped: list[list[Range]] = [[] for _ in document.buffers]
+    needed: list[list[Range]] = [[] for _ in document.buffers]
+    spans = _spans(document.json, freed)
+    for number, view in enumerate(items(document.json, "bufferViews")):
+        for buffer, place in places(view):
+            if number in unused:
+                dropped[buffer] += [] if is_placeholder(view) else [place]
+                continue
+            shared = [] if number in outside.views or buffer_layout.compression(view) else spans.get(number, [])
+            theirs = [_moved(span, place[0]) for i, span in shared if i in freed]
+            kept = [_moved(span, place[0]) for i, span in shared if i not in freed]
+            free = byte_ranges.difference(theirs, kept)
+            dropped[buffer] += free
+            needed[buffer] += byte_ranges.difference([place], free)
+    return [
+        Shift(_droppable(d, n, b.byte_length) if i in movable else [])
+        for i, (d, n, b) in enumerate(zip(dropped, needed, document.buffers, strict=True))
+    ]
+
+
+def is_placeholder(view: Json) -> bool:
+    """Return whether a view can be one that only holds a number: it names a byte, but that is not its own."""
+    return view.keys() == {"buffer", "byteLength"} and view["byteLength"] == 1
+
+
+def moved_view(view: Json, shift: list[Shift]) -> Json:
+    """Return a view with its range, and that of its compressed data, where the bytes are now."""
+    moved = _relocated(view, shift[view["buffer"]])
+    compressed = buffer_layout.compression(view)
+    if compressed is not None:
+        here = _relocated(compressed, shift[compressed["buffer"]])
+        extensions = {n: here if e is compressed else e for n, e in view["extensions"].items()}
+        moved = {**moved, "extensions": extensions}
+    return moved
+
+
+def moved_accessor(accessor: Json, views: list[Json], shift: list[Shift]) -> Json:
+    """Return an accessor with its offsets into its views where the bytes are now. views: as they were."""
+    moved = _moved_offset(accessor, views, shift)
+    if "sparse" in accessor:
+        parts = {part: _moved_offset(accessor["sparse"][part], views, shift) for part in ("indices", "values")}
+        if any(parts[part] is not accessor["sparse"][part] for part in parts):
+            moved = {**moved, "sparse": {**accessor["sparse"], **parts}}
+    return moved
+
+
+def rebuilt(buffer: Buffer, shift: Shift, appended: list[Bytes], where: str) -> Buffer:
+    """Return the buffer without dropped bytes and with `appended` ones, which start on a multiple of four.
+
+    One without data gets shorter only.
+    """
+    if not shift.dropped and not appended:
+        return buffer
+    length = shift(buffer.byte_length)
+    if not buffer.has_data:
+        return Buffer(length, buffer.uri, None, where=where)
+    padding = np.zeros(-length % 4 if appended else 0, np.uint8)
+
+    def load() -> Bytes:
+        kept = byte_ranges.difference([(0, buffer.byte_length)], shift.dropped)
+        return np.concatenate([*(buffer.data[start:end] for start, end in kept), padding, *appended])
+
+    total = length + len(padding) + sum(len(piece) for piece in appended)
+    return Buffer(total, buffer.uri, load, where=where, replaced=True)
+
+
+def places(view: Json) -> Iterator[tuple[int, Range]]:
+    """Yield (buffer, range) of a view's bytes: decoded, and compressed where it is."""
+    yield view["buffer"], _span(view, view["byteLength"])
+    compressed = buffer_layout.compression(view)
+    if compressed is not None:
+        yield compressed["buffer"], _span(compressed, compressed["byteLength"])
+
+
+def _spans(json: Json, freed: Set[int]) -> dict[int, list[tuple[int, Range]]]:
+    """For each view that a freed accessor lies in: (accessor, range) of everything in it, from the view's start."""
+    accessors, views = items(json, "accessors"), items(json, "bufferViews")
+    wanted = {view for number in freed for view in views_of(accessors[number])}
+    spans: dict[int, list[tuple[int, Range]]] = {view: [] for view in wanted}
+    for i, accessor in enumerate(accessors):
+        for view, span in _accessor_spans(accessor, views):
+            if view in wanted:
+                spans[view].append((i, span))
+    return spans
+
+
+def _accessor_spans(accessor: Json, views: list[Json]) -> Iterator[tuple[int, Range]]:
+    if accessor["type"] not in buffer_layout.COMPONENTS:  # unknown: its size is unknown too
+        yield from ((view, (0, views[view]["byteLength"])) for view in views_of(accessor))
+        return
+    size = buffer_layout.element_size(accessor["componentType"], accessor["type"])
+    if "bufferView" in accessor:
+        stride = views[accessor["bufferView"]].get("byteStride", size)
+        yield accessor["bufferView"], _span(accessor, stride * (accessor["count"] - 1) + size)
+    if "sparse" in accessor:
+        sparse = accessor["sparse"]
+        index_size = buffer_layout.COMPONENT_SIZES[sparse["indices"]["componentType"]]
+        yield sparse["indices"]["bufferView"], _span(sparse["indices"], index_size * sparse["count"])
+        yield sparse["values"]["bufferView"], _span(sparse["values"], size * sparse["count"])
+
+
+def _span(place: Json, length: int) -> Range:
+    start = place.get("byteOffset", 0)
+    return start, start + length
+
+
+def _moved(span: Range, by: int) -> Range:
+    return span[0] + by, span[1] + by
+
+
+def _droppable(dropped: list[Range], needed: list[Range], length: int) -> list[Range]:
+    """What can go: no byte of it needed, padding between dropped ranges included, whole multiples of four."""
+    free = byte_ranges.difference(dropped, needed)
+    if not free:
+        return []
+    unnamed = byte_ranges.difference([(0, length)], [*free, *needed])
+    edges = {edge for span in free for edge in span}
+    padding = [(s, e) for s, e in unnamed if e - s < byte_ranges.ALIGNMENT and (s in edges or e in edges)]
+    return byte_ranges.aligned(byte_ranges.union([*free, *padding]))
+
+
+def _relocated(place: Json, shift: Shift) -> Json:
+    start, end = _span(place, place["byteLength"])
+    new_start, new_end = shift(start), shift(end)
+    if (new_start, new_end) == (start, end):
+        return place
+    moved = {**place, "byteLength": new_end - new_start}
+    if new_start or "byteOffset" in place:
+        moved["byteOffset"] = new_start
+    return moved
+
+
+def _moved_offset(place: Json, views: list[Json], shift: list[Shift]) -> Json:
+    if "bufferView" not in place:
+        return place
+    view = views[place["bufferView"]]
+    if buffer_layout.compression(view) is not None:
+        return place
+    to = shift[view["buffer"]]
+    base, offset = view.get("byteOffset", 0), place.get("byteOffset", 0)
+    new = to(base + offset) - to(base)
+    return place if new == offset else {**place, "byteOffset": new}

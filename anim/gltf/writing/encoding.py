@@ -1,0 +1,129 @@
+"""Track → the numbers that a file holds, in the track's own storage where that keeps every value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Floats
+from anim.errors import RangeError, ShapeError
+from anim.gltf.document import Json
+from anim.gltf.meshopt import storage
+from anim.gltf.meshopt.storage import Filtered
+from anim.gltf.reading.accessors import DTYPES, FLOAT, denormalized
+from anim.gltf.validation.buffer_layout import COMPONENTS
+from anim.model import Interpolation, Storage, Track
+
+ELEMENTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+DECODED = {"QUATERNION": Storage(5122, normalized=True), "EXPONENTIAL": Storage()}  # what a filter's codes become
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The content of one accessor: stored bytes and what they are. Equal ones can share an accessor.
+
+    filtered: the same as one of meshopt's filters takes it. key_size: bytes of a key, many elements for weights.
+    """
+
+    data: bytes
+    component_type: int
+    element: str
+    normalized: bool = False
+    bounds: tuple[float, float] | None = None
+    filtered: Filtered | None = field(default=None, compare=False)
+    key_size: int = field(default=4, compare=False)
+
+    @property
+    def element_size(self) -> int:
+        """Bytes of one element."""
+        columns, rows = COMPONENTS[self.element]
+        return np.dtype(DTYPES[self.component_type]).itemsize * columns * rows
+
+    def accessor(self, view: int, offset: int) -> Json:
+        """Return the JSON of an accessor that finds these bytes at `offset` of `view`; defaults are left out."""
+        about: Json = {"bufferView": view}
+        if offset:
+            about["byteOffset"] = offset
+        about["componentType"] = self.component_type
+        if self.normalized:
+            about["normalized"] = True
+        about["count"] = len(self.data) // self.element_size
+        about["type"] = self.element
+        if self.bounds is not None:
+            about["min"], about["max"] = [self.bounds[0]], [self.bounds[1]]
+        return about
+
+
+def times(track: Track) -> Numbers:
+    """Return the key times as float32, with bounds that are exact in float32 and short as text.
+
+    Raises RangeError where rounding to float32 makes two keys one.
+    """
+    stored = track.times.astype("<f4")
+    if len(stored) > 1 and not (np.diff(stored) > 0).all():
+        k = int(np.argmax(np.diff(stored) <= 0))
+        raise RangeError(f"keys {k} and {k + 1} fall together in float32 (both at {stored[k]} s)")
+    return Numbers(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
+
+
+def values(track: Track, filtered: Filtered | None = None) -> Numbers:
+    """Return the values, with tangents for CUBICSPLINE as glTF orders them: in, value, out per key.
+
+    Integers, as the track's storage asks for, only where they give every value back; float32 otherwise.
+    filtered: codes that the values were decoded from. Raises ShapeError where they decode to anything else.
+    """
+    rows = track.values
+    if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
+        assert track.out_tangents is not None
+        rows = np.stack((track.in_tangents, rows, track.out_tangents), axis=1)
+    element = ELEMENTS.get(track.path) or track.storage.element or BY_WIDTH.get(rows.shape[-1], "SCALAR")
+    storage = track.storage if filtered is None else DECODED[filtered.name]
+    stored = _stored(rows, storage)
+    integers = stored.dtype.kind != "f"
+    kind, normalized = (storage.component_type, storage.normalized) if integers else (FLOAT, False)
+    key_size = stored.itemsize * rows.shape[-1]
+    data = stored.tobytes() if filtered is None else _as_decoded(stored, element, filtered)
+    return Numbers(data, kind, element, normalized, filtered=filtered, key_size=key_size)
+
+
+def _stored(rows: Floats, storage: Storage) -> NDArray[Any]:
+    if storage.component_type != FLOAT:
+        integers = _integers(rows, np.dtype(DTYPES[storage.component_type]), storage.normalized)
+        if integers is not None:
+            return integers
+    with np.errstate(over="ignore"):
+        stored: NDArray[Any] = rows.astype("<f4")
+    if np.isinf(stored).any():
+        raise RangeError(f"a value of {float(np.abs(rows).max()):.3g} is too large for float32")
+    return stored
+
+
+def _as_decoded(stored: NDArray[Any], element: str, filtered: Filtered) -> bytes:
+    """The bytes that the codes decode to, which differ from `stored` in nothing but the sign of zeros."""
+    decoded = storage.decoded_bytes(filtered)
+    same = stored.nbytes == len(decoded) and np.array_equal(np.frombuffer(decoded, stored.dtype), stored.ravel())
+    if not same or (filtered.name == "QUATERNION") is not (element == "VEC4" and stored.dtype.kind == "i"):
+        raise ShapeError(f"values are not what their {filtered.name} codes decode to")
+    return decoded
+
+
+def _integers(rows: Floats, dtype: np.dtype[Any], normalized: bool) -> NDArray[Any] | None:
+    limits = np.iinfo(dtype)
+    scaled = np.rint(rows * limits.max if normalized else rows)
+    if scaled.min() < limits.min or scaled.max() > limits.max:
+        return None
+    stored = scaled.astype(dtype)
+    back = stored.astype(np.float64)
+    if normalized:
+        back = denormalized(back, dtype)
+    return stored if np.array_equal(back, rows) else None
+
+
+def _shortest(value: np.float32) -> float:
+    """The number with the shortest text that rounds to this float32: 1.0416666, not 1.0416666269302368; 2, not 2.0."""
+    number = float(str(value))
+    return int(number) if number.is_integer() else number

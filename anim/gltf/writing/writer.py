@@ -1,0 +1,171 @@
+"""Clips → a new Document in which only the animations were replaced.
+
+Everything else keeps its JSON, its order and its numbers. Accessors and views that only the replaced animations used
+are used again for the new ones, and their old bytes leave the buffer. A number left over in the middle gets the
+smallest legal placeholder, so that no other number moves.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+
+from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
+from anim.gltf.document import Document, Json, items
+from anim.gltf.meshopt.storage import PLAIN, Filtered, Packing
+from anim.gltf.reading import reader
+from anim.gltf.reading.node_matrix import expand_matrices
+from anim.gltf.validation import channel_targets
+from anim.gltf.writing import encoding
+from anim.gltf.writing.encoding import Numbers
+from anim.gltf.writing.insertion import Place, assemble
+from anim.model import Clip, Interpolation, Track
+
+_SAMPLER_KEYS = ("input", "output", "interpolation")
+
+
+def replace_clips(document: Document, clips: Mapping[int, Clip], *, packing: Packing = PLAIN) -> Document:
+    """Return the document with the animations numbered in `clips` replaced; all others stay as they are.
+
+    Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
+    channel get one, and their nodes TRS in place of a `matrix`. Names, extras and extensions of animations, channels
+    and samplers stay.
+    packing: how the new numbers are stored, see `pack`.
+    Raises RangeError where keys fall together in float32, no channel is left, or weights are not as many as the node's
+    morph targets; NotFoundError for a number that no animation or node has.
+    replace_clips(document, {0: clip}): the first animation becomes `clip`
+    """
+    if not clips:
+        return document
+    count = len(items(document.json, "animations"))
+    for number in clips:
+        if not isinstance(number, int):
+            raise ShapeError(
+                f"clips has the key {number!r} (expected the number of an animation)",
+                help="gltf.read.names(document) lists the names in the order of the numbers",
+            )
+        if not 0 <= number < count:
+            raise NotFoundError(f"there is no clip #{number} (the file has {count}, from #0 on)")
+    pool = _Pool(packing.filtered)
+    animations = [
+        _named_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
+        for i, animation in enumerate(items(document.json, "animations"))
+    ]
+    written = assemble(document, animations, set(clips), pool.numbers, packing)
+    return replace(written, json=expand_matrices(written.json)[0])
+
+
+class _Pool:
+    """Contents of new accessors, each kept once; numbers are given out later, so samplers hold places in here."""
+
+    def __init__(self, filtered: Mapping[int, Filtered]) -> None:
+        self.numbers: list[Numbers] = []
+        self._filtered = filtered
+        self._places: dict[Numbers, int] = {}
+        self._axes: dict[int, int] = {}
+
+    def _place(self, numbers: Numbers) -> int:
+        place = self._places.get(numbers)
+        if place is None:
+            place = self._places[numbers] = len(self.numbers)
+            self.numbers.append(numbers)
+        elif self.numbers[place].filtered is None:  # codes do for an equal content without
+            self.numbers[place] = numbers
+        return place
+
+    def values(self, track: Track) -> int:
+        """The place of a track's values."""
+        return self._place(encoding.values(track, self._filtered.get(id(track))))
+
+    def axis(self, track: Track) -> int:
+        """The place of a track's times; tracks that share one array are encoded once."""
+        found = self._axes.get(id(track.times))
+        if found is None:
+            found = self._axes[id(track.times)] = self._place(encoding.times(track))
+        return found
+
+
+def _named_animation(json: Json, animation: Json, clip: Clip, number: int, pool: _Pool) -> Json:
+    try:
+        for track in clip.tracks:
+            _check_target(json, track)
+        return _animation(animation, clip, pool)
+    except AnimError as error:
+        raise error.at(reader.label(clip.name, number)) from None
+
+
+def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
+    waiting: dict[tuple[int | None, str], deque[Track]] = {}
+    for track in clip.tracks:
+        waiting.setdefault(track.target, deque()).append(track)
+    samplers = _Samplers(animation, pool)
+    channels = []
+    for channel in animation["channels"]:
+        target = channel_targets.of_channel(channel)
+        if target is None:
+            channels.append({**channel, "sampler": samplers.kept(channel["sampler"])})
+            continue
+        node, path, pointer = target
+        queue = waiting.get((None, pointer or "") if node is None else (node, path))
+        if queue:
+            channels.append({**channel, "sampler": samplers.new(queue.popleft(), channel["sampler"])})
+    for queue in waiting.values():
+        channels += [{"sampler": samplers.new(track, None), "target": _target(track)} for track in queue]
+    if not channels:
+        if animation["channels"]:
+            raise RangeError("has no track left (glTF knows no animation without channels)")
+        return animation
+    replaced = {**animation, "channels": channels, "samplers": samplers.list}
+    if clip.name != animation.get("name", ""):
+        replaced["name"] = clip.name
+    return replaced
+
+
+class _Samplers:
+    """Samplers of one new animation; equal ones are shared unless they carry something of their own."""
+
+    def __init__(self, animation: Json, pool: _Pool) -> None:
+        self.list: list[Json] = []
+        self._old = animation["samplers"]
+        self._pool = pool
+        self._numbers: dict[tuple[object, ...], int] = {}
+
+    def kept(self, old: int) -> int:
+        return self._number(("kept", old), self._old[old])
+
+    def new(self, track: Track, old: int | None) -> int:
+        try:
+            times, values = self._pool.axis(track), self._pool.values(track)
+        except AnimError as error:
+            raise error.at(_label(track)) from None
+        own = {} if old is None else {k: v for k, v in self._old[old].items() if k not in _SAMPLER_KEYS}
+        sampler: Json = {"input": Place(times), "output": Place(values), **own}
+        if track.interpolation is not Interpolation.LINEAR:
+            sampler["interpolation"] = str(track.interpolation)
+        return self._number((times, values, track.interpolation, old if own else None), sampler)
+
+    def _number(self, key: tuple[object, ...], sampler: Json) -> int:
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = len(self.list)
+            self.list.append(sampler)
+        return number
+
+
+def _check_target(json: Json, track: Track) -> None:
+    if track.node is not None:
+        try:
+            channel_targets.check_node(json, track.node, track.path, track.values.shape[1])
+        except AnimError as error:
+            raise error.at(_label(track)) from None
+
+
+def _label(track: Track) -> str:
+    return f"{track.path} of node {track.node}" if track.pointer is None else track.pointer
+
+
+def _target(track: Track) -> Json:
+    if track.pointer is not None:
+        return {"path": "pointer", "extensions": {channel_targets.EXTENSION: {"pointer": track.pointer}}}
+    return {"node": track.node, "path": track.path}

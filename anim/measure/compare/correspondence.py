@@ -1,0 +1,211 @@
+"""What carries the first of two scenes' vertices in the second.
+
+Peers rename, reorder, merge and quantize. Only motion is to be compared, so the surface of the first scene is carried
+through both: its vertices and skin weights by the joints of each. Quantized vertices lie in another mesh space, and so
+do the inverse bind matrices that belong to them; that space is found by the vertices where they agree one by one, else
+by the inverse bind matrices themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.maths import matrix
+from anim.measure.compare import name_matching
+from anim.measure.error.point_groups import Carried
+from anim.measure.error.surface import Surface
+from anim.model import Instance, Scene, Skin
+from anim.sampling import rest
+from anim.sampling.pose import local_by_node
+
+AGREE = 0.01  # of a mesh's size: vertices that are farther apart than this are not the same ones
+SINGULAR = 1e-12  # determinants below this, relative to the cube of the size, have no inverse
+SAME_SPACE = 1e-3  # relative; joints whose matrices differ by more have another bind pose, not another mesh space
+NOWHERE = np.eye(4)[:3]
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Two scenes as one.
+
+    nodes: (N,) for each node of the first scene its number in the second, −1 where it has none.
+    surfaces: of the first scene, with what carries them in the second, None where it is the same scene.
+    by_vertex: whether all meshes agree vertex by vertex.
+    """
+
+    nodes: Ints
+    surfaces: Sequence[tuple[Surface, Carried | None]]
+    by_vertex: bool = True
+
+
+def paired(scene: Scene, other: Scene, surfaces: list[Surface]) -> Pairs:
+    """Return which nodes of two scenes are the same, and what carries the `surfaces` of the first in the second.
+
+    What hangs on a node that the second scene doesn't have is carried by the next node above that it has, as it is
+    placed there at rest: if the first scene's clip moves it, that shows as an error.
+    """
+    if other is scene:
+        return Pairs(np.arange(len(scene.skeleton)), [(surface, None) for surface in surfaces])
+    pairing = _Pairing(scene, other, name_matching.nodes(scene, other))
+    instances = [instance for instance in scene.instances if len(instance.mesh.positions)]
+    if not instances:
+        return Pairs(pairing.nodes, [(surface, pairing.by_nodes(surface)) for surface in surfaces])
+    partners = [pairing.partner(k, instance) for k, instance in enumerate(instances)]
+    found = [
+        (surface, pairing.carried(surface, instance, partner))
+        for surface, instance, partner in zip(surfaces, instances, partners, strict=True)
+    ]
+    return Pairs(pairing.nodes, found, all(partner is not None for partner in partners))
+
+
+class _Pairing:
+    """Two scenes and their nodes, while what carries what is looked for."""
+
+    def __init__(self, scene: Scene, other: Scene, nodes: Ints) -> None:
+        self._scene, self._other, self.nodes = scene, other, nodes
+        self._new = [instance for instance in other.instances if len(instance.mesh.positions)]
+        self._on_node = {instance.node: instance for instance in self._new}
+        old = [instance.mesh.name for instance in scene.instances if len(instance.mesh.positions)]
+        self._named = name_matching.by_name(old, [instance.mesh.name for instance in self._new]).tolist()
+        rest_pose = rest(scene.skeleton)
+        self._local = local_by_node(scene.skeleton, rest_pose)[:, 0]
+
+    def partner(self, number: int, instance: Instance) -> Instance | None:
+        """The instance of the other scene that has the same vertices: on the same node, of the same name, in order."""
+        choices = [self._on_node.get(int(self.nodes[instance.node]))]
+        choices.append(self._new[self._named[number]] if self._named[number] >= 0 else None)
+        choices.append(self._new[number] if len(self._new) == len(self._named) else None)
+        return next((each for each in choices if each is not None and _agree(instance, each)), None)
+
+    def carried(self, surface: Surface, instance: Instance, partner: Instance | None) -> Carried:
+        """What carries an instance's surface in the other scene."""
+        if instance.skin is None:
+            found = self._rigid(surface, instance, partner)
+        else:
+            found = self._skinned(surface, instance.skin, instance, partner)
+        morphing = partner or self._on_node.get(int(self.nodes[instance.node])) or self._below(instance)
+        if morphing is None or len(morphing.weights) != len(surface.rest_weights):
+            return replace(found, owner=int(self.nodes[instance.node]))
+        return replace(found, owner=morphing.node, rest_weights=morphing.weights)
+
+    def by_nodes(self, surface: Surface) -> Carried:
+        """What carries a surface where nothing but the nodes is known."""
+        places = [self._place(int(node)) for node in surface.nodes]
+        joints = np.array([node for node, _ in places], np.int64)
+        bind = np.array([matrix.multiply(local, bind) for (_, local), bind in zip(places, surface.bind, strict=True)])
+        return Carried(joints, bind.reshape(-1, 3, 4), -1, surface.rest_weights)
+
+    def _rigid(self, surface: Surface, instance: Instance, partner: Instance | None) -> Carried:
+        node = int(self.nodes[instance.node])
+        there = partner or self._on_node.get(node)
+        if there is None or there.skin is not None:
+            return self.by_nodes(surface)
+        points, others = instance.mesh.positions, there.mesh.positions
+        space = _space(points, others) if partner is not None else _space_of_boxes(points, others)
+        if space is None:  # merged with others: only what it hangs on can tell
+            return self._above(surface)
+        return Carried(np.array([there.node]), space[None], -1, surface.rest_weights)
+
+    def _skinned(self, surface: Surface, skin: Skin, instance: Instance, partner: Instance | None) -> Carried:
+        """What carries a skinned surface: joints of the skin that has most of them, the others by their nodes."""
+        plain = self.by_nodes(surface)
+        skins = {id(each.skin): each.skin for each in self._new if each.skin is not None}
+        if partner is not None and partner.skin is not None:
+            skins = {id(partner.skin): partner.skin}
+        matched = [(new, self._joints(skin, new)) for new in skins.values()]
+        if not matched:
+            return plain
+        new, joints = max(matched, key=lambda each: int((each[1] >= 0).sum()))
+        found = joints >= 0
+        guess = None if partner is None else _space(instance.mesh.positions, partner.mesh.positions)
+        space = _space_of_binds(skin.inverse_bind[found], new.inverse_bind[joints[found]], guess)
+        nodes, bind = plain.nodes.copy(), plain.bind.copy()
+        nodes[found] = new.joints[joints[found]]
+        bind[found] = new.inverse_bind[joints[found]]
+        if space is not NOWHERE:
+            bind[found] = matrix.multiply(bind[found], space)
+        return Carried(nodes, bind, -1, surface.rest_weights)
+
+    def _joints(self, old: Skin, new: Skin) -> Ints:
+        """For each joint of a skin (J,) its place in another skin's list, −1 where it isn't there."""
+        place = {node: i for i, node in enumerate(new.joints.tolist())}
+        return np.array([place.get(node, -1) for node in self.nodes[old.joints].tolist()], np.int64)
+
+    def _above(self, surface: Surface) -> Carried:
+        """What carries a surface of one node if that node's own partner doesn't count."""
+        node = int(surface.nodes[0])
+        parent, local = self._place(int(self._scene.skeleton.parents[node]))
+        bind = matrix.multiply(matrix.multiply(local, self._local[node]), surface.bind)
+        return Carried(np.array([parent]), bind, -1, surface.rest_weights)
+
+    def _place(self, node: int) -> tuple[int, Floats]:
+        """The other scene's node that stands for a node, −1 for the world, and where this one is on it at rest."""
+        local: Floats = NOWHERE
+        while node >= 0 and self.nodes[node] < 0:
+            local = matrix.multiply(self._local[node], local)
+            node = int(self._scene.skeleton.parents[node])
+        return (int(self.nodes[node]) if node >= 0 else -1), local
+
+    def _below(self, instance: Instance) -> Instance | None:
+        """The only instance on a child of the node that stands for an instance's own: peers put meshes there."""
+        node = int(self.nodes[instance.node])
+        parents = self._other.skeleton.parents
+        children = [each for each in self._new if node >= 0 and parents[each.node] == node]
+        return children[0] if len(children) == 1 else None
+
+
+def _agree(old: Instance, new: Instance) -> bool:
+    """Whether both have the same vertices in the same order, be it in another mesh space."""
+    a, b = old.mesh.positions, new.mesh.positions
+    if len(a) != len(b) or (old.skin is None) is not (new.skin is None):
+        return False
+    space = _space(a, b)
+    rest = np.linalg.norm(matrix.apply(space, a) - b, axis=1).max()
+    return bool(rest <= AGREE * np.linalg.norm(np.ptp(b, axis=0)) and space[0, 0] > 0)
+
+
+def _space(a: Floats, b: Floats) -> Floats:
+    """b_from_a (3, 4): the shift and the one factor that take points a (V, 3) nearest to b (least squares)."""
+    if np.array_equal(a, b):
+        return NOWHERE
+    middle_a, middle_b = a.mean(axis=0), b.mean(axis=0)
+    spread = float(((a - middle_a) ** 2).sum())
+    factor = float(((a - middle_a) * (b - middle_b)).sum()) / spread if spread > 0 else 1.0
+    return np.column_stack((factor * np.eye(3), middle_b - factor * middle_a))
+
+
+def _space_of_boxes(a: Floats, b: Floats) -> Floats | None:
+    """b_from_a (3, 4) by the boxes around points a and b, in any order and number; None where their shapes differ."""
+    sizes = [np.ptp(each, axis=0) for each in (a, b)]
+    middles = [(each.max(axis=0) + each.min(axis=0)) / 2 for each in (a, b)]
+    limit = AGREE * float(np.linalg.norm(sizes[1]))
+    if max(np.abs(sizes[0] - sizes[1]).max(), np.abs(middles[0] - middles[1]).max()) <= limit:
+        return NOWHERE
+    longest = int(sizes[0].argmax())
+    factor = float(sizes[1][longest] / sizes[0][longest]) if sizes[0][longest] > 0 else 1.0
+    if np.abs(factor * sizes[0] - sizes[1]).max() > limit:
+        return None
+    return np.column_stack((factor * np.eye(3), middles[1] - factor * middles[0]))
+
+
+def _space_of_binds(a: Floats, b: Floats, guess: Floats | None) -> Floats:
+    """b_from_a (3, 4) by what inverse bind matrices a and b (J, 3, 4) say, a = b · b_from_a; else what vertices say.
+
+    Vertices give it up to their rounding, the matrices exactly; but a peer may have moved the bind pose of joints.
+    """
+    if not len(a) or np.array_equal(a, b):
+        return NOWHERE
+    size = np.sqrt((b[..., :3] ** 2).sum(axis=(-1, -2)))
+    regular: Bools = np.asarray(np.abs(np.linalg.det(b[..., :3])) > SINGULAR * size**3)
+    if not regular.any():
+        return NOWHERE if guess is None else guess
+    back = np.linalg.inv(b[regular][..., :3])
+    spaces = np.concatenate((back @ a[regular][..., :3], back @ (a - b)[regular][..., 3:]), axis=-1)
+    middle: Floats = np.median(spaces, axis=0)
+    apart = np.sqrt(((spaces - middle) ** 2).sum(axis=(-1, -2))) / np.sqrt((middle * middle).sum())
+    is_one = float(np.median(apart)) <= SAME_SPACE
+    return middle if is_one or guess is None else guess

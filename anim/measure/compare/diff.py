@@ -1,0 +1,127 @@
+"""How far apart the motion of two files is: clips matched, each one measured, worst first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Ints
+from anim.measure.compare import name_matching
+from anim.measure.continuous_bound.prover import Prover
+from anim.measure.error.metric import FPS, MotionError, Ruler, dense_times
+from anim.measure.error.statistics import Statistics, statistics
+from anim.model import Clip, Scene
+from anim.sampling.players import pair
+
+
+@dataclass(frozen=True, slots=True)
+class ClipDiff:
+    """Two clips that are meant to be the same.
+
+    old, new: their numbers in the files. certified: m, no vertex is farther off at any time, looked at or not; None
+    where that could not be proven. end_old, end_new: s, their last keys.
+    missing, added: what only the old or only the new clip has a track for: (node or pointer, path).
+    """
+
+    old: int
+    new: int
+    name: str
+    new_name: str
+    error: MotionError
+    certified: float | None
+    statistics: Statistics
+    end_old: float
+    end_new: float
+    missing: tuple[tuple[str, str], ...]
+    added: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Diff:
+    """Two files.
+
+    diagonal: m, of the old scene's bounding box. clips: worst first. missing_clips, added_clips: numbers of those that
+    only the old or only the new file has. missing_nodes, added_nodes: names of nodes likewise.
+    by_vertex: whether every mesh has the same vertices in both files; where not, the old ones are carried by the new
+    joints all the same.
+    """
+
+    diagonal: float
+    clips: tuple[ClipDiff, ...]
+    missing_clips: tuple[int, ...]
+    added_clips: tuple[int, ...]
+    missing_nodes: tuple[str, ...]
+    added_nodes: tuple[str, ...]
+    by_vertex: bool
+
+
+def diff(
+    ruler: Ruler,
+    old: Sequence[Clip],
+    new: Sequence[Clip],
+    *,
+    chosen: Sequence[int] | None = None,
+    player: str = "spec",
+    fps: float = FPS,
+) -> Diff:
+    """Return how far the `new` clips are from the `old` ones, on the two scenes of the ruler.
+
+    chosen: numbers of the old clips that are looked at, all by default. player: a name in PLAYERS, who plays both, or
+    two, "spec,nlerp": then `old` and `new` can be the same clips, and nothing is proven between the times looked at.
+    fps: frames per second of the grid that is looked at beside the keys of both.
+    Clips are matched by name, then by their order where one has no name or none is in both files.
+    """
+    partners = name_matching.by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
+    wanted = range(len(old)) if chosen is None else chosen
+    prover = Prover(ruler)
+    found = [
+        _compared(prover, (i, old[i]), (int(partners[i]), new[partners[i]]), player=player, fps=fps)
+        for i in wanted
+        if partners[i] >= 0
+    ]
+    found.sort(key=lambda each: -each.error.max_error)
+    taken = set(partners.tolist())
+    nodes = ruler.pairs.nodes
+    return Diff(
+        ruler.diagonal,
+        tuple(found),
+        tuple(i for i in wanted if partners[i] < 0),
+        () if chosen is not None else tuple(i for i in range(len(new)) if i not in taken),
+        _names(ruler.scene, np.flatnonzero(nodes < 0)),
+        _names(ruler.other, np.setdiff1d(np.arange(len(ruler.other.skeleton)), nodes)),
+        ruler.pairs.by_vertex,
+    )
+
+
+def _compared(prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, player: str, fps: float) -> ClipDiff:
+    before, after, ruler = old[1], new[1], prover.ruler
+    times = dense_times(before, after, fps=fps)
+    look = ruler.look(before, after, times, player=player)
+    error, bound = look.error, None
+    if len(set(pair(player))) == 1:
+        proof = prover.certified(before, after, times, {player: look})
+        error, bound = proof.error, proof.bound
+    found = statistics(ruler, before, after, times=times, player=player, fps=fps)
+    one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))
+    missing = tuple(name for key, name in one.items() if key not in other)
+    added = tuple(name for key, name in other.items() if key not in one)
+    names = before.name, after.name
+    return ClipDiff(old[0], new[0], *names, error, bound, found, before.end, after.end, missing, added)
+
+
+def _targets(ruler: Ruler, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:
+    """What each track moves: comparable between both scenes, and as people call it."""
+    scene = ruler.scene if is_old else ruler.other
+    for track in clip.tracks:
+        if track.node is None:
+            yield (track.pointer, track.path), (track.pointer or "", track.path)
+        else:
+            node = int(ruler.pairs.nodes[track.node]) if is_old else track.node
+            key = node if node >= 0 else ("unmatched", track.node)
+            yield (key, track.path), (scene.skeleton.names[track.node] or f"node {track.node}", track.path)
+
+
+def _names(scene: Scene, nodes: Ints) -> tuple[str, ...]:
+    return tuple(scene.skeleton.names[i] or f"node {i}" for i in nodes.tolist())

@@ -1,0 +1,241 @@
+"""How smooth tracks are at their keys: jumps in value, speed and acceleration, by analysis and not by sampling.
+
+A key is graded by the first thing that jumps there: the value (`jump`), the speed (`C0`), the acceleration (`C1`), or
+none of them (`C2`). `G1` is C0 on a smooth path: the direction goes on, only the speed along it jumps; numbers without
+a direction in space (weights, scalars) have no G1. A jump counts where it is above SAME of the track's own RMS speed,
+or RMS acceleration, and above what keys stored in float32 (or in normalized integers) can tell. Two keys within one
+float32 step stand for a jump and are one key here.
+Source: notes/algorithms.md C4 and H.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.maths import quaternion
+from anim.measure.continuity import knots
+from anim.measure.continuity.knots import FLOAT32, PAIR, Joints, lengths
+from anim.model import Clip, Interpolation, Kind, Skeleton, Track
+
+SAME = 1e-3  # of the track's RMS speed or acceleration, or rad between two directions; jumps below are none
+CLOSED = 1e-3  # of the track's range; a loop's end this near its start is meant to be the same
+FRACTIONS = {5120: 1 / 127, 5121: 1 / 255, 5122: 1 / 32767, 5123: 1 / 65535}  # steps of normalized integers
+UNITS = {"translation": "m", "rotation": "rad"}
+
+
+class Grade(StrEnum):
+    """How smooth a track is at a key, the roughest first."""
+
+    JUMP = "jump"
+    C0 = "C0"
+    G1 = "G1"
+    C1 = "C1"
+    C2 = "C2"
+
+
+@dataclass(frozen=True, slots=True)
+class KeyJumps:
+    """Jumps at I keys: times (I,) s, grades, and how far value, speed and acceleration jump (I,).
+
+    In the track's unit, per second and per second squared: lengths of difference vectors; radians for rotations.
+    """
+
+    times: Floats
+    grades: tuple[Grade, ...]
+    value: Floats
+    speed: Floats
+    acceleration: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Largest:
+    """The largest jump of one kind, and where it is."""
+
+    size: float
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Seam:
+    """From the last key of the clip to its first: `jump` where the track does not close, or steps."""
+
+    grade: Grade
+    value_jump: float
+    speed_jump: float
+    acceleration_jump: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrackContinuity:
+    """One track. unit: of the value, "m", "rad" or "1"; jumps in speed are per second, in acceleration per second².
+
+    interior_keys: those between the first and the last, = jumps + c0 + g1 + c1 + c2. still: nothing ever moves.
+    largest_*: None where nothing jumps. seam: None for a track that is still.
+    """
+
+    target: str
+    path: str
+    interpolation: str
+    unit: str
+    still: bool
+    interior_keys: int
+    jumps: int
+    c0: int
+    g1: int
+    c1: int
+    c2: int
+    largest_value_jump: Largest | None
+    largest_speed_jump: Largest | None
+    largest_acceleration_jump: Largest | None
+    seam: Seam | None
+    keys: KeyJumps = field(repr=False)
+
+
+def continuity(clip: Clip, skeleton: Skeleton) -> tuple[TrackContinuity, ...]:
+    """Return how smooth every track of the clip is, in their order."""
+    return tuple(_track(track, clip, skeleton) for track in clip.tracks)
+
+
+def at_keys(track: Track) -> KeyJumps:
+    """Return the jumps at the interior keys of a track.
+
+    Catmull-Rom through 0, 0.9, 0.2, 1 at 0, 1, 2, 3 s → C1 at 1 and 2 s, where the acceleration jumps by 3.1 per s²
+    """
+    return _Analysis(track).at_keys()
+
+
+def seam(track: Track, *, start: float, end: float) -> Seam:
+    """Return what jumps where a clip from `start` to `end`, in seconds, is played again from its start."""
+    return _Analysis(track).seam(start, end)
+
+
+def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
+    analysis = _Analysis(track)
+    keys = analysis.at_keys()
+    count = {grade: keys.grades.count(grade) for grade in Grade}
+    target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
+    return TrackContinuity(
+        target=target or "",
+        path=track.path,
+        interpolation=str(track.interpolation),
+        unit="rad" if track.kind is Kind.ROTATION else UNITS.get(track.path, "1"),
+        still=analysis.still,
+        interior_keys=len(keys.times),
+        jumps=count[Grade.JUMP],
+        c0=count[Grade.C0],
+        g1=count[Grade.G1],
+        c1=count[Grade.C1],
+        c2=count[Grade.C2],
+        largest_value_jump=_largest(keys, keys.value, {Grade.JUMP}),
+        largest_speed_jump=_largest(keys, keys.speed, {Grade.JUMP, Grade.C0, Grade.G1}),
+        largest_acceleration_jump=_largest(keys, keys.acceleration, set(Grade) - {Grade.C2}),
+        seam=None if analysis.still else analysis.seam(clip.start, clip.end),
+        keys=keys,
+    )
+
+
+def _largest(keys: KeyJumps, sizes: Floats, among: set[Grade]) -> Largest | None:
+    """The largest of the jumps that count: those at keys of these grades."""
+    counted = np.where([grade in among for grade in keys.grades], sizes, 0.0)
+    if not counted.any():
+        return None
+    at = int(counted.argmax())
+    return Largest(float(counted[at]), float(keys.times[at]))
+
+
+class _Analysis:
+    """One track with its scales: RMS speed and acceleration, and the step in which its values are stored."""
+
+    def __init__(self, track: Track) -> None:
+        self.track = track
+        self.still = _is_still(track)
+        self._speed, self._acceleration = (0.0, 0.0) if self.still else knots.root_mean_squares(track)
+        self._size = float(np.abs(track.values).max())
+        storage = track.storage
+        self._step = FRACTIONS.get(storage.component_type, 1.0) if storage.normalized else FLOAT32 * self._size
+        self._late = FLOAT32 * float(track.times[-1])
+
+    def at_keys(self) -> KeyJumps:
+        """The jumps at the interior keys; two keys that stand for a jump are one, at the time of the second."""
+        if self.still:
+            none = np.zeros(max(len(self.track.times) - 2, 0))
+            return KeyJumps(self.track.times[1:-1], (Grade.C2,) * len(none), none, none, none)
+        return self._graded(knots.interior(self.track), 0.0)
+
+    def seam(self, start: float, end: float) -> Seam:
+        """The joint of the clip's end and its start; of a STEP track's two the one that jumps further."""
+        found = self._graded(knots.around(self.track, start=start, end=end), CLOSED * self._range())
+        worst = int(found.value.argmax())
+        sizes = (float(each[worst]) for each in (found.value, found.speed, found.acceleration))
+        return Seam(found.grades[worst], *sizes)
+
+    def _graded(self, at: Joints, allowed: float) -> KeyJumps:
+        """The jumps at joints with their grades; values may differ by `allowed` and rounding."""
+        speed = lengths(at.rates[1] - at.rates[0])
+        acceleration = lengths(at.accelerations[1] - at.accelerations[0])
+        if self.track.kind is Kind.ROTATION:
+            value = quaternion.angle_between(*(quaternion.normalize(values) for values in at.values))
+        else:
+            value = lengths(at.values[1] - at.values[0])
+        allowed_speed = SAME * self._speed + self._speed_noise(at)
+        grades = np.full(len(value), str(Grade.C2), dtype="U4")
+        grades[acceleration > SAME * self._acceleration + self._acceleration_noise(at)] = Grade.C1
+        grades[speed > allowed_speed] = Grade.C0
+        grades[(speed > allowed_speed) & self._goes_on(at, allowed_speed)] = Grade.G1
+        grades[value > allowed + self._value_noise(at)] = Grade.JUMP
+        return KeyJumps(at.times, tuple(Grade(str(each)) for each in grades), value, speed, acceleration)
+
+    def _goes_on(self, at: Joints, allowed_speed: Floats) -> Bools:
+        """Where the track moves on both sides, in one direction; weights and scalars have speeds but no direction."""
+        if self.track.path == "weights" or self.track.values.shape[1] == 1:
+            return np.zeros(len(at.times), np.bool_)
+        before, after = (lengths(rates) for rates in at.rates)
+        moving = np.minimum(before, after) > allowed_speed
+        one, other = (
+            rates / np.where(length > 0, length, 1.0)[:, None]
+            for rates, length in zip(at.rates, (before, after), strict=True)
+        )
+        return np.asarray(moving & (lengths(other - one) <= SAME))
+
+    def _value_noise(self, at: Joints) -> Floats:
+        """What a value may differ by on both sides of a pair of keys without a jump: rounding, and motion between."""
+        going = np.maximum(*(lengths(rates) for rates in at.rates))
+        return np.asarray(8 * FLOAT32 * self._size + 2 * (PAIR + 2 * self._late) * going)
+
+    def _speed_noise(self, at: Joints) -> Floats:
+        """How far stored values and times leave the speeds open: chords of LINEAR; tangents are stored themselves."""
+        noise = np.zeros(len(at.times))
+        for rates, h in zip(at.rates, at.durations, strict=True):
+            going = lengths(rates)
+            noise += 8 * FLOAT32 * going
+            if self.track.interpolation is Interpolation.LINEAR:
+                noise += (4 * self._step + 2 * self._late * going) / h
+        return noise
+
+    def _acceleration_noise(self, at: Joints) -> Floats:
+        """How far stored values, tangents and times leave the accelerations of cubics open."""
+        noise = np.zeros(len(at.times))
+        if self.track.interpolation is not Interpolation.CUBICSPLINE:
+            return noise
+        for rates, pulls, h in zip(at.rates, at.accelerations, at.durations, strict=True):
+            off = FLOAT32 + self._late / h
+            noise += 12 * self._step / h**2 + off * (12 * lengths(rates) / h + 4 * lengths(pulls))
+        return noise
+
+    def _range(self) -> float:
+        values = self.track.values
+        if self.track.kind is Kind.ROTATION:
+            unit = quaternion.normalize(values)
+            return float(quaternion.angle_between(unit, unit[:1]).max())
+        return float(lengths(values.max(axis=0) - values.min(axis=0)))
+
+
+def _is_still(track: Track) -> bool:
+    """Whether nothing ever moves: one value, and no tangents that lead away from it."""
+    tangents = (track.in_tangents, track.out_tangents)
+    same = bool((track.values == track.values[0]).all())
+    return same and (len(track.times) == 1 or not any(each is not None and each.any() for each in tangents))

@@ -1,0 +1,141 @@
+"""Both sides of the keys of a track: value, speed and acceleration just before and just after, by analysis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.maths import hermite, quaternion
+from anim.model import Interpolation, Kind, Track
+from anim.sampling import derivatives
+from anim.sampling.track import sample
+
+FLOAT32 = 2.0**-23  # relative distance of neighboring float32 numbers
+PAIR = 1.5e-6  # s; with two float32 steps, the longest time between two keys that stand for a jump
+GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))  # of a piece; exact for the squared speed of a cubic
+GAUSS_WEIGHTS = (5 / 18, 8 / 18, 5 / 18)
+
+
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """J places where one piece of a track ends and the next begins.
+
+    times: (J,) s, of the later key where two stand for a jump. Pairs are before and after: values (J, C), rates and
+    accelerations (J, D) per second and second², durations (J,) s of the pieces, infinite where there is none.
+    """
+
+    times: Floats
+    values: tuple[Floats, Floats]
+    rates: tuple[Floats, Floats]
+    accelerations: tuple[Floats, Floats]
+    durations: tuple[Floats, Floats]
+
+
+def interior(track: Track) -> Joints:
+    """Return the joints at the interior keys of a track. At a jump at an end both sides move as the inner one does."""
+    keys, steps = track.times, np.append(np.diff(track.times), np.inf)
+    borders = np.concatenate(([-1], _pieces(track), [len(keys) - 1]))
+    first, last = borders[:-1] + 1, borders[1:]
+    inside = (last > 0) & (first < len(keys) - 1)
+    first, last = first[inside], last[inside]
+    left = first - 1
+    at_start, at_end = left < 0, last == len(keys) - 1
+    stepped = track.interpolation is Interpolation.STEP
+    return Joints(
+        keys[last],
+        (track.values[np.maximum(left, 0) if stepped else first], track.values[last]),
+        _one_sided(
+            derivatives.rates(track, keys[first], before=True),
+            derivatives.rates(track, keys[last], before=False),
+            at_start,
+            at_end,
+        ),
+        _one_sided(
+            accelerations(track, keys[first], before=True),
+            accelerations(track, keys[last], before=False),
+            at_start,
+            at_end,
+        ),
+        (np.where(at_start, np.inf, steps[left]), np.where(at_end, np.inf, steps[last])),
+    )
+
+
+def around(track: Track, *, start: float, end: float) -> Joints:
+    """Return the joint of a clip's end and its start, in seconds; outside its keys the track stands still.
+
+    Of a STEP track two: a loop shows the value before the last key until the end, a player that stops shows the last.
+    """
+    ends, starts = np.array([end]), np.array([start])
+    shown = ends
+    if track.interpolation is Interpolation.STEP:
+        shown = np.array([end - PAIR - 2 * FLOAT32 * end, end])
+        ends, starts = np.array([end, end]), np.array([start, start])
+    return Joints(
+        ends,
+        (sample(track, shown), sample(track, starts)),
+        (derivatives.rates(track, ends, before=True), derivatives.rates(track, starts, before=False)),
+        (accelerations(track, ends, before=True), accelerations(track, starts, before=False)),
+        (_duration_at(track, ends, before=True), _duration_at(track, starts, before=False)),
+    )
+
+
+def accelerations(track: Track, times: Floats, *, before: bool) -> Floats:
+    """Return the second derivatives (F, D) per second² just before or just after each time; slerp and lines have none.
+
+    Of rotations the angular acceleration along the node's own axes: ω = 2 vec(q* q′) / |q|², so
+    ω′ = 2 vec(q* q″) / |q|² − 2 ω (q · q′) / |q|², since q′* q′ has no vector part.
+    """
+    keys, rotation = track.times, track.kind is Kind.ROTATION
+    result = np.zeros((len(times), 3 if rotation else track.values.shape[1]))
+    if track.in_tangents is None or track.out_tangents is None:
+        return result
+    left = np.searchsorted(keys, times, side="left" if before else "right") - 1
+    inside: Bools = (left >= 0) & (left < len(keys) - 1)
+    k = left[inside]
+    h = (keys[k + 1] - keys[k])[:, None]
+    u = (times[inside] - keys[k])[:, None] / h
+    piece = track.values[k], h * track.out_tangents[k], track.values[k + 1], h * track.in_tangents[k + 1]
+    second = hermite.second_derivative(u, *piece) / h**2
+    if rotation:
+        q, first = hermite.evaluate(u, *piece), hermite.first_derivative(u, *piece) / h
+        inverse, squared = quaternion.conjugate(q), quaternion.dot(q, q)[:, None]
+        omega = 2 * quaternion.multiply(inverse, first)[:, :3] / squared
+        pulled = 2 * quaternion.multiply(inverse, second)[:, :3]
+        second = (pulled - 2 * omega * quaternion.dot(q, first)[:, None]) / squared
+    result[inside] = second
+    return result
+
+
+def root_mean_squares(track: Track) -> tuple[float, float]:
+    """Return RMS speed and acceleration over all pieces; keys that stand for a jump take no time."""
+    pieces = _pieces(track)
+    steps = np.diff(track.times)[pieces]
+    if not len(steps) or track.interpolation is Interpolation.STEP:
+        return 0.0, 0.0
+    at = (track.times[pieces] + np.outer(GAUSS, steps)).reshape(-1)
+    weights = np.outer(GAUSS_WEIGHTS, steps).reshape(-1) / steps.sum()
+    squares = (derivatives.rates(track, at, before=False) ** 2, accelerations(track, at, before=False) ** 2)
+    speed, acceleration = (float(weights @ square.sum(axis=1)) ** 0.5 for square in squares)
+    return speed, acceleration
+
+
+def lengths(vectors: Floats) -> Floats:
+    """Return the lengths (...) of vectors (..., D)."""
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))
+
+
+def _pieces(track: Track) -> Ints:
+    """Numbers of the pieces between keys that are no jumps: (P,)."""
+    return np.flatnonzero(np.diff(track.times) > PAIR + 2 * FLOAT32 * track.times[1:])
+
+
+def _one_sided(before: Floats, after: Floats, at_start: Bools, at_end: Bools) -> tuple[Floats, Floats]:
+    return np.where(at_start[:, None], after, before), np.where(at_end[:, None], before, after)
+
+
+def _duration_at(track: Track, times: Floats, *, before: bool) -> Floats:
+    """Lengths (F,) of the pieces just before or just after times (F,), infinite outside the keys."""
+    k = np.searchsorted(track.times, times, side="left" if before else "right")
+    return np.diff(track.times, prepend=-np.inf, append=np.inf)[k]

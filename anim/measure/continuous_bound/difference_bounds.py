@@ -1,0 +1,66 @@
+"""How far quaternions of two versions of a clip can drift apart within a gap, with their first two derivatives.
+
+Both versions obey q″ = −λq − 2ρq′ + e, see `flight`, so that the difference d of two quaternions obeys
+
+    |d″| ≤ λ|d| + |Δλ||q| + 2ρ|d′| + 2|Δρ||q′| + |Δe|
+
+In a gap of length h no |d| exceeds the larger one of both ends by more than h²/8 · sup|d″|, no |d′| by more than
+h/2 · sup|d″|. With that, the line above has sup|d″| on both sides, and is solved for it. Nothing in it is as large as
+the motion itself where both versions are alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.measure.continuous_bound.quaternion_bounds import Flight, Line
+
+LEAST = 1e-3  # where less than this of sup|d″| is left on one side, nothing is said
+
+
+def drift(a: Flight, b: Flight, between: tuple[Line, Line, Bools], h: Floats) -> Floats:
+    """Return bounds (3, P, G, U) of |d| and its first two derivatives, for b's quaternions less a's.
+
+    between: both as lines, and where (P, G, U) both are lines that are divided by their length. h: (G, 1) s.
+    """
+    start, rate = (np.sqrt(_squares(x, y).max(axis=0)) for x, y in ((b.value, a.value), (b.slope, a.slope)))
+    pull, drag = _between_lines(*between[:2], h)
+    pull = np.where(between[2], pull, _apart(a.pull, b.pull) + h / 2 * (a.pull_rate + b.pull_rate))
+    drag = np.where(between[2], drag, _apart(a.drag, b.drag) + h / 2 * (a.drag_rate + b.drag_rate))
+    left = 1 - b.most_pull * h * h / 8 - b.most_drag * h
+    known = b.most_pull * start + pull * a.size + 2 * b.most_drag * rate + 2 * a.speed * drag + _own(a, b, h)
+    loose = a.bend + b.bend
+    bend = np.where(left > LEAST, np.minimum(known / np.maximum(left, LEAST), loose), loose)
+    return np.stack((start + h * h / 8 * bend, rate + h / 2 * bend, bend))
+
+
+def _between_lines(a: Line, b: Line, h: Floats) -> tuple[Floats, Floats]:
+    """Bounds of |Δλ| and |Δρ| on lines that are divided by their length.
+
+    There λ = wedge / |c|⁴ and ρ = c·c′ / |c|²: of a constant, a square of time and a line, and so are differences.
+    """
+    square = _apart(a.square, b.square) + h * h / 4 * np.abs(b.rate - a.rate)
+    fourth = square * (a.farthest + b.farthest)
+    both = a.nearest * b.nearest
+    pull = np.abs(b.wedge - a.wedge) / b.nearest**2 + a.wedge * fourth / both**2
+    return pull, _apart(a.along, b.along) / b.nearest + np.abs(a.along).max(axis=0) * square / both
+
+
+def _own(a: Flight, b: Flight, h: Floats) -> Floats | float:
+    if a.own is None and b.own is None:
+        return 0.0
+    square = _squares(np.zeros_like(a.value) if b.own is None else b.own, 0.0 if a.own is None else a.own)
+    return np.asarray(np.sqrt(square.max(axis=0)) + h / 2 * (a.own_rate + b.own_rate))
+
+
+def _squares(x: Floats, y: Floats | float) -> Floats:
+    """Squares of the distances (2, ...) of vectors (2, 4, ...)."""
+    apart = x - y
+    apart *= apart
+    return np.asarray(apart.sum(axis=1))
+
+
+def _apart(a: Floats, b: Floats) -> Floats:
+    """The larger of two differences, from (2, ...)."""
+    return np.asarray(np.abs(b - a).max(axis=0))

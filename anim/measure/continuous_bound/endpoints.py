@@ -1,0 +1,86 @@
+"""Vectors at both ends of every gap: values, slopes and second derivatives, one-sided, as tracks have them there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import hermite
+from anim.measure.continuous_bound.derivative_bounds import majorant
+from anim.measure.continuous_bound.intervals import Gaps, Placed
+from anim.model import Interpolation
+from anim.sampling.batch import Batch
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """What U vectors of C components do at both ends (2) of G gaps: value, slope per s, bend per s², each
+    (2, C, G, U). Within a gap the third derivative is constant: it is a line or a cubic."""
+
+    value: Floats
+    slope: Floats
+    bend: Floats
+
+
+def ends(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Gaps) -> Ends:
+    """Return what vectors do that are at `rest` (U, C) where no track moves them.
+
+    place: for numbers of nodes which of the vectors each is.
+    """
+    shape = (2, rest.shape[1], len(where), len(rest))
+    found = Ends(np.broadcast_to(rest.T[:, None], shape).copy(), np.zeros(shape), np.zeros(shape))
+    for batch in tracks:
+        columns = [place[track.node] for track in batch.tracks if track.node is not None]
+        for whole, part in zip((found.value, found.slope, found.bend), of_batch(batch, where), strict=True):
+            whole[..., columns] = part
+    return found
+
+
+def of_batch(batch: Batch, where: Gaps) -> tuple[Floats, Floats, Floats]:
+    """Return values, slopes and bends (2, C, G, U) of the U tracks of a batch, rotations as they are mixed."""
+    at = where.on(batch.times)
+    start, end = (np.moveaxis(batch.values[k], -1, 0) for k in (at.left, at.right))  # (C, G, U)
+    if batch.interpolation is Interpolation.STEP:
+        nothing = np.zeros((2, *start.shape))
+        return np.stack((start, start)), nothing, nothing
+    if batch.tangents is not None:
+        return _cubic(batch.tangents, at, start, end)
+    shares = np.stack((at.start, at.end))[:, None, :, None]
+    whole = np.where(at.inside, at.duration, np.inf)[:, None]
+    slope = np.broadcast_to((end - start) / whole, (2, *start.shape))
+    return start + shares * (end - start), slope, np.zeros_like(slope)
+
+
+def swings(of: Ends, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
+    """Return bounds (3, ...) of the sizes of a vector and its first two derivatives in every gap.
+
+    lengths: (G,) s. size: of vectors (C, G, U); convex, as norms are.
+    """
+    h = lengths[:, None]
+    bend = np.maximum(*map(size, of.bend))
+    jerk = size(of.bend[1] - of.bend[0])  # times the gap's length
+    slope = np.maximum(*map(size, of.slope)) + h / 8 * jerk
+    return np.stack((np.maximum(*map(size, of.value)) + h * h / 8 * bend, slope, bend))
+
+
+def slides(first: Ends, second: Ends, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
+    """Return the majorant (3, 2, ...) of a vector in two versions. lengths, size: as of `swings`."""
+    apart = Ends(second.value - first.value, second.slope - first.slope, second.bend - first.bend)
+    return majorant(swings(first, lengths, size), swings(apart, lengths, size))
+
+
+def _cubic(tangents: tuple[Floats, Floats], at: Placed, start: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:
+    arriving, leaving = tangents
+    duration = at.duration[:, None]
+    out, into = np.moveaxis(leaving[at.left], -1, 0), np.moveaxis(arriving[at.right], -1, 0)
+    piece = (start, duration * out, end, duration * into)
+    shares = np.stack((at.start, at.end))[:, None, :, None]
+    inside = at.inside[:, None]
+    whole = np.where(inside, duration, 1.0)
+    value = hermite.evaluate(shares, *piece)
+    slope = np.where(inside, hermite.first_derivative(shares, *piece) / whole, 0.0)
+    bend = np.where(inside, hermite.second_derivative(shares, *piece) / whole**2, 0.0)
+    return value, slope, bend

@@ -1,0 +1,52 @@
+"""By how much vertices can be displaced more between times than at them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.measure.continuous_bound.influence_radius import Reach
+from anim.measure.continuous_bound.intervals import gaps
+from anim.measure.continuous_bound.node_bounds import in_world
+from anim.measure.continuous_bound.second_derivative import bending
+from anim.measure.continuous_bound.track_partition import sides
+from anim.model import Clip, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Rises:
+    """Of C groups, between each of F times and the next (C, F − 1), in m; inf where nothing is known.
+
+    rise: by how much displacements can exceed the larger one of both ends. jump: by how much the displacement just
+    before the later time can exceed the one at it.
+    """
+
+    rise: Floats
+    jump: Floats
+
+
+def rises(
+    scenes: tuple[Scene, Scene],
+    clips: tuple[Clip, Clip],
+    times: Floats,
+    reaches: Sequence[Reach],
+    players: Sequence[str],
+) -> Rises:
+    """Return how far the displacement of one clip from the other can rise between `times` (F,) in s, two or more.
+
+    times: increasing, with all keys of both clips that are between them, and the last moment before each STEP key.
+    reaches: of all surfaces, their groups in order. players: keys of `laws.LAWS`; what is returned is true of each.
+    Source: |f(t)| ≤ max(|f(0)|, |f(h)|) + h²/8 · sup|f″|, as f less its chord is at most that long.
+    """
+    first, second = sides(scenes, clips)
+    where = gaps(times, *clips)
+    with np.errstate(all="ignore"):  # what has no bound is inf or nan
+        nodes = in_world(first, second, where, players=players)
+        each = [bending(reach, nodes, first, second, where) for reach in reaches]
+        number, length = where.number(times[:-1]), np.diff(times)
+        rise = np.concatenate([one.bend for one in each])[:, number] * (length * length / 8)
+    jump = np.concatenate([one.jump for one in each])[:, number] * (where.ends[number] == times[1:])
+    return Rises(*(np.where(np.isfinite(one), one, np.inf) for one in (rise, jump)))

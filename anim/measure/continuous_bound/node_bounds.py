@@ -1,0 +1,130 @@
+"""Majorants of where nodes are in their parents' spaces and in the world, in two versions of a clip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.measure.continuous_bound.derivative_bounds import product, resting
+from anim.measure.continuous_bound.endpoints import ends, slides
+from anim.measure.continuous_bound.intervals import Gaps
+from anim.measure.continuous_bound.rotation_bounds import rotations
+from anim.measure.continuous_bound.rotation_endpoints import turns
+from anim.measure.continuous_bound.track_partition import Side
+from anim.sampling.batch import Batch
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Majorants of N nodes in G gaps, without what they hang on or with it: of matrices and of origins, in m,
+    (3, 2, N, G). jumps: (1 or 2, N, G), how far both versions' matrices and origins jump where the gap ends.
+    """
+
+    matrices: Floats
+    origins: Floats
+    jumps: Floats
+
+
+def in_world(first: Side, second: Side, where: Gaps, *, players: Sequence[str]) -> Places:
+    """Return the majorants of all nodes in the world, of what any of the players shows.
+
+    Both versions have the same hierarchy. players: keys of `laws.LAWS`.
+    """
+    local = in_parents(first, second, where, players=players)
+    matrices, origins = np.empty_like(local.matrices), np.empty_like(local.origins)
+    jumps = np.zeros((2, *local.jumps.shape[1:]))
+    for depth, nodes in enumerate(first.skeleton.levels()):
+        own, origin, leap = local.matrices[:, :, nodes], local.origins[:, :, nodes], local.jumps[0, nodes]
+        if depth == 0:
+            matrices[:, :, nodes], origins[:, :, nodes], jumps[0, nodes] = own, origin, leap
+            continue
+        above = first.skeleton.parents[nodes]
+        parent = matrices[:, :, above]
+        matrices[:, :, nodes] = product(parent, own)
+        origins[:, :, nodes] = origins[:, :, above] + product(parent, origin)
+        if local.jumps.any():
+            jumps[0, nodes] = jumps[0, above] * (own[0, 1] + leap) + parent[0, 1] * leap
+            jumps[1, nodes] = jumps[1, above] + jumps[0, above] * origin[0, 1]
+    return Places(matrices, origins, jumps)
+
+
+def in_parents(first: Side, second: Side, where: Gaps, *, players: Sequence[str]) -> Places:
+    """Return the majorants of all nodes in their parents' spaces. Parameters as of `in_world`."""
+    matrices, jumps = _rotations(first, second, where, players)
+    scales = _vectors(first, second, where, "scale", _most)
+    matrices, jumps = product(matrices, scales), jumps * scales[0, 1]
+    origins = _vectors(first, second, where, "translation", _length)
+    skewed = first.skeleton.sheared
+    if len(skewed):
+        a, b = first.skeleton.sheared_local, second.skeleton.sheared_local
+        matrices[:, :, skewed] = resting(_norm(a[..., :3]), _norm((b - a)[..., :3]))[..., None]
+        origins[:, :, skewed] = resting(_length(a[..., 3].T), _length((b - a)[..., 3].T))[..., None]
+    return Places(matrices, origins, jumps[None])
+
+
+def _rotations(first: Side, second: Side, where: Gaps, players: Sequence[str]) -> tuple[Floats, Floats]:
+    """Majorants (3, 2, N, G) of all nodes' rotations, and jumps (N, G)."""
+    a, b = first.skeleton.rotation, second.skeleton.rotation
+    square = (a * a).sum(axis=1)
+    found = np.repeat(resting(square + np.abs(1 - square))[..., None], len(where), axis=-1)
+    jumps = np.zeros(found.shape[2:])
+    for nodes, tracks, gaps in _groups(first, second, "rotation", where):
+        place = {node: i for i, node in enumerate(nodes.tolist())}
+        some, leaps = rotations(
+            turns(a[nodes], tracks[0], place, gaps, players=players),
+            turns(b[nodes], tracks[1], place, gaps, players=players),
+            gaps.lengths,
+        )
+        found[:, :, nodes], jumps[nodes] = np.swapaxes(some, -1, -2), leaps.T
+    return found, jumps
+
+
+def _vectors(first: Side, second: Side, where: Gaps, path: str, size: Callable[[Floats], Floats]) -> Floats:
+    """Majorants (3, 2, N, G) of all nodes' translations or scales."""
+    a, b = getattr(first.skeleton, path), getattr(second.skeleton, path)
+    found = np.repeat(resting(size(a.T))[..., None], len(where), axis=-1)
+    for nodes, tracks, gaps in _groups(first, second, path, where):
+        place = {node: i for i, node in enumerate(nodes.tolist())}
+        both = ends(a[nodes], tracks[0], place, gaps), ends(b[nodes], tracks[1], place, gaps)
+        found[:, :, nodes] = np.swapaxes(slides(*both, gaps.lengths, size), -1, -2)
+    return found
+
+
+def _groups(
+    first: Side, second: Side, path: str, where: Gaps
+) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Gaps]]:
+    """Nodes that move in either version, with their tracks and all gaps; then those that do not, but are held somewhere
+    by a track or rest elsewhere in the second version, with one gap, which is like any other."""
+    moving = (_of_path(first.moving, path), _of_path(second.moving, path))
+    movers = _nodes(*moving)
+    if len(movers):
+        yield movers, moving, where
+    still = (_of_path(first.still, path), _of_path(second.still, path))
+    apart = np.flatnonzero((getattr(first.skeleton, path) != getattr(second.skeleton, path)).any(axis=1))
+    others = np.setdiff1d(np.union1d(_nodes(*still), apart), movers)
+    if len(others):
+        yield others, still, where.first
+
+
+def _of_path(tracks: list[Batch], path: str) -> list[Batch]:
+    return [batch for batch in tracks if batch.path == path]
+
+
+def _nodes(*tracks: list[Batch]) -> Ints:
+    found = {track.node for side in tracks for batch in side for track in batch.tracks if track.node is not None}
+    return np.array(sorted(found), np.int64)
+
+
+def _length(vectors: Floats) -> Floats:
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=0)))
+
+
+def _most(vectors: Floats) -> Floats:
+    return np.asarray(np.abs(vectors).max(axis=0))
+
+
+def _norm(matrices: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(matrices, 2, axis=(-1, -2)))

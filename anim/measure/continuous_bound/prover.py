@@ -1,0 +1,121 @@
+"""A bound on how far two versions of a clip are apart at every time, not only where it was looked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.measure.continuous_bound.arcs import LAWS
+from anim.measure.continuous_bound.influence_radius import joined, reach
+from anim.measure.continuous_bound.interval_rise import rises
+from anim.measure.continuous_bound.refinement import Seen, again, cuts
+from anim.measure.error.metric import NOISE, Look, MotionError, Ruler
+from anim.model import Clip
+
+NEAR = 0.01  # of the largest distance: a bound this close to it is as good
+FINEST = 128  # parts that a stretch between two times is cut into at most
+BLOCK = 1_000_000  # players × stretches × groups and nodes at once, each some 100 bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What is known of every time of a clip.
+
+    bound: m, no vertex is displaced more at any time, but for rounding; None where nothing could be proven.
+    error, player: the largest distance that was seen, for a proof may look where nobody has looked before.
+    """
+
+    bound: float | None
+    error: MotionError
+    player: str
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """What to prove. found: m, the largest distance so far. room: m, how far above it the bound may be."""
+
+    found: float
+    room: float
+
+
+class Prover:
+    """Proves bounds for clips on a ruler's scenes: what depends on no clip is prepared once."""
+
+    def __init__(self, ruler: Ruler) -> None:
+        self.ruler = ruler
+        found = [(part, reach(part)) for part in ruler.parts if len(part.groups)]
+        plain = [(part, each) for part, each in found if each is not None and each.morphing is None]
+        others = [(part, each) for part, each in found if each is not None and each.morphing is not None]
+        self._reaches = [joined([each for _, each in plain])] if plain else []
+        self._reaches += [each for _, each in others]
+        self._parts = [part for part, _ in (*plain, *others)]
+        self._order = [ruler.parts.index(part) for part in self._parts]
+        a, b = ruler.scene.skeleton, ruler.other.skeleton
+        same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
+        self._knows_all = same and len(self._parts) == len(found)
+
+    def certified(
+        self, before: Clip, after: Clip, times: Floats, looks: Mapping[str, Look], *, enough: float | None = None
+    ) -> Proof:
+        """Return a bound on how far any vertex is displaced at any time, whoever of the players shows it.
+
+        It is at most 1 % above what is seen, unless stretches between times would have to be cut too finely for that.
+        times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
+        `error.dense_times`. looks: what was seen there, by player. enough: m, where that is less than 1 % above what is
+        seen, the bound is to be no more than that.
+        Nothing is proven where the scenes are not of one hierarchy, or for other players than those of `laws.LAWS`; nor
+        where quaternions run through zero or turn too far between two times.
+        """
+        player, worst = max(((name, look.error) for name, look in looks.items()), key=lambda each: each[1].max_error)
+        if not self._knows_all or not set(looks) <= set(LAWS):
+            return Proof(None, worst, player)
+        bound = worst.max_error
+        room = max(bound * NEAR, NOISE * self.ruler.diagonal)
+        aim = Aim(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
+        seen = Seen()
+        for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(looks))):
+            stretch = slice(start, start + self._length(len(looks)) + 1)
+            closed, other = self._proven((before, after), times[stretch], _limits(looks, self._order, stretch), aim)
+            bound = max(bound, closed, other.bound)
+            seen = max(seen, other, key=lambda each: each.largest)
+        if seen.largest > worst.max_error:
+            found = self.ruler.error_at(before, after, np.array([seen.time]), player=seen.player)
+            pointers, pointer = worst.max_pointer_error, worst.pointer
+            player = seen.player
+            worst = replace(found, times=worst.times + 1, max_pointer_error=pointers, pointer=pointer)
+        bound = max(bound, worst.max_error)
+        return Proof(bound if np.isfinite(bound) else None, worst, player)
+
+    def _length(self, players: int) -> int:
+        """How many stretches are gone through at once."""
+        groups = sum(len(part.groups) for part in self._parts)
+        return max(BLOCK // (players * (groups + len(self.ruler.scene.skeleton)) + 1), 8)
+
+    def _proven(
+        self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: Aim
+    ) -> tuple[float, Seen]:
+        """What bounds all stretches that need no second look, and what that shows of the others."""
+        scenes = self.ruler.scene, self.ruler.other
+        risen = rises(scenes, clips, times, self._reaches, list(limits))
+        closed, asked = 0.0, []
+        for player, each in limits.items():
+            tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise
+            is_open = tops > aim.found + aim.room
+            closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
+            if is_open.any():
+                parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.room))
+                finest = np.clip(parts, 1, FINEST).astype(np.int64)
+                asked.append(cuts(player, times, risen.rise, is_open, finest))
+        return closed, again(self.ruler, clips, asked, self._parts, target=aim.found + aim.room)
+
+
+def _limits(looks: Mapping[str, Look], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
+    """What no displacement of groups exceeds at some times, by player in the order of LAWS."""
+    return {
+        player: np.concatenate([looks[player].limits[i][:, stretch] for i in order]).astype(np.float64)
+        for player in LAWS
+        if player in looks
+    }

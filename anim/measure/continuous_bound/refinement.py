@@ -1,0 +1,117 @@
+"""A second look, at times between those of the first, where displacements may have risen above what was seen there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.measure.error.displacement import CHUNK, Field, lengths
+from anim.measure.error.metric import MAX_SEARCHED, Ruler
+from anim.measure.error.point_groups import Measured
+from anim.model import Clip
+
+
+@dataclass(frozen=True, slots=True)
+class Cuts:
+    """Stretches between neighboring times of the first look, cut into equal parts, for one player.
+
+    times: (T,) s, all ends of all parts; the last of a stretch is the moment before its end. more: (C, T) m, by how
+    much the displacement of a group can rise around each within a part; nan where that stretch is not asked for.
+    """
+
+    player: str
+    times: Floats
+    more: Floats
+
+    def some(self, start: int, end: int) -> Cuts:
+        """Return those from number `start` up to `end`."""
+        here = slice(max(start, 0), max(end, 0))
+        return Cuts(self.player, self.times[here], self.more[:, here])
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a second look shows.
+
+    bound: m, nothing is displaced more in any stretch. largest: m, the longest displacement that was seen. player,
+    time: whose, and when, in s.
+    """
+
+    bound: float = 0.0
+    largest: float = 0.0
+    player: str = ""
+    time: float = 0.0
+
+
+def cuts(player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints) -> Cuts:
+    """Return stretches between neighbors among `times` (F,) in s, each cut into some of `parts` (F − 1,).
+
+    rise: (C, F − 1) m of groups in whole stretches. asked: (C, F − 1), which of them to look at for which groups.
+    """
+    stretches = np.flatnonzero(asked.any(axis=0))
+    counts = parts[stretches] + 1
+    whole, stretch = np.repeat(parts[stretches], counts), np.repeat(stretches, counts)
+    step = np.arange(len(whole)) - np.repeat(np.cumsum(counts) - counts, counts)
+    start, end = times[stretch], times[stretch + 1]
+    at = np.where(step == whole, np.nextafter(end, start), start + (end - start) * (step / whole))
+    return Cuts(player, at, np.where(asked, rise, np.nan)[:, stretch] / whole**2)
+
+
+def again(
+    ruler: Ruler, clips: tuple[Clip, Clip], asked: Sequence[Cuts], parts: Sequence[Measured], *, target: float
+) -> Seen:
+    """Return what a second look shows of the displacement of one clip from the other.
+
+    asked: of every player. parts: whose groups they are about, in order. target: m; where nothing can be displaced
+    more, no vertex is looked at.
+    """
+    seen, left = Seen(), MAX_SEARCHED
+    for chunk in _chunks(asked, ruler.length):
+        old, new = ruler.posed(*clips, [(each.player, each.times) for each in chunk])
+        more = np.concatenate([each.more for each in chunk], axis=1)
+        first = 0
+        for part in parts:
+            here = more[first : first + len(part.groups)]
+            first += len(part.groups)
+            if np.isnan(here).all():
+                continue
+            field = part.field(old, new)
+            if field is None:
+                continue
+            bound, largest, frame, looked = _searched(field, here, target, left)
+            left -= looked
+            seen = replace(seen, bound=max(seen.bound, bound))
+            if largest > seen.largest:
+                players = np.repeat([each.player for each in chunk], [len(each.times) for each in chunk])
+                seen = Seen(seen.bound, largest, str(players[frame]), float(old.pose.times[frame]))
+    return seen
+
+
+def _chunks(asked: Sequence[Cuts], length: int) -> Iterator[list[Cuts]]:
+    """Cuts of all players, up to `length` times at once."""
+    firsts = np.cumsum([0, *(len(each.times) for each in asked)]).tolist()
+    for start in range(0, firsts[-1], length):
+        some = (each.some(start - first, start + length - first) for each, first in zip(asked, firsts, strict=False))
+        yield [each for each in some if len(each.times)]
+
+
+def _searched(field: Field, more: Floats, target: float, most: int) -> tuple[float, float, int, int]:
+    """What bounds all groups, the longest vector, its frame, and how many were looked at, of `most` at most."""
+    tops = field.limits + more
+    found, frame, looked = 0.0, 0, 0
+    for group in np.flatnonzero((tops > target).any(axis=1)).tolist():
+        frames = np.flatnonzero(tops[group] > target)
+        vertices = len(field.vectors(group, frames[:1]))
+        size = max(CHUNK // max(vertices, 1), 1)
+        for some in (frames[i : i + size] for i in range(0, len(frames), size)):
+            if looked > most:
+                break
+            longest = lengths(field, group, some).max(axis=0)
+            looked += vertices * len(some)
+            tops[group, some] = longest + more[group, some]
+            if longest.max() > found:
+                found, frame = float(longest.max()), int(some[longest.argmax()])
+    return float(np.nanmax(tops)), found, frame, looked

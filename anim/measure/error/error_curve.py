@@ -1,0 +1,60 @@
+"""How the distance between two versions of a clip goes over time, and which joints make it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.measure.error.displacement import CHUNK, Field, lengths
+from anim.measure.error.metric import FPS, Ruler, dense_times
+from anim.model import Clip
+
+JOINTS = 4  # the worst ones that are told apart
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What one joint does: the largest displacement (F,) in m of a vertex that it carries most of."""
+
+    joint: str
+    error: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """One clip. times: (F,) s. error: (F,) m, the largest displacement of any vertex. joints: worst first."""
+
+    name: str
+    times: Floats
+    error: Floats
+    joints: tuple[Course, ...]
+
+
+def profile(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Profile:
+    """Return how far `after` is from `before` at each time that `dense_times` gives, as a player shows them."""
+    times = dense_times(before, after, fps=fps)
+    courses: dict[int, Floats] = {}
+    first = 0
+    for block in ruler.blocks(before, after, times, player=player):
+        for part in ruler.parts:
+            field = part.field(block.old, block.new)
+            if field is None:
+                continue
+            for group, vertices in enumerate(part.groups):
+                course = courses.setdefault(part.leader(group), np.zeros(len(times)))
+                here = course[first : first + len(block.times)]
+                np.maximum(here, _largest(field, group, len(vertices), len(here)), out=here)
+        first += len(block.times)
+    worst = sorted(courses, key=lambda node: -float(courses[node].max()))[:JOINTS]
+    error = np.max(list(courses.values()), axis=0) if courses else np.zeros(len(times))
+    moving = (Course(ruler.called(node), courses[node]) for node in worst if courses[node].any())
+    return Profile(before.name, times, error, tuple(moving))
+
+
+def _largest(field: Field, group: int, vertices: int, frames: int) -> Floats:
+    """The largest length (F,) of a vector of the group in each frame."""
+    size = max(CHUNK // vertices, 1)
+    starts = range(0, frames, size)
+    return np.concatenate([lengths(field, group, np.arange(i, min(i + size, frames))).max(axis=0) for i in starts])

@@ -1,0 +1,220 @@
+"""How far apart two versions of a clip are, in metres on the surface: where, and when.
+
+What is reported is never less than the truth at the times looked at. Times are gone through in blocks, so that memory
+stays the same however long the clip is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Floats, sorted_unique
+from anim.measure.compare.correspondence import Pairs, paired
+from anim.measure.error.displacement import longest
+from anim.measure.error.point_groups import Measured, Part, Posed
+from anim.measure.error.pointer_error import pointer_error
+from anim.measure.error.shell_points import Shells, hidden
+from anim.measure.error.surface import diagonal, has_vertices, surfaces
+from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
+from anim.sampling.players import pair, played, sampler
+from anim.sampling.pose import Poses
+from anim.sampling.times import grid
+
+NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
+SLACK = 1.001  # a bound this close to what was found is as good as found
+MAX_SEARCHED = 40_000_000  # vertices gone through per surface and block; beyond, the bound of what is left is reported
+BLOCK = 40_000  # matrices of nodes at once, each some 600 bytes with what is made from it
+SAME_MOMENT = 1e-6  # s; times nearer than this are one, written as float32 and as float64
+FPS = 120.0  # frames per second of the grid that shows what lies between keys
+
+
+@dataclass(frozen=True, slots=True)
+class MotionError:
+    """The largest distance between two versions of a clip.
+
+    max_error: m, never less than the true one at the times looked at. time: s. place: the mesh or node.
+    joint: the joint that contributes most there. times: how many were looked at.
+    max_pointer_error: largest difference in the value of a track that moves no node, as a share of its range.
+    vertex: its number in the mesh, −1 of a node's shell or where the error is too small to be searched for.
+    """
+
+    max_error: float
+    time: float
+    place: str
+    joint: str
+    times: int
+    max_pointer_error: float = 0.0
+    pointer: str = ""
+    vertex: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What was seen at some times (F,).
+
+    limits: of each part of the ruler (G, F) in m, no vertex of a group is displaced more; 0 of what nothing carries. In
+    float32, for there are many.
+    """
+
+    error: MotionError
+    limits: Sequence[NDArray[np.float32]]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Some of the times (F,) in s, both versions posed there."""
+
+    times: Floats
+    old: Posed
+    new: Posed
+
+
+class Ruler:
+    """Measures clips on one scene, or on two that show the same thing: what depends on no clip is prepared once.
+
+    other: the scene that the second clip is of: another rest pose, other numbers of nodes, another file. What is
+    carried through both is the first scene's surface, so that only motion counts
+    (`anim.measure.compare.correspondence`).
+    shell: as a share of the diagonal, the distance of six points around each node that moves no vertex; None leaves
+    such nodes out of account, but in a scene without any vertex: that is measured at cubes on its nodes then.
+    """
+
+    def __init__(self, scene: Scene, other: Scene | None = None, *, shell: float | None = None) -> None:
+        self.scene, self.other = scene, other or scene
+        self.diagonal = diagonal(scene)
+        found = surfaces(scene) if shell is None or has_vertices(scene) else []
+        self.pairs: Pairs = paired(scene, self.other, found)
+        self.parts: list[Measured] = [Part(*each) for each in self.pairs.surfaces]
+        if shell is not None:
+            nodes = np.flatnonzero(hidden(scene.skeleton, found) & (self.pairs.nodes >= 0))
+            self.parts.append(Shells(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
+
+    def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
+        """Return how far `after` is from `before`: at all keys of both, and half-way between."""
+        return self.error_at(before, after, check_times(before, after), player=player)
+
+    def error_at(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> MotionError:
+        """Return how far `after` is from `before` at `times` (F,) in seconds.
+
+        player: a name in PLAYERS, who plays both of them; or two, "spec,nlerp", for `before` and `after`.
+        """
+        return self._looked(before, after, times, player, None)
+
+    def look(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> Look:
+        """Return what `error_at` does, with limits for all times and groups of vertices."""
+        limits = [np.zeros((len(part.groups), len(times)), np.float32) for part in self.parts]
+        return Look(self._looked(before, after, times, player, limits), limits)
+
+    def _looked(
+        self, before: Clip, after: Clip, times: Floats, player: str, limits: Sequence[NDArray[np.float32]] | None
+    ) -> MotionError:
+        """What `error_at` returns. limits: to be filled with what `Look` has, or None."""
+        size, frame, place, joint, vertex = 0.0, 0, "", -1, -1
+        first = 0
+        for block in self.blocks(before, after, times, player=player):
+            shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.parts))
+            fields = [(i, field) for i, field in shown if field is not None]
+            for i, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
+                part = self.parts[i]
+                found = longest(field, floor=max(size, NOISE * self.diagonal), slack=SLACK, most=MAX_SEARCHED)
+                if limits is not None:
+                    limits[i][:, first : first + len(block.times)] = _rounded_up(found.limits)
+                if found.length > size:
+                    size, frame, vertex = found.length, first + found.frame, part.vertex(found)
+                    joint = part.node(field.joint(found.group, found.frame, found.vertex))
+                    place = part.name or self.called(joint)
+            first += len(block.times)
+        time = float(times[frame]) if len(times) else 0.0
+        share, pointer = pointer_error(before, after, times)
+        return MotionError(size, time, place, self.called(joint), len(times), share, pointer, vertex)
+
+    def blocks(
+        self, before: Clip, after: Clip, times: Floats, *, player: str = "spec", overlap: int = 0
+    ) -> Iterator[Block]:
+        """Yield `times` (F,) in s a block after the other, both clips posed there by a player, or one by each of two.
+
+        overlap: how many of a block's last times the next one starts with.
+        """
+        old, new = (
+            played(scene.skeleton, clip, player=name)
+            for scene, clip, name in zip((self.scene, self.other), (before, after), pair(player), strict=True)
+        )
+        for start in range(0, max(len(times) - overlap, 1), self.length):
+            chosen = times[start : start + self.length + overlap]
+            poses = old.at(chosen), new.at(chosen)
+            yield Block(chosen, Posed(self.scene.skeleton, poses[0]), Posed(self.other.skeleton, poses[1]))
+
+    @property
+    def length(self) -> int:
+        """How many times are posed at once."""
+        matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
+        return max(BLOCK // max(matrices, 1), 8)
+
+    def posed(self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]) -> tuple[Posed, Posed]:
+        """Return both clips posed at some times (F,) in s by one player, at others by the next, all in one.
+
+        asked: names in PLAYERS, each with its times; not more times than `length` on the whole.
+        """
+        return _posed(self.scene.skeleton, before, asked), _posed(self.other.skeleton, after, asked)
+
+    def called(self, node: int) -> str:
+        """Return how reports call a node of the scene before: by its name, or "node 7"; nothing for −1."""
+        return (self.scene.skeleton.names[node] or f"node {node}") if node >= 0 else ""
+
+
+def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> Posed:
+    poses = Poses(skeleton, clip)
+    each = [poses.sampled(sampler(player)).at(times) for player, times in asked]
+    weights = {node: np.concatenate([one.weights[node] for one in each]) for node in each[0].weights}
+    return Posed(
+        skeleton,
+        Pose(
+            np.concatenate([one.times for one in each]),
+            np.concatenate([one.translation for one in each]),
+            np.concatenate([one.rotation for one in each]),
+            np.concatenate([one.scale for one in each]),
+            weights,
+        ),
+    )
+
+
+def _rounded_up(values: Floats) -> NDArray[np.float32]:
+    """The values as float32, none less than it is."""
+    near = values.astype(np.float32)
+    return np.where(near < values, np.nextafter(near, np.float32(np.inf)), near)
+
+
+def check_times(*clips: Clip) -> Floats:
+    """Return every key time of the clips and the middle of every gap, in seconds, increasing."""
+    axes = [times for clip in clips for times in clip.axes]
+    if not axes:
+        return np.zeros(1)
+    keys = sorted_unique(np.concatenate(axes))
+    return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
+
+
+def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
+    """Return what `check_times` does, a grid of `fps` frames per second, and the last moment before each STEP key, in
+    seconds, increasing.
+
+    The grid has 0 s on it, and begins with the last frame before the first key: that shows what all earlier ones do.
+    Frames that only rounding keeps apart from a key are that key.
+    """
+    steps = {
+        id(track.times): track.times
+        for clip in clips
+        for track in clip.tracks
+        if track.interpolation is Interpolation.STEP and len(track.times) > 1
+    }
+    before = [np.nextafter(times[1:], 0) for times in steps.values()]
+    end = max((clip.end for clip in clips), default=0.0)
+    keys = check_times(*clips)
+    frames = grid(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
+    after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
+    apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
+    return sorted_unique(np.concatenate((keys, frames[apart > SAME_MOMENT], *before)))

@@ -1,0 +1,204 @@
+"""One surface in two versions: how far its vertices can be apart, and how far they are, vertex by vertex.
+
+A displacement |D·p| is convex in p, so over a box it is largest at a corner, and over a blend of joints no larger than
+the largest joint's. That bounds every time cheaply. Where skin is not morphed the displacement is linear in the joints'
+matrices, so that one product of matrices gives it for many vertices and times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.maths import matrix
+from anim.measure.error.displacement import Field, Groups, Linear, Longest, Morphed
+from anim.measure.error.morph_bounds import SIDES, Change, MorphBounds
+from anim.measure.error.surface import Surface, morphed, skinned
+from anim.model import Pose, Skeleton
+from anim.sampling.pose import world_by_node
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What carries a surface in one version of the scene.
+
+    nodes: (J,) the joints, −1 for the world itself. bind: (J, 3, 4) joint_from_mesh.
+    owner: the node whose morph weights count, −1 for none. rest_weights: (M,), where no track moves them.
+    """
+
+    nodes: Ints
+    bind: Floats
+    owner: int
+    rest_weights: Floats
+
+    def weights(self, pose: Pose) -> Floats:
+        """Return the morph weights (F, M) of a pose."""
+        found = pose.weights.get(self.owner)
+        if found is not None and found.shape[1] == len(self.rest_weights):
+            return found
+        return np.broadcast_to(self.rest_weights, (len(pose.times), len(self.rest_weights)))
+
+
+class Posed:
+    """One version at F times: its pose, and world matrices (N, F, 3, 4), worked out where they are asked for."""
+
+    def __init__(self, skeleton: Skeleton, pose: Pose) -> None:
+        self.skeleton, self.pose = skeleton, pose
+
+    @cached_property
+    def world(self) -> Floats:
+        """World matrices (N, F, 3, 4)."""
+        return world_by_node(self.skeleton, self.pose)
+
+    def of(self, nodes: Ints) -> Floats:
+        """Return the world matrices (J, F, 3, 4) of some nodes; −1 is the world itself."""
+        found: Floats = self.world[nodes]
+        found[nodes < 0] = np.eye(4)[:3]
+        return found
+
+
+class Measured(Protocol):
+    """Points that move together: those of a mesh, or shells. name: of the mesh, empty where each group has its own."""
+
+    @property
+    def groups(self) -> Sequence[Ints]:
+        """Numbers of the points (V_g,) of each group."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Name of the mesh or node, for reports; empty where each group has its own."""
+        ...
+
+    def field(self, old: Posed, new: Posed) -> Field | None:
+        """Return how far every point is displaced at every time, None where there is none."""
+        ...
+
+    def weights(self, old: Posed, new: Posed) -> list[tuple[int, Floats, Floats]]:
+        """Return the nodes whose morph weights count, in the scene before, with the weights (F, M) of both versions."""
+        ...
+
+    def leader(self, group: int) -> int:
+        """Return the number of the node that carries most of a group, in the scene before."""
+        ...
+
+    def node(self, joint: int) -> int:
+        """Return the number of the node that a joint of the field is, in the scene before."""
+        ...
+
+    def vertex(self, found: Longest) -> int:
+        """Return the number in the mesh of the vertex that was found, −1 where it is none."""
+        ...
+
+
+class Part:
+    """A surface, its vertices in groups by the joint that carries most of each, and boxes around what joints carry.
+
+    new: what carries the surface in the second version, where that is not the same.
+    used: numbers of the joints that carry anything. reach: of each group the joints that carry some of it, as places in
+    `used`. share: the largest sum of skin weights of a vertex.
+    """
+
+    def __init__(self, surface: Surface, new: Carried | None = None) -> None:
+        self.surface = surface
+        self.old = Carried(surface.nodes, surface.bind, surface.owner, surface.rest_weights)
+        self.new = new or self.old
+        self.share = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
+        carrying = surface.weights > 0
+        self.used = np.array(sorted(set(surface.joints[carrying].tolist())), np.int64)
+        place = np.full(len(surface.nodes), -1)
+        place[self.used] = np.arange(len(self.used))
+        self._influences = np.where(carrying, place[surface.joints], 0)  # (V, I), into `used`
+        found = self._grouped(carrying)
+        self._leaders, self.groups = list(found), list(found.values())
+        self.reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
+        rest = surface.points + np.tensordot(surface.rest_weights, surface.targets, axes=1)
+        products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
+        self._still = Groups(self.reach, products, self._boxes(rest), self.share)
+        corners = self._boxes(surface.points) if len(surface.targets) else self._still.corners
+        self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.share)
+
+    def field(self, old: Posed, new: Posed) -> Field | None:
+        """Return how far every vertex is displaced at every time, None where nothing carries any."""
+        if not self.groups or not len(old.pose.times):
+            return None
+        after = matrix.multiply(new.of(self.new.nodes[self.used]), self.new.bind[self.used][:, None])
+        moved = after - matrix.multiply(old.of(self.old.nodes[self.used]), self.old.bind[self.used][:, None])
+        before_weights, after_weights = self.old.weights(old.pose), self.new.weights(new.pose)
+        rest = self.surface.rest_weights
+        if (before_weights == rest).all() and (after_weights == rest).all():
+            return Linear(self._still, moved)
+        change = Change(moved, after, before_weights, after_weights)
+        return Morphed(
+            self._boxed.sizes(change),
+            (self._still.reach, self.groups),
+            displaced=lambda frames: self._displaced(frames, old, new),
+            rates=lambda step: self._boxed.rates(change, step),
+        )
+
+    def weights(self, old: Posed, new: Posed) -> list[tuple[int, Floats, Floats]]:
+        """Return the node whose morph weights count, in the scene before, with the weights (F, M) of both versions."""
+        if not len(self.surface.targets):
+            return []
+        return [(self.old.owner, self.old.weights(old.pose), self.new.weights(new.pose))]
+
+    @property
+    def name(self) -> str:
+        """Name of the mesh or node, for reports."""
+        return self.surface.name
+
+    def leader(self, group: int) -> int:
+        """Return the number of the node that carries most of each vertex of a group, in the scene before."""
+        return self.node(self._leaders[group])
+
+    def node(self, joint: int) -> int:
+        """Return the number of the node that a used joint is, in the scene before."""
+        return int(self.old.nodes[self.used[joint]])
+
+    def vertex(self, found: Longest) -> int:
+        """Return the number in the mesh of the vertex that was found, −1 where only a bound was looked at."""
+        return int(self.groups[found.group][found.vertex]) if found.vertex >= 0 else -1
+
+    def _grouped(self, carrying: Bools) -> dict[int, Ints]:
+        """Numbers of the vertices by the joint that carries most of each; those that nothing carries are left out."""
+        if not len(self.used):
+            return {}
+        first = self.surface.weights.argmax(axis=1)
+        leader = np.take_along_axis(self._influences, first[:, None], axis=1)[:, 0]
+        leader = np.where(carrying.any(axis=1), leader, -1)
+        return {joint: group for joint in range(len(self.used)) if len(group := np.flatnonzero(leader == joint))}
+
+    def _boxes(self, points: Floats) -> Floats:
+        """Corners (J, 8, 3) of the box around all vertices that each used joint carries some of."""
+        carrying = self.surface.weights > 0
+        corners = []
+        for joint in range(len(self.used)):
+            carried = points[((self._influences == joint) & carrying).any(axis=1)]
+            corners.append(np.where(SIDES < 0, carried.min(axis=0), carried.max(axis=0)))
+        return np.array(corners).reshape(-1, 8, 3)
+
+    def _products(self, points: Floats, group: Ints, reach: Ints) -> Floats:
+        """What to multiply matrices with (V_g, J_g · 4): skin weight times x, y, z, 1, per joint that reaches."""
+        result = np.zeros((len(group), len(reach), 4))
+        rows = np.arange(len(group))
+        whole = np.column_stack((points[group], np.ones(len(group))))
+        for i in range(self._influences.shape[1]):
+            weights = self.surface.weights[group, i]
+            columns = np.where(weights > 0, np.searchsorted(reach, self._influences[group, i]), 0)
+            result[rows, columns] += np.where(weights > 0, weights, 0)[:, None] * whole
+        return result.reshape(len(group), -1)
+
+    def _displaced(self, frames: Ints, old: Posed, new: Posed) -> Floats:
+        """How every vertex is displaced (V, 3, f) in some frames, morphed and skinned one after the other."""
+        result = np.zeros((*self.surface.points.shape, len(frames)))
+        for carried, posed, sign in ((self.new, new, 1), (self.old, old, -1)):
+            points = morphed(self.surface, carried.weights(posed.pose)[frames])
+            bound = matrix.multiply(posed.of(carried.nodes)[:, frames], carried.bind[:, None])
+            for i in range(len(frames)):
+                result[..., i] += sign * skinned(self.surface, points[i], bound[:, i])
+        return result

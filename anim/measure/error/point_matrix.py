@@ -1,0 +1,155 @@
+"""The points that an error is measured on: vertices with their joints, as one matrix that turns moves of nodes into
+moves of points.
+
+A skinned vertex lies at Σ w·M·b·p: linear in the joints' world matrices M. With one row per vertex and four columns
+per node (x, y, z and 1 of w·b·p), the moves of all vertices at all times are a single matrix product.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.measure.error.shell_points import shells as shells_of
+from anim.measure.error.surface import Surface, has_vertices, surfaces
+from anim.model import Scene
+
+CARRIED = 0.1  # a vertex answers for a node from this much weight on
+DIRECTIONS = np.vstack((np.eye(3), -np.eye(3)))
+CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+ALL_WAYS = np.vstack((DIRECTIONS, CORNERS))
+DENSE = 4_000_000  # numbers; a larger matrix is kept sparse
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """P points on J nodes, each on up to I of them.
+
+    nodes: (J,), increasing. joints: (P, I) into `nodes`. factors: (P, I, 4): weight times the point in the joint's own
+    space, and the weight itself; 0 where a point has fewer joints.
+    """
+
+    nodes: Ints
+    joints: Ints
+    factors: Floats
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def rows(self) -> Rows:
+        """Return the matrix (P, 4 J), float32, that turns stacked columns of node matrices into places."""
+        width = self.joints.shape[1]
+        row = np.repeat(np.arange(len(self)), 4 * width)
+        column = (4 * self.joints[..., None] + np.arange(4)).reshape(-1)
+        shape = (len(self), 4 * len(self.nodes))
+        values = self.factors.astype(np.float32).reshape(-1)
+        if shape[0] * shape[1] > DENSE:
+            from scipy.sparse import csr_array
+
+            return Rows(csr_array((values, (row, column)), shape=shape))
+        dense = np.zeros(shape, np.float32)
+        np.add.at(dense, (row, column), values)
+        return Rows(dense)
+
+    def places(self, world: Floats) -> Floats:
+        """Return where the points are (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
+        matrices = world[self.nodes]
+        places = np.zeros((len(self), world.shape[1], 3))
+        for joint, factor in zip(self.joints.T, np.swapaxes(self.factors, 0, 1), strict=True):
+            places += np.einsum("pfij,pj->pfi", matrices[joint], factor)
+        return places
+
+    def on(self, below: Bools) -> Bools:
+        """Return which points (P,) hang noticeably on the nodes `below` (N,); at all, where none does noticeably."""
+        share = (self.factors[..., 3] * below[self.nodes][self.joints]).sum(axis=1)
+        return np.asarray(share > CARRIED if (share > CARRIED).any() else share > 0)
+
+
+class Rows:
+    """A matrix (P, 4 J), dense or sparse, in front of stacked columns."""
+
+    def __init__(self, matrix: object) -> None:
+        self._matrix = matrix
+
+    def moves(self, columns: Floats) -> Floats:
+        """Return moves (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
+        moved = self._matrix @ columns.astype(np.float32)  # type: ignore[operator]
+        return np.asarray(moved).reshape(len(moved), 3, -1)
+
+
+def stacked(world: Floats, nodes: Ints) -> Floats:
+    """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, then all y, then all z."""
+    chosen = world[nodes]
+    return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), -1)
+
+
+def of_scene(scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int, int]] = frozenset()) -> Points:
+    """Return the vertices of the scene that stick out, and six points around each node in `shells`, `radius` metres
+    off in the rest pose.
+
+    Of vertices: for each joint and each of 14 directions of its space, the farthest of those that it carries most,
+    and of all that it carries noticeably. extra: more of them, (number of the surface, number of the vertex).
+    """
+    found = surfaces(scene) if has_vertices(scene) else []
+    parts = []
+    for number, surface in enumerate(found):
+        wanted = extremes(surface) | {vertex for owner, vertex in extra if owner == number}
+        parts.append(_of_surface(surface, np.array(sorted(wanted), np.int64)))
+    return _joined([*parts, *_shells(scene, shells, radius)])
+
+
+def every(scene: Scene, radius: float) -> Points:
+    """Return all vertices of the scene, surface after surface; where it has none, six points around every node."""
+    if has_vertices(scene):
+        return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in surfaces(scene)])
+    return _joined(_shells(scene, frozenset(range(len(scene.skeleton))), radius))
+
+
+def _shells(scene: Scene, nodes: Set[int], radius: float) -> list[tuple[Ints, Floats]]:
+    around = np.array(sorted(nodes), np.int64)
+    return [_shell(node, ends) for node, ends in zip(around, shells_of(scene.skeleton, around, radius), strict=True)]
+
+
+def _joined(parts: list[tuple[Ints, Floats]]) -> Points:
+    if not parts:
+        return Points(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
+    nodes = np.flatnonzero(np.bincount(np.concatenate([nodes.reshape(-1) for nodes, _ in parts])))
+    width = max(nodes.shape[1] for nodes, _ in parts)
+    joints = [np.pad(np.searchsorted(nodes, own), ((0, 0), (0, width - own.shape[1]))) for own, _ in parts]
+    factors = [np.pad(each, ((0, 0), (0, width - each.shape[1]), (0, 0))) for _, each in parts]
+    return Points(nodes, np.concatenate(joints), np.concatenate(factors))
+
+
+def extremes(surface: Surface) -> set[int]:
+    """Return the numbers of the vertices that stick out on any joint's part of a surface."""
+    chosen: set[int] = set()
+    most = surface.joints[np.arange(len(surface.points)), surface.weights.argmax(axis=1)]
+    noticed = surface.weights > CARRIED
+    for joint in np.unique(surface.joints[surface.weights > 0]).tolist():
+        here = ((surface.joints == joint) & noticed).any(axis=1)
+        for mine in (np.flatnonzero(most == joint), np.flatnonzero(here)):
+            if len(mine):
+                local = surface.points[mine] @ surface.bind[joint][:, :3].T
+                chosen.update(mine[(local @ ALL_WAYS.T).argmax(axis=0)].tolist())
+    return chosen
+
+
+def _of_surface(surface: Surface, vertices: Ints) -> tuple[Ints, Floats]:
+    """Nodes (P, I) and factors (P, I, 4) of some vertices, morphed as at rest."""
+    points = surface.points[vertices]
+    if len(surface.rest_weights):
+        points = points + np.tensordot(surface.rest_weights, surface.targets[:, vertices], axes=1)
+    joints, weights = surface.joints[vertices], surface.weights[vertices]
+    bind = surface.bind[joints]
+    factors = np.ones((*joints.shape, 4))
+    factors[..., :3] = np.einsum("viab,vb->via", bind[..., :3], points) + bind[..., 3]
+    return surface.nodes[joints], factors * weights[..., None]
+
+
+def _shell(node: int, ends: Floats) -> tuple[Ints, Floats]:
+    factors = np.ones((len(ends), 1, 4))
+    factors[:, 0, :3] = ends
+    return np.full((len(ends), 1), node, np.int64), factors

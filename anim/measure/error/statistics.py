@@ -1,0 +1,150 @@
+"""What the largest distance doesn't say of two versions of a clip: the usual distance, the turn, the speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.measure.error.displacement import lengths, longest
+from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, Ruler, dense_times
+from anim.measure.error.shell_points import Shells
+from anim.model import Clip, Pose, Skeleton
+from anim.sampling.times import grid
+
+FRAMES = 64  # times that mean and p99 are taken over
+MOST = 4_000_000  # vertices times frames that they are taken over
+SLACK = 1.01  # the speed error is no more than this above the true one
+STILL = 1e-6  # diagonals per second; no speed error below this is searched for
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """The largest of something: how much, when (s), and where: the mesh or node, the joint, the vertex or −1."""
+
+    size: float = 0.0
+    time: float = 0.0
+    place: str = ""
+    joint: str = ""
+    vertex: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Two versions of a clip, beside the largest distance.
+
+    mean, p99: m, over all vertices at up to 64 of the times, evenly chosen (fewer of very large meshes).
+    angle: rad, the largest turn between the world rotations of a node; over all nodes that are in both scenes.
+    speed: m/s, the largest difference in a vertex's velocity, by differences from frame to frame of a regular grid.
+    weight: the largest difference of a morph weight; its vertex is the number of the target.
+    """
+
+    mean: float
+    p99: float
+    angle: Peak
+    speed: Peak
+    weight: Peak
+
+
+def statistics(
+    ruler: Ruler, before: Clip, after: Clip, *, times: Floats | None = None, player: str = "spec", fps: float = FPS
+) -> Statistics:
+    """Return how far `after` is from `before` on the whole, on the ruler's scenes.
+
+    times: (F,) s, where distances, turns and weights are looked at; `dense_times` by default.
+    player: a name in PLAYERS, who plays both. fps: frames per second of the grid for speeds, 120 by default.
+    """
+    times = dense_times(before, after, fps=fps) if times is None else times
+    vertices = sum(len(group) for part in ruler.parts for group in part.groups)
+    count = int(np.clip(MOST // max(vertices, 1), 2, FRAMES))
+    chosen = np.unique(np.linspace(0, len(times) - 1, count).round().astype(np.int64))
+    found: list[Floats] = []
+    for block in ruler.blocks(before, after, times[chosen], player=player):
+        found += _distances(ruler, block)
+    angle, weight = Peak(), Peak()
+    for block in ruler.blocks(before, after, times, player=player):
+        angle = max(angle, _turned(ruler, block), key=lambda each: each.size)
+        weight = max(weight, _weighted(ruler, block), key=lambda each: each.size)
+    every = np.concatenate(found) if found else np.zeros(1)
+    speed = speed_error(ruler, before, after, player=player, fps=fps)
+    return Statistics(float(every.mean()), _percentile(every, 0.99), angle, speed, weight)
+
+
+def speed_error(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Peak:
+    """Return the largest difference in a vertex's velocity, m/s, by differences over a grid of `fps` frames per second.
+
+    It is never less than the true one on that grid, and no more than 1 % above. time: the middle of the frame's step.
+    """
+    times = grid(0.0, max(before.end, after.end), fps=fps)
+    worst = Peak()
+    for block in ruler.blocks(before, after, times, player=player, overlap=1):
+        step = np.diff(block.times)
+        if not len(step):
+            continue
+        for part in ruler.parts:
+            field = part.field(block.old, block.new)
+            if field is None:
+                continue
+            rate = field.rate(step)
+            floor = max(worst.size, STILL * ruler.diagonal)
+            top = longest(rate, floor=floor, slack=SLACK, most=MAX_SEARCHED)
+            if top.length > worst.size:
+                joint = ruler.called(part.node(rate.joint(top.group, top.frame, top.vertex)))
+                time = float(block.times[top.frame] + block.times[top.frame + 1]) / 2
+                worst = Peak(top.length, time, part.name or joint, joint, part.vertex(top))
+    return worst
+
+
+def _distances(ruler: Ruler, block: Block) -> Iterator[Floats]:
+    """Distances of all vertices at all times of the block; where there are none, of the points of shells."""
+    frames = np.arange(len(block.times))
+    surfaces = [part for part in ruler.parts if not isinstance(part, Shells)]
+    for part in surfaces or ruler.parts:
+        field = part.field(block.old, block.new)
+        if field is not None:
+            for group in range(len(part.groups)):
+                yield lengths(field, group, frames).reshape(-1)
+
+
+def _percentile(values: Floats, share: float) -> float:
+    """The value that this share of all does not exceed."""
+    place = min(int(np.ceil(share * len(values))), len(values)) - 1
+    return float(np.partition(values, place)[place])
+
+
+def _turned(ruler: Ruler, block: Block) -> Peak:
+    """The largest angle between the world rotations of a node in both versions."""
+    old = _world_rotations(ruler.scene.skeleton, block.old.pose)
+    new = _world_rotations(ruler.other.skeleton, block.new.pose)
+    both = np.flatnonzero(ruler.pairs.nodes >= 0)
+    if not len(both):
+        return Peak()
+    angles = quaternion.angle_between(old[both], new[ruler.pairs.nodes[both]])
+    node, frame = np.unravel_index(int(angles.argmax()), angles.shape)
+    name = ruler.called(int(both[node]))
+    return Peak(float(angles[node, frame]), float(block.times[frame]), name, name) if angles[node, frame] else Peak()
+
+
+def _world_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Rotations of all nodes against the world (N, F, 4), scales left out."""
+    local = quaternion.normalize(np.swapaxes(pose.rotation, 0, 1))
+    result = local.copy()
+    for level in skeleton.levels()[1:]:
+        result[level] = quaternion.multiply(result[skeleton.parents[level]], local[level])
+    return result
+
+
+def _weighted(ruler: Ruler, block: Block) -> Peak:
+    """The largest difference of a morph weight."""
+    worst = Peak()
+    for part in ruler.parts:
+        for owner, old, new in part.weights(block.old, block.new):
+            apart = np.abs(old - new)
+            frame, target = np.unravel_index(int(apart.argmax()), apart.shape)
+            if apart[frame, target] > worst.size:
+                name = ruler.called(owner)
+                worst = Peak(float(apart[frame, target]), float(block.times[frame]), name, name, int(target))
+    return worst

@@ -1,0 +1,189 @@
+"""Findings: what is not as it should be, under a name, with what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from anim.errors import AnimError
+from anim.gltf.document import Document, Json, items, node_label
+from anim.gltf.reading import reader
+from anim.gltf.validation import buffer_layout, channel_targets, hierarchy
+from anim.gltf.validation.structure import TOP_ARRAYS
+
+INVALID = "invalid"  # the finding for what other commands refuse
+LISTED = 10  # faults of one file
+
+
+class Severity(StrEnum):
+    """How bad: not legal glTF, and a player may refuse it or go wrong; likely wrong; wasteful or worth knowing."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """name: stable, in kebab-case. where: the part of the file. problem: what was seen. advice: what to do."""
+
+    name: str
+    severity: Severity
+    where: str
+    problem: str
+    advice: str
+
+
+def of_faults(faults: Sequence[AnimError]) -> Iterator[Finding]:
+    """Yield what makes other commands refuse a file; of many faults, the first ones."""
+    for fault in faults[:LISTED]:
+        advice = fault.help or "mend it where the file was made; other commands refuse it"
+        yield Finding(INVALID, Severity.ERROR, fault.where or "file", fault.problem, advice)
+    if len(faults) > LISTED:
+        problem = f"{len(faults) - LISTED} more faults"
+        yield Finding(INVALID, Severity.ERROR, "file", problem, "mend the first ones, and look again")
+
+
+def of_document(document: Document) -> Iterator[Finding]:
+    """Yield faults of the file's structure that leave its meaning clear, so that no command refuses it."""
+    json = document.json
+    for key in sorted(TOP_ARRAYS):
+        if json.get(key) == []:
+            yield Finding(
+                "empty-array", Severity.ERROR, key, "is an empty array", "leave the property out where the file is made"
+            )
+    yield from _of_accessors(json)
+    yield from _of_samplers(json)
+    yield from _of_clip_names(json)
+    yield from _of_skins(json)
+    if document.expanded:
+        more = len(document.expanded) - 1
+        problem = "has a matrix and is animated" + (f", as {more} more nodes" if more else "")
+        where = node_label(json, document.expanded[0])
+        yield Finding(
+            "animated-matrix",
+            Severity.ERROR,
+            where,
+            problem,
+            "every command that writes the file takes it apart: gltf-anim convert IN OUT",
+        )
+    for name in json.get("extensionsRequired", ()):
+        if name not in KNOWN_REQUIRED:
+            problem = f"{name} is required and not known here"
+            yield Finding("unknown-extension", Severity.WARNING, "extensionsRequired", problem, _PASSES)
+
+
+KNOWN_REQUIRED = frozenset(
+    """
+    EXT_mesh_gpu_instancing EXT_meshopt_compression EXT_texture_webp KHR_animation_pointer KHR_draco_mesh_compression
+    KHR_lights_punctual KHR_materials_unlit KHR_mesh_quantization KHR_meshopt_compression KHR_node_visibility
+    KHR_texture_basisu KHR_texture_transform
+    """.split()  # noqa: SIM905 (one name per line would hide the words)
+)
+_PASSES = "it passes through untouched; check the result in a viewer that knows it"
+
+
+def _of_accessors(json: Json) -> Iterator[Finding]:
+    for i, accessor in enumerate(items(json, "accessors")):
+        if accessor.get("normalized") and accessor["componentType"] in (5125, 5126):
+            where, problem = f"accessor {i}", "floats are marked normalized"
+            yield Finding("normalized-float", Severity.ERROR, where, problem, "drop the mark where the file is made")
+        if accessor["type"] not in buffer_layout.COMPONENTS:
+            problem = f"type is '{accessor['type']}'"
+            advice = "use one of glTF's types where the file is made"
+            yield Finding("unknown-type", Severity.WARNING, f"accessor {i}", problem, advice)
+
+
+def badly_stored(json: Json) -> frozenset[int]:
+    """Return the numbers of the clips whose keys are stored as glTF doesn't allow, or with samplers that nobody uses.
+
+    Commands that edit clips write those anew, also where no key changes.
+    """
+    faults = (_unbounded, _strided, _idle)
+    return frozenset(i for i, each in enumerate(items(json, "animations")) if any(f(json, each) for f in faults))
+
+
+_REWRITE = "to write them anew and change nothing else: gltf-anim retime IN OUT --speed 1"
+
+
+def _of_samplers(json: Json) -> Iterator[Finding]:
+    clips = items(json, "animations")
+    for i, animation in enumerate(clips):
+        where = reader.label(animation.get("name", ""), i)
+        if idle := _idle(json, animation):
+            yield Finding("unused-samplers", Severity.INFO, where, f"{len(idle)} samplers in no channel", _REWRITE)
+        ignored = sum(channel_targets.of_channel(channel) is None for channel in animation["channels"])
+        if ignored:
+            problem = f"{ignored} channels without a target that is known"
+            yield Finding("ignored-channels", Severity.INFO, where, problem, "players skip them; they are kept")
+    unbounded, strided = (set().union(*(fault(json, each) for each in clips)) for fault in (_unbounded, _strided))
+    if unbounded:
+        problem = f"{len(unbounded)} key time accessors without min and max"
+        yield Finding("missing-bounds", Severity.ERROR, "animations", problem, _REWRITE)
+    if strided:
+        problem = f"{len(strided)} accessors lie in views with byteStride"
+        yield Finding("strided-animation", Severity.ERROR, "animations", problem, _REWRITE)
+
+
+def _idle(json: Json, animation: Json) -> set[int]:
+    """Samplers of a clip that no channel uses."""
+    del json
+    return set(range(len(animation["samplers"]))) - {channel["sampler"] for channel in animation["channels"]}
+
+
+def _unbounded(json: Json, animation: Json) -> set[int]:
+    """Accessors of key times without min and max."""
+    accessors = items(json, "accessors")
+    return {n for s in animation["samplers"] if not {"min", "max"} <= accessors[n := s["input"]].keys()}
+
+
+def _strided(json: Json, animation: Json) -> set[int]:
+    """Accessors of a clip in views with a byteStride, which only vertices may have."""
+    accessors, views = items(json, "accessors"), items(json, "bufferViews")
+    named = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
+    return {n for n in named if _has_stride(accessors[n], views)}
+
+
+def _of_clip_names(json: Json) -> Iterator[Finding]:
+    by_name: dict[str, list[int]] = {}
+    for i, animation in enumerate(items(json, "animations")):
+        by_name.setdefault(animation.get("name", ""), []).append(i)
+    for name, numbers in by_name.items():
+        if name and len(numbers) > 1:
+            problem = f"{len(numbers)} clips have this name (numbers {', '.join(map(str, numbers))})"
+            advice = f"players that look for the name find one of them; here '#{numbers[-1]}' is the last; rename it"
+            yield Finding("duplicate-clip-names", Severity.WARNING, f"clip '{name}'", problem, advice)
+
+
+def _has_stride(accessor: Json, views: list[Json]) -> bool:
+    return "bufferView" in accessor and "byteStride" in views[accessor["bufferView"]]
+
+
+def _of_skins(json: Json) -> Iterator[Finding]:
+    skins = items(json, "skins")
+    if not skins:
+        return
+    parents = hierarchy.parents(json)
+    for i, skin in enumerate(skins):
+        where = reader.label(skin.get("name", ""), i, "skin")
+        common = set.intersection(*(set(_ancestors(joint, parents)) for joint in skin["joints"]))
+        if not common:
+            problem = "joints have no common root"
+            yield Finding("no-common-root", Severity.ERROR, where, problem, "put them under one node where it is made")
+        elif "skeleton" in skin and skin["skeleton"] not in common:
+            problem = f"skeleton names node {skin['skeleton']}, which is not above all joints"
+            advice = "players ignore the property; drop it where the skin is made"
+            yield Finding("skeleton-hint", Severity.WARNING, where, problem, advice)
+        accessor = skin.get("inverseBindMatrices")
+        if accessor is not None and _has_stride(items(json, "accessors")[accessor], items(json, "bufferViews")):
+            problem = "inverse bind matrices lie in a view with byteStride"
+            yield Finding(
+                "strided-matrices", Severity.ERROR, where, problem, "give them a view of their own where it is made"
+            )
+
+
+def _ancestors(node: int, parents: list[int]) -> Iterator[int]:
+    while node >= 0:
+        yield node
+        node = parents[node]

@@ -1,0 +1,243 @@
+"""What is in a file, and is it healthy? Facts per clip, track and skin, and findings that say what to do."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Bools, sorted_unique
+from anim.errors import AnimError
+from anim.gltf.document import Document, items
+from anim.gltf.io.lenient import Broken
+from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
+from anim.measure.inspect import clip_findings, file_findings, frame_rate, root_motion, storage_cost
+from anim.measure.inspect.file_findings import Finding
+from anim.measure.inspect.report import ClipFacts, Facts, SkinFacts, TrackFacts
+from anim.measure.inspect.stored_bytes import stored
+from anim.measure.inspect.track_statistics import TrackStats, stats
+from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.seam import Seam, SkinMotion
+from anim.model import Clip, Interpolation, Scene, Skeleton, Track
+from anim.model.scene import Instance
+from anim.sampling.joined import Joined, joined
+
+
+def inspect(
+    document: Document,
+    *,
+    file_bytes: int,
+    chosen: Iterable[int] | None = None,
+    tracks: bool = False,
+    broken: Broken | None = None,
+) -> Facts:
+    """Return the facts of a document.
+
+    file_bytes: the size that shares refer to. chosen: numbers of the clips to look at, None for all.
+    tracks: list every track too. broken: what is wrong with a document that is only a part of its file.
+    Clips that can't be read become faults and findings, vertices that can't be read a finding.
+    """
+    json = document.json
+    accessors = Accessors(document)
+    clips, unread = reader.readable_clips(document, accessors)
+    skeleton = reader.skeleton(document)
+    lost_clips, lost_skins = (broken.lost_clips, broken.lost_skins) if broken else (frozenset(), frozenset())
+    faults = (*broken.faults, *unread) if broken else tuple(unread)
+    wanted = clips.keys() if chosen is None else chosen
+    numbers = [i for i in wanted if i in clips and i not in lost_clips]
+    looked_at = [clips[i] for i in numbers]
+    groups = joined([track for clip in looked_at for track in clip.tracks])
+    counted = stats(groups, skeleton)
+    ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
+    ways = root_motion.travels(skeleton, looked_at, groups)
+    scene, hidden = _scene(document, accessors)
+    skin = SkinMotion(scene or Scene(skeleton, ()))
+    seams = _seams(skin, looked_at, groups)
+    measured_on = "skin" if skin.is_skin else "nodes"
+    costs, cost = storage_cost.footprints(document)
+    stored_bytes = min(stored(document), cost.data)
+    packed = stored_bytes / cost.data if cost.data else 1.0
+    clip_facts = tuple(
+        _clip(
+            i,
+            clip,
+            ways[n],
+            seams[n],
+            measured_on,
+            skeleton,
+            counted[ends[n] : ends[n + 1]],
+            costs[i],
+            packed,
+            file_bytes,
+            tracks=tracks,
+        )
+        for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
+    )
+    skins = tuple(_skin(i, document, scene) for i in range(len(items(json, "skins"))) if i not in lost_skins)
+    return Facts(
+        str(json["asset"].get("generator", "")),
+        tuple(json.get("extensionsUsed", ())),
+        len(skeleton),
+        len(items(json, "meshes")),
+        scene.vertex_count if scene is not None else None,
+        cost.data,
+        stored_bytes,
+        cost.json,
+        clip_facts,
+        skins,
+        (
+            *file_findings.of_faults(faults),
+            *file_findings.of_document(document),
+            *hidden,
+            *clip_findings.of_clips(clip_facts),
+            *clip_findings.of_skins(skins),
+        ),
+        faults,
+    )
+
+
+def _seams(skin: SkinMotion, clips: list[Clip], groups: list[Joined]) -> list[Seam]:
+    """The seams of whole clips, as `loop` measures them."""
+    roots = (root_motion.traveling_root(skin.skeleton, clip) for clip in clips)
+    parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
+    return skin.seams(parts, groups)
+
+
+def _clip(
+    number: int,
+    clip: Clip,
+    way: root_motion.Travel,
+    seam: Seam,
+    measured_on: str,
+    skeleton: Skeleton,
+    counted: TrackStats,
+    cost: storage_cost.Footprint,
+    packed: float,
+    file_bytes: int,
+    *,
+    tracks: bool,
+) -> ClipFacts:
+    start, end, axes = clip.start, clip.end, clip.axes
+    counted = _with_end(clip, counted)
+    stored_bytes = round(packed * cost.data)
+    estimated = frame_rate.estimate(sorted_unique(np.concatenate(axes))) if axes else None
+    return ClipFacts(
+        index=number,
+        name=clip.name,
+        start_s=start,
+        end_s=end,
+        duration_s=end - start,
+        tracks=dict(Counter(track.path for track in clip.tracks)),
+        interpolations=dict(Counter(str(track.interpolation) for track in clip.tracks)),
+        keys=sum(len(track.times) for track in clip.tracks),
+        frame_rate_fps=estimated.fps if estimated else None,
+        frame_rate_regular=estimated.regular if estimated else None,
+        data_bytes=cost.data,
+        stored_bytes=stored_bytes,
+        json_bytes=cost.json,
+        share=(stored_bytes + cost.json) / file_bytes if file_bytes else 0.0,
+        constant_tracks=int(counted.constant.sum()),
+        no_effect_tracks=int(counted.no_effect.sum()),
+        repeating_tracks=_repeating(clip, counted),
+        redundant_keys=int(counted.redundant.sum()),
+        non_unit_rotations=int(counted.non_unit.sum()),
+        sign_flips=int(counted.flips.sum()),
+        sign_flips_in_splines=int(counted.flips[_splines(clip)].sum()),
+        wide_steps=int(counted.wide.sum()),
+        widest_step_rad=float(counted.widest.max(initial=0.0)),
+        seam_m=seam.gap,
+        seam_speed_m_per_s=seam.speed,
+        seam_measured_on=measured_on,
+        root=(skeleton.names[way.root] or f"node {way.root}") if way.root >= 0 else "",
+        root_distance_m=way.distance,
+        root_speed_m_per_s=way.speed,
+        track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
+    )
+
+
+def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
+    """The facts, with the key at the clip's end not redundant where only constant tracks have one."""
+    at_end = [i for i, track in enumerate(clip.tracks) if track.times[-1] == clip.end]
+    if clip.end <= clip.start or not all(counted.constant[i] and counted.redundant[i] for i in at_end):
+        return counted
+    redundant = counted.redundant.copy()
+    redundant[min(at_end, key=lambda i: redundant[i])] -= 1
+    return replace(counted, redundant=redundant)
+
+
+def _splines(clip: Clip) -> Bools:
+    return np.array([track.interpolation is Interpolation.CUBICSPLINE for track in clip.tracks], np.bool_)
+
+
+def _repeating(clip: Clip, counted: TrackStats) -> int:
+    """How many tracks say one value again and again; where nothing else moves, one of them holds the clip's end."""
+    needed = np.where(_splines(clip), 2, 1)  # keys; a spline has two at least
+    several = np.array([len(track.times) for track in clip.tracks], np.int64) > needed
+    count = int((counted.constant & ~counted.no_effect & several).sum())
+    return max(count - 1, 0) if counted.constant.all() and clip.end > clip.start else count
+
+
+def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackFacts:
+    target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
+    return TrackFacts(
+        target or "",
+        track.path,
+        str(track.interpolation),
+        len(track.times),
+        float(track.times[0]),
+        float(track.times[-1]),
+        bool(facts.constant[i]),
+        bool(facts.no_effect[i]),
+        int(facts.redundant[i]),
+        int(facts.non_unit[i]),
+        int(facts.flips[i]),
+        int(facts.wide[i]),
+        float(facts.widest[i]),
+    )
+
+
+def _scene(document: Document, accessors: Accessors) -> tuple[Scene | None, list[Finding]]:
+    try:
+        return reader.scene(document, accessors), []
+    except AnimError as error:
+        advice_text = "skins are counted without their vertices"
+        return None, [Finding("vertices-unread", file_findings.Severity.WARNING, "meshes", str(error), advice_text)]
+
+
+def _skin(number: int, document: Document, scene: Scene | None) -> SkinFacts:
+    about = items(document.json, "skins")[number]
+    name, joints = about.get("name", ""), about["joints"]
+    nodes = items(document.json, "nodes")
+    using = [i for i in scene.instances if nodes[i.node].get("skin") == number] if scene is not None else []
+    if scene is None or not using:
+        return SkinFacts(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
+    counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
+    off = [np.abs(i.mesh.weight_sums - 1) for i in using if i.mesh.weight_sums is not None]
+    sums = np.concatenate([np.empty(0), *off])
+    unused = len(joints) - len(_useful(using, joints, scene.skeleton))
+    return SkinFacts(
+        number,
+        name,
+        len(joints),
+        len(counts),
+        unused,
+        int(counts.max(initial=0)),
+        float(counts.mean()) if len(counts) else 0.0,
+        int((sums > 0).sum()),
+        float(sums.max(initial=0.0)),
+    )
+
+
+def _useful(instances: list[Instance], joints: list[int], skeleton: Skeleton) -> set[int]:
+    """Joints of a skin that carry a vertex, and those above them."""
+    useful: set[int] = set()
+    for instance in instances:
+        carrying = set(instance.mesh.joints[instance.mesh.weights > 0].tolist())
+        for node in (joints[j] for j in sorted(carrying)):
+            while node >= 0 and node not in useful:
+                useful.add(node)
+                node = int(skeleton.parents[node])
+    return useful & set(joints)

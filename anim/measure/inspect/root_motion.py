@@ -1,0 +1,86 @@
+"""Where a clip leads: how far its root travels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.measure.loops.clip_ends import poses_of_clips
+from anim.model import Clip, Skeleton
+from anim.sampling.joined import Joined
+from anim.sampling.pose import world_by_node
+
+ONWARD = 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """The way of a clip's root from start to end.
+
+    root: number of the node whose way was taken, −1 where no translation moves. distance: m. speed: m/s.
+    """
+
+    root: int
+    distance: float
+    speed: float
+
+
+def travels(skeleton: Skeleton, clips: Sequence[Clip], groups: Sequence[Joined] | None = None) -> list[Travel]:
+    """Return one Travel per clip; a clip without time between start and end has none.
+
+    groups: the tracks of all clips, `joined`, for callers that have them.
+    """
+    if not len(skeleton) or not clips:
+        return [Travel(-1, 0.0, 0.0) for _ in clips]
+    times = np.array([[clip.start, clip.end] for clip in clips])
+    world = world_by_node(skeleton, poses_of_clips(skeleton, clips, times, groups=groups)[0])
+    places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
+    depth = _depths(skeleton)
+    return [_travel(clip, places[:, i, 1] - places[:, i, 0], depth) for i, clip in enumerate(clips)]
+
+
+def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
+    """Return the node whose way carries a character along, −1 where none does.
+
+    It is the moved node nearest to the root, if others hang on it and its way leads somewhere: at least ONWARD of the
+    length of its path lies between its ends.
+    """
+    root = _root(clip, _depths(skeleton)) if len(skeleton) else -1
+    return root if _leads(skeleton, clip, root) else -1
+
+
+def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
+    """Whether the keys of a root's translation lead somewhere, and others hang on it."""
+    if root < 0 or not (skeleton.parents == root).any():
+        return False
+    path = next(t.values for t in clip.tracks if t.node == root and t.path == "translation")
+    steps = np.diff(path, axis=0)
+    length = float(np.sqrt((steps * steps).sum(axis=1)).sum())
+    return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length
+
+
+def _travel(clip: Clip, away: Floats, depth: Floats) -> Travel:
+    """away: (N, 3) from start to end."""
+    duration = clip.end - clip.start
+    if duration <= 0:
+        return Travel(-1, 0.0, 0.0)
+    root = _root(clip, depth)
+    distance = float(np.linalg.norm(away[root])) if root >= 0 else 0.0
+    return Travel(root, distance, distance / duration)
+
+
+def _root(clip: Clip, depth: Floats) -> int:
+    """The moved node nearest to the root of the hierarchy: what carries a character along."""
+    tracks = {track.node: track for track in clip.tracks if track.path == "translation" and track.node is not None}
+    from_root = sorted(tracks, key=lambda node: (depth[node], node))
+    return next((node for node in from_root if (tracks[node].values != tracks[node].values[0]).any()), -1)
+
+
+def _depths(skeleton: Skeleton) -> Floats:
+    depth = np.zeros(len(skeleton))
+    for level, nodes in enumerate(skeleton.levels()):
+        depth[nodes] = level
+    return depth

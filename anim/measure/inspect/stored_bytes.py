@@ -1,0 +1,37 @@
+"""How many bytes of a file hold the numbers of its animations, as they are stored: compressed, shared, overlapping."""
+
+from __future__ import annotations
+
+from anim.gltf.document import Document, Json, items
+from anim.gltf.validation import buffer_layout
+from anim.gltf.writing import byte_ranges
+from anim.gltf.writing.references import outside, views_of
+
+
+def stored(document: Document) -> int:
+    """Return the bytes that only animations take in the buffers; of compressed views the compressed ones."""
+    content = document.json
+    clips = items(content, "animations")
+    samplers = [sampler for animation in clips for sampler in animation["samplers"]]
+    others = outside(content, range(len(clips))).accessors
+    mine = {sampler[key] for sampler in samplers for key in ("input", "output")} - others
+    accessors, views = items(content, "accessors"), items(content, "bufferViews")
+    spans: dict[int, list[byte_ranges.Range]] = {}
+    compressed: dict[int, int] = {}
+    for number in mine:
+        for view in views_of(accessors[number]):
+            found = buffer_layout.compression(views[view])
+            if found is not None:
+                compressed[view] = found["byteLength"]
+            elif accessors[number].get("bufferView") == view:
+                spans.setdefault(view, []).append(_span(accessors[number]))
+    plain = sum(end - start for parts in spans.values() for start, end in byte_ranges.union(parts))
+    return plain + sum(compressed.values())
+
+
+def _span(accessor: Json) -> byte_ranges.Range:
+    start = accessor.get("byteOffset", 0)
+    if accessor["type"] not in buffer_layout.COMPONENTS:
+        return start, start
+    size = buffer_layout.element_size(accessor["componentType"], accessor["type"])
+    return start, start + accessor["count"] * size

@@ -1,0 +1,125 @@
+"""Many clips at once around their ends: the poses there, and what differs between end and start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.measure.continuity.knots import FLOAT32, PAIR
+from anim.measure.error import orientation_probes
+from anim.model import Clip, Interpolation, Pose, Skeleton
+from anim.sampling.joined import Joined, joined
+from anim.sampling.pose import world_by_node
+
+PARTS = ("translation", "rotation", "scale")
+# Of the times start, just after it, a probe on, a frame on, and the same before the end: the pose, the speed (times the
+# probe's length), the first and the last frame's motion, and the start against where the last frame goes on to.
+DIFFERENCES = np.array(
+    [
+        [-1, 0, 0, 0, 0, 0, 0, 1],
+        [0, 1, -1, 0, 0, -1, 1, 0],
+        [-1, 0, 0, 1, 0, 0, 0, 0],
+        [0, 0, 0, 0, -1, 0, 0, 1],
+        [-1, 0, 0, 0, -1, 0, 0, 2],
+    ],
+    float,
+)
+SPEED = 1  # its row
+HELD = [0, 1, 1, 3, 4, 6, 6, 7]  # when a STEP track is looked at: it has no speed
+
+
+@dataclass(frozen=True, slots=True)
+class LoopRange:
+    """A part of a clip that is played in a loop.
+
+    start, end: s, start ≤ end. frame: s, from one frame to the next, 0 where motion per frame is not asked for.
+    root: the node whose way is taken off, −1 for none.
+    """
+
+    clip: Clip
+    start: float
+    end: float
+    frame: float = 0.0
+    root: int = -1
+
+    @property
+    def probe(self) -> float:
+        """Seconds from an end to where the speed there is looked at."""
+        return min(orientation_probes.SPEED_STEP, (self.end - self.start) / 4)
+
+    @property
+    def shortest(self) -> float:
+        """Seconds from an end within which two keys stand for a jump, which is no speed."""
+        return min(PAIR + 2 * FLOAT32 * abs(self.end), self.probe / 2)
+
+    def times(self) -> Floats:
+        """Return the times (T,) of DIFFERENCES."""
+        after = np.array([0.0, self.shortest, self.probe, self.frame])
+        return np.concatenate((self.start + after, self.end - after[::-1]))
+
+
+@dataclass(frozen=True, slots=True)
+class AtEnds:
+    """A part at the T times of DIFFERENCES. world: (N, T, 3, 4). weights: (T, M) by node, of meshes that morph."""
+
+    world: Floats
+    weights: dict[int, Floats]
+
+
+def at_ends(skeleton: Skeleton, parts: Sequence[LoopRange], groups: Sequence[Joined] | None = None) -> list[AtEnds]:
+    """Return each range around its ends, the way of its root taken off.
+
+    groups: the tracks of all their clips, `joined`, for callers that have them.
+    """
+    times = np.array([part.times() for part in parts])
+    whole, weights = poses_of_clips(skeleton, [part.clip for part in parts], times, held=times[:, HELD], groups=groups)
+    world = world_by_node(skeleton, whole)
+    world = world.reshape(len(skeleton), *times.shape, 3, 4)
+    for i, part in enumerate(parts):
+        take_off(skeleton, world[:, i], part.root)
+    return [AtEnds(world[:, i], weights[i]) for i in range(len(parts))]
+
+
+def poses_of_clips(
+    skeleton: Skeleton,
+    clips: Sequence[Clip],
+    times: Floats,
+    *,
+    held: Floats | None = None,
+    groups: Sequence[Joined] | None = None,
+) -> tuple[Pose, list[dict[int, Floats]]]:
+    """Return clips at times of their own (clips, T), one after the other: one pose of clips × T frames; and the morph
+    weights (T, M) of each, by node.
+
+    held: times for STEP tracks, by default the same.
+    """
+    parts = {name: np.tile(getattr(skeleton, name), (*times.shape, 1, 1)) for name in PARTS}
+    weights: list[dict[int, Floats]] = [{} for _ in clips]
+    clip_of_track: Ints = np.repeat(np.arange(len(clips)), [len(clip.tracks) for clip in clips])
+    for group in joined([track for clip in clips for track in clip.tracks]) if groups is None else groups:
+        at = held if held is not None and group.interpolation is Interpolation.STEP else times
+        clip = clip_of_track[group.numbers]
+        if group.path in parts:
+            node = np.array([track.node for track in group.tracks])
+            parts[group.path][clip[:, None], np.arange(times.shape[1]), node[:, None]] = group.sample(at[clip])
+        elif group.path == "weights":
+            for i, track, values in zip(clip.tolist(), group.tracks, group.sample(at[clip]), strict=True):
+                if track.node is not None:
+                    weights[i][track.node] = values
+    translation, rotation, scale = (part.reshape(-1, *part.shape[2:]) for part in parts.values())
+    return Pose(times.reshape(-1), translation, rotation, scale), weights
+
+
+def take_off(skeleton: Skeleton, world: Floats, root: int) -> None:
+    """Take the way of node `root` since the first frame off world matrices (N, F, 3, 4), in place; −1: of none."""
+    if root >= 0:
+        way = world[root, :, :, 3] - world[root, :1, :, 3]
+        world[..., 3] -= skeleton.below(root)[:, None, None] * way
+
+
+def differences(values: Floats, axis: int) -> Floats:
+    """Return the DIFFERENCES of values along the axis of their times."""
+    return np.asarray(np.moveaxis(np.tensordot(DIFFERENCES, values, (1, axis)), 0, axis))

@@ -1,0 +1,163 @@
+"""What kind of loop is a clip, how large is its seam, and which part of it would loop best?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from anim.arrays import sorted_unique
+from anim.measure.inspect import frame_rate
+from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.seam import JointGap, Seam, SkinMotion
+from anim.model import Clip, Scene
+from anim.sampling.pose import pose, world_by_node
+
+CLOSED = (1e-5, 1e-3)  # of the model's size: a seam below the first is rounding, one above the second is seen
+UNSEEN = 0.1  # of the usual motion per frame; between these two, a smaller seam is not seen
+ONE_FRAME = 1.6  # an open loop's seam against the motion per frame next to it: about one frame's worth
+MAX_FRAMES = 600  # looked at by `best_ranges`
+MAX_STEPS = 300  # pairs of frames looked at inside a clip
+DEFAULT_FPS = 30.0
+
+
+class LoopKind(StrEnum):
+    """How a clip's end meets its start."""
+
+    CLOSED = "closed"
+    OPEN_BY_ONE_FRAME = "open by one frame"
+    CLOSED_EXCEPT = "closed except some joints"
+    NOT_A_LOOP = "not a loop"
+    SINGLE_POSE = "a single pose"
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """What any vertex does at most from one frame to the next: largest, typical: m, over all frames, and their median.
+
+    speed: m/s, the largest change of velocity.
+    """
+
+    largest: float = 0.0
+    typical: float = 0.0
+    speed: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A clip, or a part of it, as a loop; all is measured on the skin.
+
+    start, end: seconds. seam: m, how far the worst vertex is from where it started; the way that the root has made is
+    taken off. speed_seam: m/s. node: the joint that opens the seam most, by speed where the loop is closed. frame: m,
+    the motion per frame at the seam. inside: what the clip does from frame to frame. travel: m, the root's way. fps:
+    the rate that frames were counted at. joints: those that don't close, the largest gap first; none of a closed loop.
+    """
+
+    kind: LoopKind
+    start: float
+    end: float
+    seam: float
+    speed_seam: float
+    node: str
+    frame: float
+    inside: Steps
+    travel: float
+    fps: float
+    joints: tuple[JointGap, ...] = ()
+
+
+def loop(scene: Scene, clip: Clip, *, root: int = -1) -> Loop:
+    """Return what kind of loop the clip is.
+
+    Closed: no vertex that is seen to jump. Closed except some joints: fewer joints stay open than close while they
+    move, and they jump no further than the clip moves from frame to frame. Open by one frame: the seam is about the
+    next frame's motion. root: the node whose way does not count, −1 for none.
+    """
+    return judge(SkinMotion(scene), clip, root=root)
+
+
+def judge(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
+    """Return the same of a clip on a skin that is there already: for many clips."""
+    return _judged(skin, clip, clip.start, clip.end, root)
+
+
+def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:
+    """Return the parts of a clip that loop best, the best first, none shorter than `shortest` seconds.
+
+    Poses and their speeds are compared at the clip's frame rate, or at as many frames as fit in MAX_FRAMES; parts that
+    start and end within two frames of a better one are left out. shortest: by default half of the clip.
+    """
+    duration = clip.end - clip.start
+    if duration <= 0:
+        return []
+    fps = min(_fps(clip), (MAX_FRAMES - 1) / duration)
+    times = clip.start + np.arange(int(duration * fps + 1e-6) + 1) / fps
+    points = skin.places(clip, times, root)
+    speeds = np.gradient(points, axis=1) if points.shape[1] > 1 else np.zeros_like(points)
+    features = np.concatenate((points, speeds), axis=0).transpose(1, 0, 2).reshape(len(times), -1)
+    squares = (features * features).sum(axis=1)
+    apart = squares[:, None] + squares[None] - 2 * features @ features.T
+    frames = max(int(np.ceil((shortest or duration / 2) * fps - 1e-6)), 1)
+    apart[np.tril_indices(len(times), frames - 1)] = np.inf
+    found: list[Loop] = []
+    taken: list[tuple[int, int]] = []
+    for flat in np.argsort(apart, axis=None)[: 400 * count].tolist():
+        a, b = divmod(flat, len(times))
+        if not np.isfinite(apart[a, b]) or len(found) == count:
+            break
+        if all(abs(a - c) > 2 or abs(b - d) > 2 for c, d in taken):
+            taken.append((a, b))
+            found.append(_judged(skin, clip, float(times[a]), float(times[b]), root))
+    looping = [each for each in found if each.kind is not LoopKind.NOT_A_LOOP] or found
+    return sorted(looping, key=lambda each: (list(LoopKind).index(each.kind), each.seam))
+
+
+def _judged(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> Loop:
+    fps = _fps(clip)
+    frame_step = min(1 / fps, (end - start) / 2) if end > start else 0.0
+    if not len(skin.points) or frame_step == 0:
+        kind = LoopKind.NOT_A_LOOP if end > start else LoopKind.SINGLE_POSE
+        return Loop(kind, start, end, 0.0, 0.0, "", 0.0, Steps(), 0.0, fps)
+    (seam,) = skin.seams([LoopRange(clip, start, end, frame_step, root)])
+    inside = _steps(skin, clip, start, end, frame_step, root)
+    gaps = skin.gaps(clip, start, end, root)
+    size = seam.gap
+    joints = tuple(each for each in gaps if each.gap > CLOSED[0] * skin.size)
+    if size <= min(max(UNSEEN * inside.typical, CLOSED[0] * skin.size), CLOSED[1] * skin.size):
+        kind, joints = LoopKind.CLOSED, ()
+    else:
+        closing = skin.moving(clip, start, end, frame_step, root) - {each.node for each in joints}
+        kind = _open_kind(seam, size, inside.largest, few=len(joints) < len(closing))
+    worst = joints[0].joint if joints else seam.fastest
+    travel = _travel(skin, clip, start, end, root)
+    return Loop(kind, start, end, size, seam.speed, worst, seam.frame, inside, travel, fps, joints)
+
+
+def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind:
+    """few: whether more joints close while they move than stay open; then no frame is missing."""
+    if few and size <= inside:
+        return LoopKind.CLOSED_EXCEPT
+    if not few and size <= ONE_FRAME * seam.frame and seam.going_on <= seam.frame:
+        return LoopKind.OPEN_BY_ONE_FRAME
+    return LoopKind.NOT_A_LOOP
+
+
+def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, root: int) -> Steps:
+    count = max(round((end - start) / step) - 1, 1)
+    frames = np.unique(np.linspace(1, count, min(count, MAX_STEPS)).round())
+    times = start + step * np.concatenate((frames - 1, frames, frames + 1))
+    *moved, changed = skin.steps(clip, np.minimum(times, end).reshape(3, -1), root)
+    return Steps(float(np.max(moved)), float(np.median(moved)), float(changed.max()) / step)
+
+
+def _fps(clip: Clip) -> float:
+    found = frame_rate.estimate(sorted_unique(np.concatenate(clip.axes))) if clip.axes else None
+    return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
+
+
+def _travel(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> float:
+    if root < 0:
+        return 0.0
+    both = world_by_node(skin.skeleton, pose(skin.skeleton, clip, np.array([start, end])))[root, :, :, 3]
+    return float(np.linalg.norm(both[1] - both[0]))

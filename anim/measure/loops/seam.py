@@ -1,0 +1,265 @@
+"""The seam of a loop as it is seen: on the skin, with the joints that make it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.maths import matrix
+from anim.measure.error import orientation_probes, point_matrix
+from anim.measure.error.point_matrix import Points, Rows
+from anim.measure.error.surface import Surface, has_vertices, morphed, skinned, surfaces
+from anim.measure.loops import clip_ends
+from anim.measure.loops.clip_ends import AtEnds, LoopRange
+from anim.model import Clip, Pose, Scene
+from anim.sampling.joined import Joined
+from anim.sampling.pose import pose, rest, world_by_node
+
+PARTS = ("translation", "rotation", "scale")
+STEPS = np.array([[-1.0, 1, 0], [0, -1, 1], [1, -2, 1]])  # of three frames: two moves, and how much they differ
+AT_ONCE = 4_000_000  # numbers; moves of points that are looked at together
+
+
+@dataclass(frozen=True, slots=True)
+class JointGap:
+    """A joint whose own motion does not close. joint: its name. node: its number.
+
+    gap: m, the largest distance that any vertex would move if this joint alone ended as it starts.
+    is_morph: whether it is a mesh whose morph weights don't close.
+    """
+
+    joint: str
+    node: int
+    gap: float
+    is_morph: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Seam:
+    """End against start, over all vertices: the largest of each.
+
+    gap: m. speed: m/s, the change of velocity without what STEP tracks do, and the joint at it (fastest, "" where none
+    changes). frame: m, the motion per frame next to the seam. going_on: m, how far the start is from where the end was
+    heading.
+    """
+
+    gap: float = 0.0
+    speed: float = 0.0
+    fastest: str = ""
+    frame: float = 0.0
+    going_on: float = 0.0
+
+
+class SkinMotion:
+    """The points of a scene on which motion is seen: its vertices.
+
+    Seams and steps are measured on all of them, long stretches (`places`) on those that stick out on each joint. Where
+    nothing has a vertex all nodes count, by six points around each. Nodes that move no vertex (IK controls, cameras)
+    don't count otherwise.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.skeleton = scene.skeleton
+        self._scene = scene
+        self.is_skin = has_vertices(scene)
+        self._surfaces = surfaces(scene) if self.is_skin else []
+        self._rest_world = world_by_node(scene.skeleton, rest(scene.skeleton))
+        self._lever = (
+            orientation_probes.LEVER * orientation_probes.size(self._rest_world[..., 3]) if len(scene.skeleton) else 0.0
+        )
+
+    @cached_property
+    def points(self) -> Points:
+        """The points that stick out."""
+        nodes = range(0 if self.is_skin else len(self.skeleton))
+        return point_matrix.of_scene(self._scene, frozenset(nodes), self._lever)
+
+    @cached_property
+    def size(self) -> float:
+        """The diagonal, in metres, of the scene's box in its rest pose; 1 where it has none."""
+        return orientation_probes.size(self.points.places(self._rest_world)) if len(self.points) else 1.0
+
+    @cached_property
+    def _every(self) -> Points:
+        return point_matrix.every(self._scene, self._lever)
+
+    @cached_property
+    def _rows(self) -> Rows:
+        return self._every.rows()
+
+    @cached_property
+    def _owners(self) -> Ints:
+        """The node of each point's mesh (P,)."""
+        return np.repeat([part.owner for part in self._surfaces], [len(part.points) for part in self._surfaces])
+
+    def places(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
+        """Return where the points that stick out are (P, F, 3) at times (F,), the way of node `root` taken off."""
+        world = world_by_node(self.skeleton, pose(self.skeleton, clip, times))
+        clip_ends.take_off(self.skeleton, world, root)
+        return self.points.places(world)
+
+    def steps(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
+        """Return (3, F) how far any vertex moves from the first of times (3, F) to the second and from there to the
+        third, and how much these two moves differ: the largest of each, the way of node `root` taken off.
+        """
+        frames = times.shape[1]
+        poses = pose(self.skeleton, clip, times.reshape(-1))
+        world = world_by_node(self.skeleton, poses)
+        clip_ends.take_off(self.skeleton, world, root)
+        world = world.reshape(len(world), 3, frames, 3, 4)
+        weights = {node: each.reshape(3, frames, -1) for node, each in poses.weights.items()}
+        count = max(AT_ONCE // (9 * len(self._every)), 1)
+        cuts = [slice(first, first + count) for first in range(0, frames, count)]
+        parts = [self._steps(world[:, :, cut], {node: each[:, cut] for node, each in weights.items()}) for cut in cuts]
+        return np.concatenate(parts, axis=1)
+
+    def _steps(self, world: Floats, weights: Mapping[int, Floats]) -> Floats:
+        """world: (N, 3, F, 3, 4). weights: (3, F, M) by node."""
+        size, frames = world.shape[0], world.shape[2]
+        differences = np.moveaxis(np.tensordot(STEPS, world, (1, 1)), 0, 1)
+        squares = self._squares(differences.reshape(size, -1, 3, 4))
+        morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in weights]
+        if morphing:
+            squares[np.isin(self._owners, [mesh.owner for mesh in morphing])] = 0
+        most = np.sqrt(squares.max(axis=0)).reshape(3, frames).astype(np.float64)
+        for mesh in morphing:
+            seen = AtEnds(world.reshape(size, -1, 3, 4), {mesh.owner: weights[mesh.owner].reshape(3 * frames, -1)})
+            moved = np.tensordot(STEPS, _morphing(mesh, seen).reshape(3, frames, -1, 3), (1, 0))
+            most = np.maximum(most, np.sqrt((moved * moved).sum(axis=-1).max(axis=-1)))
+        return np.asarray(most)
+
+    def seams(self, parts: Sequence[LoopRange], groups: Sequence[Joined] | None = None) -> list[Seam]:
+        """Return how the end of each part meets its start, in pose and speed.
+
+        groups: the tracks of all their clips, `joined`, for callers that have them.
+        """
+        if not parts or not len(self._every):
+            return [Seam() for _ in parts]
+        seen = clip_ends.at_ends(self.skeleton, parts, groups)
+        count = max(AT_ONCE // (3 * len(clip_ends.DIFFERENCES) * len(self._every)), 1)
+        return [
+            seam
+            for first in range(0, len(parts), count)
+            for seam in self._seams(seen[first : first + count], parts[first : first + count])
+        ]
+
+    def _seams(self, seen: Sequence[AtEnds], parts: Sequence[LoopRange]) -> list[Seam]:
+        differences = np.stack([clip_ends.differences(each.world, 1) for each in seen], axis=1)  # (N, parts, D, 3, 4)
+        squares = self._squares(differences.reshape(len(self.skeleton), -1, 3, 4)).reshape(
+            len(self._every), len(seen), -1
+        )
+        return [self._seam(squares[:, i], each, part) for i, (each, part) in enumerate(zip(seen, parts, strict=True))]
+
+    def _seam(self, squares: Floats, seen: AtEnds, part: LoopRange) -> Seam:
+        """squares: (P, D), the squared lengths of all differences, of meshes that morph as they are at rest."""
+        morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in seen.weights]
+        if morphing:
+            squares[np.isin(self._owners, [mesh.owner for mesh in morphing])] = 0
+        most = np.sqrt(squares.max(axis=0)).astype(np.float64)
+        fastest = self._carrier(int(squares[:, clip_ends.SPEED].argmax()))
+        for mesh in morphing:
+            moved = _longest_each(clip_ends.differences(_morphing(mesh, seen), 0))
+            fastest = self._name(mesh.owner) if moved[clip_ends.SPEED] > most[clip_ends.SPEED] else fastest
+            most = np.maximum(most, moved)
+        gap, speed, second, last, going_on = most.tolist()
+        speed = speed / (part.probe - part.shortest) if part.end > part.start else 0.0
+        return Seam(gap, speed, fastest if speed else "", max(second, last), going_on)
+
+    def _squares(self, differences: Floats) -> Floats:
+        """Squared lengths (P, F) of the moves of all points, by differences of world matrices (N, F, 3, 4)."""
+        moves = self._rows.moves(point_matrix.stacked(differences, self._every.nodes))
+        return np.asarray((moves * moves).sum(axis=1))
+
+    def _carrier(self, point: int) -> str:
+        """Name of the node that carries most of a point."""
+        most = self._every.factors[point, :, 3].argmax()
+        return self._name(int(self._every.nodes[self._every.joints[point, most]]))
+
+    def gaps(self, clip: Clip, start: float, end: float, root: int = -1) -> list[JointGap]:
+        """Return the joints whose pose at `end` is not that at `start`, the largest gap first.
+
+        The translation of `root` does not count. Morph weights count for the node of their mesh.
+        """
+        both = pose(self.skeleton, clip, np.array([start, end]))
+        nodes = self._moved_between(both, root)
+        found = dict(zip(nodes.tolist(), self._carried(both, nodes, root), strict=True))
+        rows = [JointGap(self._name(node), node, float(gap)) for node, gap in found.items()]
+        for node, weights in both.weights.items():
+            change = self._morphed(node, weights[1] - weights[0])
+            rows.append(JointGap(self._name(node), node, change, is_morph=True))
+        return sorted((each for each in rows if each.gap > 0), key=lambda each: (-each.gap, each.node))
+
+    def moving(self, clip: Clip, start: float, end: float, frame: float, root: int = -1) -> set[int]:
+        """Return the nodes that move in the first or in the last frame, and carry a point."""
+        frames = (np.array([start, start + frame]), np.array([end - frame, end]))
+        found = [self._moved_between(pose(self.skeleton, clip, times), root) for times in frames]
+        return {node for node in np.concatenate(found).tolist() if self._carries(node)}
+
+    def _name(self, node: int) -> str:
+        return self.skeleton.names[node] or f"node {node}"
+
+    def _carries(self, node: int) -> bool:
+        below: Bools = self.skeleton.below(node)[self.points.nodes]
+        return bool((below[self.points.joints] & (self.points.factors[..., 3] > 0)).any())
+
+    def _moved_between(self, both: Pose, root: int) -> Ints:
+        """Numbers of the nodes whose local transforms differ between the two frames of a pose; q and −q don't."""
+        differs = (both.scale[0] != both.scale[1]).any(axis=1)
+        differs |= np.minimum(*(np.abs(both.rotation[0] - s * both.rotation[1]).max(axis=1) for s in (1, -1))) > 0
+        shifted = (both.translation[0] != both.translation[1]).any(axis=1)
+        if root >= 0:
+            shifted[root] = False
+        return np.flatnonzero(differs | shifted)
+
+    def _carried(self, both: Pose, nodes: Ints, root: int) -> Floats:
+        """How far (K,) points move at most where one of the nodes (K,), alone, ends as it starts."""
+        frame = np.arange(len(nodes))
+        parts = {name: np.repeat(getattr(both, name)[1:], len(nodes), axis=0) for name in PARTS}
+        for name, values in parts.items():
+            values[frame, nodes] = getattr(both, name)[0, nodes]
+        if root >= 0:
+            parts["translation"][:, root] = both.translation[1, root]
+        last = Pose(both.times[1:], both.translation[1:], both.rotation[1:], both.scale[1:])
+        times = np.repeat(both.times[1:], len(nodes))
+        changed = Pose(times, parts["translation"], parts["rotation"], parts["scale"])
+        differences = np.subtract(*(world_by_node(self.skeleton, each) for each in (changed, last)))
+        count = max(AT_ONCE // (3 * max(len(self._every), 1)), 1)
+        stretches = (differences[:, first : first + count] for first in range(0, len(nodes), count))
+        squares = [self._squares(each).max(axis=0, initial=0.0) for each in stretches if len(self._every)]
+        return np.sqrt(np.concatenate(squares)) if squares else np.zeros(len(nodes))
+
+    def _morphed(self, node: int, change: Floats) -> float:
+        """How far, in metres, a change of morph weights (M,) moves any vertex of a node's mesh, at most."""
+        mine = [part for part in self._surfaces if part.owner == node and len(part.targets) == len(change)]
+        return max((self._widening(part) * _longest(np.tensordot(change, part.targets, 1)) for part in mine), default=0)
+
+    def _widening(self, part: Surface) -> float:
+        """How many metres of the world one unit of a mesh's space is at most, in the rest pose."""
+        world = matrix.multiply(self._rest_world[part.nodes, 0], part.bind)
+        return float(np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max())
+
+
+def _morphing(mesh: Surface, seen: AtEnds) -> Floats:
+    """Vertices (T, V, 3) of a mesh that morphs, at the times of the ends."""
+    placed = [
+        skinned(mesh, *each)
+        for each in zip(
+            morphed(mesh, seen.weights[mesh.owner]),
+            matrix.multiply(np.swapaxes(seen.world[mesh.nodes], 0, 1), mesh.bind),
+            strict=True,
+        )
+    ]
+    return np.stack(placed)
+
+
+def _longest_each(vectors: Floats) -> Floats:
+    """The longest (D,) of each row of vectors (D, V, 3)."""
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1).max(axis=-1)))
+
+
+def _longest(vectors: Floats) -> float:
+    return float(np.sqrt((vectors * vectors).sum(axis=-1)).max(initial=0.0))

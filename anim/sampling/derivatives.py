@@ -1,0 +1,40 @@
+"""Rates of change of tracks, by analysis, just before and just after a time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.model import Interpolation, Kind, Track
+from anim.sampling import segment as piece
+
+
+def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return in and out tangents (F, C) per second for keys at `times` (F,) with these values (F, C) of the track.
+
+    values: as sampled; rotations with any signs, which their tangents follow.
+    """
+    before, after = rates(track, times, before=True), rates(track, times, before=False)
+    if track.kind is Kind.ROTATION:
+        return quaternion.derivative(values, before), quaternion.derivative(values, after)
+    return before, after
+
+
+def rates(track: Track, times: Floats, *, before: bool) -> Floats:
+    """Return the rate of change just before, or just after, each time: (F, C) per second.
+
+    Of rotations the angular velocity (F, 3) in rad/s along the turning node's own axes. STEP has rate 0, and outside
+    its keys every track stands still.
+    """
+    result = np.zeros((len(times), 3 if track.kind is Kind.ROTATION else track.values.shape[1]))
+    if track.interpolation is Interpolation.STEP or len(track.times) == 1:
+        return result
+    keys = track.times
+    segment = np.searchsorted(keys, times, side="left" if before else "right") - 1
+    inside = (segment >= 0) & (segment < len(keys) - 1)
+    left = segment[inside]
+    duration = keys[left + 1] - keys[left]
+    share = (times[inside] - keys[left]) / duration
+    result[inside] = piece.rates(track, left, share) / duration[:, None]
+    return result

@@ -1,0 +1,246 @@
+"""What a filmstrip shows: clips of a file by skinning method, or a cache, at chosen times."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import AnyArray, Bools, Floats
+from anim.caches.transforms import resample, up_axis
+from anim.caches.transforms.resample import SAME
+from anim.errors import NotFoundError, RangeError
+from anim.exchange.stick_mesh import sticks
+from anim.gltf.document import Document, items
+from anim.gltf.reading import reader
+from anim.model import Clip, Instance, Mesh, Scene, Skeleton, VertexCache
+from anim.sampling import grid
+from anim.show.filmstrip import heat_map, palette, root_path
+from anim.show.filmstrip.filmstrip import MOST_POINTS, Extent, Row
+from anim.show.filmstrip.ground import ground_height
+from anim.skinning.bake import bake
+from anim.skinning.methods.registry import SKINNING_METHODS
+
+AROUND = 48  # frames of the whole motion that the camera is framed on
+MOST_FRAMES = 3000
+THICKER = 1.9  # times as wide as the sticks that go into files
+WIDEST = 1.5  # times the middle one: links to helpers far away don't hide the others
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """Which frames: at these times; or `count` of them evenly spaced; or `fps` a second. From `begin` to `end` s.
+
+    begin, end: None for the clip's own.
+    """
+
+    at: tuple[float, ...] = ()
+    count: int | None = None
+    fps: float | None = None
+    begin: float | None = None
+    end: float | None = None
+
+    def check(self, start: float, end: float) -> None:
+        """Raise RangeError for a wanted time outside all motions, which go from `start` to `end` s."""
+        for time in self.at:
+            if not start - SAME <= time <= end + SAME:
+                raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
+
+    def span(self, start: float, end: float) -> tuple[float, float]:
+        """Return the first and the last time in s of a motion from `start` to `end`. Raises RangeError for none."""
+        first = start if self.begin is None else max(self.begin, start)
+        last = end if self.end is None else min(self.end, end)
+        if first > last:
+            raise RangeError(
+                f"nothing lies from {first:g} s to {last:g} s (the motion goes from {start:g} s to {end:g} s)"
+            )
+        return first, last
+
+    def times(self, start: float, end: float) -> Floats:
+        """Return times (F,) s of a motion from `start` to `end`; of those in `at` none where it has none of them.
+
+        Raises RangeError where nothing of the motion is chosen otherwise, or more than a picture can hold.
+        """
+        if self.at:
+            at = np.unique(np.array(self.at, np.float64))
+            return at[(at >= start - SAME) & (at <= end + SAME)]
+        first, last = self.span(start, end)
+        if self.fps is not None and self.count is None:
+            found = grid(first, last, fps=self.fps)
+            if len(found) > MOST_FRAMES:
+                raise RangeError(f"{len(found)} frames are too many for a picture (limit {MOST_FRAMES})")
+            return found
+        return np.linspace(first, last, self.count or 1) if last > first else np.array([first])
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One motion. clip, method: what it is, or empty. cache: its chosen frames; path: some frames of all of it.
+
+    colors: (T, 3) linear, of the faces. body: (V,) vertices that a skin moves, or None where that is unknown.
+    """
+
+    clip: str
+    method: str
+    cache: VertexCache
+    path: VertexCache
+    colors: Floats
+    body: Bools | None = None
+
+
+def of_document(
+    document: Document,
+    clips: Sequence[int],
+    methods: Sequence[str],
+    when: When,
+    *,
+    nodes: Collection[int] | None = None,
+) -> list[Shot]:
+    """Return a shot for each clip by number and each skinning method; without clips one of the rest pose.
+
+    nodes: only meshes on these; None for all. A file without a mesh is shown as sticks from joint to joint.
+    Raises NotFoundError for a file without anything.
+    """
+    for name in methods:
+        if name not in SKINNING_METHODS:
+            raise RangeError(f"method is '{name}' (expected {', '.join(SKINNING_METHODS)})")
+    scene = _visible(reader.scene(document), nodes)
+    known = reader.clips(document)
+    chosen = [(known[i].name, known[i]) for i in clips] or [("", Clip("", ()))]
+    moving = [clip for _, clip in chosen if clip.tracks]
+    when.check(min((clip.start for clip in moving), default=0.0), max((clip.end for clip in moving), default=0.0))
+    found = []
+    for name, clip in chosen:
+        start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
+        times, path = when.times(start, end), _spread(start, end)
+        if not len(times):
+            continue
+        for method in methods or ("lbs",):
+            cache = bake(scene, clip, times=times, method=method, rigid=True)
+            whole = bake(scene, clip, times=path, method=method, rigid=True)
+            colors = palette.of_faces(cache, _materials(document))
+            found.append(Shot(name, method if methods else "", cache, whole, colors, _body(scene, cache)))
+    if not found:
+        raise RangeError(f"no clip has a frame at {', '.join(f'{time:g} s' for time in when.at)}")
+    return found
+
+
+def of_cache(cache: VertexCache, when: When) -> list[Shot]:
+    """Return one shot of a cache. Raises NotFoundError where it has no faces."""
+    if not len(cache.faces):
+        raise NotFoundError("has no faces to draw", help="put the rest mesh beside it: NAME-rest.ply")
+    cache = up_axis.turned(cache, "y")
+    start, end = float(cache.times[0]), float(cache.times[-1])
+    when.check(start, end)
+    chosen = resample.at_times(cache, when.times(start, end))
+    whole = resample.at_times(cache, _spread(start, end))
+    return [Shot("", "", chosen, whole, palette.of_faces(cache))]
+
+
+def rows(shots: Sequence[Shot], *, heated: bool = False, followed: bool | None = None) -> tuple[list[Row], Extent]:
+    """Return the rows of a filmstrip, and what its camera has to hold.
+
+    heated: color how far vertices are from where the clip's first method has them; from the rest pose where there is
+    one method only. Raises NotFoundError where there is no rest pose.
+    followed: whether the camera goes with the figure; None for where it leaves its place by more than its own size.
+    """
+    several_clips = len({shot.clip for shot in shots}) > 1
+    found: list[Row] = []
+    points: list[AnyArray] = []
+    first = shots[0]
+    reference: AnyArray = np.empty(0)
+    for i, shot in enumerate(shots):
+        positions = shot.cache.whole().positions
+        if i == 0 or first.clip != shot.clip:
+            first, reference = shot, positions
+            goes = root_path.travels(shot.path) if followed is None else followed
+            way = root_path.way(shot.path) if goes else None
+        alone = sum(other.clip == shot.clip for other in shots) == 1
+        distances = _distances(shot, positions, reference, alone, shot is first) if heated else None
+        heading = (shot.clip or "(no name)") if several_clips else ""
+        cache = shot.cache
+        found.append(
+            Row(shot.method, cache.times, positions, cache.faces, shot.colors, distances, heading, way, cache.rest)
+        )
+        points += [_places(each, way) for each in (shot.path, shot.cache)]
+    ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
+    return found, Extent(np.concatenate(points), ground)
+
+
+def _distances(shot: Shot, positions: AnyArray, reference: AnyArray, alone: bool, is_first: bool) -> Floats | None:
+    """Distances (F, V) m from the clip's first method, or from the rest pose of what is alone."""
+    if not alone:
+        return None if is_first else heat_map.distances(positions, reference)
+    if shot.cache.rest is None:
+        raise NotFoundError("has no rest pose that distances could be measured from")
+    return heat_map.distances(positions, shot.cache.rest)
+
+
+def _body(scene: Scene, cache: VertexCache) -> Bools:
+    """Vertices (V,) of meshes with a skin."""
+    skinned = {instance.node for instance in scene.instances if instance.skin is not None}
+    body = np.zeros(cache.vertex_count, bool)
+    for part in cache.parts:
+        body[slice(*part.vertices)] = part.node in skinned
+    return body
+
+
+def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
+    """The scene with the chosen meshes, or with sticks on its joints where it has no faces."""
+    if nodes is not None:
+        scene = replace(scene, instances=tuple(each for each in scene.instances if each.node in nodes))
+        if not any(len(instance.mesh.faces) for instance in scene.instances):
+            raise NotFoundError("no mesh is left to draw")
+    if any(len(instance.mesh.faces) for instance in scene.instances):
+        return scene
+    if not len(scene.skeleton):
+        raise NotFoundError("has neither a mesh nor a node to draw")
+    mesh, skin = sticks(scene.skeleton, _ends(scene.skeleton))
+    if not len(mesh.positions):
+        raise NotFoundError("has neither a mesh nor joints to draw")
+    return Scene(scene.skeleton, (Instance(0, _thicker(mesh), skin, np.zeros(0)),))
+
+
+def _thicker(mesh: Mesh) -> Mesh:
+    """Sticks of 24 corners (start, ring, ring, end, ring, ring, …) with wider rings, for small pictures."""
+    bodies = mesh.positions.reshape(-1, 24, 3).copy()
+    ring = np.array([1, 2, 4, 5, 7, 8, 10, 11, 13, 14, 16, 17, 19, 20, 22, 23])
+    middle = (bodies[:, [1]] + bodies[:, [13]]) / 2  # corners of the ring that face each other
+    radius = np.linalg.norm(bodies[:, [1]] - middle, axis=-1, keepdims=True)
+    wanted = THICKER * np.minimum(radius, WIDEST * np.median(radius))
+    bodies[:, ring] = middle + wanted / radius * (bodies[:, ring] - middle)
+    return replace(mesh, positions=bodies.reshape(-1, 3))
+
+
+def _ends(skeleton: Skeleton) -> frozenset[int]:
+    """Nodes that only mark where their parent's stick ends: those without children."""
+    parents = set(skeleton.parents.tolist())
+    return frozenset(i for i in range(len(skeleton)) if i not in parents and skeleton.parents[i] >= 0)
+
+
+def _materials(document: Document) -> list[tuple[float, float, float]]:
+    found = []
+    for material in items(document.json, "materials"):
+        surface = material.get("pbrMetallicRoughness", {})
+        color = (1.0, 1.0, 1.0) if "baseColorTexture" in surface else surface.get("baseColorFactor", (1.0, 1.0, 1.0))
+        found.append((float(color[0]), float(color[1]), float(color[2])))
+    return found
+
+
+def _spread(start: float, end: float) -> Floats:
+    return np.linspace(start, end, AROUND) if end > start else np.array([start])
+
+
+def _places(cache: VertexCache, way: root_path.Way | None) -> AnyArray:
+    """Vertices of all frames as the camera sees them, of frames farther apart where they are too many."""
+    step = max(1, -(-cache.frame_count * cache.vertex_count // MOST_POINTS))
+    found = []
+    for chunk in cache.chunks():
+        chosen = slice(-chunk.first % step, None, step)
+        positions = chunk.positions[chosen].copy()
+        if way is not None:
+            times = cache.times[chunk.first : chunk.first + len(chunk.positions)][chosen]
+            positions[..., [0, 2]] -= way.at(times)[:, None]
+        found.append(positions.reshape(-1, 3))
+    return np.concatenate(found)

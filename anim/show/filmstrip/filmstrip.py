@@ -1,0 +1,277 @@
+"""A motion as a filmstrip: clips one under the other, a row for each method, one camera, times under the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import AnyArray, Floats, Ints
+from anim.errors import RangeError
+from anim.show.filmstrip import captions, heat_map
+from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, framed
+from anim.show.filmstrip.captions import FAINT, LINE
+from anim.show.filmstrip.renderer import Stage, draw, encoded, mark_spacing, moved, stage
+from anim.show.filmstrip.root_path import Way
+from anim.show.filmstrip.surface_pattern import Checker, Marks, edges
+
+HEIGHT = 240  # pixels of a frame
+GAP, EDGE = 3, 12  # pixels between frames, and around all
+APART = 10  # pixels between clips
+WIDEST_TIME = "00.00 s"
+MAX_WIDTH = 1600  # pixels, beyond which frames go into another line
+PAPER = (247, 247, 248)  # sRGB
+INSIDE = 8  # pixels from the left of a frame to words in it
+LOW = 8 + 7 * captions.LETTER  # pixels from the bottom of a frame to the top of words in it
+MOST_POINTS = 2_000_000  # that the camera is framed on
+CLOSED = 1e-3  # share of the way that vertices move; a loop ends this near its start
+MOST_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One strip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
+
+    distances: (F, V) m, shown as heat instead of the colors where there are any. label: of the row, "dqs".
+    heading: of all rows of one clip, which stand together, "Walk". way: for a camera that goes with the figure.
+    rest: (V, 3) m, what a checker is fixed to.
+    """
+
+    label: str
+    times: Floats
+    positions: AnyArray
+    faces: Ints
+    colors: Floats
+    distances: AnyArray | None = None
+    heading: str = ""
+    way: Way | None = None
+    rest: AnyArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """points: (P, 3) m, all places that the motion reaches: what the camera is framed on. ground: its height in m."""
+
+    points: AnyArray
+    ground: float
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """height: pixels of a frame. azimuth, elevation: degrees of the camera around the motion.
+
+    checker: squares fixed to the rest pose on the surface. wire: the edges of its triangles.
+    """
+
+    height: int = HEIGHT
+    azimuth: float = AZIMUTH
+    elevation: float = ELEVATION
+    checker: bool = False
+    wire: bool = False
+
+
+def filmstrip(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Look = Look()) -> Image:
+    """Return the picture (H, W, 3) of all rows under each other, clip by clip; long ones go on in a next line.
+
+    Rows of one clip stay together in each line, so that methods are compared at the same times.
+    Raises RangeError for pictures of less than 32 or more than 4096 pixels.
+    """
+    scenery = _scenery(extent, look)
+    width, height = scenery.camera.width, scenery.camera.height
+    most, header = _most(rows), _header_height(rows, title)
+    clips = [list(each) for _, each in groupby(rows, key=lambda row: row.heading)]
+    per_line, pitch = _grid(width)
+    columns = max(_columns(row, per_line)[0] for row in rows)
+    across = max(columns * pitch - GAP, _header_width(rows, title))
+    sheet = _paper(header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP, across + 2 * EDGE)
+    captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
+    top = header
+    for clip in clips:
+        words = captions.wrapped(clip[0].heading, across) if clip[0].heading else []
+        for i, line in enumerate(words):
+            captions.write(sheet, line, EDGE, top + APART + i * LINE)
+        begin = top + len(words) * LINE + (APART if words else 0)
+        for r, row in enumerate(clip):
+            _draw_row(sheet, row, _frames(row, scenery, most, look), begin, (r, len(clip)), per_line, (width, height))
+        top += _clip_height(clip, per_line, height)
+    return sheet
+
+
+def _clip_height(clip: Sequence[Row], per_line: int, height: int) -> int:
+    lines = max(_columns(row, per_line)[1] for row in clip)
+    heading = LINE + APART if clip[0].heading else 0
+    return heading + lines * len(clip) * (height + _footer(clip[0]))
+
+
+def _grid(width: int) -> tuple[int, int]:
+    """How many frames go into a line at most, and pixels from one to the next: words under them need room too."""
+    pitch = max(width, captions.width(WIDEST_TIME)) + GAP
+    return max((MAX_WIDTH - 2 * EDGE) // pitch, 1), pitch
+
+
+def _columns(row: Row, per_line: int) -> tuple[int, int]:
+    """How many frames a line has, all about equally many, and how many lines there are."""
+    lines = -(-len(row.times) // per_line)
+    return -(-len(row.times) // lines), lines
+
+
+def _footer(row: Row) -> int:
+    return GAP + LINE * (1 if row.way is None else 2)
+
+
+def _draw_row(
+    sheet: Image,
+    row: Row,
+    frames: Iterator[Image],
+    top: int,
+    place: tuple[int, int],
+    per_line: int,
+    size: tuple[int, int],
+) -> None:
+    """Draw the frames of a row, which is the first number of `place` among the second, under `top` pixels."""
+    (r, count), (width, height) = place, size
+    columns, pitch = _columns(row, per_line)[0], _grid(width)[1]
+    for f, frame in enumerate(frames):
+        y = top + (f // columns * count + r) * (height + _footer(row))
+        x = EDGE + f % columns * pitch + (pitch - GAP - width) // 2
+        sheet[y : y + height, x : x + width] = frame
+        for i, words in enumerate(_moment(row, f)):
+            middle = x + (width - captions.width(words)) // 2
+            captions.write(sheet, words, middle, y + height + GAP + i * LINE, color=FAINT)
+        if row.label and f % columns == 0:
+            captions.write(sheet, row.label, x + INSIDE, y + height - LOW)
+
+
+def _moment(row: Row, frame: int) -> list[str]:
+    """When a frame is, and how far the figure has got where the camera goes with it: "0.50 s", "1.2 m"."""
+    time = f"{row.times[frame]:.2f} s"
+    if row.way is None:
+        return [time]
+    return [time, f"{row.way.distance(row.times[frame : frame + 1])[0]:.1f} m"]
+
+
+def moving(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Look = Look()) -> Iterator[Image]:
+    """Yield the pictures (H, W, 3) of an endless film, the rows side by side; the shorter ones wait for the longest.
+
+    Raises RangeError for more pixels than memory should hold.
+    """
+    scenery = _scenery(extent, look)
+    width, height = scenery.camera.width, scenery.camera.height
+    per_line, pitch = _grid(width)
+    names = [captions.wrapped(" ".join(filter(None, (row.heading, row.label))), pitch - GAP) for row in rows]
+    name_lines = max(len(lines) for lines in names) if any(lines != [""] for lines in names) else 0
+    columns = min(len(rows), per_line)
+    header, cell = _header_height(rows, title), name_lines * LINE + height + APART
+    across = max(columns * pitch - GAP, _header_width(rows, title)) + 2 * EDGE
+    tall = header + -(-len(rows) // columns) * cell - APART + LINE + EDGE
+    times, most = film_times(rows), _most(rows)
+    _check_size(tall, across, len(times))
+    frames = [_held(_frames(row, scenery, most, look)) for row in rows]
+    for time, *pictures in zip(times, *frames, strict=False):
+        sheet = _paper(tall, across)
+        captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
+        for r, picture in enumerate(pictures):
+            top, left = header + r // columns * cell, EDGE + r % columns * pitch
+            for i, line in enumerate(names[r]):
+                captions.write(sheet, line, left, top + i * LINE)
+            top += name_lines * LINE
+            sheet[top : top + height, left : left + width] = picture
+        captions.write(sheet, f"{time:.2f} s", EDGE, tall - EDGE - LINE + 2 * GAP, color=FAINT)
+        yield sheet
+
+
+def film_times(rows: Sequence[Row]) -> Floats:
+    """Return the times (F,) s of a film of the rows: of the longest; a loop's last frame, which is its first, is none.
+
+    At least one row.
+    """
+    times = max((row.times for row in rows), key=len)
+    return times[:-1] if _is_loop(rows) else times
+
+
+def _held(frames: Iterator[Image]) -> Iterator[Image]:
+    """The frames, and the last of them for good."""
+    last = next(frames)
+    yield last
+    for last in frames:
+        yield last
+    while True:
+        yield last
+
+
+def _is_loop(rows: Sequence[Row]) -> bool:
+    """Whether all rows end together, where they began, and are elsewhere between."""
+    if len({len(row.times) for row in rows}) > 1:
+        return False
+    for row in rows:
+        moved = [float(np.abs(each - row.positions[0]).max(initial=0)) for each in row.positions]
+        if max(moved) == 0 or moved[-1] > CLOSED * max(moved):
+            return False
+    return True
+
+
+def _paper(height: int, width: int) -> Image:
+    _check_size(height, width, 1)
+    return np.full((height, width, 3), PAPER, np.uint8)
+
+
+def _check_size(height: int, width: int, frames: int) -> None:
+    if height * width * frames > MOST_PIXELS:
+        what = "the picture has" if frames == 1 else f"{frames} frames have"
+        raise RangeError(
+            f"{what} {width} × {height} pixels, too many (limit {MOST_PIXELS // 10**6} million together)",
+            help="ask for fewer or smaller frames",
+        )
+
+
+def _scenery(extent: Extent, look: Look) -> Stage:
+    if not 32 <= look.height <= 4096:
+        raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
+    points = np.asarray(extent.points, np.float64).reshape(-1, 3)
+    camera = framed(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
+    return stage(camera, points, extent.ground)
+
+
+def _frames(row: Row, scenery: Stage, most: float, look: Look) -> Iterator[Image]:
+    marks = _marks(row, look)
+    for f, positions in enumerate(row.positions):
+        colors = row.colors
+        if row.distances is not None:
+            colors = heat_map.of_faces(row.distances[f], row.faces, most)
+        seen, now = positions.astype(np.float64), scenery
+        if row.way is not None:
+            place = row.way.at(row.times[f])
+            seen[:, [0, 2]] -= place
+            now = moved(scenery, place, row.way.milestones(row.times[f], mark_spacing(scenery)))
+        yield encoded(draw(now, seen, row.faces, colors, marks))
+
+
+def _marks(row: Row, look: Look) -> list[Marks]:
+    found: list[Marks] = []
+    if look.checker:
+        found.append(Checker(row.positions[0] if row.rest is None else row.rest, row.faces).brightness)
+    if look.wire:
+        found.append(edges)
+    return found
+
+
+def _most(rows: Sequence[Row]) -> float:
+    return max((float(row.distances.max(initial=0)) for row in rows if row.distances is not None), default=0.0)
+
+
+def _header_height(rows: Sequence[Row], title: str) -> int:
+    return EDGE + (LINE if title or _legend(rows) else 0)
+
+
+def _header_width(rows: Sequence[Row], title: str) -> int:
+    return captions.header_width(title, _legend(rows))
+
+
+def _legend(rows: Sequence[Row]) -> str:
+    """What the heat's far end means, empty without heat."""
+    return captions.length(_most(rows)) if any(row.distances is not None for row in rows) else ""

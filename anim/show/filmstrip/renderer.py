@@ -1,0 +1,199 @@
+"""One frame of a mesh as a picture: flat-shaded over a ground with a grid and a soft shadow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.show.filmstrip.camera import Camera
+from anim.show.filmstrip.rasterizer import visible
+from anim.show.filmstrip.surface_pattern import Marks
+
+SAMPLES = 3  # across and down in each pixel
+BAND = 1 << 22  # samples that are drawn at a time, about: they take 60 bytes each
+# Linear light.
+SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
+LINE, SHADOW = np.array([0.52, 0.53, 0.55]), np.array([0.16, 0.17, 0.20])
+KEY, FILL = np.array([-0.45, 0.80, 0.55]), np.array([0.75, 0.25, 0.30])  # directions of lights, in the camera's frame
+KEY_LIGHT, FILL_LIGHT, FROM_ABOVE, FROM_BELOW = 0.72, 0.14, 0.34, 0.16
+SHADOW_DEPTH = 0.55  # how much light the ground loses
+STEEPER = 0.5  # the light that casts shadows falls this much more from above, so that they stay near
+SHADOW_BLUR = 0.012  # of the picture's height
+CELLS = 7.0  # squares of the grid across the motion, about
+GRID_DEPTH = 0.38
+DOT, DOT_DEPTH = 0.08, 0.75  # radius of marks on the ground as a share of their spacing, and how dark they are
+FADED = 1.6  # radii of the motion from its middle, where the ground's grid ends
+GAMMA = 2.2
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """What all frames share. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m.
+
+    background: (H, W, 3) linear, with the grid as it lies while the camera stands where it began.
+    """
+
+    camera: Camera
+    ground: float
+    middle: Floats
+    reach: float
+    background: Floats
+
+
+def stage(camera: Camera, points: Floats, ground: float) -> Stage:
+    """Return the stage for a motion whose vertices are `points` (P, 3), with the ground at a height in m."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low[[0, 2]] + high[[0, 2]]) / 2
+    reach = max(float(np.linalg.norm(high - low)) / 2, 1e-6)
+    return Stage(camera, ground, middle, reach, _background(camera, ground, middle, reach, np.zeros(2)))
+
+
+def moved(stage: Stage, place: Floats, milestones: Floats) -> Stage:
+    """Return the stage under a camera that has gone to a place (2,), m in x and z from where it began.
+
+    milestones: (M, 2) m of x and z, shown as dots on the ground.
+    """
+    camera, ground = stage.camera, stage.ground
+    background = _background(camera, ground, stage.middle, stage.reach, place)
+    spots = np.zeros((len(milestones), 3))
+    spots[:, 1] = ground
+    spots[:, [0, 2]] = milestones - place
+    for spot in spots[np.linalg.norm(milestones - place - stage.middle, axis=1) < FADED * stage.reach]:
+        _draw_dot(background, camera, spot, DOT * mark_spacing(stage))
+    return replace(stage, background=background)
+
+
+def mark_spacing(stage: Stage) -> float:
+    """Return the distance in m from mark to mark along the way of a figure that the camera goes with."""
+    return nice(stage.reach / 2)
+
+
+def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats, marks: Sequence[Marks] = ()) -> Floats:
+    """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces.
+
+    marks: drawn on the surface, each over the one before.
+    """
+    camera = stage.camera
+    corners = _larger(camera, SAMPLES).project(positions)[faces]
+    painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
+    picture: Floats = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
+    rows = max(BAND // (camera.width * SAMPLES**2), 1)
+    for top in range(0, camera.height, rows):
+        _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted, marks)
+    return picture
+
+
+def _paint(band: Floats, corners: Floats, painted: Floats, marks: Sequence[Marks]) -> None:
+    """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
+    height, width = band.shape[:2]
+    seen = visible(corners, width=width * SAMPLES, height=height * SAMPLES)
+    shape = (height, SAMPLES, width, SAMPLES)
+    cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
+    colors = painted[seen]
+    y, x = np.nonzero(seen >= 0)
+    for mark in marks:
+        chosen = seen[y, x]
+        shown = corners[chosen] * (1 / SAMPLES, 1 / SAMPLES, 1)
+        samples = np.stack(((x + 0.5) / SAMPLES, (y + 0.5) / SAMPLES), axis=1)
+        colors[y, x] *= mark(shown, samples, chosen)[:, None]
+    band *= 1 - cover
+    band += colors.reshape(*shape, 3).mean(axis=(1, 3))
+
+
+def encoded(image: Floats) -> np.ndarray:
+    """Return linear light as bytes of sRGB (nearly: one power for all)."""
+    return np.rint(np.clip(image, 0, 1) ** (1 / GAMMA) * 255).astype(np.uint8)
+
+
+def _larger(camera: Camera, times: int) -> Camera:
+    return Camera(camera.eye, camera.axes, camera.scale * times, camera.width * times, camera.height * times)
+
+
+def _shade(camera: Camera, positions: Floats, faces: Ints) -> Floats:
+    """Light (T,) that each face sends to the eye: a key and a fill light, and the sky above."""
+    a, b, c = (positions[faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0, length, 1)
+    away = np.einsum("ti,ti->t", normals, a - camera.eye) > 0
+    normals = np.where(away[:, None], -normals, normals)
+    light = np.full(len(faces), 0.0)
+    for direction, strength in ((KEY, KEY_LIGHT), (FILL, FILL_LIGHT)):
+        world = direction / np.linalg.norm(direction) @ camera.axes
+        light += strength * np.maximum(normals @ world, 0)
+    above = (1 + normals[:, 1]) / 2
+    return light + FROM_BELOW + (FROM_ABOVE - FROM_BELOW) * above
+
+
+def _background(camera: Camera, ground: float, middle: Floats, reach: float, place: Floats) -> Floats:
+    share = np.linspace(0, 1, camera.height)[:, None, None]
+    image = np.broadcast_to(SKY * (1 - share) + EARTH * share, (camera.height, camera.width, 3)).copy()
+    rays = camera.rays()
+    down, height = -rays[..., 1], camera.eye[1] - ground
+    is_ground = (down > 1e-6) & (height > 0)
+    far = height / np.where(is_ground, down, 1)
+    places = camera.eye[[0, 2]] + rays[..., [0, 2]] * far[..., None]
+    fade = np.clip(1.25 - np.linalg.norm(places - middle, axis=-1) / (FADED * reach), 0, 1)
+    step = nice(2 * reach / CELLS)
+    line = np.maximum(*(_lines(places[..., i] + place[i], step) for i in (0, 1)))
+    line = np.where(is_ground, line * fade * GRID_DEPTH, 0)[..., None]
+    picture: Floats = image * (1 - line) + LINE * line
+    return picture
+
+
+def _draw_dot(image: Floats, camera: Camera, spot: Floats, radius: float) -> None:
+    """Draw a disc that lies on the ground: an ellipse, as flat as the eye is low."""
+    x, y, near = camera.project(spot)
+    across = max(radius * near * camera.scale, 1.2)
+    away = (camera.eye - spot) / np.linalg.norm(camera.eye - spot)
+    down = max(across * abs(float(away[1])), 0.8)
+    dx = (np.arange(camera.width) + 0.5 - x) / across
+    dy = (np.arange(camera.height) + 0.5 - y) / down
+    off = np.hypot(dx[None, :], dy[:, None])
+    depth = DOT_DEPTH * np.clip((1 - off) * down + 0.5, 0, 1)[..., None]
+    image += (LINE * 0.5 - image) * depth
+
+
+def _lines(places: Floats, step: float) -> Floats:
+    """How much (H, W) of a pixel is line of a grid of this step, less where lines come too near each other."""
+    spread = np.abs(np.gradient(places, axis=0)) + np.abs(np.gradient(places, axis=1)) + 1e-9
+    off = np.abs((places / step + 0.5) % 1 - 0.5) * step
+    found: Floats = np.clip(1 - off / (0.75 * spread), 0, 1) * np.clip(step / (6 * spread), 0, 1)
+    return found
+
+
+def nice(length: float) -> float:
+    """Return the nearest of 1, 2, 5, 10, … below a length."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return max(factor * power for factor in (1, 2, 5) if factor * power <= length * 1.0001)
+
+
+def _shadow(stage: Stage, positions: Floats, faces: Ints) -> Floats:
+    """How dark (H, W) the ground is: what the key light finds in its way, made soft."""
+    camera = stage.camera
+    if camera.eye[1] <= stage.ground:
+        return np.zeros((camera.height, camera.width))
+    light = KEY / np.linalg.norm(KEY) @ camera.axes * (STEEPER, 1, STEEPER)
+    light[1] = max(light[1], 0.6)
+    above = np.maximum(positions[:, 1] - stage.ground, 0)
+    fallen = positions - (above / light[1])[:, None] * light
+    fallen[:, 1] = stage.ground
+    mask = visible(camera.project(fallen)[faces], width=camera.width, height=camera.height) >= 0
+    return SHADOW_DEPTH * _blurred(mask.astype(np.float64), max(round(SHADOW_BLUR * camera.height), 1))
+
+
+def _blurred(image: Floats, radius: int) -> Floats:
+    for axis in (0, 1):
+        for _ in range(2):
+            pad = [(0, 0), (0, 0)]
+            pad[axis] = (radius + 1, radius)
+            total = np.cumsum(np.pad(image, pad, mode="edge"), axis=axis)
+            size = 2 * radius + 1
+            ahead = np.take(total, range(size, total.shape[axis]), axis)
+            behind = np.take(total, range(total.shape[axis] - size), axis)
+            image = (ahead - behind) / size
+    return image

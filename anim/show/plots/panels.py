@@ -1,0 +1,333 @@
+"""The panels of one track: values with keys and handles, angle, speed, and the difference of two files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Interpolation, Kind, Track
+from anim.show.plots import polylines
+from anim.show.plots.figure import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, short, spread
+from anim.show.plots.polylines import Line
+from anim.show.plots.rotations import COMPONENTS, FROM_REST, NEAR_LOCK_DEG, Curve, lock_line, rotation_curve
+from anim.show.plots.track_selection import Shown
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LABEL = 8.0  # points
+BEHIND, PALE, THIN = 4.5, 0.25, 1.1  # width and opacity of a first file's lines, width of the second's
+COLORED = 6  # components in color; the others are a quiet background
+TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px from key to key, from which on there is room for marks
+FAR = 4.0  # times the widest range; values that stand further apart are drawn from their first key
+GAP = 12.5  # px between names of components
+ROUND, ROUND_ANGLES = (1.0, 2.0, 2.5, 5.0, 10.0), (1.0, 1.5, 3.0, 4.5, 9.0, 10.0)  # steps of ticks
+DEGREES = 180 / math.pi
+UNITS = ((1e6, "µm", 1e-4), (1e3, "mm", 5e-2))  # factor, name, and the length in m below which it is used
+
+
+def kinds(each: Shown) -> list[str]:
+    """Return what a track is drawn as, from top to bottom: names of DRAW."""
+    names = ["value"]
+    if each.track.kind is Kind.ROTATION:
+        names.append("angle" if each.view in (FROM_REST, COMPONENTS) else "lock")
+    if any(np.nan_to_num(polylines.speed_line(track).values).any() for track in _tracks(each)):
+        names.append("speed")
+    if each.other is not None:
+        names.append("difference")
+    return names
+
+
+def labels(each: Shown) -> list[str]:
+    """Return the names of the components that are drawn in color."""
+    return [each.labels[c] for c in _colored(each)]
+
+
+def span(each: Shown) -> tuple[float, float]:
+    """Return the first and last time that are drawn, in seconds: those of the clip."""
+    return (each.start, each.end) if each.end > each.start else (each.start - 0.5, each.start + 0.5)
+
+
+def time_axis(axes: Axes, each: Shown, *, labeled: bool) -> None:
+    """Mark seconds below the last panel, with a fine tick for every frame where there is room."""
+    from matplotlib.ticker import FixedLocator, MaxNLocator
+
+    low, high = span(each)
+    width = _size(axes)[0]
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=max(int(width / 80), 3), steps=list(ROUND)))
+    axes.set_xlim(low, high)
+    if not labeled:
+        axes.tick_params(axis="x", labelbottom=False)
+        return
+    ticks = [t for t in axes.get_xticks() if low - 1e-9 <= t <= high + 1e-9]
+    axes.set_xticks(ticks, [f"{short(t)} s" if i == len(ticks) - 1 else short(t) for i, t in enumerate(ticks)])
+    axes.tick_params(axis="x", which="major", length=4, width=0.6, color=SOFT)
+    frames = (high - low) * each.fps if each.fps is not None else 0.0
+    if each.fps is not None and 2 <= frames <= width / 3:
+        axes.xaxis.set_minor_locator(FixedLocator((low + np.arange(int(frames + 1.001)) / each.fps).tolist()))
+        axes.tick_params(axis="x", which="minor", length=2.2, width=0.5, color=HAIR)
+
+
+def _value(axes: Axes, each: Shown) -> str:
+    """The values: those of the second file over those of the first, keys and handles of the one on top."""
+    front = each.other or each.track
+    curves = [_curve(each, track) for track in _tracks(each)]
+    top = curves[-1]
+    origin = _origin(each, curves[0])
+    if each.other is not None:
+        _draw_lines(axes, each, curves[0].line, origin, linewidth=BEHIND, alpha=PALE)
+    _draw_lines(axes, each, top.line, origin, linewidth=LINE if each.other is None else THIN)
+    if top.risers is not None:
+        _draw_lines(axes, each, top.risers, origin, linewidth=0.6, alpha=0.5)
+    is_plain = front.interpolation is Interpolation.CUBICSPLINE and not each.is_in_degrees
+    handles = is_plain and _spacing(axes, each) >= HANDLES
+    _limits(axes, each, curves, origin, handles=handles)
+    _mark_lock(axes, each)
+    if handles:
+        _handles(axes, each, front, origin)
+    _keys(axes, each, front.times, top.keys - origin)
+    _component_names(axes, each, top.keys[-1] - origin)
+    return ", from its first key" if origin.any() else ""
+
+
+def _angle(axes: Axes, each: Shown) -> str:
+    start = each.rest if each.is_in_degrees else each.track.values[0]
+    _single(axes, [polylines.angle_line(track, start) for track in _tracks(each)], DEGREES, INK, steps=ROUND_ANGLES)
+    return "angle from rest, °" if each.is_in_degrees else "angle from the first key, °"
+
+
+def _lock(axes: Axes, each: Shown) -> str:
+    """How far an order of Euler angles is from gimbal lock, 90° at best; what is nearer than 5° is filled."""
+    found = [lock_line(track, order=each.view) for track in _tracks(each)]
+    for i, line in enumerate(found):
+        behind = len(found) > 1 and i == 0
+        look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
+        axes.plot(line.times, line.values[:, 0] * DEGREES, color=INK, **look)
+    axes.set_ylim(0, 90 * 1.08)
+    axes.set_yticks([0, 45, 90])
+    axes.axhspan(0, NEAR_LOCK_DEG, color=COLORS[0], alpha=0.3, linewidth=0)
+    line = found[-1]
+    at = int(np.nanargmin(line.values[:, 0]))
+    least, time = float(line.values[at, 0]) * DEGREES, float(line.times[at])
+    axes.plot(time, least, "o", color=COLORS[0], markersize=3.4, clip_on=False, zorder=3)
+    return f"distance to gimbal lock of {each.view}: at least {short(least)}° at {short(time)} s"
+
+
+def _speed(axes: Axes, each: Shown) -> str:
+    found = [polylines.speed_line(track) for track in _tracks(each)]
+    factor, unit = _unit(each, max(float(np.nanmax(line.values)) for line in found if len(line.times)))
+    _single(axes, found, factor, SPEED)
+    if each.track.kind is Kind.ROTATION:
+        return "turning speed, °/s"
+    return f"speed, {unit}/s" if unit else "speed, per second"
+
+
+def _difference(axes: Axes, each: Shown) -> str:
+    assert each.other is not None
+    line = polylines.difference_line(each.track, each.other)
+    at = int(line.values[:, 0].argmax())
+    most = float(line.values[at, 0])
+    factor, unit = _unit(each, most)
+    _single(axes, [line], factor, COLORS[0])
+    if most == 0:
+        return "difference: none"
+    axes.plot(line.times[at], most * factor, "o", color=COLORS[0], markersize=3.4, clip_on=False)
+    unit = unit if unit in ("°", "") else f" {unit}"
+    return f"difference: at most {short(most * factor)}{unit} at {short(float(line.times[at]))} s"
+
+
+def _mark_lock(axes: Axes, each: Shown) -> None:
+    """Shade the times at which Euler angles are near gimbal lock, with a line at the nearest."""
+    if not each.is_in_degrees or each.view == FROM_REST:
+        return
+    line = lock_line(each.other or each.track, order=each.view)
+    distance = np.nan_to_num(line.values[:, 0], nan=np.inf) * DEGREES
+    is_near = np.concatenate(([False], distance < NEAR_LOCK_DEG, [False]))
+    starts, ends = np.flatnonzero(is_near[1:] & ~is_near[:-1]), np.flatnonzero(is_near[:-1] & ~is_near[1:]) - 1
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        nearest = line.times[start + int(distance[start : end + 1].argmin())]
+        axes.axvspan(line.times[start], line.times[end], color=COLORS[0], alpha=0.18, linewidth=0, zorder=0.5)
+        axes.axvline(nearest, color=COLORS[0], linewidth=0.9, linestyle=(0, (3, 2)), zorder=0.6)
+        axes.annotate(
+            "lock", (nearest, 1), xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points",
+            ha="center", fontsize=SMALL, color=COLORS[0],
+        )  # fmt: skip
+
+
+DRAW: dict[str, Callable[[Axes, Shown], str]] = {
+    "value": _value,
+    "angle": _angle,
+    "lock": _lock,
+    "speed": _speed,
+    "difference": _difference,
+}
+
+
+def _tracks(each: Shown) -> list[Track]:
+    return [each.track] if each.other is None else [each.track, each.other]
+
+
+def _curve(each: Shown, track: Track) -> Curve:
+    """A track as numbers that are drawn."""
+    if each.is_in_degrees:
+        return rotation_curve(track, view=each.view, rest=each.rest)
+    risers = polylines.risers(track) if track.interpolation is Interpolation.STEP else None
+    return Curve(polylines.value_line(track), track.values, risers)
+
+
+def _colored(each: Shown) -> list[int]:
+    """Numbers of the components that move most."""
+    ranges = np.ptp(_curve(each, each.track).keys, axis=0)
+    return sorted(np.argsort(-ranges, kind="stable")[:COLORED].tolist())
+
+
+def _color(each: Shown, component: int) -> str:
+    """Red, green and blue for turns about x, y and z; else the next color for each component that moves most."""
+    if each.is_in_degrees:
+        is_twice = len({label[0] for label in each.labels}) < len(each.labels)
+        return COLORS[component if is_twice else "xyz".index(each.labels[component].lower())]
+    colored = _colored(each)
+    return COLORS[colored.index(component)] if component in colored else HAIR
+
+
+def _origin(each: Shown, curve: Curve) -> Floats:
+    """What values are drawn from (C,): 0, or the first key where curves far apart would hide how they move."""
+    values = curve.keys
+    width = float(np.ptp(values, axis=0).max())
+    far = values.shape[1] <= COLORED and float(values.max() - values.min()) > FAR * width > 0
+    return values[0] if far and each.track.kind is not Kind.ROTATION else np.zeros(values.shape[1])
+
+
+def _unit(each: Shown, most: float) -> tuple[float, str]:
+    """Factor and name of the unit in which values up to `most` are easy to read."""
+    if each.track.kind is Kind.ROTATION:
+        return DEGREES, "°"
+    if each.track.path != "translation":
+        return 1.0, ""
+    return next(((factor, unit) for factor, unit, limit in UNITS if most < limit), (1.0, "m"))
+
+
+def _draw_lines(axes: Axes, each: Shown, line: Line, origin: Floats, **look: Any) -> None:
+    """Draw components, those in color over the others, and of those the ones that move least first."""
+    if not len(line.times):
+        return
+    colored = _colored(each)
+    others = [c for c in range(line.values.shape[1]) if c not in colored]
+    still_first = sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c]))))
+    for c in (*others, *still_first):
+        chosen = {"linewidth": 0.6, "alpha": 0.7, "zorder": 1.5} if c in others else look
+        axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **chosen)
+
+
+def _limits(axes: Axes, each: Shown, curves: Sequence[Curve], origin: Floats, *, handles: bool) -> None:
+    """Room for all values, and for handles as far as they don't press the curve flat."""
+    from matplotlib.ticker import MaxNLocator
+
+    values = np.concatenate([part for curve in curves for part in (curve.line.values, curve.keys)]) - origin
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    size = max(high - low, 1e-4 * max(abs(low), abs(high)), 1e-6)
+    if high - low < size:
+        low, high = (low + high - size) / 2, (low + high + size) / 2
+    if handles:
+        tips = polylines.handles(each.other or each.track)[1][:, 1] - origin
+        low, high = max(min(low, float(tips.min())), low - size / 2), min(max(high, float(tips.max())), high + size / 2)
+    pad = 0.07 * (high - low)
+    axes.set_ylim(low - pad, high + pad)
+    steps = ROUND_ANGLES if each.is_in_degrees and high - low > 4 else ROUND
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=list(steps)))
+    plain(axes)
+
+
+def _handles(axes: Axes, each: Shown, front: Track, origin: Floats) -> None:
+    colored = _colored(each)
+    times, values = polylines.handles(front)
+    for c in colored:
+        pieces = np.concatenate(np.split(values[:, :, c], 2), axis=1)  # both keys and both handles of every piece
+        bent = np.tile(np.ptp(pieces, axis=1) > 0, 2)
+        color, places = _color(each, c), values[bent, :, c] - origin[c]
+        for t, v in zip(times[bent], places, strict=True):
+            axes.plot(t, v, color=color, linewidth=0.7, alpha=0.55, zorder=2.5)
+        ring = {"color": PAPER, "markeredgecolor": color, "markersize": 2.6, "markeredgewidth": 0.7, "zorder": 2.6}
+        axes.plot(times[bent, 1], places[:, 1], "o", **ring)
+
+
+def _keys(axes: Axes, each: Shown, times: Floats, values: Floats) -> None:
+    """Keys as dots, or as a row of fine ticks at the foot where they are too close."""
+    spacing = _spacing(axes, each)
+    if spacing < DOTS:
+        low, high = axes.get_ylim()
+        if spacing >= TOO_DENSE:
+            axes.vlines(times, low, low + 0.025 * (high - low), color=SOFT, linewidth=0.5, alpha=0.55)
+        return
+    colored = _colored(each)
+    for c in colored:
+        rim = 0.6 if spacing >= RIMS else 0.0  # closer ones would cut the line into dashes
+        dot = {"color": _color(each, c), "markersize": 3.6, "markeredgecolor": PAPER, "markeredgewidth": rim}
+        axes.plot(times, values[:, c], "o", zorder=3, clip_on=False, **dot)
+
+
+def _component_names(axes: Axes, each: Shown, last: Floats) -> None:
+    """Names of components at the right ends of their curves; of equal ones the first is on top."""
+    colored = _colored(each)
+    low, high = axes.get_ylim()
+    gap = GAP / _size(axes)[1] * (high - low)
+    upwards = colored[::-1]
+    places = spread([float(last[c]) for c in upwards], gap, low + gap / 2, high - gap / 2)
+    beside = {"xycoords": ("axes fraction", "data"), "xytext": (6, 0), "textcoords": "offset points", "va": "center"}
+    for c, place in zip(upwards, places, strict=True):
+        color = _color(each, c)
+        axes.annotate(each.labels[c][:16], (1, place), color=color, fontsize=LABEL, parse_math=False, **beside)
+    rest = len(last) - len(colored)
+    if rest:
+        above = {"xycoords": "axes fraction", "xytext": (0, 4), "textcoords": "offset points", "ha": "right"}
+        axes.annotate(f"+ {rest} more, gray", (1, 1), color=SOFT, fontsize=SMALL, **above)
+
+
+def _single(axes: Axes, found: list[Line], factor: float, color: str, *, steps: Sequence[float] = ROUND) -> None:
+    """One filled curve from 0 up, or two lines where a second file is compared."""
+    from matplotlib.ticker import MaxNLocator
+
+    top = max((float(np.nanmax(line.values)) for line in found if len(line.times)), default=0.0) * factor
+    axes.set_ylim(0, top * 1.08 if top > 0 else 1)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=2, steps=list(steps)))
+    plain(axes)
+    for i, line in enumerate(found):
+        behind = len(found) > 1 and i == 0
+        look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
+        values = line.values[:, 0] * factor
+        axes.plot(line.times, values, color=color, **look)
+        if len(found) == 1:
+            axes.fill_between(line.times, values, 0, color=color, alpha=0.08, linewidth=0)
+
+
+def plain(axes: Axes) -> None:
+    """Label the ticks of y with as many decimals as they differ in, and no more."""
+    from matplotlib.ticker import FuncFormatter
+
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value, axes)))
+
+
+def _tick(value: float, axes: Axes) -> str:
+    places = axes.get_yticks()
+    step = float(places[1] - places[0]) if len(places) > 1 else 1.0
+    digits = max(0, math.ceil(-math.log10(step) - 1e-9)) if step > 0 else 0
+    digits += 1 if abs(step * 10**digits - round(step * 10**digits)) > 1e-6 else 0
+    return f"{value + 0.0:.{digits}f}".replace("-", "−")
+
+
+def _size(axes: Axes) -> tuple[float, float]:
+    """Width and height of a panel in pixels."""
+    box = axes.get_window_extent()
+    return float(box.width), float(box.height)
+
+
+def _spacing(axes: Axes, each: Shown) -> float:
+    """Pixels from key to key, the mean."""
+    times = (each.other or each.track).times
+    low, high = span(each)
+    share = float(times[-1] - times[0]) / (high - low) if len(times) > 1 else 1.0
+    return _size(axes)[0] * share / max(len(times) - 1, 1)

@@ -1,0 +1,115 @@
+"""Tracks as lines to draw: values, speeds, handles, and where a line must break."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, sorted_unique
+from anim.maths import quaternion
+from anim.measure.continuity.knots import FLOAT32, PAIR, lengths
+from anim.model import Interpolation, Kind, Track
+from anim.sampling import derivatives
+from anim.sampling.track import sample
+
+POINTS = 800  # of a whole line: one for each pixel of a wide panel
+MOST, LEAST = 40, 2  # points of one piece
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Points (P,) s and (P, C); NaN where it breaks."""
+
+    times: Floats
+    values: Floats
+
+
+def value_line(track: Track) -> Line:
+    """Return the values of a track; STEP breaks at every key."""
+    if track.interpolation is Interpolation.STEP:
+        return _holds(track)
+    if track.interpolation is Interpolation.LINEAR and track.kind is not Kind.ROTATION:
+        return Line(track.times, track.values)
+    times = _points(track, pieces_only=False)[0].reshape(-1)
+    return Line(times, sample(track, times))
+
+
+def risers(track: Track) -> Line:
+    """Return the jumps of a STEP track as upright lines, each its own piece."""
+    keys = np.flatnonzero((np.diff(track.values, axis=0) != 0).any(axis=1)) + 1
+    blank = np.full((len(keys), 1, track.values.shape[1]), np.nan)
+    values = np.concatenate((track.values[keys - 1][:, None], track.values[keys][:, None], blank), axis=1)
+    return Line(np.repeat(track.times[keys], 3), values.reshape(-1, track.values.shape[1]))
+
+
+def speed_line(track: Track) -> Line:
+    """Return the speed of a track (P, 1) per second, rad/s for rotations, true on both sides of every key.
+
+    It breaks where the value jumps; a STEP track has none.
+    """
+    if track.interpolation is Interpolation.STEP or len(track.times) == 1:
+        return Line(np.zeros(0), np.zeros((0, 1)))
+    times, jumps = _points(track, pieces_only=True)
+    speeds = np.empty(times.shape)
+    speeds[:, :-1] = lengths(derivatives.rates(track, times[:, :-1].reshape(-1), before=False)).reshape(len(times), -1)
+    speeds[:, -1] = lengths(derivatives.rates(track, times[:, -1], before=True))
+    blank = np.full((len(times), 1), np.nan)
+    times = np.concatenate((times, times[:, -1:]), axis=1)
+    speeds = np.concatenate((speeds, np.where(jumps[:, None], blank, speeds[:, -1:])), axis=1)
+    return Line(times.reshape(-1), speeds.reshape(-1, 1))
+
+
+def angle_line(track: Track, start: Floats) -> Line:
+    """Return the angle (P, 1) in rad, 0 … π, of a rotation from another: start (4,)."""
+    line = value_line(track)
+    first = quaternion.normalize(start[None])
+    broken: Bools = np.isnan(line.values[:, 0])
+    whole = quaternion.normalize(np.where(broken[:, None], first, line.values))
+    angle = quaternion.angle_between(np.broadcast_to(first, whole.shape), whole)
+    return Line(line.times, np.where(broken, np.nan, angle)[:, None])
+
+
+def difference_line(track: Track, other: Track) -> Line:
+    """Return how far two tracks of one target are apart (P, 1), rad for rotations, over the time of both."""
+    start, end = min(track.times[0], other.times[0]), max(track.times[-1], other.times[-1])
+    keys = np.concatenate((track.times, other.times, np.linspace(start, end, POINTS)))
+    times = sorted_unique(keys)
+    a, b = sample(track, times), sample(other, times)
+    off = quaternion.angle_between(a, b) if track.kind is Kind.ROTATION else lengths(a - b)
+    return Line(times, off[:, None])
+
+
+def handles(track: Track) -> tuple[Floats, Floats]:
+    """Return the Bézier handles of a CUBICSPLINE track: times (H, 2) and values (H, 2, C), from key to handle."""
+    if track.in_tangents is None or track.out_tangents is None:
+        return np.zeros((0, 2)), np.zeros((0, 2, track.values.shape[1]))
+    third = np.diff(track.times) / 3
+    leaving_t = np.stack((track.times[:-1], track.times[:-1] + third), axis=1)
+    leaving = np.stack((track.values[:-1], track.values[:-1] + third[:, None] * track.out_tangents[:-1]), axis=1)
+    arriving_t = np.stack((track.times[1:], track.times[1:] - third), axis=1)
+    arriving = np.stack((track.values[1:], track.values[1:] - third[:, None] * track.in_tangents[1:]), axis=1)
+    return np.concatenate((leaving_t, arriving_t)), np.concatenate((leaving, arriving))
+
+
+def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
+    """Times (P, m) within every piece, both ends included, and whether it is followed by a jump (P,)."""
+    steps = np.diff(track.times)
+    real = np.asarray(steps > PAIR + 2 * FLOAT32 * track.times[1:])
+    chosen = np.flatnonzero(real) if pieces_only else np.arange(len(steps))
+    straight = track.interpolation is Interpolation.LINEAR and (pieces_only or track.kind is not Kind.ROTATION)
+    count = LEAST if straight else int(np.clip(POINTS // max(len(chosen), 1), 4, MOST))
+    shares = np.linspace(0, 1, count)
+    times = track.times[chosen][:, None] + steps[chosen][:, None] * shares
+    times[:, -1] = track.times[chosen + 1]
+    return times, np.append(~real, True)[np.minimum(chosen + 1, len(steps))]
+
+
+def _holds(track: Track) -> Line:
+    keys, width = len(track.times), track.values.shape[1]
+    if keys == 1:
+        return Line(track.times, track.values)
+    times = np.stack((track.times[:-1], track.times[1:], track.times[1:]), axis=1)
+    values = np.full((keys - 1, 3, width), np.nan)
+    values[:, :2] = track.values[:-1, None]
+    return Line(times.reshape(-1), values.reshape(-1, width))

@@ -1,0 +1,107 @@
+"""Animation bytes against error: the curve that a budget is chosen on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from anim.optimize.rate_distortion import Sized
+from anim.show.plots.figure import ACCENT, HAIR, INK, SMALL, SOFT, TITLE, Sheet, short, spread, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WIDTH, HEIGHT = 8.4, 4.8  # inches
+LEFT, RIGHT, TOP, BOTTOM = 0.75, 0.45, 1.05, 0.62
+ROOM = 0.08  # of the logarithm of the bytes, on both sides
+ABOVE = 0.13, 0.17  # inches from the panel to the lowest words above it, and from line to line
+APART = 1.5  # inches; words of lines that are nearer go into different lines
+TICKS = (1, 2, 3, 5)
+CLOSE = 4.0  # times the least; ticks of axes that go no further are evenly spaced
+UNITS = ((1e6, "MB"), (1e3, "kB"), (1, "B"))
+
+
+def tradeoff(sizes: Sequence[Sized], diagonal: float, *, title: str, kind: str, source: int | None = None) -> bytes:
+    """Return a picture of bounds at sizes as the bytes of a PNG or SVG file: % of the diagonal over animation bytes.
+
+    Both are logarithmic. Upright lines are the source, what is kept without loss (a bound of 0), and the smallest
+    size, below which no bound leads.
+    source: animation bytes of the file before. Raises RangeError for another kind, UnsupportedError where matplotlib
+    is not installed.
+    """
+    with style(kind):
+        sheet = Sheet(WIDTH, HEIGHT)
+        sheet.text(LEFT, 0.35, title, fontsize=TITLE + 2, weight="bold")
+        words = "error bound, % of the diagonal, over bytes of animation: keys and their JSON"
+        sheet.text(LEFT, 0.58, words, fontsize=SMALL, color=SOFT)
+        axes = sheet.panel(LEFT, TOP, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM)
+        lossy = [each for each in sizes if each.max_error > 0]
+        marks = _marks(sizes, source)
+        _scale(axes, [*(each.animation for each in lossy), *marks.values()])
+        _draw(axes, lossy, diagonal)
+        _draw_marks(sheet, axes, marks)
+        return sheet.render(kind)
+
+
+def _marks(sizes: Sequence[Sized], source: int | None) -> dict[str, int]:
+    """Animation bytes by what they are called."""
+    marks = {} if source is None else {"source": source}
+    without_loss = [each.animation for each in sizes if each.max_error == 0]
+    if without_loss:
+        marks["without loss"] = min(without_loss)
+    marks["floor"] = min(each.animation for each in sizes)
+    return marks
+
+
+def _scale(axes: Axes, counts: Sequence[int]) -> None:
+    """A logarithmic axis of bytes that holds all counts, with round ticks."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = np.log10(max(min(counts), 1)), np.log10(max(max(counts), 1))
+    room = max(ROOM * (high - low), 0.015)
+    axes.set_xscale("log")
+    axes.set_xlim(10 ** (low - room), 10 ** (high + room))
+    first, last = axes.get_xlim()
+    decades = range(int(np.floor(np.log10(first))), int(np.ceil(np.log10(last))) + 1)
+    ticks = [step * 10.0**decade for decade in decades for step in TICKS]
+    ticks = [tick for tick in ticks if first <= tick <= last]
+    if last < CLOSE * first:
+        ticks = [tick for tick in MaxNLocator(7).tick_values(first, last) if first <= tick <= last]
+    elif len(ticks) > 9:
+        ticks = [tick for tick in ticks if f"{tick:e}"[0] in "1"]
+    axes.set_xticks(ticks, [_bytes(tick) for tick in ticks])
+    axes.tick_params(axis="x", which="major", length=4, width=0.6, color=SOFT)
+
+
+def _draw(axes: Axes, sizes: Sequence[Sized], diagonal: float) -> None:
+    percents = [100 * each.max_error / diagonal for each in sizes]
+    counts = [each.animation for each in sizes]
+    axes.set_yscale("log")
+    axes.plot(counts, percents, color=ACCENT, marker="o", markersize=4, linewidth=1.4, clip_on=False)
+    for percent, count in zip(percents, counts, strict=True):
+        axes.annotate(
+            _bytes(count), (count, percent), xytext=(7, 2), textcoords="offset points", fontsize=SMALL, color=INK,
+            annotation_clip=False,
+        )  # fmt: skip
+    axes.set_yticks(percents, [f"{short(percent)} %" for percent in percents])
+    axes.minorticks_off()
+
+
+def _draw_marks(sheet: Sheet, axes: Axes, marks: dict[str, int]) -> None:
+    """Upright lines with words above them, in two lines where they are near each other."""
+    first, last = np.log10(axes.get_xlim())
+    width = WIDTH - LEFT - RIGHT
+    names = list(marks)
+    places = [LEFT + width * (np.log10(max(marks[name], 1)) - first) / (last - first) for name in names]
+    words = spread(places, APART, LEFT + APART / 2, WIDTH - RIGHT - APART / 2)
+    for name, place, at in zip(names, places, words, strict=True):
+        axes.axvline(marks[name], color=HAIR if name == "floor" else SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
+        sheet.line((place, at), (TOP, TOP - ABOVE[0] + 0.04), color=HAIR, linewidth=0.8)
+        sheet.text(at, TOP - ABOVE[0], f"{name}  {_bytes(marks[name])}", fontsize=SMALL, color=INK, ha="center")
+
+
+def _bytes(count: float) -> str:
+    factor, unit = next(((factor, unit) for factor, unit in UNITS if count >= factor), UNITS[-1])
+    return f"{short(count / factor)} {unit}"

@@ -1,0 +1,76 @@
+"""Rotations as numbers that people read: degrees from rest, Euler angles, or the components of the quaternion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import euler, quaternion
+from anim.model import Interpolation, Track
+from anim.sampling.track import sample
+from anim.show.plots import polylines
+from anim.show.plots.polylines import Line
+
+FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the twelve orders of Euler angles
+FLOAT32 = 1e-6  # rad from lock, below which rotations stored as float32 don't tell first and third angle apart
+NEAR_LOCK_DEG = 5.0  # rates of angles are 23 times amplified there
+TURN = 360.0
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A track as it is drawn. line: its values over time. keys: (K, C). risers: the jumps of a STEP track, or None."""
+
+    line: Line
+    keys: Floats
+    risers: Line | None
+
+
+def rotation_curve(track: Track, *, view: str, rest: Floats) -> Curve:
+    """Return a rotation track as degrees (…, 3): about the joint's own axes from rest, or as Euler angles.
+
+    view: FROM_REST, or an order such as "ZXY", intrinsic. rest: (4,). Values run on without jumps of whole turns.
+    """
+    if track.interpolation is Interpolation.STEP or len(track.times) == 1:
+        keys = degrees(track.values, view=view, rest=rest)
+        held = replace(track, path="translation", values=keys, interpolation=Interpolation.STEP)
+        return Curve(polylines.value_line(held), keys, polylines.risers(held))
+    dense = polylines.value_line(track)
+    values = degrees(dense.values, view=view, rest=rest)
+    at = np.searchsorted(dense.times, track.times).clip(max=len(values) - 1)
+    return Curve(Line(dense.times, values), values[at], None)
+
+
+def degrees(q: Floats, *, view: str, rest: Floats) -> Floats:
+    """Return rotations (P, 4) in order of time as degrees (P, 3)."""
+    unit = quaternion.normalize(q)
+    if view == FROM_REST:
+        return _continuous(quaternion.multiply(quaternion.conjugate(rest), unit))
+    return np.degrees(euler.continuous(unit, order=view, lock=FLOAT32))
+
+
+def lock_line(track: Track, *, order: str) -> Line:
+    """Return the distance (P, 1) in rad, 0 … π/2, of a rotation from the gimbal lock of an order."""
+    keys = track.times
+    times = polylines.value_line(track).times if len(keys) > 1 else keys
+    if track.interpolation is Interpolation.STEP:
+        line = polylines.value_line(track)
+        held = np.isnan(line.values[:, 0])
+        q = quaternion.normalize(np.where(held[:, None], track.values[:1], line.values))
+        return Line(line.times, np.where(held, np.nan, euler.distance_to_lock(q, order=order))[:, None])
+    q = quaternion.normalize(sample(track, times))
+    return Line(times, euler.distance_to_lock(q, order=order)[:, None])
+
+
+def _continuous(q: Floats) -> Floats:
+    """Rotation vectors (P, 3) in degrees of unit quaternions (P, 4): past a half turn they go on and don't flip."""
+    vectors = np.degrees(quaternion.rotation_vector(quaternion.align_signs(q)))
+    for i in range(1, len(vectors)):
+        length = float(np.linalg.norm(vectors[i]))
+        if length > 0:
+            axis = vectors[i] / length
+            turns = np.rint((vectors[i - 1] @ axis - length) / TURN)
+            vectors[i] += turns * TURN * axis
+    return np.asarray(vectors)

@@ -1,0 +1,234 @@
+"""Which tracks a picture shows, what they are called, and their partners in a second file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats, sorted_unique
+from anim.errors import NotFoundError
+from anim.gltf.document import Document, items
+from anim.gltf.reading import reader
+from anim.maths import quaternion
+from anim.measure.inspect import frame_rate
+from anim.model import Clip, Interpolation, Kind, Skeleton, Track
+from anim.ops.selection import Selection
+from anim.show.plots.rotations import COMPONENTS, FROM_REST
+
+NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
+STILL = 2e-5  # of the largest value; what moves less than this is rounding of the exporter
+COLORS = ("color", "Color", "ColorFactor", "emissiveFactor", "attenuationColor")  # ends of pointers that name colors
+SLOWEST = 8.0  # fps; fewer are the distances of a few poses and no frames
+REGULAR = 0.98  # share of keys on a rate's grid from which on frames are worth showing
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One track to draw.
+
+    clip, target: names. labels: of its components. start, end: of its clip, s. fps: of its clip, None where unknown.
+    other: the same track in a second file, if there is one to compare. view: what a rotation is drawn as: FROM_REST,
+    COMPONENTS, or an order of Euler angles. rest: (4,) rotation of the node at rest.
+    """
+
+    clip: str
+    target: str
+    track: Track
+    labels: tuple[str, ...]
+    start: float
+    end: float
+    fps: float | None
+    other: Track | None = None
+    view: str = FROM_REST
+    rest: Floats = field(default_factory=lambda: NO_TURN)
+
+    @property
+    def is_in_degrees(self) -> bool:
+        """Whether a rotation is drawn as angles, not as the components of its quaternion."""
+        return self.track.kind is Kind.ROTATION and self.view != COMPONENTS
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What tracks of two files are matched by."""
+        return self.clip, self.target, self.track.path
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """Tracks to draw, in the file's order, and how many more were meant: still ones, and those above the limit."""
+
+    shown: tuple[Shown, ...]
+    still: int = 0
+    more: int = 0
+
+
+def choose(document: Document, selection: Selection, *, limit: int, view: str = FROM_REST) -> Chosen:
+    """Return the selected tracks that move, at most `limit`; still ones only where nothing else is meant.
+
+    view: what rotations are drawn as; with an order of Euler angles only rotations are selected.
+    Raises NotFoundError where no track is selected.
+    """
+    found = _selected(document, selection, view)
+    if view not in (FROM_REST, COMPONENTS):
+        found = [each for each in found if each.track.kind is Kind.ROTATION]
+    if not found:
+        raise NotFoundError("no track is selected", help="gltf-anim inspect IN --tracks lists them")
+    moving = [each for each in found if _moves(each.track)] or found
+    return Chosen(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
+
+
+def compare(chosen: Chosen, other: Document) -> tuple[Chosen, int]:
+    """Return the tracks with their partners in another file, by clip, node and path, and how many have none.
+
+    Raises NotFoundError where none has.
+    """
+    partners = {each.key: each for each in reversed(_selected(other, Selection(), FROM_REST))}
+    shown = tuple(_with(each, partners.get(each.key)) for each in chosen.shown)
+    alone = sum(each.other is None for each in shown)
+    if alone == len(shown):
+        clips = sorted({each.clip for each in partners.values()})
+        listed = ", ".join(f"'{name}'" for name in clips[:6])
+        raise NotFoundError(
+            "has none of the tracks to compare with (matched by clip, node and path)",
+            help=f"its clips are {listed}{', …' if len(clips) > 6 else ''}" if clips else "it has no clips",
+        )
+    return replace(chosen, shown=shown), alone
+
+
+def _with(each: Shown, partner: Shown | None) -> Shown:
+    if partner is None or partner.track.values.shape[1] != each.track.values.shape[1]:
+        return each
+    track = partner.track
+    if track.kind is Kind.ROTATION and quaternion.dot(track.values[0], each.track.values[0]) < 0:
+        track = _scaled(track, np.full((len(track.times), 1), -1.0))
+    return replace(
+        each, other=track, start=min(each.start, partner.start), end=max(each.end, partner.end), fps=each.fps
+    )
+
+
+def _selected(document: Document, selection: Selection, view: str) -> list[Shown]:
+    clips, skeleton = reader.clips(document), reader.skeleton(document)
+    targets = _morph_targets(document)
+    found = []
+    for number in selection.chosen_clips([clip.name for clip in clips]):
+        clip = clips[number]
+        fps = _rate(clip)
+        for i in sorted(selection.chosen_tracks(clip, skeleton)):
+            track = _aligned(clip.tracks[i])
+            labels = _labels(track, targets, view)
+            name, target = _shown(reader.clip_name(clip.name, number)), _shown(_target(track, skeleton))
+            rest = NO_TURN if track.node is None else skeleton.rotation[track.node]
+            found.append(Shown(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
+    return found
+
+
+def _aligned(track: Track) -> Track:
+    """The track with the signs of its quaternions such that curves don't jump where the rotation doesn't.
+
+    CUBICSPLINE stays: there a sign is part of the way.
+    """
+    if track.kind is not Kind.ROTATION or track.interpolation is Interpolation.CUBICSPLINE:
+        return track
+    signs = np.where(quaternion.dot(quaternion.align_signs(track.values), track.values) < 0, -1.0, 1.0)
+    return track if (signs > 0).all() else _scaled(track, signs[:, None])
+
+
+def _scaled(track: Track, signs: Floats) -> Track:
+    before = None if track.in_tangents is None else track.in_tangents * signs
+    after = None if track.out_tangents is None else track.out_tangents * signs
+    return replace(track, values=track.values * signs, in_tangents=before, out_tangents=after)
+
+
+def _rate(clip: Clip) -> float | None:
+    estimated = frame_rate.estimate(sorted_unique(np.concatenate(clip.axes))) if clip.axes else None
+    if estimated is None or estimated.regular < REGULAR or estimated.fps < SLOWEST:
+        return None
+    return estimated.fps
+
+
+def _target(track: Track, skeleton: Skeleton) -> str:
+    if track.node is None:
+        return track.pointer or ""
+    return skeleton.names[track.node] or f"node {track.node}"
+
+
+def _labels(track: Track, targets: Mapping[str, Sequence[str]], view: str) -> tuple[str, ...]:
+    count = track.values.shape[1]
+    if track.kind is Kind.ROTATION and view != COMPONENTS:
+        return tuple("xyz") if view == FROM_REST else _euler_labels(view)
+    if named := _weight_names(track, targets):
+        return named
+    if count in (3, 4) and track.pointer is not None and track.pointer.endswith(COLORS):
+        return tuple("rgba"[:count])
+    if count == 1:
+        return ("",)
+    return tuple("xyzw"[:count]) if count <= 4 else tuple(str(i) for i in range(count))
+
+
+def _euler_labels(order: str) -> tuple[str, ...]:
+    """The axes in their order, told apart where the first is the third again: ("Z", "X", "Y"), ("Z1", "X", "Z2")."""
+    if order[0] != order[2]:
+        return tuple(order)
+    return f"{order[0]}1", order[1], f"{order[2]}2"
+
+
+def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """What morph weights are called, by the target's name or number; none for other tracks."""
+    pointer = f"/nodes/{track.node}/weights" if track.path == "weights" else track.pointer or ""
+    whole = re.fullmatch(r"(/(?:nodes|meshes)/\d+/weights)(?:/(\d+))?", pointer)
+    if whole is None:
+        return ()
+    names, count = targets.get(whole[1], ()), track.values.shape[1]
+    if whole[2] is not None:
+        number = int(whole[2])
+        return (_shown(names[number]) if number < len(names) else f"target {number}",)
+    if len(names) == count:
+        return _shortened([_shown(name) for name in names])
+    return tuple(f"target {i}" for i in range(count))
+
+
+def _morph_targets(document: Document) -> dict[str, tuple[str, ...]]:
+    """Names of morph targets by the pointer to their weights, where a mesh has any in `extras.targetNames`."""
+    result: dict[str, tuple[str, ...]] = {}
+    for i, mesh in enumerate(items(document.json, "meshes")):
+        names = _target_names(mesh) or _target_names(mesh["primitives"][0])
+        if names:
+            result[f"/meshes/{i}/weights"] = names
+    for i, node in enumerate(items(document.json, "nodes")):
+        pointer = f"/meshes/{node.get('mesh')}/weights"
+        if pointer in result:
+            result[f"/nodes/{i}/weights"] = result[pointer]
+    return result
+
+
+def _target_names(owner: Mapping[str, Any]) -> tuple[str, ...]:
+    extras = owner.get("extras")
+    names = extras.get("targetNames") if isinstance(extras, dict) else None
+    return tuple(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
+
+
+def _shown(name: str) -> str:
+    """A name as a picture can hold it: XML has no place for control characters."""
+    return "".join(c if c.isprintable() else "�" for c in name)
+
+
+def _shortened(names: Sequence[str]) -> tuple[str, ...]:
+    """Names without what all of them begin with, up to the last separator: "face_a", "face_b" → "a", "b"."""
+    first, last = min(names), max(names)  # what these two share, all share
+    same = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
+    cut = max(first[:same].rfind(mark) for mark in "_.-/ ") + 1
+    short = [name[cut:] for name in names]
+    return tuple(names) if any(not name or name.isdecimal() for name in short) else tuple(short)
+
+
+def _moves(track: Track) -> bool:
+    values = track.values
+    tangents = (track.in_tangents, track.out_tangents)
+    tolerance = STILL * (1 if track.kind is Kind.ROTATION else max(float(np.abs(values).max()), 1e-30))
+    return bool((np.abs(values - values[0]) > tolerance).any()) or any(
+        each is not None and len(values) > 1 and bool(np.abs(each).max() > tolerance) for each in tangents
+    )

@@ -1,0 +1,113 @@
+"""How much linear blending loses in a clip, and how other methods fare: candy wrappers, volumes, bulges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from anim.arrays import Floats
+from anim.errors import NotFoundError, RangeError
+from anim.model import Clip, Scene
+from anim.skinning.analysis.collapse_index import Narrow, indices
+from anim.skinning.analysis.method_scores import Fared, fared, subject
+from anim.skinning.bake import baker
+
+LOW = 0.7  # collapse index below which skin looks pinched: what a quarter turn between two joints makes
+
+
+@dataclass(frozen=True, slots=True)
+class MeshCollapse:
+    """One skinned mesh in one clip.
+
+    indices: (F,) least collapse index of its vertices at each of `times` (F,) s. worst: where it is least of all.
+    low: share of vertices that are ever below 0.7. inverted: share that is ever turned inside out.
+    closed: share of faces that enclose a volume. methods: how each of them fared.
+    """
+
+    mesh: str
+    node: int
+    vertices: int
+    times: Floats
+    indices: Floats
+    worst: Narrow
+    low: float
+    inverted: float
+    closed: float
+    methods: tuple[Fared, ...]
+
+
+def collapse(
+    scene: Scene,
+    clip: Clip,
+    *,
+    times: Floats,
+    methods: Sequence[str] = ("lbs", "dqs"),
+    bulge_clamp: bool = False,
+    nodes: Sequence[int] | None = None,
+) -> tuple[MeshCollapse, ...]:
+    """Return what happens to each skinned mesh of a scene at `times` (F,) s while a clip plays.
+
+    The collapse index of a vertex belongs to linear blending; the methods are compared by the volume that they enclose
+    and by how far they stand off the links. bulge_clamp: with the clamp on methods other than lbs. nodes: only meshes
+    on these. For many clips make a `Comparison`.
+    collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707
+    Source: notes/algorithms.md E3.
+    """
+    return Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=nodes).of(clip, times=times)
+
+
+class Comparison:
+    """Methods side by side on one scene, ready for any clip. meshes: how many are looked at.
+
+    Raises NotFoundError where there is no skinned mesh, RangeError for a bulge clamp where lbs is the only method.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        methods: Sequence[str] = ("lbs", "dqs"),
+        bulge_clamp: bool = False,
+        nodes: Sequence[int] | None = None,
+    ) -> None:
+        skinned = [i.node for i in scene.instances if i.skin is not None and (nodes is None or i.node in nodes)]
+        if not skinned:
+            raise NotFoundError("there is no skinned mesh to look at")
+        if bulge_clamp and set(methods) == {"lbs"}:
+            raise RangeError("bulge clamp needs another method than lbs (expected dqs or cor)")
+        self._scene = scene
+        self._bakers = {
+            method: baker(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)
+            for method in methods
+        }
+        self._linear = self._bakers.get("lbs") or baker(scene, nodes=skinned)
+        self._subjects = [subject(layer, scene.skeleton) for layer in next(iter(self._bakers.values())).layers]
+        self.meshes = len(self._subjects)
+
+    def of(
+        self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda methods: None
+    ) -> tuple[MeshCollapse, ...]:
+        """Return what happens to each mesh while a clip plays. progress: called with the methods done."""
+        by_method = []
+        for i, (method, made) in enumerate(self._bakers.items()):
+            by_method.append(list(fared(made, self._linear, method, self._subjects, clip, times)))
+            progress(i + 1)
+        found = []
+        for each, methods in zip(self._subjects, zip(*by_method, strict=True), strict=True):
+            instance, rig = each.layer.instance, each.layer.rig
+            seen = indices(self._scene, each.layer, clip, times)
+            found.append(
+                MeshCollapse(
+                    instance.mesh.name or self._scene.skeleton.names[instance.node] or f"node {instance.node}",
+                    instance.node,
+                    len(rig.points),
+                    times,
+                    seen.by_frame,
+                    seen.worst,
+                    float((seen.least < LOW).mean()),
+                    float(seen.inverted.mean()),
+                    len(each.faces) / max(len(rig.faces), 1),
+                    methods,
+                )
+            )
+        return tuple(found)

@@ -1,0 +1,193 @@
+"""What to do about skin that collapses: in words and, where a command of ours does it, as its line.
+
+IN and OUT stand for the files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from anim.measure.inspect.clip_findings import choosing
+from anim.skinning.analysis.collapse import LOW, MeshCollapse
+from anim.skinning.analysis.collapsed_clips import KEPT, linear_volume, pinches
+from anim.skinning.analysis.method_scores import Fared
+from anim.skinning.analysis.ranking import ALIKE, Standing, best, standings
+from anim.skinning.methods.registry import SKINNING_METHODS
+
+GOOD = 0.95  # of a ring's radius: what twist joints should leave
+MUCH = 1.25  # times the distance from the links of its joints at rest: a bulge that is seen
+MORE = 0.1  # than linear blending: else it is the motion that does it
+CLAMP = " --bulge-clamp"  # for methods other than lbs, the same in both commands
+SOME = 0.01  # share of vertices that has to bulge to be worth a word
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A mesh in a clip, by the clip's number and name."""
+
+    number: int
+    clip: str
+    mesh: MeshCollapse
+
+
+def advice(found: Sequence[Found], *, clamped: bool = False) -> Iterator[str]:
+    """Yield what to do, a line each, the worst of all first; one line that all is well, or that there is no clip.
+
+    Methods that were measured are recommended by what they did, others only to be measured. clamped: whether methods
+    other than lbs were measured with the bulge clamp.
+    """
+    yield from _unusable(found)
+    pinched = sorted((each for each in found if pinches(each.mesh)), key=lambda each: each.mesh.worst.index)
+    if pinched:
+        yield from _against_pinching(pinched, clamped=clamped)
+    elif found:
+        yield _all_is_well(found, clamped=clamped)
+    else:
+        yield "there is no clip to look at"
+
+
+def _unusable(found: Sequence[Found]) -> Iterator[str]:
+    """Of each method that loses the model, where it does most."""
+    lost = [(fared.off, fared, each) for each in found for fared in each.mesh.methods if fared.unusable]
+    for method in dict.fromkeys(fared.method for _, fared, _ in lost):
+        off, fared, each = max((one for one in lost if one[1].method == method), key=lambda one: one[0])
+        yield (
+            f"{method} can't be used: a vertex is {off:.3g} m from where linear blending has it, more than the model's "
+            f"size ('{each.clip}', {fared.off_time:.2f} s)"
+        )
+
+
+def twist_joints(angle: float) -> int:
+    """Return how many joints must share a twist by `angle` rad so that each leaves 95 % of the radius: cos(θ / 2n).
+
+    twist_joints(π / 2) → 3
+    """
+    return max(1, math.ceil(angle / (2 * math.acos(GOOD)) - 1e-9))
+
+
+def _all_is_well(found: Sequence[Found], *, clamped: bool) -> str:
+    meshes = [each.mesh for each in found]
+    index = min(each.worst.index for each in meshes)
+    told = f"no vertex falls below {LOW} (least {index:.3f})"
+    left = _left(meshes)
+    if left is not None and left < KEPT:
+        return f"{told}; {_percent(left)} of the volume is left at worst, and no method that was measured keeps more"
+    if left is not None:
+        return f"linear blending is good enough: {told}, {_percent(left)} or more of the volume is left"
+    if any(each.closed for each in meshes):
+        line = _measuring(found, ["lbs"], clamped=clamped)
+        return f"{told}; to see what linear blending leaves of the volume: {line}"
+    return f"linear blending is good enough: {told}"
+
+
+def _left(meshes: list[MeshCollapse]) -> float | None:
+    """The least volume of all by linear blending, against bind pose."""
+    volumes = [volume for each in meshes if (volume := linear_volume(each)) is not None]
+    return min((float(each.min()) for each in volumes), default=None)
+
+
+def _against_pinching(pinched: list[Found], *, clamped: bool) -> Iterator[str]:
+    yield _worst(pinched)
+    found = standings([each.mesh for each in pinched])
+    chosen = best(found)
+    worse = chosen is not None and _keeps_less(found, chosen)
+    yield _no_gain(found) if worse else _bake(found, chosen, pinched, clamped=clamped)
+    yield from _sharing_the_twist(pinched)
+    if chosen is not None and not worse:
+        yield from _against_bulging(pinched, chosen.method, clamped=clamped)
+
+
+def _worst(pinched: list[Found]) -> str:
+    first, clips = pinched[0], len({each.number for each in pinched})
+    worst, left = first.mesh.worst, _left([first.mesh])
+    told = "1 clip pinches" if clips == 1 else f"{clips} clips pinch"
+    places = f"'{worst.joint}' against '{worst.other}', {math.degrees(worst.angle):.0f}° at {worst.time:.2f} s"
+    loss = f"; {_percent(left)} of the volume is left" if left is not None and left < KEPT else ""
+    return f"{told}; worst {worst.index:.2f} in '{first.clip}': {places}{loss}"
+
+
+def _bake(found: Sequence[Standing], chosen: Standing | None, pinched: list[Found], *, clamped: bool) -> str:
+    if chosen is None and any(each.unusable for each in found):
+        return "no other method that was measured can be used"
+    if chosen is None:
+        others = _unmeasured(pinched)
+        line = _measuring(pinched, others, clamped=False)
+        return f"bake it with another method; to see first what {' and '.join(others)} would keep: {line}"
+    numbers = _numbers(pinched)
+    clips, output = choosing(numbers), "OUT" if len(numbers) == 1 else "'OUT-{clip}.glb'"
+    keeps = f" ({_keeps(found)} of the volume)" if chosen.volume is not None else ""
+    method = f"--method {chosen.method}{CLAMP if clamped else ''}"
+    return f"to bake it with {chosen.method}{keeps}: gltf-anim bake IN {output} {method}{clips}"
+
+
+def _no_gain(found: Sequence[Standing]) -> str:
+    return f"no other method that was measured keeps more of the volume than lbs ({_keeps(found)})"
+
+
+def _keeps_less(found: Sequence[Standing], chosen: Standing) -> bool:
+    """Whether even the best method loses volume that linear blending keeps."""
+    linear = next((each.volume for each in found if each.method == "lbs"), None)
+    return linear is not None and chosen.volume is not None and chosen.volume + ALIKE < min(linear, 1.0)
+
+
+def _keeps(found: Sequence[Standing]) -> str:
+    return ", ".join(
+        f"{each.method} keeps {_percent(each.volume)}"
+        for each in found
+        if each.volume is not None and not each.unusable
+    )
+
+
+def _sharing_the_twist(pinched: list[Found]) -> Iterator[str]:
+    """The worst twist, if any: bends have no use for twist joints."""
+    worst = next((each.mesh.worst for each in pinched if each.mesh.worst.twist), None)
+    if worst is not None and (count := twist_joints(worst.angle)) > 1:
+        yield (
+            f"or share the twist among {count} joints between '{worst.joint}' and '{worst.other}' "
+            f"({_percent(math.cos(worst.angle / (2 * count)))} of the radius stays), which every player shows"
+        )
+
+
+def _against_bulging(pinched: list[Found], method: str, *, clamped: bool) -> Iterator[str]:
+    swollen: list[tuple[Fared, Found]] = []
+    for each in pinched:
+        linear = max((fared.bulge for fared in each.mesh.methods if fared.method == "lbs"), default=1.0)
+        swollen += [(fared, each) for fared in each.mesh.methods if fared.method == method and _swells(fared, linear)]
+    if swollen:
+        fared, each = max(swollen, key=lambda pair: pair[0].bulge)
+        yield f"{method} bulges up to {fared.bulge:.2f}× at '{fared.joint}' ({each.clip}, {fared.time:.2f} s)"
+        if not clamped:
+            yield f"to see what a clamp makes of the bulge: {_measuring([each], [], clamped=True)}"
+        if others := _unmeasured([each]):
+            names = " and ".join(others)
+            yield f"to see what {names} makes of it: {_measuring([each], others, clamped=clamped)}"
+
+
+def _swells(fared: Fared, linear: float) -> bool:
+    """Whether a method bulges so that it is seen, and more than linear blending does."""
+    return fared.bulge > max(MUCH, linear + MORE) and fared.bulging > SOME
+
+
+def _unmeasured(found: Sequence[Found]) -> list[str]:
+    """The methods whose effect is not known yet."""
+    known = {"lbs", *(fared.method for each in found for fared in each.mesh.methods)}
+    return [name for name in SKINNING_METHODS if name not in known]
+
+
+def _measuring(found: Sequence[Found], others: Sequence[str], *, clamped: bool) -> str:
+    """The line that looks at these clips again: by the methods that were measured and can be used, and by others."""
+    lost = {fared.method for each in found for fared in each.mesh.methods if fared.unusable}
+    known = [fared.method for each in found for fared in each.mesh.methods if fared.method not in lost]
+    methods = "".join(f" --method {name}" for name in dict.fromkeys([*known, *others]))
+    return f"gltf-anim collapse IN{methods}{CLAMP if clamped else ''}{choosing(_numbers(found))}"
+
+
+def _numbers(found: Sequence[Found]) -> list[int]:
+    """The clips' numbers, each once."""
+    return sorted({each.number for each in found})
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"

@@ -1,0 +1,153 @@
+"""One mesh instance on its way through a bake: which matrices move it, and in which columns its vertices go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError, RangeError
+from anim.maths import matrix
+from anim.model import Instance, Skeleton
+from anim.skinning.binding import Rig, rig
+from anim.skinning.kernels.layout import NOTHING, Shape, Singles, Target
+from anim.skinning.methods.skinner import Skinner, filled
+from anim.skinning.pose_blocks import Frames
+from anim.skinning.vertex_normals import SmoothNormals
+
+Make: TypeAlias = Callable[[Rig, bool], Skinner]
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """An instance, its rig and skinner, and its first column.
+
+    in_mesh_space: positions are wanted in the space of the instance's node. smooth: what makes normals of the faces
+    where they are wanted and the mesh has none. still: its vertices where no morph target counts.
+    """
+
+    instance: Instance
+    rig: Rig
+    skinner: Skinner
+    at: int
+    in_mesh_space: bool
+    smooth: SmoothNormals | None
+    still: Shape
+
+    @property
+    def packed_size(self) -> int:
+        """How many bytes a frame takes that is packed, about: its matrices, and vertices where they are morphed."""
+        morphed = len(self.rig.points) if len(self.instance.mesh.targets) else 0
+        return 96 * len(self.rig.nodes) + 36 * morphed
+
+    def pack(self, frames: Frames, block: slice) -> tuple[Any, Shape]:
+        """Return what `place` needs for some of the frames."""
+        return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
+
+    def place(self, packed: tuple[Any, Shape], block: slice, whole: Target, first: int, last: int) -> None:
+        """Write vertices first … last, for a block of frames, into the whole."""
+        parts, shape = packed
+        normals = whole.normals[block] if len(shape.normals) else NOTHING
+        tangents = whole.tangents[block] if len(shape.tangents) else NOTHING
+        self.skinner.place(parts, shape, Target(self.at, whole.positions[block], normals, tangents), first, last)
+
+    def finish(self, frames: Frames, whole: Target) -> None:
+        """Bring what was placed in world space into the mesh's own, and make normals of the faces if need be."""
+        span = slice(self.at, self.at + len(self.rig.points))
+        if self.in_mesh_space and self.instance.skin is not None:
+            node = frames.world[self.instance.node]
+            back = _inverse(node)
+            whole.positions[:, span] = matrix.apply(back, whole.positions[:, span].astype(np.float64))
+            if len(self.rig.normals):  # by the inverse's inverse transpose, of rows
+                whole.normals[:, span] = _unit(whole.normals[:, span] @ node[..., :3])
+            if len(self.rig.tangents):
+                whole.tangents[:, span] = _unit(whole.tangents[:, span] @ np.swapaxes(back[..., :3], -1, -2))
+        if self.smooth is not None:
+            self.smooth.of(whole.positions[:, span], whole.normals[:, span])
+
+    def at_rest(self, frames: Frames) -> Floats:
+        """Return the vertices (V, 3) in the first of the frames, blended linearly in float64."""
+        bound = self.matrices(frames, slice(0, 1))[0]
+        points = _morphed(self.rig.points, self.instance.mesh.targets, self._weights(frames, slice(0, 1)))[..., 0]
+        owner = np.repeat(np.arange(len(points)), np.diff(self.rig.start))
+        chosen = bound[self.rig.joint]
+        moved = np.einsum("eij,ej->ei", chosen[..., :3], points[owner]) + chosen[..., 3]
+        weighted = moved * self.rig.weight[:, None]
+        sums = [np.bincount(owner, part, minlength=len(points)) for part in weighted.T]
+        placed: Floats = np.stack(sums, axis=-1).astype(np.float64)
+        if self.in_mesh_space and self.instance.skin is not None:
+            placed = matrix.apply(_inverse(frames.world[self.instance.node, :1])[0], placed)
+        return placed
+
+    def matrices(self, frames: Frames, block: slice) -> Floats:
+        """Return world_from_mesh (n, J, 3, 4) of the joints; where there is no skin, of the node."""
+        if self.in_mesh_space and self.instance.skin is None:
+            count = len(frames.times[block])
+            return np.broadcast_to(np.eye(4)[:3], (count, 1, 3, 4))
+        world = frames.world[self.rig.nodes, block]
+        joints, count = world.shape[:2]
+        whole = np.zeros((joints, 4, 4))
+        whole[:, :3], whole[:, 3, 3] = self.rig.bind, 1
+        product = world.reshape(joints, 3 * count, 4) @ whole  # one per joint, not per frame: ten times faster
+        return product.reshape(joints, count, 3, 4).transpose(1, 0, 2, 3)
+
+    def _shape(self, frames: Frames, block: slice) -> Shape:
+        mesh, weights = self.instance.mesh, self._weights(frames, block)
+        if not weights.any():
+            return self.still
+        points = _morphed(self.rig.points, mesh.targets, weights)
+        normals = _morphed(self.rig.normals, mesh.normal_targets, weights)
+        tangents = _morphed(self.rig.tangents, mesh.tangent_targets, weights)
+        return Shape(_rows(points), _rows(normals), _rows(tangents))
+
+    def _weights(self, frames: Frames, block: slice) -> Floats:
+        """Morph weights (n, M), or (1, M) where no frame has its own."""
+        animated = frames.weights.get(self.instance.node)
+        return self.instance.weights[None] if animated is None else animated[block]
+
+
+def layer(
+    skeleton: Skeleton, instance: Instance, make: Make, *, at: int, space: str, normals: bool, tangents: bool
+) -> Layer:
+    """Return the layer of an instance. make: gets its rig, and whether its points never change and are all it needs."""
+    name = instance.mesh.name or skeleton.names[instance.node] or f"node {instance.node}"
+    try:
+        bound = rig(instance, skeleton.parents, normals=normals, tangents=tangents)
+    except AnimError as error:
+        raise error.at(f"mesh '{name}'") from None
+    smooth = SmoothNormals(bound.faces, len(bound.points)) if normals and instance.mesh.normals is None else None
+    plain = not len(instance.mesh.targets) and not len(bound.normals) and not len(bound.tangents)
+    still = Shape(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))
+    return Layer(instance, bound, make(bound, plain), at, space == "mesh", smooth, still)
+
+
+def _morphed(base: Floats, targets: Floats | None, weights: Floats) -> Floats:
+    """base (V, 3) and targets (M, V, 3) by weights (n, M) → (V, 3, n); targets that never count are not read."""
+    if targets is None or not len(targets) or not len(base):
+        return base[:, :, None]
+    used = np.flatnonzero(weights.any(axis=0))
+    if not len(used):
+        return base[:, :, None]
+    moved = targets[used].reshape(len(used), -1).T @ weights[:, used].T
+    return np.asarray(base[:, :, None] + moved.reshape(*base.shape, -1))
+
+
+def _rows(values: Floats) -> Singles:
+    return np.ascontiguousarray(values, np.float32) if values.shape[2] == 1 else filled(values)
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    return np.asarray(vectors / np.where(length > 0, length, 1))
+
+
+def _inverse(world: Floats) -> Floats:
+    """Inverses (F, 3, 4) of a node's matrices. Raises RangeError where it is flat at some time."""
+    linear = world[..., :3]
+    if not (np.abs(np.linalg.det(linear)) > 0).all():
+        raise RangeError("mesh space is flat: the node of a mesh has scale 0 (expected space 'world')")
+    back = np.linalg.inv(linear)
+    return np.concatenate((back, -(back @ world[..., 3:])), axis=-1)

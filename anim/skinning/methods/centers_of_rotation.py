@@ -1,0 +1,60 @@
+"""Skinning with optimized centers of rotation: limbs neither pinch when twisted nor bulge when bent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.skinning.binding import Rig
+from anim.skinning.kernels.layout import Shape, Singles, Stretches, Target, output, vertices
+from anim.skinning.methods.rotation_centers import centers
+from anim.skinning.methods.skinner import lanes
+from anim.skinning.weighted_joints import Carriers
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """Rotations (U, 4, L) and rigid motions (U, 12, L) of joints with weight; (U, 15, L) where any is stretched.
+
+    The last three are what is added to the translation for each unit of scale.
+    """
+
+    turns: Singles
+    rigids: Singles
+    stretches: Stretches | None
+
+
+@dataclass(frozen=True)
+class CentersOfRotation:
+    """Turns each vertex by the blended quaternion about a center that blends linearly.
+
+    The center belongs to the mesh at rest, morph targets don't move it. Stretches come first, as with dual quaternions.
+    Source: Le & Hodgins 2016, "Real-time Skeletal Skinning with Optimized Centers of Rotation", algorithm 1.
+    """
+
+    rig: Rig
+    carriers: Carriers = field(init=False, repr=False)
+    centers: Singles = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "carriers", Carriers(self.rig))
+        object.__setattr__(self, "centers", centers(self.rig).astype(np.float32)[:, :, None])
+
+    def pack(self, matrices: Floats) -> Packed:
+        """Return the matrices (n, J, 3, 4) as the kernel reads them."""
+        parts = self.carriers.split(matrices)
+        turn = quaternion.to_matrix(parts.rotation)
+        rigid = np.concatenate((turn, parts.translation[..., None]), axis=-1).reshape(*turn.shape[:2], 12)
+        if parts.stretch is not None:
+            rigid = np.concatenate((rigid, -quaternion.rotate(parts.rotation, self.carriers.pivots)), axis=-1)
+        return Packed(lanes(parts.rotation), lanes(rigid), self.carriers.stretches(parts))
+
+    def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
+        """Write vertices first … last of all frames."""
+        from anim.skinning.kernels.centers import skin_centers
+
+        moves = (packed.turns, packed.rigids, packed.stretches)
+        skin_centers(*vertices(shape), self.centers, self.carriers.held, *moves, first, last, *output(target))

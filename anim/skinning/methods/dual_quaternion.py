@@ -1,0 +1,58 @@
+"""Dual-quaternion skinning: twisted limbs keep their volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import dual_quaternion as duals
+from anim.maths import quaternion
+from anim.skinning.binding import Rig
+from anim.skinning.kernels.layout import Shape, Singles, Stretches, Target, output, vertices
+from anim.skinning.methods.skinner import lanes
+from anim.skinning.weighted_joints import Carriers
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """Rigid motions of joints with weight (U, 8, L); (U, 12, L) where any is stretched.
+
+    The last four are what is added to the dual part for each unit of scale.
+    """
+
+    duals: Singles
+    stretches: Stretches | None
+
+
+@dataclass(frozen=True)
+class DualQuaternion:
+    """Blends rigid motions as dual quaternions, after stretches linearly.
+
+    One influence gives exactly its matrix: scale, shear and mirror included.
+    Source: Kavan, Collins, Žára & O'Sullivan 2008, "Geometric Skinning with Approximate Dual Quaternion Blending",
+    sections 3 and 4; the pivot is the strongest influence, and stretches lie about the joints' own places.
+    """
+
+    rig: Rig
+    carriers: Carriers = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "carriers", Carriers(self.rig))
+
+    def pack(self, matrices: Floats) -> Packed:
+        """Return the matrices (n, J, 3, 4) as the kernel reads them."""
+        parts = self.carriers.split(matrices)
+        rigid = duals.from_rigid(parts.rotation, parts.translation)
+        if parts.stretch is not None:
+            turned = quaternion.rotate(parts.rotation, self.carriers.pivots)
+            rigid = np.concatenate((rigid, duals.from_rigid(parts.rotation, -turned)[..., 4:]), axis=-1)
+        return Packed(lanes(rigid), self.carriers.stretches(parts))
+
+    def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
+        """Write vertices first … last of all frames."""
+        from anim.skinning.kernels.dual_quaternion import skin_dual_quaternion
+
+        moves = (self.carriers.held, packed.duals, packed.stretches)
+        skin_dual_quaternion(*vertices(shape), *moves, first, last, *output(target))

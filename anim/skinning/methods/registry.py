@@ -1,0 +1,32 @@
+"""The skinning methods, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from anim.skinning.binding import Rig
+from anim.skinning.methods.centers_of_rotation import CentersOfRotation
+from anim.skinning.methods.dual_quaternion import DualQuaternion
+from anim.skinning.methods.linear_blend import LinearBlend
+from anim.skinning.methods.skinner import Skinner
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One method. about: for --help. skinner: gets a rig, and whether its points never change and need no normals."""
+
+    about: str
+    skinner: Callable[[Rig, bool], Skinner]
+
+
+SKINNING_METHODS: dict[str, Method] = {
+    "lbs": Method("linear blend, as every player does it; twists pinch", LinearBlend),
+    "dqs": Method(
+        "dual quaternions: twists keep their volume, bends bulge a little", lambda rig, _: DualQuaternion(rig)
+    ),
+    "cor": Method(
+        "optimized centers of rotation: neither pinches nor bulges; slow to start",
+        lambda rig, _: CentersOfRotation(rig),
+    ),
+}

@@ -1,0 +1,107 @@
+"""Skinning matrices taken apart into a rigid motion and a stretch, so that methods that only turn can use them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.maths import quaternion
+from anim.skinning.binding import Rig
+
+RIGID = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what float32 bind matrices leave behind
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Joints' matrices as rotation (n, J, 4) xyzw and translation (n, J, 3), after a stretch and a scale.
+
+    stretch: (n, J, 3, 4), scale: (n, J); None where all are rigid and there is nothing to stretch.
+    """
+
+    rotation: Floats
+    translation: Floats
+    stretch: Floats | None = None
+    scale: Floats | None = None
+
+
+def split(matrices: Floats, pivots: Floats) -> Split:
+    """Return affine matrices (n, J, 3, 4) as A p + t = R (S p + c o) + t′ − c R o, whatever c is.
+
+    R is a rotation, o the joint's own place in bind space, `pivots` (J, 3), and t′ the place to which it goes. S is a
+    symmetric stretch about o; a mirrored joint has all three factors negative. `scale` is the joint's own, ∛det A.
+    A blend takes one c for all joints of a vertex (`carriers.scale_shares`). Where they all scale alike, that is their
+    scale: the blend is then the one without scale, made larger. A joint that alone grows or shears does so about its
+    own place, and doesn't drag what it shares with its neighbors.
+    split(2 · identity about (0, 1, 0)) → S p = 2 p − (0, 2, 0), c = 2, t′ = (0, 1, 0)
+    Source: polar decomposition, Shoemake & Duff 1992.
+    """
+    linear = matrices[..., :3]
+    if _is_rotation(linear).all():
+        return Split(quaternion.from_matrix(linear), matrices[..., 3])
+    return _stretched(matrices, pivots)
+
+
+def split_after(matrices: Floats, pivots: Floats, shape: Floats) -> Split:
+    """Return matrices (n, J, 3, 4) in the same parts where all joints' stretches begin with one, `shape` (3, 3).
+
+    pivots: (J, 3) m, stretched by it.
+    """
+    bound = np.concatenate((matrices[..., :3] @ np.linalg.inv(shape), matrices[..., 3:]), axis=-1)
+    parts = _stretched(bound, pivots)
+    assert parts.stretch is not None
+    whole = np.concatenate((parts.stretch[..., :3] @ shape, parts.stretch[..., 3:]), axis=-1)
+    return replace(parts, stretch=whole)
+
+
+def pivots(rig: Rig) -> Floats:
+    """Return where each joint (J, 3) stands in mesh space at bind time; the origin for one that has no such place."""
+    linear = rig.bind[..., :3]
+    solvable = np.abs(np.linalg.det(linear)) > 0
+    found = np.zeros((len(linear), 3))
+    found[solvable] = -np.linalg.solve(linear[solvable], rig.bind[solvable][..., 3:])[..., 0]
+    return found
+
+
+def _is_rotation(linear: Floats) -> Bools:
+    """Whether matrices (..., 3, 3) have no scale, shear or mirror; one that holds NaN has."""
+    x, y, z = np.ascontiguousarray(np.moveaxis(linear, (-1, -2), (0, 1)))  # by component: rows are fast
+    unit = [_dot(each, each) - 1 for each in (x, y, z)]
+    square = np.stack([*unit, _dot(x, y), _dot(y, z), _dot(z, x)])
+    normal = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+    return np.asarray((np.abs(square).max(axis=0) < RIGID) & (_dot(normal, z) > 0))
+
+
+def _dot(a: Sequence[Floats], b: Sequence[Floats]) -> Floats:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _stretched(matrices: Floats, pivots: Floats) -> Split:
+    linear, moved = matrices[..., :3], matrices[..., 3]
+    turn, stretch = _polar(linear, np.swapaxes(linear, -1, -2) @ linear)
+    whole = np.concatenate((stretch, -_times(stretch, pivots)[..., None]), axis=-1)
+    scale = np.cbrt(np.linalg.det(linear))
+    return Split(quaternion.from_matrix(turn), _times(linear, pivots) + moved, whole, scale)
+
+
+def _polar(linear: Floats, square: Floats) -> tuple[Floats, Floats]:
+    """Rotation and stretch (..., 3, 3); the slow way only for matrices that are no rotation times a number."""
+    size = np.sqrt(np.trace(square, axis1=-2, axis2=-1) / 3)[..., None, None]
+    sign = np.where(np.linalg.det(linear) < 0, -1.0, 1.0)[..., None, None]
+    even = (np.abs(square - size**2 * np.eye(3)).max(axis=(-1, -2)) <= RIGID * size[..., 0, 0] ** 2) & (
+        size[..., 0, 0] > 0
+    )
+    turn = sign * linear / np.where(size > 0, size, 1)
+    stretch = sign * size * np.eye(3)
+    if not even.all():
+        u, factors, v = np.linalg.svd(linear[~even])
+        flip = np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[:, None, None]
+        turn[~even] = flip * (u @ v)
+        stretch[~even] = flip * (np.swapaxes(v, -1, -2) @ (factors[:, :, None] * v))
+    return turn, stretch
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    return np.asarray((matrices @ vectors[..., None])[..., 0])

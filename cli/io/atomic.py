@@ -1,0 +1,268 @@
+"""Files that appear whole or not at all: written as temporary neighbors, renamed once they are complete.
+
+One file is replaced by one rename. Files that belong together by their names alone (a cache and its companions) can't
+be: their main file is moved away before any of them changes and comes last, so that whoever finds it finds one set.
+"""
+
+from __future__ import annotations
+
+import filecmp
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from anim.caches.storage import PIECE
+from anim.gltf.document import Bytes
+from cli import loading
+from cli.errors import OutputError, not_written
+from cli.io import links
+
+MAX_PREFIX_LENGTH = 40  # letters of a name that its temporary neighbor begins with: longer names have no room for more
+MAX_LOCK_WAIT_S = 5.0  # `flock FOLDER gltf-anim …` in a script would make us wait for ever
+LOCK_POLL_S = 0.005
+
+
+def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
+    """Write one file whole, in one rename; of a file that has these bytes already only the time is updated.
+
+    Links are followed; what is no plain file (/dev/null, a named pipe) is written into. Raises OutputError.
+    """
+    with commit_after(path, pieces):
+        pass
+
+
+@contextmanager
+def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
+    """Write one file like `write_file`, but rename it after the block only; where that fails, the file stays as it was.
+
+    So what may fail of this file (no permission, a full disk) fails before the block. What is no plain file is written
+    into before it.
+    """
+    target, temporary = links.followed(path), None
+    with temporaries() as made:
+        with named_errors(path):
+            check_writable(path)
+            if target.exists() and not target.is_file():
+                with target.open("wb") as file:
+                    file.writelines(piece.data for piece in pieces)
+            elif not has_bytes(target, pieces):
+                temporary = write_temporary(target, pieces, made)
+        yield
+        with named_errors(path):
+            if temporary is not None:
+                os.replace(temporary, target)
+            elif target.is_file():
+                os.utime(target)
+
+
+@dataclass
+class AtomicOutputs:
+    """Files of one folder, `main` and its companions, that take their places together on `commit`.
+
+    folder and main: without links. A companion that is a link goes: what it leads to belongs to others.
+    """
+
+    folder: Path
+    main: str
+    files: dict[str, Path] = field(default_factory=dict)
+
+    def size(self, names: Sequence[str]) -> int:
+        """Return the bytes of these files together."""
+        return sum(self.files[name].stat().st_size for name in names)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All files, the main one last."""
+        return tuple(sorted(self.files, key=lambda name: name == self.main))
+
+    def create(self, name: str) -> BinaryIO:
+        """Return a new file of this name, open for writing and reading back."""
+        path = self.folder / name
+        if path.exists() and not path.is_file():  # what lies beside /dev/null is not for everybody to write
+            path = Path(tempfile.gettempdir()) / name
+        handle, self.files[name] = create_temporary(path)
+        return os.fdopen(handle, "w+b")
+
+    def commit(self) -> None:
+        """Give the files their names, where their bytes are new; else update the main file's time.
+
+        Where the main file is none of them (a sequence of numbered frames) the first one counts as it.
+        """
+        main = self.main if self.main in self.files else min(self.files)
+        with locked(self.folder):
+            new = {}
+            for name, temporary in self.files.items():
+                path = self.folder / name
+                check_writable(path)
+                if path.exists() and not path.is_file():  # /dev/null, a named pipe
+                    with temporary.open("rb") as source, path.open("wb") as target:
+                        shutil.copyfileobj(source, target, PIECE)
+                elif not path.exists() or not filecmp.cmp(temporary, path, shallow=False):
+                    os.chmod(temporary, mode_of(path))
+                    new[path] = temporary
+            _replace_set(new, self.folder / main)
+
+    def clear(self) -> None:
+        """Remove what is still temporary."""
+        for temporary in self.files.values():
+            with suppress(OSError):
+                temporary.unlink()
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other runs from changing sets of files in this folder meanwhile, where the system has locks for folders.
+
+    The lock leaves no file behind and ends with the process. After 5 s it goes on without.
+    """
+    try:
+        import fcntl
+
+        handle = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        yield
+        return
+    try:
+        end = time.monotonic() + MAX_LOCK_WAIT_S
+        while time.monotonic() < end:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(LOCK_POLL_S)
+            except OSError:  # a file system without locks
+                break
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def named_errors(path: Path) -> Iterator[None]:
+    """Turn errors of the system into ours, which name the output."""
+    try:
+        yield
+    except OSError as error:
+        raise not_written(path, error) from None
+
+
+@contextmanager
+def temporaries() -> Iterator[list[Path]]:
+    """Give a list of files of which those that are still there at the end are removed."""
+    made: list[Path] = []
+    try:
+        yield made
+    finally:
+        with loading.signals_held():  # what stops us may not stop this
+            for path in made:
+                with suppress(OSError):
+                    path.unlink()
+
+
+def write_temporary(path: Path, pieces: Iterable[Bytes], made: list[Path]) -> Path:
+    """Write pieces to a neighbor of `path` that is to take its place, with its permissions; return where it is.
+
+    made: of `temporaries`; gets it as soon as it is there.
+    """
+    handle, temporary = create_temporary(path)
+    made.append(temporary)
+    with os.fdopen(handle, "wb") as file:
+        file.writelines(piece.data for piece in pieces)
+    os.chmod(temporary, mode_of(path))
+    return temporary
+
+
+def create_temporary(path: Path, suffix: str = ".tmp") -> tuple[int, Path]:
+    """Make an empty file beside `path` that is to take its place; return what is open, and where it is."""
+    handle, name = tempfile.mkstemp(prefix=f".{path.name[:MAX_PREFIX_LENGTH]}.", suffix=suffix, dir=path.parent)
+    return handle, Path(name)
+
+
+def move_to_free(temporary: Path, path: Path) -> None:
+    """Give a finished file of `temporaries` a name that is free, in one step. Raises FileExistsError where none is."""
+    try:
+        os.link(temporary, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links: the name is taken first, empty
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        try:
+            os.replace(temporary, path)
+        except BaseException:
+            os.unlink(path)
+            raise
+
+
+def mode_of(path: Path) -> int:
+    """Return the permissions that a file at `path` has or would get."""
+    if path.exists():
+        return path.stat().st_mode & 0o7777
+    umask = os.umask(0)
+    os.umask(umask)
+    return 0o666 & ~umask
+
+
+def check_writable(path: Path) -> None:
+    """Raise OutputError for a file that is there and can't be written."""
+    if path.exists() and not os.access(path, os.W_OK):
+        raise OutputError(f"{path}: is read-only")
+
+
+def has_bytes(path: Path, pieces: Sequence[Bytes]) -> bool:
+    """Return whether a plain file at `path` holds exactly these pieces."""
+    if not path.is_file() or path.stat().st_size != sum(len(piece) for piece in pieces):
+        return False
+    with path.open("rb") as file:
+        return all(
+            file.read(min(PIECE, len(piece) - at)) == piece[at : at + PIECE].tobytes()
+            for piece in pieces
+            for at in range(0, len(piece), PIECE)
+        )
+
+
+def _replace_set(new: Mapping[Path, Path], main: Path) -> None:
+    """Rename the temporary files `new`, by the path that each is to get, so that `main` never stands in a mixed set.
+
+    Whatever fails, or is interrupted but by SIGKILL, leaves the old set as it was.
+    """
+    with loading.signals_held():
+        if len(new) > 1:
+            _replace_several(new, main)
+        else:
+            for path, temporary in new.items():
+                os.replace(temporary, path)
+        if main not in new and main.is_file():
+            os.utime(main)
+
+
+def _replace_several(new: Mapping[Path, Path], main: Path) -> None:
+    companions = [path for path in new if path != main]
+    old: dict[Path, Path] = {}
+    placed: list[Path] = []
+    with temporaries() as made:
+        try:
+            for path in (main, *companions):
+                if path.is_file():
+                    handle, away = create_temporary(path, ".old")
+                    os.close(handle)
+                    made.append(away)
+                    os.replace(path, away)
+                    old[path] = away
+            for path in companions:
+                os.replace(new[path], path)
+                placed.append(path)
+            os.replace(new[main] if main in new else old[main], main)
+        except BaseException:
+            for path in placed:
+                with suppress(OSError):
+                    path.unlink()
+            for path, away in old.items():
+                with suppress(OSError):
+                    os.replace(away, path)
+            raise

@@ -1,0 +1,145 @@
+"""Vertex caches on disk and in pipes: which format a path has, and its reader or writer set to work, frame by frame."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+
+from anim.caches import registry
+from anim.caches.formats import mesh_sequence
+from anim.caches.options import Reading, Writing, Written
+from anim.caches.registry import CACHE_FORMATS, Files
+from anim.caches.sniffing import ending_of
+from anim.caches.storage import suffix
+from anim.errors import AnimError, FormatError
+from anim.model import VertexCache
+from cli import loading
+from cli.errors import OutputError, UsageError, not_written
+from cli.io import cache_folders, documents
+from cli.reports import cache_notes
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A cache that was opened: what messages call it, its format's ending, and what its reader said."""
+
+    cache: VertexCache
+    name: str
+    ending: str
+    notes: tuple[str, ...]
+    _folder: cache_folders.Folder
+
+    @property
+    def size(self) -> int:
+        """Bytes of all files that were opened up to now."""
+        return sum(self._folder.sizes.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """Files that were written, the main one last, their size in bytes together, and what there is to say."""
+
+    files: tuple[str, ...]
+    size: int
+    written: Written
+
+
+@contextmanager
+def load(path: str, reading: Reading) -> Iterator[Loaded]:
+    """Give the cache at `path`, "-" for stdin, its format by the name's ending or by its first bytes.
+
+    Its frames are read while it is used, so use it inside; errors raised there name the input.
+    """
+    name = "stdin" if path == documents.PIPE else path or "''"
+    notes: list[str] = []
+    with ExitStack() as stack:
+        try:
+            inputs = cache_folders.inputs(path, stack)
+            ending = _ending(inputs)
+            if path == documents.PIPE:
+                check_pipe(name, ending)
+            read = registry.reader_for(ending)
+            loading.load(CACHE_FORMATS[ending].library)
+            cache = read(inputs, replace(reading, note=notes.append))
+            yield Loaded(cache, name, ending, tuple(notes), inputs)
+        except (UsageError, OutputError):
+            raise
+        except AnimError as error:
+            raise error.at(name, ": ") from None
+
+
+def check(path: str, ending: str | None = None, placeholders: Sequence[str] = ()) -> str:
+    """Return the ending of the format that is written to `path`: its own, or `ending`; ".npz" for "-" without one.
+
+    Raises UsageError at once, before any work, where nothing can be written, no format is called so, `ending` and
+    the name's own are two formats, or a pipe is no place for it. placeholders: what may stand in the name as {this}.
+    """
+    own = "" if path == documents.PIPE else suffix(path)
+    if path == documents.PIPE:
+        check_pipe("stdout", ending or ".npz")
+    else:
+        documents.check_file(path, placeholders)
+    if ending and own in CACHE_FORMATS and own != ending:
+        raise UsageError(
+            f"{path}: the name says {own[1:]}, --format says {ending[1:]}",
+            help="leave --format out, or change the name",
+        )
+    found = ending or own or (".npz" if path == documents.PIPE else "")
+    if found not in CACHE_FORMATS:
+        raise UsageError(f"{path}: no cache format is called '{found}' (expected {', '.join(CACHE_FORMATS)})")
+    return found
+
+
+def check_pipe(name: str, ending: str) -> None:
+    """Raise UsageError for a format that one file is not enough for."""
+    if ending in CACHE_FORMATS and CACHE_FORMATS[ending].files is Files.SEVERAL:
+        raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")
+
+
+def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_run: bool = False) -> Saved:
+    """Write a cache, "-" for stdout, in the format that `check` returned.
+
+    What lies beside the main file (a rest mesh) is left out on stdout, and a note says so.
+    """
+    is_pipe = path == documents.PIPE
+    if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
+        raise UsageError(
+            f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
+            help="convert-cache --at takes one of them",
+        )
+    has_rest = writing.rest and "rest" in CACHE_FORMATS[ending].takes
+    loading.load("trimesh" if has_rest else CACHE_FORMATS[ending].library)
+    with tempfile.TemporaryDirectory() as away:
+        staged = cache_folders.outputs(path, away, dry_run=dry_run)
+        try:
+            written = registry.writer_for(ending)(cache, staged, writing)
+            names = staged.names[-1:] if is_pipe else staged.names
+            size = staged.size(names)
+            if not dry_run and is_pipe:
+                cache_folders.to_stdout(staged)
+            elif not dry_run:
+                staged.commit()
+        except OSError as error:
+            raise not_written(path, error) from None
+        finally:
+            staged.clear()
+    lost = cache_notes.not_held(cache, ending)
+    left = cache_notes.no_place(staged.names[:-1]) if is_pipe else cache_notes.left_behind(path, names, ending)
+    return Saved(names, size, replace(written, notes=(*written.notes, *lost, *left)))
+
+
+def _ending(inputs: cache_folders.Folder) -> str:
+    """The format of what is read: by the name, else by the first bytes of it or of its first frame."""
+    own = suffix(inputs.main)
+    if own in CACHE_FORMATS:
+        return own
+    frames = () if inputs.main in inputs.names() else mesh_sequence.belonging(inputs.main, inputs.names())
+    head, size = inputs.beginning(frames[0] if frames else inputs.main)
+    try:
+        return ending_of(head, size)
+    except FormatError:
+        if own:
+            return own  # which is then said to be none
+        raise

@@ -1,0 +1,119 @@
+"""The images of a glTF that are files of their own: taken along to another folder, or into the file."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+
+from anim.errors import FormatError
+from anim.gltf.document import Bytes, Document, Json, items
+from anim.gltf.io import uri
+from cli import text
+from cli.errors import OutputError
+from cli.io import atomic, companion_files
+
+LISTED = 3  # names in a note
+
+
+def along(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Bytes]]:
+    """Return a document that is to go from `folder` to `target`, and the images that it needs there, by path.
+
+    They keep their relative paths, and the URIs stay. Where another file has the name, the copy is named after its
+    content (`skin-1a2b3c4d.png`). Images that can't be read stay as they are.
+    """
+    copies: dict[Path, Bytes] = {}
+    images: list[Json] = []
+    for image in items(document.json, "images"):
+        address, data = _outside(image), _content(folder, image)
+        if data is not None and address:
+            name = _free(target, uri.relative_path(address), data, copies)
+            copies[target / name] = data
+            image = image if name == uri.relative_path(address) else {**image, "uri": uri.from_path(name)}
+        images.append(image)
+    changed = replace(document, json={**document.json, "images": images}) if copies else document
+    return changed, copies
+
+
+def write_copies(copies: Mapping[Path, Bytes]) -> None:
+    """Write images where nothing is; one that is there already is the same. Raises OutputError."""
+    for path, data in copies.items():
+        with atomic.named_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if not path.exists():
+                with atomic.temporaries() as made:
+                    atomic.move_to_free(atomic.write_temporary(path, [data], made), path)
+
+
+def embed(document: Document, folder: Path | None) -> Document:
+    """Return the document with those of its external images that can be read as data URIs."""
+    images = [
+        image if (data := _content(folder, image)) is None else {**image, "uri": _data_uri(data)}
+        for image in items(document.json, "images")
+    ]
+    return replace(document, json={**document.json, "images": images}) if images else document
+
+
+def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: str = "") -> Iterator[str]:
+    """Yield what there is to say of images outside a document that left its folder.
+
+    copied: whether those that can be read were copied; else they stay behind. embed_hint: what would take them in.
+    """
+    outside = [image for image in items(document.json, "images") if _outside(image)]
+    lost = [image["uri"] for image in outside if _content(folder, image) is None]
+    found = [image["uri"] for image in outside if image["uri"] not in lost]
+    if found and copied:
+        yield f"note: {text.plural(len(found), 'image')} copied beside the output ({_listed(found)})"
+    elif found:
+        verb = "stays" if len(found) == 1 else "stay"
+        yield f"note: {text.plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
+    if lost:
+        yield f"note: {text.plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
+
+
+def _outside(image: Json) -> str:
+    """The URI of an image that is a file of its own, else nothing."""
+    address = str(image.get("uri", ""))
+    return "" if uri.is_data(address) else address
+
+
+def _content(folder: Path | None, image: Json) -> Bytes | None:
+    """The bytes of an image that is a file beside the input; None for others, and where it can't be read."""
+    address = _outside(image)
+    if not address or folder is None:
+        return None
+    try:
+        return companion_files.opened(folder, uri.relative_path(address))
+    except FormatError:
+        return None
+
+
+def _free(target: Path, name: str, data: Bytes, copies: Mapping[Path, Bytes]) -> str:
+    """The name that a copy gets in the folder."""
+    digest = hashlib.sha256(data.data).hexdigest()
+    path = PurePosixPath(name)
+    for each in (name, *(str(path.with_name(f"{path.stem}-{digest[:n]}{path.suffix}")) for n in (8, 16, 64))):
+        if target / each in copies or not os.path.lexists(target / each) or atomic.has_bytes(target / each, [data]):
+            return each
+    raise OutputError(f"{target / name}: is there already, with other content")
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:LISTED]) + (", …" if len(names) > LISTED else "")
+
+
+def _data_uri(data: Bytes) -> str:
+    return uri.encode_data(data.tobytes(), _media_type(data))
+
+
+def _media_type(data: Bytes) -> str:
+    head = data[:12].tobytes()
+    if head.startswith(b"\x89PNG"):
+        return "image/png"
+    if head.startswith(b"\xff\xd8"):
+        return "image/jpeg"
+    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+        return "image/webp"
+    return "image/ktx2" if head.startswith(b"\xabKTX 20") else "application/octet-stream"

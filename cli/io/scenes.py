@@ -1,0 +1,35 @@
+"""Where commands read the scene of a file, and say what changes the meaning of whatever is measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
+from anim.model import Scene
+from anim.skinning.analysis.weight_sums import bad_sums
+from cli.text import Voice
+
+
+def scene(
+    document: Document,
+    name: str,
+    voice: Voice,
+    *,
+    accessors: Accessors | None = None,
+    normals: bool = False,
+    tangents: bool = False,
+    nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
+) -> Scene:
+    """Return the scene of a document, and warn of skin weights that are not used as they stand in the file.
+
+    name: of the file, as messages call it. normals, tangents: whether to read those too.
+    nodes: gives the nodes whose meshes the command is about; None for all.
+    """
+    found = reader.scene(document, accessors, normals=normals, tangents=tangents)
+    chosen = nodes(found)
+    for bad in bad_sums(each for each in found.instances if chosen is None or each.node in chosen):
+        for words in bad.in_words():
+            voice.warn(f"{name}: {words}")
+    return found

@@ -1,0 +1,113 @@
+"""Options of all commands that read or write vertex caches, and what they come to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from anim.caches.formats import gltf
+from anim.caches.options import Writing
+from anim.caches.registry import CACHE_FORMATS
+from anim.caches.transforms import vertex_order
+from anim.caches.transforms.up_axis import UPS
+from anim.caches.vat import presets
+from cli.errors import UsageError
+
+FORMATS = ", ".join(CACHE_FORMATS)
+
+Up = StrEnum("Up", [(up, up) for up in UPS])  # type: ignore[misc]
+Order = StrEnum("Order", [(name, name) for name in vertex_order.ORDERS])  # type: ignore[misc]
+Layout = StrEnum("Layout", [(name, name) for name in gltf.LAYOUTS])  # type: ignore[misc]
+Preset = StrEnum("Preset", [(name, name) for name in presets.PRESETS])  # type: ignore[misc]
+Format = StrEnum("Format", [(ending[1:], ending[1:]) for ending in CACHE_FORMATS])  # type: ignore[misc]
+
+
+class Depth(StrEnum):
+    """Numbers of an EXR."""
+
+    FLOAT = "float"
+    HALF = "half"
+
+
+class RestMesh(StrEnum):
+    """The rest mesh beside a PC2 or MDD."""
+
+    PLY = "ply"
+    OBJ = "obj"
+    NONE = "none"
+
+
+Product = Annotated[str, typer.Argument(metavar="OUT", help=f"A cache: {FORMATS}; '-' for stdout.", show_default=False)]
+UpOption = Annotated[
+    Up | None, typer.Option("--up", help="Axis that points up; z is what Blender has.", show_default=False)
+]
+OrderOption = Annotated[
+    Order | None,
+    typer.Option(
+        "--order", help="blender: without unused vertices, as its glTF importer leaves them out.", show_default=False
+    ),
+]
+FormatOption = Annotated[
+    Format | None,
+    typer.Option(
+        "--format",
+        help="Of OUT; a name that ends as another of these is refused; default: by its ending, npz for '-'.",
+        show_default=False,
+    ),
+]
+MaxError = Annotated[
+    str | None,
+    typer.Option(
+        "--max-error", metavar="LENGTH", help="Morph targets: how far a vertex may be off: 0.5mm, 0.1%, default 0.1%."
+    ),
+]
+Quantize = Annotated[bool, typer.Option("--quantize", help="Morph targets as 16-bit integers.")]
+LayoutOption = Annotated[
+    Layout | None,
+    typer.Option(
+        "--layout", help=".glb: morph targets (default; up to 1 GB of positions) or a flip-book.", show_default=False
+    ),
+]
+PresetOption = Annotated[
+    Preset | None, typer.Option("--preset", help="Textures: whose axes; default plain.", show_default=False)
+]
+DepthOption = Annotated[
+    Depth | None, typer.Option("--depth", help=".exr: float (default) or half.", show_default=False)
+]
+RestOption = Annotated[
+    RestMesh | None,
+    typer.Option("--rest", help=".pc2, .mdd: the rest mesh beside, default ply.", show_default=False),
+]
+
+
+def writing(ending: str, given: Mapping[str, Any]) -> Writing:
+    """Return the settings for a format from the options that were given (None, False: not given).
+
+    Raises UsageError for an option that means nothing to the format.
+    """
+    takes = CACHE_FORMATS[ending].takes
+    said: dict[str, Any] = {name: value for name, value in given.items() if value not in (None, False)}
+    for name in said:
+        if name not in takes:
+            raise UsageError(f"--{name.replace('_', '-')} means nothing to {ending}")
+    if "max_error" in said and str(said.get("layout", "")).startswith("flip"):
+        raise UsageError("--max-error means nothing to a flip-book, which has every frame as it is")
+    if "rest" in said:
+        said["rest"] = "" if said["rest"] == "none" else f".{said['rest']}"
+    plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}
+    return Writing(**plain)
+
+
+def holding(what: str) -> tuple[str, ...]:
+    """Return the endings of formats with a place for "normals" or "tangents"."""
+    return tuple(ending for ending, format in CACHE_FORMATS.items() if what in format.holds)
+
+
+def check_held(ending: str, **wanted: bool) -> None:
+    """Raise UsageError for what is wanted beside positions and has no place in the format."""
+    for what, is_wanted in wanted.items():
+        if is_wanted and what not in CACHE_FORMATS[ending].holds:
+            raise UsageError(f"--{what} means nothing to {ending}", help=f"{', '.join(holding(what))} keep {what}")

@@ -1,0 +1,54 @@
+"""Which meshes of a scene a command is about: `--mesh GLOB`, `--hide GLOB`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from anim.exchange.retarget.ground_contact import at_or_below
+from anim.model import Scene
+from anim.ops.selection import matching
+
+Meshes = Annotated[
+    list[str] | None,
+    typer.Option("--mesh", metavar="GLOB", help="Only meshes of this name, or of their node's; may be repeated."),
+]
+
+Hidden = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hide", metavar="GLOB", help="Leave out meshes of this name, and all on or below a node of this name."
+    ),
+]
+
+
+def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:
+    """Return the nodes of the meshes that are meant, by the mesh's name or the node's; None for all.
+
+    Raises NotFoundError for a glob that matches none.
+    """
+    if not globs:
+        return None
+    meshes = [each.mesh.name or str(each.node) for each in scene.instances]
+    nodes = [scene.skeleton.names[each.node] or str(each.node) for each in scene.instances]
+    return [scene.instances[i % len(meshes)].node for i in matching(globs, [*meshes, *nodes], "mesh")]
+
+
+def shown(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> list[int] | None:
+    """Return the nodes of the meshes that are meant and not hidden; None for all.
+
+    hidden: globs for names of meshes and of nodes, which hide what descends from them too.
+    Raises NotFoundError for a glob that matches none.
+    """
+    chosen = nodes(scene, globs)
+    if not hidden:
+        return chosen
+    names = [name or str(i) for i, name in enumerate(scene.skeleton.names)]
+    meshes = [each.mesh.name or str(each.node) for each in scene.instances]
+    found = matching(hidden, [*names, *meshes], "mesh or node")
+    above = {i for i in found if i < len(names)}
+    gone = {scene.instances[i - len(names)].node for i in found if i >= len(names)}
+    gone.update(at_or_below(scene.skeleton, above).tolist())
+    kept = [each.node for each in scene.instances] if chosen is None else chosen
+    return [node for node in kept if node not in gone]

@@ -1,0 +1,68 @@
+"""What `bake` says about a scene besides its result: what it leaves out or loses, so that it is never silent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.model import Scene
+from anim.skinning.analysis.inbetween_error import Missed
+from anim.skinning.analysis.method_deviation import Deviation
+from anim.skinning.bake import baked
+from cli import text
+from cli.text import Voice
+
+SHOWN_JOINTS = 3  # that a note lists
+SHOWN = 1e-3  # of the diagonal; less is not seen
+
+
+def lost(found: Sequence[tuple[str, Deviation]], method: str, voice: Voice) -> None:
+    """Warn where a method places vertices farther from linear blending than the model is large.
+
+    found: of clips of these names.
+    """
+    if far := [(each, name) for name, each in found if each.distance > each.size]:
+        worst, name = max(far)
+        voice.warn(
+            f"{method} can't be used: a vertex is {text.length(worst.distance)} from where linear blending "
+            f"(lbs), and so every player, has it, more than the model's size of {text.length(worst.size)}, at "
+            f"{worst.time:.3g} s of {name}"
+        )
+
+
+def uneven(joints: Sequence[int], scene: Scene, method: str, voice: Voice) -> None:
+    """Note which joints scale unevenly while a method plays that other tools define differently there."""
+    if joints:
+        names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
+        more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
+        voice.say(
+            f"note: {names}{more}: uneven scale, where tools define {method} differently; here each joint stretches "
+            "the mesh about its own place, then turns it"
+        )
+
+
+def left_out(scene: Scene, nodes: Sequence[int] | None, voice: Voice) -> None:
+    """Warn of how many vertices are not baked as only nodes move them."""
+    kept = {id(each) for each in baked(scene, nodes=nodes)}
+    lost = [each for each in baked(scene, rigid=True, nodes=nodes) if id(each) not in kept]
+    if lost:
+        count = sum(len(each.mesh.positions) for each in lost)
+        voice.warn(f"{count} vertices that only nodes move are left out; --rigid takes them in")
+
+
+def gaps(found: Sequence[tuple[str, Missed]], rest: Floats, voice: Voice) -> None:
+    """Warn of how far vertices are off the straight way between frames, of the clip where that can be seen best.
+
+    found: what clips of these names miss. rest: (V, 3) m, for their size.
+    """
+    diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) if len(rest) else 0.0
+    seen = [(missed, name) for name, missed in found if missed.distance > SHOWN * diagonal]
+    if seen:
+        missed, name = max(seen)
+        others = f" ({len(seen)} clips have such places)" if len(seen) > 1 else ""
+        voice.warn(
+            f"between frames a vertex is up to {text.length(missed.distance)} off the straight way, at "
+            f"{missed.time:.3g} s of {name}{others}; --fps puts more frames there"
+        )

@@ -1,0 +1,41 @@
+"""What there is to say about the files of a vertex cache that was written: a line each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from anim.caches.formats import mesh_sequence
+from anim.caches.registry import CACHE_FORMATS, Files
+from anim.model import VertexCache
+from cli import text
+from cli.io import links
+
+
+def not_held(cache: VertexCache, ending: str) -> tuple[str, ...]:
+    """Return what of the cache has no place in the format."""
+    carried = [name for name, has in (("normals", cache.has_normals), ("tangents", cache.has_tangents)) if has]
+    lost = [name for name in carried if name not in CACHE_FORMATS[ending].holds]
+    return (f"{' and '.join(lost)} are left out: {ending[1:]} has no place for them",) if lost else ()
+
+
+def no_place(names: Sequence[str]) -> tuple[str, ...]:
+    """Return which files a pipe has no place for."""
+    return (f"not written, since the output is a pipe: {', '.join(names)}",) if names else ()
+
+
+def left_behind(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
+    """Return which frames of an earlier sequence are still beside those that were written to `path`."""
+    if CACHE_FORMATS[ending].files is not Files.FRAMES:
+        return ()
+    target, there = links.followed(Path(path)), []
+    with suppress(OSError):
+        there = os.listdir(target.parent)
+    notes = []
+    if old := [name for name in mesh_sequence.belonging(target.name, there) if name not in written]:
+        notes.append(f"{text.plural(len(old), 'frame')} of before still there, from {old[0]} on")
+    if target.name in there and target.name not in (*written, *old):
+        notes.append(f"{target.name} of before is still there, and is what that name reads")
+    return tuple(notes)

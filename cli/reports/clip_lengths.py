@@ -1,0 +1,24 @@
+"""How long clips are and became, for the line that sums up a command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from anim.gltf.reading.reader import clip_name
+from anim.model import Clip
+from cli.text import moment, plural, span
+
+LISTED = 3  # clips whose lengths are given one by one; more as their sum
+
+
+def lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
+    """Return the length of every clip that changed it: "'walk' 1 s → 4 s"; of many clips the sum; else "".
+
+    before, after: clips of a file by number. Where a clip starts late, its span stands for its length: "0.5–1.5 s".
+    """
+    spans = {i: [span(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
+    changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
+    if len(changed) <= LISTED:
+        return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())
+    sums = (sum(clips[i].end for i in changed) for clips in (before, after))
+    return f"{plural(len(changed), 'clip')} {' → '.join(map(moment, sums))} in all"

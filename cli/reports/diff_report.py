@@ -1,0 +1,227 @@
+"""The report of `diff`: a table for people, one JSON document for scripts."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from anim.gltf.reading.reader import clip_name
+from anim.measure.compare.diff import ClipDiff, Diff
+from anim.measure.error.statistics import Peak
+from anim.measure.inspect.storage_cost import Footprint
+from cli import tables
+from cli.text import change, digits, length, plural, speed
+
+SCHEMA = 1
+SAME_END = 1e-6  # s; ends that are nearer than this differ by rounding
+LISTED = 5  # names of things that only one file has
+STRANGERS = "no clip and no node has the same name in both files"
+HEADER = ("clip", "joint", "vertex", "at s", "max", "%", "p99", "mean", "turn", "speed", "weights", "pointers", "end s")
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """One of the two files: its name, its bytes, what its animations cost as stored, and the names of its clips."""
+
+    name: str
+    size: int
+    cost: Footprint
+    clips: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What was found about two files, and how it was measured.
+
+    nodes_by_name: how many nodes of the old file have a namesake in the new one. are_named: whether both files call
+    anything by a name. player: who plays both, or two, "spec,nlerp". fps: frames per second of the grid. shell: m.
+    measured_at: "surface" or, where the old file has no vertices, "nodes".
+    """
+
+    old: File
+    new: File
+    diff: Diff
+    nodes_by_name: int
+    are_named: bool
+    player: str
+    fps: float
+    shell: float
+    measured_at: str
+
+    @property
+    def clips_by_name(self) -> int:
+        """How many of the clips that are compared have the same name in both files."""
+        return sum(bool(each.name) and each.name == each.new_name for each in self.diff.clips)
+
+    @property
+    def are_strangers(self) -> bool:
+        """Whether names are given, and none is in both files: order alone says what is held against what."""
+        return self.are_named and not self.clips_by_name and not self.nodes_by_name
+
+
+def text(found: Found) -> str:
+    """Return a row per clip, the worst first, then what only one file has, and one line that says it all.
+
+    Files in which nothing has the same name are called that before anything else.
+    """
+    head = f"{STRANGERS}: what follows holds things against each other by their order\n" if found.are_strangers else ""
+    clips = found.diff.clips
+    rows = [_row(each, found.diff.diagonal) for each in clips]
+    table = tables.text([*HEADER, "tracks"], rows, left=2, indent="") + "\n" if rows else ""
+    return head + table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
+
+
+def as_json(found: Found, *, warnings: Sequence[str] = ()) -> str:
+    """Return the same as one JSON document, units in the keys. warnings: said of the files."""
+    diff = found.diff
+    content = {
+        "schema": SCHEMA,
+        "files": [_file(found.old), _file(found.new)],
+        "player": found.player,
+        "grid_fps": found.fps,
+        "shell_m": found.shell,
+        "diagonal_m": diff.diagonal,
+        "measured_at": found.measured_at,
+        "meshes_agree_by_vertex": diff.by_vertex,
+        "clips_matched_by_name": found.clips_by_name,
+        "nodes_matched_by_name": found.nodes_by_name,
+        "max_error_m": diff.clips[0].error.max_error if diff.clips else 0.0,
+        "max_error_percent": _percent(diff.clips[0].error.max_error, diff.diagonal) if diff.clips else 0.0,
+        "clips": [_clip(each, diff.diagonal) for each in diff.clips],
+        "missing_clips": [clip_name(found.old.clips[i], i) for i in diff.missing_clips],
+        "added_clips": [clip_name(found.new.clips[i], i) for i in diff.added_clips],
+        "missing_nodes": list(diff.missing_nodes),
+        "added_nodes": list(diff.added_nodes),
+        "warnings": list(warnings),
+    }
+    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+
+
+def worst(found: Found) -> str:
+    """Return where the largest distance is: "4.3 mm (0.21 %) in 'Run' at 'tail3', vertex 134, 0.458 s"."""
+    each = found.diff.clips[0]
+    error = each.error
+    if not error.max_error:
+        return "0 mm"
+    vertex = f", vertex {error.vertex}" if error.vertex >= 0 else ""
+    percent = f" ({_share(_percent(error.max_error, found.diff.diagonal))} %)" if found.diff.diagonal else ""
+    clip = clip_name(each.name, each.old)
+    return f"{length(error.max_error)}{percent} in '{clip}' at '{error.joint}'{vertex}, {error.time:.3f} s"
+
+
+def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
+    error, found = each.error, each.statistics
+    moved = bool(error.max_error)
+    ends = f"{each.end_old:.4g} → {each.end_new:.4g}" if abs(each.end_old - each.end_new) > SAME_END else ""
+    changed = [f"−{len(each.missing)}"] * bool(each.missing) + [f"+{len(each.added)}"] * bool(each.added)
+    return [
+        clip_name(each.name, each.old)
+        + (f" → {clip_name(each.new_name, each.new)}" if each.new_name != each.name else ""),
+        error.joint,
+        str(error.vertex) if error.vertex >= 0 else "",
+        f"{error.time:.3f}" if moved else "",
+        length(error.max_error),
+        _share(_percent(error.max_error, diagonal)) if moved else "",
+        length(found.p99) if moved else "",
+        length(found.mean) if moved else "",
+        f"{_share(math.degrees(found.angle.size))}°" if found.angle.size else "",
+        speed(found.speed.size) if found.speed.size else "",
+        _share(found.weight.size) if found.weight.size else "",
+        f"{_share(100 * error.max_pointer_error)} %" if error.max_pointer_error else "",
+        ends,
+        " ".join(changed),
+    ]
+
+
+def _alone(found: Found) -> list[str]:
+    """Lines about what only one of the files has."""
+    diff, lines = found.diff, []
+    for names, which in (
+        ([clip_name(found.old.clips[i], i) for i in diff.missing_clips], f"clip only in {found.old.name}"),
+        ([clip_name(found.new.clips[i], i) for i in diff.added_clips], f"clip only in {found.new.name}"),
+        (diff.missing_nodes, f"node only in {found.old.name}"),
+        (diff.added_nodes, f"node only in {found.new.name}"),
+    ):
+        if names:
+            noun, rest = which.split(" ", 1)
+            more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+            listed = ", ".join(f"'{tables.one_line(name)}'" for name in names[:LISTED])
+            lines.append(f"{plural(len(names), noun)} {rest}: {listed}{more}")
+    if not diff.by_vertex:
+        lines.append("meshes differ: the first file's vertices, carried by the second one's joints")
+    return lines
+
+
+def _summary(found: Found) -> list[str]:
+    old, new = found.old, found.new
+    count = plural(len(found.diff.clips), "clip")
+    motion = f"{count} compared, max {worst(found)}" if found.diff.clips else "no clips to compare"
+    if "," in found.player:
+        return [motion, f"{old.name}, as {found.player.replace(',', ' and as ')} show it"]
+    cost = f"animation {change(old.cost.total, new.cost.total)}"
+    return [motion, f"{old.name} → {new.name}: {change(old.size, new.size)}, {cost}, of it JSON {_json_part(found)}"]
+
+
+def _json_part(found: Found) -> str:
+    return change(found.old.cost.json, found.new.cost.json)
+
+
+def _file(file: File) -> dict[str, Any]:
+    cost = {"animation_data_bytes": file.cost.data, "animation_json_bytes": file.cost.json}
+    return {"file": file.name, "bytes": file.size, **cost, "clips": len(file.clips)}
+
+
+def _clip(each: ClipDiff, diagonal: float) -> dict[str, Any]:
+    error, found = each.error, each.statistics
+    return {
+        "clip": clip_name(each.name, each.old),
+        "other_clip": clip_name(each.new_name, each.new),
+        "max_error_m": error.max_error,
+        "max_error_percent": _percent(error.max_error, diagonal),
+        "certified_error_m": each.certified,
+        "time_s": error.time,
+        "mesh": error.place,
+        "joint": error.joint,
+        "vertex": error.vertex if error.vertex >= 0 else None,
+        "times": error.times,
+        "p99_m": found.p99,
+        "mean_m": found.mean,
+        "max_angle_deg": math.degrees(found.angle.size),
+        "angle_node": found.angle.joint,
+        "angle_time_s": found.angle.time,
+        "max_speed_error_m_per_s": found.speed.size,
+        **_where(found.speed, "speed"),
+        "max_weight_error": found.weight.size,
+        "weight_node": found.weight.joint,
+        "weight_target": found.weight.vertex if found.weight.vertex >= 0 else None,
+        "weight_time_s": found.weight.time,
+        "max_pointer_error": error.max_pointer_error,
+        "pointer": error.pointer,
+        "end_s": each.end_old,
+        "other_end_s": each.end_new,
+        "missing_tracks": _tracks(each.missing),
+        "added_tracks": _tracks(each.added),
+    }
+
+
+def _where(peak: Peak, what: str) -> dict[str, Any]:
+    vertex = peak.vertex if peak.vertex >= 0 else None
+    return {f"{what}_joint": peak.joint, f"{what}_vertex": vertex, f"{what}_time_s": peak.time}
+
+
+def _tracks(targets: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
+    return [{"target": target, "path": path} for target, path in targets]
+
+
+def _percent(size: float, diagonal: float) -> float:
+    return 100 * size / diagonal if diagonal else 0.0
+
+
+def _share(value: float) -> str:
+    """A number with two digits, three above 100, never in the form 2.8e-05."""
+    if 0 < value < 1e-4:
+        return "<0.0001"
+    return digits(value, 3 if value >= 100 else 2)

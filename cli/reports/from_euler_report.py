@@ -1,0 +1,169 @@
+"""What a conversion from Euler tracks says: lines for a person, or one JSON document."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from math import degrees
+from typing import Any
+
+from anim.exchange.euler.from_euler import Converted
+from anim.exchange.euler.gimbal import NEAR, GimbalRow
+from anim.exchange.euler.motion import EulerMotion
+from anim.exchange.retarget.apply import Onto
+from anim.exchange.retarget.rest_alignment import Measure
+from anim.model import Skeleton
+from cli import tables, text
+
+SCHEMA = 1
+LISTED = 8  # names in a line
+WORDS = {
+    Measure.JOINTS: "the path is scaled by the distances of the matched joints at rest",
+    Measure.EXTENT: "the path is scaled by the sizes of both figures at rest",
+}
+NEAR_DEG = round(degrees(NEAR))
+
+
+@dataclass(frozen=True, slots=True)
+class Conversion:
+    """A motion, what became of it, and on whom.
+
+    scale_words: where meters_per_unit comes from; is_guess: whether that is not certain.
+    """
+
+    format: str
+    motion: EulerMotion
+    converted: Converted
+    meters_per_unit: float
+    scale_words: str
+    gimbal: tuple[GimbalRow, ...]
+    onto: Onto | None = None
+    character: Skeleton | None = None
+    is_guess: bool = False
+
+
+def warnings(made: Conversion) -> Iterator[str]:
+    """Yield what was guessed or put right, a line each: it changes the meaning of times, lengths and poses."""
+    yield from made.motion.notes
+    if made.is_guess:
+        yield f"scale: {made.scale_words}"
+    if made.onto is not None and made.onto.num_bound:
+        moved = f"{text.plural(made.onto.num_bound, 'joint')} of the character rest elsewhere than its skin was bound"
+        yield f"{moved}: that pose is taken for the rest"
+    if made.onto is not None:
+        yield from _guesses(made.onto)
+
+
+def lines(made: Conversion, *, verbose: bool) -> Iterator[str]:
+    """Yield what a person wants to know, one line each; tables where verbose."""
+    if made.scale_words and not made.is_guess:
+        yield f"scale: {made.scale_words}"
+    if made.format != "bvh":
+        yield from _angles_line(made.motion)
+    if made.gimbal:
+        yield _gimbal_line(made.gimbal)
+        if verbose:
+            yield _gimbal_table(made.gimbal)
+    if made.onto is not None and made.character is not None:
+        yield from _onto_lines(made, made.onto, made.character, verbose=verbose)
+
+
+def counts(made: Conversion) -> str:
+    """Return "31 joints, 22.9 s in up to 2752 keys a track"."""
+    tracks = made.converted.clip.tracks
+    most = max((len(track.times) for track in tracks), default=0)
+    joints = len(made.converted.skeleton) - len(made.converted.ends)
+    return f"{text.plural(joints, 'joint')}, {text.plural(most, 'key')} at most, {made.converted.clip.end:.3g} s long"
+
+
+def as_json(made: Conversion, *, warnings: Sequence[str]) -> str:
+    """Return the report as one JSON document: schema, units in the keys. warnings: said so far."""
+    content: dict[str, Any] = {
+        "schema": SCHEMA,
+        "format": made.format,
+        "clip": made.converted.clip.name,
+        "duration_s": made.converted.clip.end,
+        "joints": len(made.converted.skeleton) - len(made.converted.ends),
+        "keys": sum(len(track.times) for track in made.converted.clip.tracks),
+        "meters_per_unit": made.meters_per_unit,
+        "warnings": list(warnings),
+        "gimbal": [asdict(row) for row in made.gimbal],
+    }
+    if made.onto is not None and made.character is not None:
+        names, others = made.converted.skeleton.names, made.character.names
+        content["onto"] = {
+            "pairs": {names[a]: others[b] for a, b in made.onto.matching.pairs.items()},
+            "unmatched": [names[a] for a in made.onto.matching.unmatched],
+            "path_scale": made.onto.scale,
+            "lowered_m": list(made.onto.lowered),
+            "joints_at_bind_pose": made.onto.num_bound,
+        }
+    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+
+
+def listed(names: list[str]) -> str:
+    """Return some names for a line: "'a', 'b' and 3 more"."""
+    words = ", ".join(f"'{name}'" for name in names[:LISTED])
+    return f"{words} and {len(names) - LISTED} more" if len(names) > LISTED else words
+
+
+def _angles_line(motion: EulerMotion) -> Iterator[str]:
+    """The range of angles, which shows degrees that were read as radians, and the other way round."""
+    curves = [curve for node in motion.nodes for curve in node.rotation if curve is not None]
+    if curves:
+        low, high = min(curve.values.min() for curve in curves), max(curve.values.max() for curve in curves)
+        yield f"angles: {degrees(low):.4g}° to {degrees(high):.4g}°"
+
+
+def _gimbal_line(rows: tuple[GimbalRow, ...]) -> str:
+    near = [row for row in rows if row.nearest_deg < NEAR_DEG]
+    worst = min(rows, key=lambda row: row.nearest_deg)
+    words = f"gimbal: {len(near)} of {text.plural(len(rows), 'joint')} within {NEAR_DEG}° of lock; nearest "
+    words += f"'{worst.node}', {round(worst.nearest_deg, 2):.2g}° at {worst.at_s:.3g} s"
+    if worst.best_order != worst.order:
+        words += f" ({worst.order}; {worst.best_order} would keep {worst.best_nearest_deg:.2g}°)"
+    return words
+
+
+def _gimbal_table(rows: tuple[GimbalRow, ...]) -> str:
+    header = ("joint", "order", "nearest", "at", f"time < {NEAR_DEG}°", "condition", "aligns", "best order", "keeps")
+    cells: list[tuple[tables.Cell, ...]] = [
+        (
+            row.node,
+            row.order,
+            f"{row.nearest_deg:.1f}°",
+            f"{row.at_s:.2f} s",
+            f"{row.near_s:.2f} s" if row.near_s else None,
+            f"{row.worst_condition:.1f}",
+            row.aligned,
+            row.best_order,
+            f"{row.best_nearest_deg:.1f}°",
+        )
+        for row in rows
+    ]
+    return tables.text(header, cells).rstrip("\n")
+
+
+def _onto_lines(made: Conversion, onto: Onto, character: Skeleton, *, verbose: bool) -> Iterator[str]:
+    names = made.converted.skeleton.names
+    left = [names[node] for node in onto.matching.unmatched]
+    total = len(left) + len(onto.matching.pairs)
+    rest = f"; not: {listed(left)}" if left else ""
+    yield f"onto: {len(onto.matching.pairs)} of {text.plural(total, 'joint')} matched{rest}"
+    if made.motion.nested:
+        low, high = (text.length(abs(each)) for each in onto.lowered)
+        ways = ["down" if each >= 0 else "up" for each in onto.lowered]
+        moved = f", hips {low} {ways[0]} to {high} {ways[1]} for the floor" if any(onto.lowered) else ""
+        yield f"onto: path × {onto.scale:.3g}{moved}"
+    if verbose:
+        yield from (f"  {names[a]} → {character.names[b]}" for a, b in onto.matching.pairs.items())
+
+
+def _guesses(onto: Onto) -> Iterator[str]:
+    """What the path and the floor had to do without, where the builds differ."""
+    if onto.without and onto.measure not in (None, Measure.BUILD):
+        made = [WORDS[onto.measure]] if onto.measure in WORDS else []
+        made += ["soles are not put on the floor (as with --floor keep)"] if "feet" in onto.without else []
+        made = made or ["the topmost matched joint carries the path"]
+        yield f"not matched: {', '.join(onto.without)}; {', and '.join(made)}"

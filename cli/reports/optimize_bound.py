@@ -1,0 +1,55 @@
+"""What `optimize` says of times at which nobody has looked: a bound that is proven for all of them, or why none is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from anim.optimize.options import Reference
+from anim.optimize.request import Request
+from anim.optimize.verification import NOTHING, Verdict
+from cli.text import length
+
+NOT_PROVEN = "not proven between the times looked at"
+
+
+def summary(verdicts: Iterable[Verdict], request: Request, scale: float) -> str:
+    """Return what is proven for every time of all clips; nothing where no vertex moved or only keys count.
+
+    scale: m, the diagonal.
+    """
+    moved = [each for each in verdicts if each.error.max_error > NOTHING * scale]
+    if not moved or request.policy.reference is Reference.KEYS:
+        return ""
+    proven = [each.certified for each in moved if each.certified is not None]
+    if len(proven) < len(moved):
+        return f", {NOT_PROVEN}"
+    if max(proven) <= request.bounds.max_error:
+        return ", proven for every time"
+    return f", proven for every time: at most {length(_rounded_up(max(proven)))}"
+
+
+def of_clip(verdict: Verdict, request: Request) -> str:
+    """Return the bound of a clip for every time."""
+    if request.policy.reference is Reference.KEYS:
+        return ""
+    if verdict.certified is None:
+        return f", {NOT_PROVEN}"
+    return f", at most {length(_rounded_up(verdict.certified))} at any time"
+
+
+def why_not(verdict: Verdict, request: Request) -> str | None:
+    """Return why no bound is proven for a clip, None where one is."""
+    if verdict.certified is not None:
+        return None
+    if request.policy.reference is Reference.KEYS:
+        return "only the source's keys count"
+    return NOT_PROVEN
+
+
+def _rounded_up(meters: float) -> float:
+    """The length with two digits, no shorter than it is."""
+    if meters <= 0:
+        return 0.0
+    step = 10.0 ** (math.floor(math.log10(meters)) - 1)
+    return math.ceil(meters / step - 1e-9) * step

@@ -1,0 +1,215 @@
+"""What `optimize` says of its work to a person: a line or two, and the points of a curve."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.measure.inspect.storage_cost import footprints
+from anim.measure.inspect.stored_bytes import stored
+from anim.model import Clip
+from anim.optimize.fingerprint import KEY
+from anim.optimize.optimize import Optimized
+from anim.optimize.options import Drop
+from anim.optimize.rate_distortion import Sized
+from anim.optimize.request import Request
+from anim.optimize.search.solution import Solution
+from anim.optimize.verification import NOTHING, Verdict
+from cli.errors import CheckError
+from cli.reports import optimize_bound
+from cli.text import change, length, plural, share, size, took
+
+LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """Everything there is to say. size_before, size_after: bytes of the files; scale: m, the diagonal.
+
+    measured_at: "surface" or, in a file without vertices, "nodes".
+    """
+
+    name: str
+    before: Document
+    after: Document
+    clips: Sequence[Clip]
+    found: Optimized
+    request: Request
+    scale: float
+    size_before: int
+    size_after: int
+    seconds: float
+    measured_at: str
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether the input was given back."""
+        return self.after is self.before
+
+    @property
+    def unchanged_because(self) -> str | None:
+        """Why the output is the input, None where it is not."""
+        if not self.unchanged:
+            return None
+        return "optimized like this before" if self.found.unchanged else "no smaller file within the bound"
+
+    @property
+    def optimized_before(self) -> bool:
+        """Whether the input says that it came from here."""
+        extras = self.before.json["asset"].get("extras", {})
+        return isinstance(extras, dict) and KEY in extras
+
+
+def is_long(clips: Sequence[Clip], chosen: Sequence[int]) -> bool:
+    """Return whether the work takes so long that several processes are faster than one."""
+    return len(chosen) > 1 and sum(track.values.size for i in chosen for track in clips[i].tracks) > LONG
+
+
+def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: float) -> None:
+    """Raise CheckError where a clip does not keep its bounds."""
+    bad = {i: each for i, each in found.verdicts.items() if not each.holds}
+    if bad:
+        worst = max(bad, key=lambda i: bad[i].strain)
+        off = bad[worst].error
+        raise CheckError(
+            f"{reader.label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
+            f"{off.time:.3f} s (bound {length(request.bounds.max_error)}); nothing was written"
+        )
+
+
+def smaller(found: Optimized, document: Document, size_of: Callable[[Document], int]) -> Document:
+    """Return the optimized document, or the old one where it takes no more bytes."""
+    if found.unchanged or size_of(found.document) >= size_of(document):
+        return document
+    return found.document
+
+
+def worst(found: Optimized) -> float:
+    """Return the largest error of any clip, in metres."""
+    return max((each.error.max_error for each in found.verdicts.values()), default=0.0)
+
+
+def lines(about: About, *, dry_run: bool) -> list[str]:
+    """Return what is always said."""
+    dry = " (dry run: nothing written)" if dry_run else ""
+    if about.unchanged:
+        said = f"{about.name}  {size(about.size_after)}, unchanged: {about.unchanged_because}{dry}"
+        return [said]
+    keys = f"{_keys(about.clips, about)} → {sum(count_keys(each.clip) for each in about.found.solutions.values())} keys"
+    summary = [
+        f"{about.name}  {change(about.size_before, about.size_after)}",
+        f"animation {change(cost(about.before), cost(about.after))}",
+        keys,
+        _worst_words(about),
+        took(about.seconds),
+    ]
+    return [", ".join(summary) + dry, *_policy(about)]
+
+
+def warnings(about: About) -> list[str]:
+    """Return what is said even when quiet, since it changes what the numbers mean."""
+    return [] if about.found.unchanged else _earlier(about)
+
+
+def details(about: About) -> list[str]:
+    """Return a line per clip."""
+    found = {} if about.unchanged else about.found.solutions
+    return [_clip_line(about, i, solution) for i, solution in found.items()]
+
+
+def _clip_line(about: About, number: int, solution: Solution) -> str:
+    source = about.clips[number]
+    keys = f"{count_keys(source)} → {count_keys(solution.clip)} keys"
+    counts = f"{keys}, {len(source.tracks)} → {len(solution.clip.tracks)} tracks"
+    found = about.found.verdicts[number]
+    assert found.statistics is not None  # -v asks for them
+    usual = f", p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
+    usual = optimize_bound.of_clip(found, about.request) + usual
+    moved = found.error.max_error > NOTHING * about.scale
+    return f"  {reader.label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
+
+
+def curve_line(sized: Sized, scale: float) -> str:
+    """Return one point of the curve for a person."""
+    percent = 100 * sized.max_error / scale if scale else 0.0
+    bound = f"{length(sized.max_error)} ({percent:.2g} %)" if sized.max_error else "without loss"
+    return f"  {bound}: animation {size(sized.animation)}, file {size(sized.size)}, max {length(sized.error)}"
+
+
+def curve_csv(sizes: Sequence[Sized], scale: float) -> str:
+    """Return the curve as CSV: bound in metres and as a share of the diagonal, bytes of the file, largest error found,
+    and bytes of the animation alone."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m", "animation_bytes"])
+    for each in sizes:
+        share = each.max_error / scale if scale else 0.0
+        writer.writerow([each.max_error, share, each.size, each.error, each.animation])
+    return text.getvalue()
+
+
+def cost(document: Document) -> int:
+    """Return the bytes of all animations: keys as stored, and JSON."""
+    return stored(document) + footprints(document)[1].json
+
+
+def _keys(clips: Sequence[Clip], about: About) -> int:
+    return sum(count_keys(clips[i]) for i in about.found.solutions)
+
+
+def count_keys(clip: Clip) -> int:
+    """Return the keys of all tracks."""
+    return sum(len(track.times) for track in clip.tracks)
+
+
+def _length(meters: float, scale: float) -> str:
+    return f"max {length(meters)}{share(meters, scale)}"
+
+
+def _worst_words(about: About) -> str:
+    verdicts = about.found.verdicts
+    if not verdicts:
+        return "no clip"
+    words = _error_words(max(verdicts.values(), key=lambda each: each.error.max_error), about)
+    return words + optimize_bound.summary(verdicts.values(), about.request, about.scale)
+
+
+def _error_words(verdict: Verdict, about: About) -> str:
+    error = verdict.error
+    if error.max_error <= NOTHING * about.scale:
+        words = "no vertex moved"
+    else:
+        where = f" at '{error.joint}', {error.time:.3f} s" if error.joint else ""
+        words = _length(error.max_error, about.scale) + where
+    if error.max_pointer_error > 0:
+        words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
+    return words
+
+
+def _earlier(about: About) -> list[str]:
+    """What to know where the input was lossy before: nothing in a file tells its motion from its own source's."""
+    if not about.optimized_before:
+        return []
+    return ["the input was optimized before; errors are measured from it, not from its source"]
+
+
+def _policy(about: About) -> list[str]:
+    """What was removed and moved, and under which rule."""
+    policy, words = about.request.policy, []
+    dropped = Counter(about.clips[i].tracks[k].path for i, each in about.found.solutions.items() for k in each.dropped)
+    if dropped:
+        rule = {Drop.REST: "at rest", Drop.UNUSED: "at rest in all clips", Drop.NEVER: "unseen"}[policy.drop]
+        seen = f"{rule} or unseen" if policy.drop_invisible and policy.drop is not Drop.NEVER else rule
+        each = ", ".join(f"{count} {path}" for path, count in sorted(dropped.items()))
+        words.append(f"dropped {plural(dropped.total(), 'channel')} {seen} ({each}; --drop {policy.drop})")
+    if about.found.moved:
+        words.append(f"moved {plural(len(about.found.moved), 'rest value')}")
+    if about.found.without_loss:
+        names = [reader.clip_name(about.clips[i].name, i) for i in about.found.without_loss]
+        words.append(f"kept without loss, as no smaller way held all bounds: {', '.join(names)}")
+    return [f"  {'; '.join(words)}"] if words else []

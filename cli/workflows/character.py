@@ -1,0 +1,144 @@
+"""A converted motion put on a character of the user's: names, partners, and the limit on those without one."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+from anim.errors import NotFoundError
+from anim.exchange.retarget import aliases
+from anim.exchange.retarget.apply import onto, to_match
+from anim.exchange.retarget.kept_tracks import left_over, with_left_over
+from anim.exchange.retarget.retarget import Floor
+from anim.exchange.retarget.vrm_humanoid import stated_roles
+from anim.gltf import authoring
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
+from anim.model import Scene
+from anim.ops.selection import Selection
+from cli import tables, text
+from cli.errors import CheckError, UsageError
+from cli.io import documents, scenes
+from cli.reports import from_euler_report
+from cli.reports.from_euler_report import Conversion
+from cli.text import Voice
+
+
+@dataclass(frozen=True, slots=True)
+class Casting:
+    """What --onto is told: pairs of names, what heights the hips get, the time of the rest pose, and the limit.
+
+    replaced: index of the clip that gives way to the new one; None where it is added.
+    """
+
+    names: dict[str, str]
+    floor: Floor
+    rest_at: float | None
+    fail_unmatched: int | None
+    replaced: int | None = None
+
+
+def cast(made: Conversion, character: documents.Source, casting: Casting, voice: Voice) -> tuple[Conversion, Document]:
+    """Return the conversion with what became of it on the character, and its document with the clip.
+
+    Raises CheckError where more joints are without a partner than may be.
+    """
+    document = character.document
+    scene = scenes.scene(document, character.name, voice)
+    try:
+        done = onto(
+            made.converted,
+            scene,
+            aliases=casting.names,
+            nested=made.motion.nested,
+            stated=stated_roles(document.json),
+            floor=casting.floor,
+            rest_at=casting.rest_at,
+        )
+    except NotFoundError:  # no joint is matched, or an alias names one that is not there
+        _list_joints(made, scene, voice)
+        raise
+    left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
+    if casting.fail_unmatched is not None and len(left) > casting.fail_unmatched:
+        raise CheckError(
+            f"{len(left)} joints without a partner (limit {casting.fail_unmatched}): {from_euler_report.listed(left)}",
+            help="name partners in an --alias file; an empty target leaves a joint out",
+        )
+    made = replace(made, onto=done, character=scene.skeleton)
+    if casting.replaced is not None:
+        old = reader.clips(document)[casting.replaced]
+        stay, num_gone = left_over(old, done)
+        if stay:
+            voice.say(f"note: {text.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
+        if num_gone:
+            what = f"{text.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
+            voice.warn(f"{what} go with it: it is another figure's motion")
+        clip = with_left_over(done, stay, scene.skeleton)
+        return made, writer.replace_clips(document, {casting.replaced: clip})
+    return made, authoring.add_clips(document, [done.clip])
+
+
+def _list_joints(made: Conversion, scene: Scene, voice: Voice) -> None:
+    """Say, where details are wanted, which names there are to pair."""
+    moving, moved = to_match(made.converted, scene, nested=made.motion.nested)
+    for what, skeleton, nodes in (
+        ("motion", made.converted.skeleton, moving),
+        ("character", scene.skeleton, moved),
+    ):
+        names = ", ".join(f"'{skeleton.names[node]}'" for node in sorted(nodes))
+        voice.detail(f"joints of the {what} ({len(nodes)}): {tables.one_line(names)}")
+
+
+def pairs(path: str | None) -> dict[str, str]:
+    """Return what an alias file says, nothing for none."""
+    if path is None:
+        return {}
+    with documents.content(path, ending=".csv") as (data, _):
+        return aliases.read(data.tobytes())
+
+
+def named(made: Conversion, document: Document, *, name: str | None, replaced: int | None) -> Conversion:
+    """Return the conversion with the name that its clip gets in the character's file, and a note where it is taken.
+
+    name: as asked for, which stays; None for the motion's own, which gets a number where a clip has it. replaced:
+    index of the clip whose place it takes, and whose name.
+    """
+    names = reader.names(document)
+    if replaced is not None:
+        return _called(made, names[replaced])
+    own = made.converted.clip.name
+    if own not in names:
+        return made
+    if name is not None:
+        index = names.index(own)
+        note = f"a second clip '{own}': #{len(names)} beside #{index}, which players and diff find first"
+        return _called(made, own, f"{note} (--replace '#{index}' takes its place)")
+    new = next(f"{own} {number}" for number in itertools.count(2) if f"{own} {number}" not in names)
+    note = f"the character has a clip '{own}': this one is called '{new}'"
+    return _called(made, new, f"{note} (--name says otherwise; --replace '{own}' takes its place)")
+
+
+def index_of(replaced: str | None, document: Document) -> int | None:
+    """Return the index of the one clip that a name or '#number' means. Raises NotFoundError for none or several."""
+    if replaced is None:
+        return None
+    names = reader.names(document)
+    found = Selection((replaced,)).chosen_clips(names)
+    if len(found) > 1:
+        listed = ", ".join(f"#{i} '{names[i]}'" for i in found[: from_euler_report.LISTED])
+        raise NotFoundError(f"--replace '{replaced}' means {len(found)} clips (expected one)", help=f"one of {listed}")
+    return found[0]
+
+
+def check_name(name: str | None, replaced: int | None, document: Document) -> None:
+    """Raise UsageError where a clip is to take the place of another under a name that is not that one's."""
+    if name is not None and replaced is not None and name != (own := reader.names(document)[replaced]):
+        words = f"--replace keeps the name of the clip, '{own}' (got --name '{name}')"
+        raise UsageError(words, help="leave --name out")
+
+
+def _called(made: Conversion, name: str, *notes: str) -> Conversion:
+    motion = replace(made.motion, notes=(*made.motion.notes, *notes))
+    clip = replace(made.converted.clip, name=name)
+    return replace(made, motion=motion, converted=replace(made.converted, clip=clip))

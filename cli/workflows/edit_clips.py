@@ -1,0 +1,181 @@
+"""What all commands share that turn clips into clips: read, select, change, write, and say what it cost."""
+
+from __future__ import annotations
+
+import operator
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from anim.errors import AnimError
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.writing import writer
+from anim.measure.error.metric import MotionError, Ruler
+from anim.measure.inspect.file_findings import badly_stored
+from anim.measure.inspect.track_statistics import non_unit_keys
+from anim.model import Clip, Scene, Skeleton
+from anim.ops.selection import Selection
+from cli import text
+from cli.io import documents, images, scenes
+from cli.reports.clip_lengths import lengths
+
+Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
+Clips = Mapping[int, Clip]  # by their number in the file
+DRY = " (dry run: nothing written)"
+
+
+@dataclass(frozen=True, slots=True)
+class Edited:
+    """Clips of a file before and after, by number, and the worst that happened to the surface.
+
+    at_nodes: whether the surface could not be read, so that only nodes were measured.
+    """
+
+    before: dict[int, Clip]
+    after: dict[int, Clip]
+    worst: MotionError | None
+    diagonal: float
+    at_nodes: bool = False
+
+
+def edit(
+    path: str,
+    output: str,
+    selection: Selection,
+    change: Change,
+    voice: text.Voice,
+    *,
+    dry_run: bool,
+    measure: bool = True,
+    notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
+    advise: Callable[[Clip, int], str] = lambda clip, number: "",
+) -> None:
+    """Change the selected clips of one file and write it; one line on stderr says what came of it.
+
+    change: gets a clip, the numbers of its selected tracks, and what reads the scene; returns the new clip.
+    measure: compare the motion of the written file with that of the input, on the surface.
+    notes: gets the clips that are changed, before and after, and returns what a user should know, a line each.
+    advise: gets a clip that can't be changed, and its number, and returns what to do, "" where it doesn't know.
+    """
+    began = time.perf_counter()
+    if not dry_run:
+        documents.check_output(output)
+    with documents.source(path, voice) as source:
+        document = source.document
+        accessors = Accessors(document)
+        clips = reader.clips(document, accessors)
+        skeleton = reader.skeleton(document)
+        chosen = selection.chosen_clips([clip.name for clip in clips])
+        scene = cache(lambda: _scene(document, accessors, skeleton))
+        new = {}
+        for i in chosen:
+            try:
+                new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), scene)
+            except AnimError as error:
+                raise error.at(reader.label(clips[i].name, i)).advise(advise(clips[i], i)) from None
+        stale = badly_stored(document.json)
+        new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
+        for note in notes({i: clips[i] for i in new}, new):
+            voice.say(f"note: {note}")
+        result = writer.replace_clips(document, new)
+        written = reader.clips(result)
+        edited = Edited({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
+        if not new:
+            pass
+        elif measure:
+            edited = _measured(edited, source, accessors, skeleton, voice)
+        else:
+            for i, clip in edited.before.items():
+                voice.detail(f"  {reader.label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
+        size = documents.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run)
+    if not dry_run:
+        note_images(result, source, output, voice)
+    name = source.name if output == documents.PIPE else output
+    if chosen and not new:
+        before = text.size(size) if size == source.size else text.change(source.size, size)
+        voice.say(f"{name}  {before}, unchanged: no track was changed{DRY if dry_run else ''}")
+        return
+    voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
+
+
+def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
+    """The scene, without its meshes where their vertices can't be read."""
+    try:
+        return reader.scene(document, accessors)
+    except AnimError:  # `_measured` says so
+        return Scene(skeleton, ())
+
+
+def _is_same(new: Clip, old: Clip) -> bool:
+    return new is old or (len(new.tracks) == len(old.tracks) and all(map(operator.is_, new.tracks, old.tracks)))
+
+
+def _measured(
+    edited: Edited, source: documents.Source, accessors: Accessors, skeleton: Skeleton, voice: text.Voice
+) -> Edited:
+    at_nodes = False
+    try:
+        scene = scenes.scene(source.document, source.name, voice, accessors=accessors)
+    except AnimError as error:  # vertices that can't be read don't stop a change of keys
+        hint = f" ({error.help})" if error.help else ""
+        voice.warn(f"measured at nodes, not on the surface: {error}{hint}")
+        scene, at_nodes = Scene(skeleton, ()), True
+    ruler = Ruler(scene)
+    worst: MotionError | None = None
+    _warn_of_lengths(edited, voice)
+    for i, before in edited.before.items():
+        found = ruler.error(before, edited.after[i])
+        counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
+        voice.detail(f"  {reader.label(before.name, i)}: {counts}, {_error(found, ruler.diagonal)}")
+        if worst is None or found.max_error > worst.max_error:
+            worst = found
+    return Edited(edited.before, edited.after, worst, ruler.diagonal, at_nodes)
+
+
+def _warn_of_lengths(edited: Edited, voice: text.Voice) -> None:
+    """Warn of rotations off unit length in tracks that changed: the stated error is for players that normalize them."""
+    off: list[tuple[str, int]] = []
+    keys = 0
+    for i, before in edited.before.items():
+        new = {track.target: track for track in edited.after[i].tracks}
+        counts = non_unit_keys(before.tracks)
+        changed = [n for n, track in zip(counts, before.tracks, strict=True) if n and new.get(track.target) != track]
+        if changed:
+            off.append((before.name, i))
+            keys += sum(changed)
+    if off:
+        found = f"{text.plural(keys, 'rotation key')} of {reader.labels(off)} {'is' if keys == 1 else 'are'}"
+        rest = "players that don't normalize rotations may be further off than stated"
+        voice.warn(f"{found} off unit length; {rest}")
+
+
+def _summary(name: str, before: int, after: int, edited: Edited, seconds: float, *, dry_run: bool) -> str:
+    keys = [sum(_keys(clip) for clip in clips.values()) for clips in (edited.before, edited.after)]
+    parts = [f"{name}  {text.change(before, after)}", f"{keys[0]} → {keys[1]} keys"]
+    parts += filter(None, [lengths(edited.before, edited.after)])
+    if edited.worst is not None:
+        parts.append(_error(edited.worst, edited.diagonal) + (" (nodes only)" if edited.at_nodes else ""))
+    parts.append(text.took(seconds))
+    return ", ".join(parts) + (DRY if dry_run else "")
+
+
+def _error(error: MotionError, diagonal: float) -> str:
+    where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
+    words = f"max {text.length(error.max_error)}{text.share(error.max_error, diagonal)}{where}"
+    if error.max_pointer_error > 0:
+        words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
+    return words
+
+
+def _keys(clip: Clip) -> int:
+    return sum(len(track.times) for track in clip.tracks)
+
+
+def note_images(document: Document, source: documents.Source, output: str, voice: text.Voice) -> None:
+    """Say which images went along to an output in another folder than its input, and which are missing there."""
+    if output != documents.PIPE and not source.is_beside(output):
+        for note in images.notes(document, source.folder, copied=True):
+            voice.say(note)

@@ -1,0 +1,144 @@
+"""One file on its way through `optimize`: searched as often as it takes, sized as it will be written."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
+from anim.measure.error.surface import diagonal
+from anim.model import Clip, Scene
+from anim.ops.selection import Selection
+from anim.optimize.optimize import Optimized, optimize
+from anim.optimize.rate_distortion import MOST, Sized, fitting
+from anim.optimize.request import Request
+from cli.errors import CheckError
+from cli.io import documents, scenes
+from cli.progress import Progress
+from cli.reports import optimize_report
+from cli.text import Voice, length, plural
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A file, what of it is to be optimized, and where it goes.
+
+    chosen: numbers of clips. scale: m, the diagonal. detailed: whether verdicts are to have statistics.
+    """
+
+    source: documents.Source
+    clips: tuple[Clip, ...]
+    scene: Scene
+    chosen: Sequence[int]
+    scale: float
+    output: str
+    workers: int
+    detailed: bool
+    progress: Progress
+
+    def run(self, request: Request) -> Optimized:
+        """Return what the search makes of it."""
+        with _errors_for_broken_pipes():
+            found = optimize(
+                self.source.document,
+                self.scene,
+                self.clips,
+                request,
+                chosen=self.chosen,
+                workers=self.workers if optimize_report.is_long(self.clips, self.chosen) else 1,
+                detailed=self.detailed,
+                start="fork" if sys.platform == "linux" else "spawn",
+                progress=lambda share: self.progress(round(1000 * share)),
+            )
+        self.progress.close()
+        return found
+
+    def smaller(self, found: Optimized) -> Document:
+        """Return the optimized document, or the source where that takes no more bytes."""
+        return optimize_report.smaller(found, self.source.document, self.size)
+
+    def size(self, document: Document) -> int:
+        """Return the bytes of a document as it would be written."""
+        return documents.write(document, self.output, self.source, dry_run=True)
+
+    def sized(self, request: Request, max_error: float) -> Sized:
+        """Return what a bound, in m, leads to, searched fast."""
+        found = self.run(replace(_bounded(request, max_error), effort="fast"))
+        smaller = self.smaller(found)
+        return Sized(max_error, self.size(smaller), optimize_report.worst(found), optimize_report.cost(smaller))
+
+    def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
+        """Return what fits with the smallest error, and the request that led there.
+
+        ceiling: m, what the error may not exceed; None for a tenth of the diagonal. Raises CheckError where nothing
+        fits.
+        """
+        most = MOST * self.scale if ceiling is None else ceiling
+        if ceiling is not None:
+            self._check_fit(self.sized(request, most), max_bytes)
+        best = fitting(max_bytes, self.scale, lambda max_error: self.sized(request, max_error))
+        if best is None:
+            self._check_fit(self.sized(request, most), max_bytes)
+        bound = most if best is None else min(best.max_error, most)
+        request = _bounded(request, bound)
+        found = self.run(request)
+        if self.size(self.smaller(found)) > max_bytes:  # a fast search fits, and a longer one may end elsewhere
+            found = self.run(replace(request, effort="fast"))
+        return request, found
+
+    def _check_fit(self, sized: Sized, max_bytes: int) -> None:
+        if sized.size > max_bytes:
+            percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
+            raise CheckError(
+                f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {length(sized.max_error)}{percent} "
+                f"it still takes {plural(sized.size, 'byte')}, {sized.animation} of them animation; "
+                "nothing was written",
+                help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {sized.size}",
+            )
+
+
+@contextmanager
+def _errors_for_broken_pipes() -> Iterator[None]:
+    """Keep SIGPIPE from ending this process: `concurrent.futures` writes to workers that may be gone, and handles it.
+
+    After an error its thread still may, so that the signal stays off then.
+    """
+    if not hasattr(signal, "SIGPIPE"):
+        yield
+        return
+    usual = signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGPIPE, usual)
+
+
+def _bounded(request: Request, max_error: float) -> Request:
+    """The request with a bound in metres that nobody has given."""
+    return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
+
+
+def job(source: documents.Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:
+    """Return the job for a source. clip: globs. jobs: processes, 0 for one per core.
+
+    Raises NotFoundError; FormatError or UnsupportedError where vertices can't be read: no bound holds on those.
+    """
+    document = source.document
+    accessors = Accessors(document)
+    clips = tuple(reader.clips(document, accessors))
+    scene = scenes.scene(document, source.name, voice, accessors=accessors)
+    return Job(
+        source,
+        clips,
+        scene,
+        Selection(clip).chosen_clips(reader.names(document)),
+        diagonal(scene),
+        output,
+        jobs or os.cpu_count() or 1,
+        detailed,
+        Progress("optimize", 1000, shown=not voice.quiet),
+    )

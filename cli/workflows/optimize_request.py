@@ -1,0 +1,76 @@
+"""What `optimize` is asked for: its options, as they were typed, turned into one request in metres and radians."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+from anim.measure.error.surface import diagonal
+from anim.model import Scene
+from anim.ops.selection import Selection
+from anim.optimize.options import Bounds
+from cli import units
+from cli.errors import UsageError
+
+MAX_ERROR = "0.01%"  # of the diagonal, where nothing else is said
+ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
+BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
+
+
+def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
+    """Return the bounds in metres and radians; percents are of the scene's diagonal. Raises UsageError.
+
+    said: what was typed, by the names of the bounds; None for those that are not wanted.
+    """
+    scale = diagonal(scene)
+
+    def length(name: str) -> float | None:
+        text, option = said[name], f"--{name.replace('_', '-')}"
+        if text is None:
+            return None
+        return 0.0 if ZERO.fullmatch(text) else units.meters(text, option, lambda: scale)
+
+    pointer, angle, speed = said["max_pointer_error"] or "0", said["max_angle"], said["max_speed_error"]
+    return Bounds(
+        length("max_error") or 0.0,
+        length("shell") or 0.0,
+        0.0 if ZERO.fullmatch(pointer) else units.share(pointer, "--max-pointer-error"),
+        None if angle is None else units.angle(angle, "--max-angle"),
+        None if speed is None else units.meters(speed, "--max-speed-error", lambda: scale),
+    )
+
+
+def given(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
+    """Return the same as it was typed where that is a share of the diagonal, and the number of metres elsewhere."""
+    return tuple(_share(text) or f"{getattr(bounds, name)}" for name, text in said.items())
+
+
+def notes(said: Mapping[str, str | None]) -> Iterator[str]:
+    """Yield what may have been meant otherwise: lengths without a unit, which are metres."""
+    for name in ("max_error", "shell"):
+        text = (said[name] or "").strip()
+        if text and text[-1].isdigit() and not ZERO.fullmatch(text):
+            yield f"--{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
+
+
+def _share(text: str | None) -> str:
+    number = (text or "").strip()
+    return f"{float(number[:-1])}%" if number.endswith("%") else ""
+
+
+def kept(globs: Sequence[str], scene: Scene) -> frozenset[int]:
+    """Return the numbers of the nodes that match any glob; none without globs. Raises NotFoundError."""
+    return frozenset(Selection((), globs).chosen_nodes(scene.skeleton)) if globs else frozenset()
+
+
+def count_of_bytes(text: str) -> int:
+    """Return a number of bytes above 0: 800kB, 1.5 MB, 65536. Raises UsageError."""
+    number = text.strip().lower().rstrip("bkmgi ")
+    unit = text.strip().lower()[len(number) :].strip()
+    try:
+        count = int(float(number) * BYTES[unit])
+    except (ValueError, KeyError, OverflowError):
+        count = 0
+    if count <= 0:
+        raise UsageError(f"--max-bytes is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
+    return count

@@ -1,0 +1,173 @@
+"""Fits: within the tolerance at 1000 samples a piece, and with no more pieces than notes/algorithms.md C2 lists."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from anim.arrays import Floats
+from anim.curves.easing.function import evaluate
+from anim.curves.easing.table import EASINGS, parse
+from anim.curves.fitting.easing_fit import cubic_pieces, fit_cubic, fit_error, fit_linear
+from anim.curves.fitting.rotation_fit import RotationKeys, fit_rotation
+from anim.errors import RangeError
+from anim.maths import hermite
+from anim.maths import quaternion as quat
+
+MANY = np.linspace(0, 1, 1001)
+CURVED = [name for name, ease in EASINGS.items() if ease.exact is None]
+TABLE = {  # ease: cubic and linear pieces at 1e-3, notes/algorithms.md C2
+    "smoothstep": (1, 27),
+    "sine-in-out": (4, 25),
+    "smootherstep": (6, 27),
+    "quart-in": (3, 39),
+    "expo-out": (8, 76),
+    "ease": (8, 39),
+    "ease-in-out": (5, 24),
+    "elastic-out": (25, 216),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_needs_no_more_pieces_than_the_note(name: str) -> None:
+    ease = EASINGS[name]
+    cubic, linear = TABLE[name]
+    assert len(cubic_pieces(ease, tolerance=1e-3)) <= cubic
+    assert len(fit_linear(ease.value, ease.breakpoints, 1e-3)) - 1 <= linear
+
+
+@pytest.mark.parametrize("name", [*CURVED, "spring(100, 5)", "spring(100, 80)", "cubic-bezier(0, 1, 1, 0)"])
+def test_cubics_stay_within_the_tolerance(name: str) -> None:
+    ease = parse(name)
+    pieces = cubic_pieces(ease, tolerance=1e-3)
+    u = np.concatenate([p.start + (p.end - p.start) * MANY for p in pieces])
+    worst = np.abs(evaluate(pieces, u) - ease.value(u)).max()
+    assert worst <= 1e-3
+    assert fit_error(ease.value, pieces) == pytest.approx(worst, rel=0.03)
+    assert [p.start for p in pieces[1:]] == [p.end for p in pieces[:-1]]
+    assert set(ease.breakpoints) <= {p.end for p in pieces}
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def test_tolerance_is_kept_whatever_it_is(tolerance: float) -> None:
+    for name in ("smootherstep", "expo-in", "quint-in-out"):
+        ease = EASINGS[name]
+        pieces = cubic_pieces(ease, tolerance=tolerance)
+        assert np.abs(evaluate(pieces, MANY) - ease.value(MANY)).max() <= tolerance
+
+
+def test_smooth_eases_stay_c1() -> None:
+    for name in ("smootherstep", "sine-in-out", "ease", "elastic-out"):
+        pieces = cubic_pieces(EASINGS[name], tolerance=1e-3)
+        slopes = [(a.slope1, b.slope0) for a, b in pairwise(pieces)]
+        assert all(before == after for before, after in slopes)
+
+
+def test_fit_of_a_known_cubic_is_one_piece() -> None:
+    (piece,) = fit_cubic(lambda u: u * u * u, lambda u: 3 * u * u, (), 1e-7)
+    assert (piece.slope0, piece.slope1) == (0, 3)
+
+
+def test_fewer_pieces_are_not_enough() -> None:
+    """The longest first piece, found here by plain scanning, is no shorter than ours, and not half the way."""
+    ease = EASINGS["smootherstep"]
+
+    def worst(end: float) -> float:
+        u = end * MANY
+        slopes = end * ease.derivative(np.array([0.0, end]))
+        fitted = hermite.evaluate(MANY, np.zeros(1), slopes[0], ease.value(np.array([end])), slopes[1])
+        return float(np.abs(fitted - ease.value(u)).max())
+
+    pieces = cubic_pieces(ease, tolerance=1e-3)
+    longest = max(end for end in np.linspace(0.01, 1, 300) if worst(end) <= 1e-3)
+    assert pieces[0].end <= longest + 1e-9
+    assert longest + longest < 1  # by symmetry two pieces can't do
+
+
+@pytest.mark.parametrize("name", ["quad-in", "circ-out", "bounce-out", "elastic-in-out", "ease"])
+def test_chords_stay_within_the_tolerance(name: str) -> None:
+    ease = EASINGS[name]
+    u = fit_linear(ease.value, ease.breakpoints, 1e-3)
+    dense = np.concatenate([a + (b - a) * MANY for a, b in pairwise(u)])
+    assert np.abs(np.interp(dense, u, ease.value(u)) - ease.value(dense)).max() <= 1e-3
+
+
+def test_parabola_has_evenly_spaced_chords() -> None:
+    """h²/8 · 2 = 1e-3 gives h = 0.0632, so 16 chords."""
+    u = fit_linear(lambda x: x * x, (), 1e-3)
+    assert len(u) == 17
+    np.testing.assert_allclose(np.diff(u), 1 / 16, rtol=0.05)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-8, np.inf, np.nan])
+def test_tolerance_out_of_range(tolerance: float) -> None:
+    with pytest.raises(RangeError, match="tolerance is"):
+        cubic_pieces(EASINGS["sine-in"], tolerance=tolerance)
+
+
+# Rotations
+
+START = np.asarray(Rotation.from_euler("xyz", [20, -50, 130], degrees=True).as_quat())
+AXIS = np.array([2.0, -1.0, 2.0]) / 3
+
+
+def turned(degrees: float) -> Floats:
+    """Return START turned about its own AXIS, with the other sign."""
+    return np.asarray(-(Rotation.from_quat(START) * Rotation.from_rotvec(np.radians(degrees) * AXIS)).as_quat())
+
+
+def worst_angle(keys: RotationKeys, name: str, degrees: float) -> float:
+    """Return the greatest angle in radians between what a player shows and the eased turn made with scipy."""
+    worst = 0.0
+    ease = EASINGS[name]
+    for k in range(len(keys.u) - 1):
+        h = keys.u[k + 1] - keys.u[k]
+        ends = keys.rotations[k], h * keys.out_tangents[k], keys.rotations[k + 1], h * keys.in_tangents[k + 1]
+        shown = Rotation.from_quat(hermite.evaluate(MANY[:, None], *ends))
+        angle = np.radians(degrees) * ease.value(keys.u[k] + h * MANY)
+        true = Rotation.from_quat(START) * Rotation.from_rotvec(angle[:, None] * AXIS)
+        worst = max(worst, float((shown.inv() * true).magnitude().max()))
+    return worst
+
+
+@pytest.mark.parametrize("degrees", [1.0, 45.0, 90.0, 179.0])
+@pytest.mark.parametrize("name", ["linear", "smoothstep", "ease", "back-out", "bounce-out", "elastic-out", "circ-in"])
+def test_turns_stay_within_the_tolerance(name: str, degrees: float) -> None:
+    tolerance = np.radians(0.1)
+    keys = fit_rotation(START, turned(degrees), EASINGS[name], tolerance)
+    worst = worst_angle(keys, name, degrees)
+    assert worst <= keys.error + 1e-9 <= tolerance + 1e-9
+    np.testing.assert_allclose(np.linalg.norm(keys.rotations, axis=1), 1, atol=1e-15)
+    assert (quat.dot(keys.rotations[:-1], keys.rotations[1:]) > 0).all()
+    steps = quat.angle_between(keys.rotations[:-1], keys.rotations[1:])
+    assert np.degrees(steps.max()) <= 120 + 1e-6
+
+
+@pytest.mark.parametrize(("degrees", "tolerance", "pieces"), [(90, 0.1, 3), (90, 0.01, 4), (179, 0.1, 4)])
+def test_smoothstep_turn_needs_few_pieces(degrees: float, tolerance: float, pieces: int) -> None:
+    keys = fit_rotation(START, turned(degrees), EASINGS["smoothstep"], np.radians(tolerance))
+    assert len(keys.u) - 1 <= pieces
+
+
+def test_turn_starts_and_ends_where_asked() -> None:
+    keys = fit_rotation(START, turned(70), EASINGS["sine-in-out"], 1e-3)
+    np.testing.assert_array_equal(keys.rotations[0], START)
+    np.testing.assert_array_equal(keys.rotations[-1], -turned(70))
+    assert not keys.in_tangents[0].any()
+    assert not keys.out_tangents[-1].any()
+
+
+@pytest.mark.parametrize("name", ["linear", "ease", "circ-out", "bounce-in"])
+def test_no_turn(name: str) -> None:
+    keys = fit_rotation(START, -START, EASINGS[name], 1e-3)
+    np.testing.assert_allclose(keys.rotations, np.tile(START, (len(keys.u), 1)), atol=1e-15)
+    np.testing.assert_allclose(keys.out_tangents, 0, atol=1e-12)
+    assert keys.error < 1e-12
+
+
+def test_steps_do_not_turn() -> None:
+    with pytest.raises(RangeError, match="jumps"):
+        fit_rotation(START, turned(10), parse("steps(3)"), 1e-3)

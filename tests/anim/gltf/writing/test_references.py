@@ -1,0 +1,73 @@
+"""Who refers to what: every place in glTF and its known extensions that names an accessor or a view."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from anim.gltf.writing import references
+
+Json = dict[str, Any]
+
+PRIMITIVE: Json = {"attributes": {}}
+
+
+@pytest.mark.parametrize(
+    ("content", "accessors", "views"),
+    [
+        ({}, set(), set()),
+        ({"meshes": [{"primitives": [{"attributes": {"POSITION": 3, "_X": 4}}]}]}, {3, 4}, set()),
+        ({"meshes": [{"primitives": [PRIMITIVE | {"indices": 5}]}]}, {5}, set()),
+        ({"meshes": [{"primitives": [PRIMITIVE | {"targets": [{"POSITION": 6}, {"NORMAL": 7}]}]}]}, {6, 7}, set()),
+        ({"skins": [{"joints": [1], "inverseBindMatrices": 8}, {"joints": [2]}]}, {8}, set()),
+        ({"animations": [{}, {"channels": [], "samplers": [{"input": 1, "output": 2}]}]}, {1, 2}, set()),
+        ({"images": [{"bufferView": 9}, {"uri": "a.png"}]}, set(), {9}),
+        (
+            {"nodes": [{"extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 3, "_ID": 4}}}}]},
+            {3, 4},
+            set(),
+        ),
+        ({"nodes": [{"mesh": 5, "skin": 6, "children": [7], "camera": 8, "weights": [1, 0]}]}, set(), set()),
+        ({"materials": [{"alphaCutoff": 1, "pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}]}, set(), set()),
+        ({"extras": {"a": [1, {"b": 2}], "c": True, "d": 3.0, "e": "4", "f": None}}, {1, 2}, {1, 2}),
+        ({"extensions": {"ACME": 5}}, {5}, {5}),
+        ({"scenes": [{"extensions": {"ACME": [[6]]}}]}, {6}, {6}),
+        ({"extensions": {"KHR_lights_punctual": {"lights": [{"range": 5}]}}}, set(), set()),
+        ({"extensions": {"VRMC_vrm": {"humanoid": {"humanBones": {"hips": {"node": 1}}}}}}, set(), set()),
+        ({"textures": [{"source": 1, "extensions": {"KHR_texture_basisu": {"source": 2}}}]}, set(), set()),
+        ({"asset": {"version": "2.0", "extras": 7}}, {7}, {7}),
+    ],
+)
+def test_each_place(content: Json, accessors: set[int], views: set[int]) -> None:
+    found = references.outside(content, {0})
+    assert found.accessors == accessors
+    assert found.views == views
+
+
+def test_draco_names_a_view() -> None:
+    """Its attribute numbers are Draco's own; taking them for views too does no harm."""
+    draco = {"KHR_draco_mesh_compression": {"bufferView": 5, "attributes": {"POSITION": 0}}}
+    found = references.outside({"meshes": [{"primitives": [PRIMITIVE | {"extensions": draco}]}]}, set())
+    assert found.views >= {5}
+    assert found.accessors == set()
+
+
+@pytest.mark.parametrize(
+    ("accessor", "views"),
+    [
+        ({}, []),
+        ({"bufferView": 1}, [1]),
+        ({"sparse": {"indices": {"bufferView": 2}, "values": {"bufferView": 3}}}, [2, 3]),
+        ({"bufferView": 1, "sparse": {"indices": {"bufferView": 2}, "values": {"bufferView": 3}}}, [1, 2, 3]),
+    ],
+)
+def test_views_of(accessor: Json, views: list[int]) -> None:
+    assert references.views_of(accessor) == views
+
+
+def test_ids_inside_draco_data_name_no_views() -> None:
+    """Or the keys of old clips stay in the file, in views that have the same number as an attribute."""
+    draco = {"KHR_draco_mesh_compression": {"bufferView": 3, "attributes": {"POSITION": 0, "JOINTS_0": 1}}}
+    json = {"meshes": [{"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1}, "extensions": draco}]}]}
+    assert references.outside(json, ()).views == {3}

@@ -1,0 +1,73 @@
+"""The laws that are derived from, against the players that play: the same quaternions, on both sides of every key."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.measure.continuous_bound.arcs import LAWS
+from anim.measure.continuous_bound.intervals import gaps
+from anim.measure.continuous_bound.rotation_endpoints import turns
+from anim.measure.error.metric import dense_times
+from anim.model import Interpolation, Track
+from anim.sampling.batch import batches
+from anim.sampling.players import PLAYERS, played
+from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, skeleton, track
+
+TIMES = np.array([0.1, 0.2, 0.5, 0.9, 1.0])
+
+
+def _rotations(mode: Interpolation, seed: int) -> Track:
+    """Near and far keys, some equal, of lengths up to 1 % off 1, with signs by chance."""
+    random = np.random.default_rng(seed)
+    keys = np.cumsum(random.normal(size=(5, 4)) * random.choice([0.001, 0.02, 0.5], size=(5, 1)), axis=0)
+    keys += [0, 0, 0, 2]
+    keys *= random.choice([-1, 1], size=(5, 1)) * random.uniform(0.99, 1.01, (5, 1))
+    keys /= np.linalg.norm(keys, axis=1, keepdims=True) ** random.choice([0.98, 1], size=(5, 1))
+    keys[2] = keys[1]
+    sides = (random.normal(size=(5, 4)), random.normal(size=(5, 4))) if mode is CUBICSPLINE else None
+    return track("rotation", TIMES, keys, mode, tangents=sides)
+
+
+def test_every_player_has_a_law() -> None:
+    assert set(LAWS) == set(PLAYERS)
+
+
+@pytest.mark.parametrize("mode", [LINEAR, STEP, CUBICSPLINE])
+@pytest.mark.parametrize("seed", range(6))
+def test_laws_play_as_players_do(mode: Interpolation, seed: int) -> None:
+    moving = clip(_rotations(mode, seed))
+    times = np.unique(np.concatenate((dense_times(moving), [0.0, 1.2])))
+    where = gaps(times, moving)
+    players = list(LAWS)
+    found = turns(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
+    length = np.linalg.norm(found.value, axis=1)  # (2, P, G, U)
+    shown = found.value / np.where(found.unit, length, 1.0)[:, None]
+    for p, player in enumerate(players):
+        poses = played(skeleton([-1]), moving, player=player)
+        for end, at in enumerate((where.starts, np.nextafter(where.ends, 0))):
+            expected = poses.at(at).rotation[:, 0]
+            assert np.abs(_same_side(shown[end, :, p, :, 0].T, expected) - expected).max() < 1e-9
+        after = np.where(found.next_unit[p, :, 0], 1.0, length[1, p, :, 0])
+        at_key = np.linalg.norm(poses.at(where.ends).rotation[:, 0], axis=1)
+        if mode is LINEAR:  # a step is elsewhere
+            assert np.abs(after - at_key).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_within_gaps_the_law_goes_on(seed: int) -> None:
+    """Half-way through a gap, by c″ = −ν²c from both ends, divided by its length where it says so."""
+    moving = clip(_rotations(LINEAR, seed))
+    where = gaps(dense_times(moving), moving)
+    players = list(LAWS)
+    found = turns(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
+    middle = (found.value[0] + found.value[1]) / (2 * np.cos(found.turn / 2))
+    middle /= np.where(found.unit, np.linalg.norm(middle, axis=0), 1.0)
+    for p, player in enumerate(players):
+        expected = played(skeleton([-1]), moving, player=player).at((where.starts + where.ends) / 2).rotation[:, 0]
+        assert np.abs(_same_side(middle[:, p, :, 0].T, expected) - expected).max() < 1e-9
+
+
+def _same_side(found: Floats, expected: Floats) -> Floats:
+    return found * np.where((found * expected).sum(axis=1) < 0, -1.0, 1.0)[:, None]

@@ -1,0 +1,78 @@
+"""The search for the longest vector: right with any amount of searching, and never too short."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.measure.error.displacement import Groups, Linear, Rate, lengths, longest
+
+RNG = np.random.default_rng(5)
+JOINTS, FRAMES, VERTICES = 4, 40, 30
+
+
+@pytest.fixture
+def field() -> Linear:
+    """Three groups of vertices in random places, carried by one or two of four joints that move at random."""
+    points = RNG.normal(size=(VERTICES, 3))
+    low, high = points.min(axis=0), points.max(axis=0)
+    sides = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    corners = np.tile(low + sides * (high - low), (JOINTS, 1, 1))
+    whole = np.column_stack((points, np.ones(VERTICES)))
+    two = np.concatenate((0.25 * whole[20:], 0.75 * whole[20:]), axis=1)
+    groups = Groups([np.array([0]), np.array([1]), np.array([2, 3])], [whole[:10], whole[10:20], two], corners)
+    return Linear(groups, RNG.normal(size=(JOINTS, FRAMES, 3, 4)))
+
+
+def _all(field: Linear | Rate, frames: int) -> list[Floats]:
+    return [lengths(field, group, np.arange(frames)) for group in range(3)]
+
+
+def test_the_longest_is_found_where_it_is(field: Linear) -> None:
+    every = _all(field, FRAMES)
+    top = max(each.max() for each in every)
+    found = longest(field, floor=0, slack=1, most=10**9)
+    assert found.length == top
+    assert every[found.group][found.vertex, found.frame] == top
+
+
+@pytest.mark.parametrize("most", [0, 1, 50, 500])
+def test_less_searching_says_more_never_less(field: Linear, most: int) -> None:
+    top = max(each.max() for each in _all(field, FRAMES))
+    found = longest(field, floor=0, slack=1, most=most)
+    assert top <= found.length <= field.limits.max()
+    if not most:
+        assert (found.length, found.vertex) == (field.limits.max(), -1)
+
+
+def test_what_is_below_the_floor_is_only_bounded(field: Linear) -> None:
+    found = longest(field, floor=1e9, slack=1, most=10**9)
+    assert (found.length, found.vertex) == (field.limits.max(), -1)
+
+
+def test_limits_are_limits(field: Linear) -> None:
+    step = np.full(FRAMES - 1, 0.1)
+    for one, frames in ((field, FRAMES), (field.rate(step), FRAMES - 1), (Rate(field, step), FRAMES - 1)):
+        for group, sizes in enumerate(_all(one, frames)):  # type: ignore[arg-type]
+            assert (sizes <= one.limits[group] * (1 + 1e-12)).all()
+
+
+def test_rates_are_differences(field: Linear) -> None:
+    step = RNG.uniform(0.1, 0.2, FRAMES - 1)
+    frames = np.array([3, 17, 0])
+    for group in range(3):
+        vectors = field.vectors(group, np.arange(FRAMES))
+        expected = (np.diff(vectors, axis=-1) / step)[..., frames]
+        for one in (field.rate(step), Rate(field, step)):
+            assert one.vectors(group, frames) == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_joint_that_moves_a_vertex_most_is_named(field: Linear) -> None:
+    """A vertex with shares 1/4 and 3/4 of two joints: whichever carries it farther."""
+    for frame in range(10):
+        single = [
+            np.linalg.norm(field._moved[j, frame] @ field._groups.products[2][4].reshape(2, 4)[k])
+            for k, j in ((0, 2), (1, 3))
+        ]
+        assert field.joint(2, frame, 4) == (2, 3)[int(np.argmax(single))]

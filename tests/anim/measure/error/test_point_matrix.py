@@ -1,0 +1,134 @@
+"""Measured points, against plain loops over vertices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.measure.error import point_matrix as points_
+from anim.measure.error.point_matrix import CARRIED, Points, of_scene, stacked
+from anim.measure.error.surface import surfaces
+from anim.model import Scene
+from anim.sampling import rest, world_matrices
+from tests.anim.optimize.making import JOINTS, every_point, scene
+from tests.anim.skinning.scenes import looped, mesh
+from tests.anim.skinning.scenes import scene as made
+from tests.clips import skeleton
+
+RNG = np.random.default_rng(3)
+
+
+def _world(of: Scene, frames: int = 4) -> Floats:
+    """World matrices (N, F, 3, 4) of no particular pose."""
+    return RNG.normal(size=(len(of.skeleton), frames, 3, 4))
+
+
+def _places(of: Scene, world: Floats) -> Floats:
+    """Every vertex (V, F, 3), by loops over frames, vertices and influences."""
+    (instance,) = of.instances
+    assert instance.skin is not None
+    bind = np.concatenate((instance.skin.inverse_bind, np.tile([[[0.0, 0, 0, 1]]], (JOINTS, 1, 1))), axis=1)
+    bound = np.swapaxes(world[instance.skin.joints], 0, 1) @ bind
+    mesh = instance.mesh
+    return looped(mesh.positions, mesh.joints, mesh.weights, bound).swapaxes(0, 1)
+
+
+def test_places_are_those_of_every_vertex() -> None:
+    of = scene()
+    world = _world(of)
+    points = every_point(of)
+    assert points.places(world) == pytest.approx(_places(of, world), abs=1e-9)
+
+
+@pytest.mark.parametrize("dense", [0, 10**9])
+def test_moves_are_differences_of_places(dense: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(points_, "DENSE", dense)
+    of = scene()
+    points = every_point(of)
+    a, b = _world(of), _world(of)
+    moved = points.rows().moves(stacked(b, points.nodes) - stacked(a, points.nodes))
+    assert moved.swapaxes(1, 2) == pytest.approx(_places(of, b) - _places(of, a), abs=1e-4)
+
+
+def test_a_joint_twice_on_one_vertex_counts_twice() -> None:
+    of = made(mesh([[1.0, 0, 0]], [[0, 0]], [[0.25, 0.75]]), [-1])
+    points = every_point(of)
+    world = np.eye(4)[:3][None, None] * np.array([2.0, 1, 1, 1])[:, None][:3]
+    world = np.repeat(world, 2, axis=0)
+    moved = points.rows().moves(
+        stacked(world, points.nodes) - stacked(np.tile(np.eye(4)[:3], (2, 1, 1, 1)), points.nodes)
+    )
+    assert moved[0, :, 0] == pytest.approx([1, 0, 0])
+
+
+def test_shells_are_six_points_around_a_node() -> None:
+    of = Scene(skeleton([-1, 0], translation=[[1, 0, 0], [0, 2, 0]], scale=[[2, 2, 2], [1, 1, 1]]), ())
+    points = of_scene(of, {1}, 0.25)
+    world = world_matrices(of.skeleton, rest(of.skeleton)).swapaxes(0, 1)
+    places = points.places(world)[:, 0]
+    assert places.mean(axis=0) == pytest.approx([1, 4, 0])
+    assert np.linalg.norm(places - [1, 4, 0], axis=1) == pytest.approx(
+        np.full(6, 0.25)
+    )  # metres of the world, under any scale
+    assert len(np.unique(places.round(9), axis=0)) == 6
+
+
+def test_nothing_to_measure() -> None:
+    points = of_scene(Scene(skeleton([-1]), ()), frozenset(), 1.0)
+    assert len(points) == 0
+    assert points.places(np.ones((1, 5, 3, 4))).shape == (0, 5, 3)
+
+
+def test_what_sticks_out_is_measured() -> None:
+    """For every joint and direction of its space, no vertex that it carries most lies beyond the chosen ones."""
+    of = scene(8)
+    (surface,) = surfaces(of)
+    chosen = sorted(points_.extremes(surface))
+    assert 0 < len(chosen) < 60
+    (instance,) = of.instances
+    assert instance.skin is not None
+    for joint in range(JOINTS):
+        bind = instance.skin.inverse_bind[joint]
+        most = [v for v in range(60) if instance.mesh.joints[v][instance.mesh.weights[v].argmax()] == joint]
+        some = [
+            v
+            for v in range(60)
+            if any(
+                j == joint and w > CARRIED
+                for j, w in zip(instance.mesh.joints[v], instance.mesh.weights[v], strict=True)
+            )
+        ]
+        for mine in (most, some):
+            local = {v: bind[:, :3] @ instance.mesh.positions[v] + bind[:, 3] for v in mine}
+            for axis in range(3):
+                for sign in (1, -1):
+                    best = max((sign * place[axis] for place in local.values()), default=-np.inf)
+                    assert max((sign * local[v][axis] for v in chosen if v in local), default=-np.inf) == best
+
+
+def test_extra_vertices_are_measured_too() -> None:
+    of = scene()
+    usual = of_scene(of, frozenset(), 0.0)
+    (surface,) = surfaces(of)
+    missing = min(set(range(60)) - points_.extremes(surface))
+    assert len(of_scene(of, frozenset(), 0.0, {(0, missing)})) == len(usual) + 1
+    assert len(of_scene(of, frozenset(), 0.0, {(1, missing)})) == len(usual)
+
+
+def test_morphed_as_at_rest() -> None:
+    of = made(mesh([[1.0, 0, 0]], [[0]], [[1.0]], targets=[[[0, 2.0, 0]]], rest_weights=[0.5]), [-1])
+    world = np.tile(np.eye(4)[:3], (2, 1, 1, 1))
+    assert every_point(of).places(world)[0, 0] == pytest.approx([1, 1, 0])
+
+
+def test_points_answer_for_what_they_noticeably_hang_on() -> None:
+    one = Points(np.array([2, 7]), np.array([[0, 1], [1, 0]]), np.ones((2, 2, 4)) * [[[0.95], [0.05]]])
+    nodes = np.zeros(9, np.bool_)
+    nodes[2] = True
+    assert one.on(nodes).tolist() == [True, False]
+    faint = replace(one, factors=0.1 * one.factors)
+    assert faint.on(nodes).tolist() == [True, True]  # where none hangs on it noticeably: all that do at all
+    assert not one.on(np.zeros(9, np.bool_)).any()

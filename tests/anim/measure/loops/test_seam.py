@@ -1,0 +1,223 @@
+"""Seams on the skin: closed forms of small scenes, and the joints that make them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import fixtures
+from anim.gltf.reading import reader
+from anim.maths import matrix, quaternion
+from anim.measure.loops import seam
+from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.loop_analysis import LoopKind, Steps, loop
+from anim.measure.loops.seam import SkinMotion
+from anim.model import Clip, Instance, Mesh, Scene
+from anim.sampling import pose, world_matrices
+from anim.skinning.bake import bake
+from tests.anim.skinning.scenes import looped, random_scene
+from tests.clips import STEP, about, clip, skeleton, track
+from tests.files import opened
+
+FPS = 10
+AT = np.arange(11) / FPS  # s
+SWING = 30 * np.sin(2 * np.pi * AT)  # deg; there and back, to the bit
+SWING[-1] = SWING[0]
+
+
+def _mesh(point: ArrayLike, target: ArrayLike | None = None) -> Mesh:
+    """One vertex, and one morph target that moves it."""
+    none = np.empty((1, 0))
+    targets = np.empty((0, 1, 3)) if target is None else np.array([[target]], float)
+    return Mesh("", np.array([point], float), np.empty((0, 3), int), none.astype(int), none, targets, np.empty(0))
+
+
+def _chain(targets: ArrayLike | None = None) -> Scene:
+    """Three joints in a row, 1 m apart, each with a vertex half a metre on; node 3 is a control without any."""
+    nodes = skeleton([-1, 0, 1, 0], translation=[[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 5, 0]])
+    rows = [Instance(n, _mesh([0.5, 0, 0], targets), None, np.zeros(int(targets is not None))) for n in range(3)]
+    return Scene(nodes, tuple(rows))
+
+
+CHAIN = _chain()
+
+
+def _swinging(**ends: float) -> Clip:
+    """All joints swing; j0, j1, j2: by how much (deg) each drifts away until the end."""
+    tracks = []
+    for node in range(3):
+        degrees = (1 + 0.1 * node) * SWING + np.linspace(0, ends.get(f"j{node}", 0.0), 11)
+        tracks.append(track("rotation", AT, about("z", degrees), node=node))
+    return clip(*tracks)
+
+
+def test_a_swing_that_comes_back_is_closed() -> None:
+    found = loop(CHAIN, _swinging())
+    assert (found.kind, found.seam, found.joints) == (LoopKind.CLOSED, 0.0, ())
+
+
+def test_a_joint_that_stays_open_is_named_with_its_own_gap() -> None:
+    """Joint 1 is 5° off, with vertices at 0.5 m and 1.5 m from it: 2 r sin(θ/2), and nothing of the joints around."""
+    found = loop(CHAIN, _swinging(j1=5))
+    assert found.kind is LoopKind.CLOSED_EXCEPT
+    assert [each.joint for each in found.joints] == ["1"]
+    assert found.joints[0].gap == pytest.approx(3 * np.sin(np.radians(2.5)))
+    assert found.seam == pytest.approx(3 * np.sin(np.radians(2.5)))
+    assert found.node == "1"
+
+
+def test_gaps_that_reach_further_than_the_motion_are_no_loop() -> None:
+    assert loop(CHAIN, _swinging(j1=150)).kind is LoopKind.NOT_A_LOOP
+
+
+def test_all_joints_one_frame_short_are_open_by_one_frame() -> None:
+    whole = _swinging()
+    short = clip(*(replace(each, times=each.times[:-1], values=each.values[:-1]) for each in whole.tracks))
+    found = loop(CHAIN, short)
+    assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
+    assert len(found.joints) == 3
+
+
+def test_a_control_that_moves_no_vertex_does_not_count() -> None:
+    control = track("translation", [0, 1], [[0, 5, 0], [7, 5, 0]], node=3)
+    found = loop(CHAIN, clip(*_swinging().tracks, control))
+    assert (found.kind, found.seam) == (LoopKind.CLOSED, 0.0)
+    without = Scene(CHAIN.skeleton, ())  # no vertices anywhere: then all nodes count
+    assert loop(without, clip(*_swinging().tracks, control)).kind is LoopKind.NOT_A_LOOP
+
+
+def test_a_turn_that_comes_back_with_the_other_sign_is_closed() -> None:
+    around = track("rotation", AT, np.r_[about("z", 36.0 * np.arange(10)), -about("z", [0.0])], node=0)
+    found = loop(CHAIN, clip(around, *_swinging().tracks[1:]))
+    assert (found.kind, found.joints) == (LoopKind.CLOSED, ())
+
+
+def test_a_seam_below_the_usual_motion_is_closed() -> None:
+    """A tenth of the usual motion from frame to frame is not seen, but a thousandth of the size at most."""
+    found = loop(CHAIN, _swinging(j2=0.01))
+    assert 0 < found.seam < 0.1 * found.inside.typical
+    assert found.kind is LoopKind.CLOSED
+    slow = clip(*(replace(each, values=about("z", 1e-3 * SWING) * [1, 1, 1, 1]) for each in _swinging().tracks[:2]))
+    jump = track("rotation", AT, about("z", np.r_[1e-3 * SWING[:10], 0.01]), node=2)
+    assert loop(CHAIN, clip(*slow.tracks, jump)).kind is not LoopKind.CLOSED
+
+
+def test_morph_weights_that_stay_open_are_named() -> None:
+    """A target of 0.2 m, at half weight in the end."""
+    scene = _chain([0, 0.2, 0])
+    smile = track("weights", AT, np.r_[np.zeros(10), 0.5][:, None], node=2)
+    found = loop(scene, clip(*_swinging().tracks, smile))
+    assert found.kind is LoopKind.CLOSED_EXCEPT
+    assert [(each.joint, each.is_morph) for each in found.joints] == [("2", True)]
+    assert found.joints[0].gap == pytest.approx(0.1)
+
+
+def test_steps_inside_are_those_of_the_vertices() -> None:
+    """One vertex that turns by 36° a frame, 0.5 m off its axis; the chord, and how much it turns."""
+    scene = Scene(CHAIN.skeleton, CHAIN.instances[:1])
+    around = clip(track("rotation", AT, about("z", 36.0 * np.arange(11)), node=0))
+    found = loop(scene, around).inside
+    chord = 2 * 0.5 * np.sin(np.radians(18))
+    expected = Steps(chord, chord, 2 * chord * np.sin(np.radians(18)) * FPS)
+    assert (found.largest, found.typical, found.speed) == pytest.approx(
+        (expected.largest, expected.typical, expected.speed)
+    )
+
+
+def test_the_seam_is_that_of_a_plain_loop_over_vertices() -> None:
+    scene = random_scene(5, joints=5, vertices=60)
+    turn = clip(*(track("rotation", [0, 1], about("x", [0, 10.0 * n]), node=n) for n in range(1, 4)))
+    (instance,) = scene.instances
+    assert instance.skin is not None
+    world = world_matrices(scene.skeleton, pose(scene.skeleton, turn, np.array([0.0, 1.0])))[:, instance.skin.joints]
+    bind = np.concatenate((instance.skin.inverse_bind, np.tile([[[0.0, 0, 0, 1]]], (5, 1, 1))), axis=1)
+    bound = world @ bind
+    mesh = instance.mesh
+    first, end = looped(mesh.positions, mesh.joints, mesh.weights, bound)
+    expected = np.linalg.norm(end - first, axis=1).max()
+    (found,) = SkinMotion(scene).seams([LoopRange(turn, 0.0, 1.0)])
+    assert found.gap == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["arm", "tube", "biped", "morph_cube"])
+def test_the_seam_is_how_far_a_bake_ends_from_its_start(name: str) -> None:
+    document = opened(fixtures.build(name))
+    scene = reader.scene(document)
+    for each in reader.clips(document):
+        first, last = bake(scene, each, times=np.array([each.start, each.end]), rigid=True).whole().positions
+        assert loop(scene, each).seam == pytest.approx(np.linalg.norm(last - first, axis=1).max(), rel=1e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["arm", "biped", "morph_cube"])
+def test_steps_inside_are_those_of_a_bake(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of every vertex, skinned and morphed, whatever the number of frames that are looked at together."""
+    monkeypatch.setattr(seam, "AT_ONCE", 20_000)
+    document = opened(fixtures.build(name))
+    scene = reader.scene(document)
+    for each in reader.clips(document):
+        found = loop(scene, each)
+        step = min(1 / found.fps, (each.end - each.start) / 2)
+        count = max(round((each.end - each.start) / step), 2)
+        times = np.minimum(each.start + step * np.arange(count + 1), each.end)
+        places = bake(scene, each, times=times, rigid=True).whole().positions.astype(float)
+        moves = np.linalg.norm(np.diff(places, axis=0), axis=2).max(axis=1)
+        changes = np.linalg.norm(np.diff(places, n=2, axis=0), axis=2).max(axis=1)
+        assert found.inside.largest == pytest.approx(moves.max(), rel=1e-5, abs=1e-6)
+        assert found.inside.speed == pytest.approx(changes.max() / step, rel=1e-4, abs=1e-6 / step)
+
+
+def test_seams_of_a_bent_tube_are_closed_forms() -> None:
+    """The end of a tube, bent at 90°: √2 times as far as its farthest vertex is from the elbow's axis."""
+    document = opened(fixtures.build("tube"))
+    scene = reader.scene(document)
+    bend = next(each for each in reader.clips(document) if each.name == "bend90")
+    (instance,) = scene.instances
+    (elbow,) = (t.node for t in bend.tracks)
+    assert instance.skin is not None
+    assert elbow is not None
+    (upper,) = np.flatnonzero(instance.skin.joints == elbow)
+    carried = ((instance.mesh.joints == upper) * instance.mesh.weights).sum(axis=1) == 1
+    axis = quaternion.rotation_vector(bend.tracks[0].values[-1])
+    from_elbow = matrix.apply(instance.skin.inverse_bind[upper], instance.mesh.positions[carried])
+    off = np.linalg.norm(np.cross(from_elbow, axis / np.linalg.norm(axis)), axis=1).max()
+    found = loop(scene, bend)
+    assert found.seam == pytest.approx(np.sqrt(2) * off, rel=1e-5)
+    assert found.speed_seam == pytest.approx(np.sqrt(2) * np.pi / 2 * off, rel=1e-3)
+
+
+@pytest.mark.parametrize("late", [0.0, 5e-5, 1e-7])
+def test_a_step_is_a_gap_and_no_speed(late: float) -> None:
+    """Joint 0 turns on by 0.2 rad/s, 2.5 m from the end; a STEP track jumps in the last or in the first moment."""
+    turn = track("rotation", [0, 1], about("z", [0, np.degrees(0.2)]), node=0)
+    values = np.array([[1.0, 0, 0]] * 2 + [[1, 0.05, 0]])
+    jump = track("translation", [0, 0.5, 1 - late], values, STEP, node=2)
+    found = loop(CHAIN, clip(turn, jump))
+    still = loop(CHAIN, clip(turn))
+    assert found.speed_seam == pytest.approx(still.speed_seam, abs=0.2 * 0.05)
+    assert still.speed_seam == pytest.approx(2 * np.sin(0.1) * 0.2 * 2.5, rel=1e-3)
+    assert found.joints[-1].gap == pytest.approx(0.05)
+    first = track("translation", [0, late + 1e-9, 1], np.array([[1, 0.05, 0], [1, 0, 0], [1, 0, 0]]), STEP, node=2)
+    assert loop(CHAIN, clip(turn, first)).speed_seam == pytest.approx(still.speed_seam, abs=0.2 * 0.05)
+
+
+def test_two_keys_in_one_moment_are_a_step_too() -> None:
+    values = np.zeros((4, 3))
+    values[-1, 1] = 0.05
+    pair = track("translation", [0, 0.5, 1 - 2.0**-24, 1], values, node=0)
+    found = loop(CHAIN, clip(pair))
+    assert (found.speed_seam, found.node) == (0.0, "0")
+    assert found.seam == pytest.approx(0.05)
+    closed = track("translation", [0, 0.5, 1], np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0]]), STEP, node=0)
+    found = loop(CHAIN, clip(closed))
+    assert (found.kind, found.seam, found.speed_seam, found.node) == (LoopKind.CLOSED, 0.0, 0.0, "")
+
+
+def test_a_jump_at_the_end_counts() -> None:
+    """STEP: the last key is shown for no time, but players that stop there show it."""
+    stepped = track("translation", AT, np.r_[np.zeros((10, 3)), [[0, 0.05, 0]]], STEP, node=1)
+    found = loop(CHAIN, clip(*_swinging().tracks, stepped))
+    assert found.kind is LoopKind.CLOSED_EXCEPT
+    assert [each.gap for each in found.joints] == [pytest.approx(0.05)]

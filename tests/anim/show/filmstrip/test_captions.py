@@ -1,0 +1,94 @@
+"""Words on filmstrips: where they are, and that they fit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.show.filmstrip import captions, clips
+from anim.show.filmstrip.clips import When
+from anim.show.filmstrip.filmstrip import Extent, Look, Row, filmstrip, moving
+from tests.files import opened_fixture
+
+LONG = "Dualwield_Melee_Attack_Chop"
+FACE = np.array([[0, 1, 2]])
+EXTENT = Extent(np.array([[0, 0, 0], [0.3, 0, 0], [0, 1, 0.0]]), 0.0)
+SMALL = Look(height=64)
+
+
+@pytest.fixture
+def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
+    """Texts with the x and y where they were written."""
+    found: list[tuple[str, int, int]] = []
+    real = captions.write
+
+    def write(image: Any, text: str, x: int, y: int, **rest: Any) -> None:
+        found.append((text, x, y))
+        assert x >= 0
+        assert x + captions.width(text) <= image.shape[1], f"{text} is cut off"
+        real(image, text, x, y, **rest)
+
+    monkeypatch.setattr(captions, "write", write)
+    return found
+
+
+def row(heading: str, count: int, label: str = "") -> Row:
+    positions = np.repeat(EXTENT.points[None], count, axis=0)
+    return Row(label, np.arange(count) / 10, positions, FACE, np.full((1, 3), 0.5), heading=heading)
+
+
+@pytest.mark.parametrize(
+    ("text", "pixels", "lines"),
+    [
+        (LONG, 400, [LONG]),
+        (LONG, 200, ["Dualwield_Melee_", "Attack_Chop"]),
+        ("x" * 20, 118, ["x" * 10, "x" * 10]),
+        ("Walk lbs", 60, ["Walk", "lbs"]),
+        ("", 60, [""]),
+    ],
+)
+def test_long_names_are_broken_behind_their_marks(text: str, pixels: int, lines: list[str]) -> None:
+    assert captions.wrapped(text, pixels) == lines
+    assert all(captions.width(line) <= pixels for line in lines)
+
+
+def test_clips_come_one_after_the_other(written: list[tuple[str, int, int]]) -> None:
+    filmstrip([row("first", 60), row("second", 60)], EXTENT, look=SMALL)
+    names = [text for text, _, _ in written if not text.endswith(" s")]
+    assert names == ["", "first", "second"]
+    (y,) = (y for text, _, y in written if text == "second")
+    heights = [y for text, _, y in written if text == "0.00 s"]
+    lasts = [y for text, _, y in written if text == "5.90 s"]
+    assert heights[0] < lasts[0] < y < heights[1] < lasts[1]
+
+
+def test_methods_of_one_clip_are_compared_at_the_same_times(written: list[tuple[str, int, int]]) -> None:
+    filmstrip([row("", 60, "lbs"), row("", 60, "dqs")], EXTENT, look=SMALL)
+    first, second = [y for text, _, y in written if text == "0.00 s"]
+    later = [y for text, _, y in written if text == "5.90 s"]
+    assert first < second < later[0] < later[1]
+
+
+def test_names_of_clips_side_by_side_don_t_overlap(written: list[tuple[str, int, int]]) -> None:
+    image = next(moving([row(LONG, 2), row(LONG[::-1], 2)], EXTENT, look=SMALL))
+    cells = sorted({x for text, x, _ in written if text and not text.endswith(" s")})
+    assert len(cells) == 2
+    frame = cells[1] - cells[0]
+    assert all(captions.width(text) <= frame for text, _, _ in written if text)
+    assert image.shape[0] > 64 + 4 * captions.LINE
+
+
+def test_many_clips_of_a_film_go_on_in_a_next_line() -> None:
+    found = list(moving([row(f"clip {i}", 1) for i in range(60)], EXTENT, look=SMALL))
+    assert found[0].shape[1] <= 1600
+    assert found[0].shape[0] > 2 * 64
+
+
+def test_headings_are_the_names_of_clips() -> None:
+    document = opened_fixture("biped")
+    rows, _ = clips.rows(clips.of_document(document, [0, 1], ("lbs", "dqs"), When(count=1)))
+    assert [(each.heading, each.label) for each in rows] == [
+        ("walk", "lbs"), ("walk", "dqs"), ("wave", "lbs"), ("wave", "dqs"),
+    ]  # fmt: skip

@@ -1,0 +1,199 @@
+"""Filmstrips: what is in them, for files, caches and bare skeletons."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.caches.transforms.up_axis import turned
+from anim.errors import NotFoundError, RangeError
+from anim.model import Scene
+from anim.model.vertex_cache import from_arrays
+from anim.show.filmstrip import clips, renderer
+from anim.show.filmstrip import filmstrip as filmstrip_module
+from anim.show.filmstrip.clips import When
+from anim.show.filmstrip.filmstrip import Extent, Look, Row, filmstrip, moving
+from tests.clips import skeleton
+from tests.files import opened_fixture
+
+SMALL = Look(height=64)
+FACE = np.array([[0, 1, 2]])
+
+
+def strip(name: str, *, methods: tuple[str, ...] = (), heated: bool = False, clip: int = 0, **when: Any) -> Any:
+    """The rows of a fixture, and its picture."""
+    found = clips.of_document(opened_fixture(name), [clip], methods, When(**when))
+    rows, extent = clips.rows(found, heated=heated)
+    return rows, filmstrip(rows, extent, title=name, look=SMALL)
+
+
+def test_frames_lie_beside_each_other_and_move() -> None:
+    rows, image = strip("biped", count=4)
+    assert len(rows) == 1
+    assert rows[0].times == pytest.approx([0, 1 / 3, 2 / 3, 1])
+    width = (image.shape[1] - 2 * 12 + 3) // 4
+    cells = [image[31 : 31 + 64, 12 + i * width : 12 + i * width + width - 3].astype(int) for i in range(4)]
+    for one, other in pairwise(cells):
+        assert np.abs(one - other).max() > 60
+    for cell in cells:  # something is in it, and it isn't cut at the sides
+        assert np.abs(cell[:, :1] - cell[:, -1:]).max() < 30
+        assert cell.std() > 15
+
+
+def test_the_same_input_gives_the_same_picture() -> None:
+    assert (strip("biped", count=3)[1] == strip("biped", count=3)[1]).all()
+
+
+def test_long_strips_go_on_in_a_next_line() -> None:
+    _, one = strip("arm", count=3)
+    _, two = strip("arm", count=60)
+    assert two.shape[1] <= 1600
+    assert two.shape[0] > one.shape[0] + 64
+
+
+def test_heat_shows_where_methods_differ() -> None:
+    rows, image = strip("tube", methods=("lbs", "dqs"), heated=True, clip=1, at=(0.0, 0.999))
+    plain, heated = rows
+    assert (plain.label, heated.label) == ("lbs", "dqs")
+    assert plain.distances is None
+    assert heated.distances[0].max() < 1e-6
+    ring = heated.distances[1].reshape(-1)[48 * 48 : 49 * 48]  # where LBS pinches to nothing, the whole radius is off
+    assert ring == pytest.approx(0.1, abs=1e-3)
+    image = image.astype(int)
+    violet = (image[..., 2] > image[..., 1] + 20) & (image[..., 0] > image[..., 1] + 20)
+    assert violet[31:115].sum() == 0  # the first method has its own colors
+    assert violet[115:].sum() > 20
+
+
+def test_heat_of_one_method_is_the_distance_to_the_rest_pose() -> None:
+    rows, _ = strip("arm", heated=True, at=(0.0, 1.0))
+    assert rows[0].distances[0].max() < 1e-6
+    assert rows[0].distances[1].max() > 0.01
+
+
+def test_a_skeleton_without_a_mesh_is_drawn_as_sticks() -> None:
+    from dataclasses import replace
+
+    document = opened_fixture("biped")
+    nodes = [{k: v for k, v in node.items() if k not in ("mesh", "skin")} for node in document.json["nodes"]]
+    bare = replace(document, json={**document.json, "nodes": nodes})
+    rows, extent = clips.rows(clips.of_document(bare, [0], (), When(count=2)))
+    assert len(rows[0].faces) >= 8 * 10
+    assert np.ptp(extent.points[:, 1]) > 1
+    assert filmstrip(rows, extent, look=SMALL).std() > 5
+
+
+def test_a_long_stick_is_no_wider_than_half_more_than_the_middle_one() -> None:
+    joints = skeleton([-1, 0, 1, 2, 0], translation=[[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0], [0, 0.1, 0], [1, 0, 0]])
+    (instance,) = clips._visible(Scene(joints, ()), None).instances
+    bodies = instance.mesh.positions.reshape(-1, 24, 3)
+    assert np.ptp(bodies, axis=1).max() == pytest.approx(1)
+    widths = np.linalg.norm(bodies[:, 1] - bodies[:, 13], axis=1)
+    assert widths.max() == pytest.approx(1.5 * np.median(widths))
+
+
+def test_a_cache_with_z_up_stands() -> None:
+    points = np.array([[[0, 0, 0], [1, 0, 0], [0, 2, 0]]], np.float32)
+    cache = from_arrays(np.zeros(1), points, FACE)
+    for each in (cache, turned(cache, "z")):
+        (shot,) = clips.of_cache(each, When(count=3))
+        assert shot.cache.whole().positions == pytest.approx(points)
+
+
+def test_nearer_faces_hide_others() -> None:
+    near, far = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1.0]]), np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    colors = np.array([[1.0, 0, 0], [0, 0, 1]])
+    faces = np.array([[0, 1, 2], [3, 4, 5]])
+    positions = np.concatenate((near, far))[None]
+    look = Look(height=64, azimuth=0, elevation=0)
+    image = filmstrip([Row("", np.zeros(1), positions, faces, colors)], Extent(positions[0], 0.0), look=look).astype(
+        int
+    )
+    is_red, is_blue = image[..., 0] > image[..., 2] + 60, image[..., 2] > image[..., 0] + 60
+    assert is_red.sum() > 10 * is_blue.sum()
+
+
+def test_moving_pictures_have_their_rows_side_by_side() -> None:
+    found = clips.of_document(opened_fixture("arm"), [0], ("lbs", "dqs"), When(count=3))
+    rows, extent = clips.rows(found)
+    one, *others = moving(rows, extent, title="arm", look=SMALL)
+    assert len(others) == 2
+    assert all(image.shape == one.shape for image in others)
+    alone = next(moving(rows[:1], extent, look=SMALL))
+    assert one.shape[1] > alone.shape[1]
+
+
+def _turning(times: list[float], *, back: bool) -> Row:
+    """A triangle that moves to the right, and back where it began or not."""
+    way = np.linspace(0, 1, len(times))
+    way = np.minimum(way, 1 - way) if back else way
+    positions = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]) + way[:, None, None] * np.array([1.0, 0, 0])
+    return Row("", np.array(times), positions, FACE, np.full((1, 3), 0.5))
+
+
+def test_the_shorter_rows_of_a_film_wait_for_the_longest() -> None:
+    short, long = _turning([0, 0.1], back=False), _turning([0, 0.1, 0.2, 0.3], back=False)
+    pictures = list(moving([short, long], Extent(long.positions[[0, -1]], 0.0), look=SMALL))
+    assert len(pictures) == 4
+    half = pictures[0].shape[1] // 2
+    assert not (pictures[0][:, :half] == pictures[1][:, :half]).all()
+    assert (pictures[1][:40, :half] == pictures[3][:40, :half]).all(), "the time is below"
+    assert not (pictures[2][:, half:] == pictures[3][:, half:]).all()
+
+
+@pytest.mark.parametrize(("back", "frames"), [(True, 4), (False, 5)])
+def test_a_loop_shows_its_first_frame_once(back: bool, frames: int) -> None:
+    row = _turning([0, 0.25, 0.5, 0.75, 1], back=back)
+    assert len(list(moving([row], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == frames
+    still = Row("", row.times, row.positions[[0] * 5], FACE, row.colors)
+    assert len(list(moving([still], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == 5, (
+        "what doesn't move is no loop"
+    )
+
+
+def test_pictures_are_drawn_in_bands_where_they_are_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, once = strip("biped", count=2)
+    monkeypatch.setattr(renderer, "BAND", 5000)
+    _, bands = strip("biped", count=2)
+    assert np.abs(once.astype(int) - bands).max() <= 1
+
+
+def test_more_pixels_than_memory_should_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = _turning([0, 0.25, 0.5], back=False)
+    monkeypatch.setattr(filmstrip_module, "MOST_PIXELS", 10_000)
+    with pytest.raises(RangeError, match=r"the picture has \d+ × \d+ pixels, too many"):
+        filmstrip([row], Extent(row.positions[0], 0.0), look=SMALL)
+    with pytest.raises(RangeError, match=r"3 frames have \d+ × \d+ pixels, too many"):
+        next(moving([row], Extent(row.positions[0], 0.0), look=SMALL))
+
+
+@pytest.mark.parametrize(
+    ("when", "times"),
+    [
+        (When(at=(1.0, 0.5, 0.5)), [0.5, 1.0]),
+        (When(at=(1.0, 2.5)), [1.0]),
+        (When(count=3), [0, 1, 2]),
+        (When(count=1), [0]),
+        (When(count=3, begin=1), [1, 1.5, 2]),
+        (When(fps=2, end=1), [0, 0.5, 1]),
+        (When(count=2, begin=-5, end=9), [0, 2]),
+    ],
+)
+def test_times(when: When, times: list[float]) -> None:
+    assert when.times(0.0, 2.0).tolist() == times
+
+
+def test_what_can_t_be_shown_is_refused() -> None:
+    with pytest.raises(RangeError, match="nothing lies"):
+        When(count=2, begin=3).times(0, 2)
+    with pytest.raises(RangeError, match="too many"):
+        When(fps=9999).times(0, 2)
+    with pytest.raises(NotFoundError, match="no faces"):
+        clips.of_cache(from_arrays(np.zeros(1), np.zeros((1, 3, 3)), np.empty((0, 3), np.int64)), When())
+    with pytest.raises(RangeError, match="expected lbs"):
+        clips.of_document(opened_fixture("arm"), [0], ("foo",), When())
+    with pytest.raises(RangeError, match="32"):
+        filmstrip([], Extent(np.zeros((1, 3)), 0.0), look=Look(height=3))

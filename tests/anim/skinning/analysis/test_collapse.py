@@ -1,0 +1,324 @@
+"""Collapse: indices, volumes and bulges with numbers worked by hand, and the advice that follows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from anim.errors import NotFoundError, RangeError
+from anim.gltf.reading import reader
+from anim.model import Clip, Scene
+from anim.sampling.times import grid
+from anim.skinning.analysis.collapse import MeshCollapse, collapse
+from anim.skinning.analysis.collapse_index import Narrow
+from anim.skinning.analysis.collapsed_clips import KEPT, pinches
+from anim.skinning.analysis.enclosed_volume import closed_faces, volumes
+from anim.skinning.analysis.method_scores import Fared
+from anim.skinning.analysis.ranking import Standing, best, standings
+from anim.skinning.analysis.recommendations import Found, advice, twist_joints
+from anim.skinning.bake import bake
+from fixtures.shapes import cube
+from tests.anim.skinning.methods.test_linear_blend import TIMES, moving
+from tests.anim.skinning.scenes import mesh, random_scene, scene, skinning_matrices
+from tests.clips import about, clip, track
+from tests.files import opened_fixture
+
+
+def tube() -> Scene:
+    return reader.scene(opened_fixture("tube"))
+
+
+def turned(axis: str, *angles: float) -> Clip:
+    return clip(track("rotation", np.arange(len(angles)), about(axis, angles), node=1), name="turn")
+
+
+def test_a_twisted_tube() -> None:
+    (found,) = collapse(tube(), turned("y", 0, 90), times=np.linspace(0, 1, 4))
+    assert found.indices == pytest.approx(np.cos(np.radians([0, 15, 30, 45])), abs=1e-6)
+    worst = found.worst
+    assert (worst.joint, worst.other, worst.time, worst.twist) == ("lower", "upper", 1.0, True)
+    assert (worst.index, worst.angle) == pytest.approx((np.sqrt(0.5), np.pi / 2), abs=1e-6)
+    assert worst.vertex // 48 == 48, "the middle ring"
+    assert (found.low, found.inverted, found.closed) == (0, 0, 1)
+    linear, dual = found.methods
+    assert linear.volume is not None
+    assert dual.volume is not None
+    assert linear.volume == pytest.approx(1 - 2 / 3 * np.sin(np.radians([0, 15, 30, 45])) ** 2, abs=1e-3)
+    assert dual.volume == pytest.approx(1, abs=1e-3)
+    assert linear.bulge == pytest.approx(1, abs=1e-5)
+
+
+def test_a_candy_wrapper_and_its_share() -> None:
+    """At 180° the index of weight s is |1 − 2s|: below 0.7 for s in 0.15 … 0.85."""
+    (found,) = collapse(tube(), turned("y", 0, 90, 180), times=np.array([2.0]))
+    assert found.worst.index == pytest.approx(0, abs=1e-3)
+    heights = tube().instances[0].mesh.positions[:, 1]
+    assert found.low == pytest.approx(((heights > 0.15) & (heights < 0.85)).mean(), abs=0.01)
+
+
+def test_indices_are_the_determinants_of_the_blend() -> None:
+    """Scales and shears divided out, for random joints; scales alone are no collapse."""
+    of = random_scene(4, stretch=0.5)
+    played = moving(of, 1)
+    matrices, body = skinning_matrices(of, played, TIMES)[..., :3], of.instances[0].mesh
+    blended = np.einsum("vi,fviab->fvab", body.weights, matrices[:, body.joints])
+    sizes = np.log(np.abs(np.linalg.det(matrices)))[:, body.joints]
+    factors = np.linalg.det(blended) / np.exp((body.weights * sizes).sum(axis=2))
+    (found,) = collapse(of, played, times=TIMES)
+    wanted = np.sqrt(np.clip(factors, 0, None))
+    assert found.indices == pytest.approx(wanted.min(axis=1), abs=2e-3)
+    assert found.inverted == pytest.approx((factors.min(axis=0) < 0).mean(), abs=0.02)
+    grown = clip(track("scale", [0], [[2, 2, 2]]))
+    (found,) = collapse(tube(), grown, times=np.zeros(1))
+    assert found.worst.index == pytest.approx(1, abs=1e-6)
+    assert found.methods[0].volume == pytest.approx([1], abs=1e-5)
+
+
+def test_a_bend_is_no_twist_and_bulges() -> None:
+    (found,) = collapse(tube(), turned("x", 0, 90), times=np.array([1.0]), methods=("lbs", "dqs", "cor"))
+    assert not found.worst.twist
+    linear, dual, centers = found.methods
+    assert linear.bulge < centers.bulge < dual.bulge
+    assert dual.bulging > 0.1
+
+
+def test_volumes_are_trimeshs() -> None:
+    for name in ("tube", "arm"):
+        of = reader.scene(opened_fixture(name))
+        cache = bake(of, reader.clips(opened_fixture(name))[-1], times=np.array([0.3, 1.0]), method="dqs")
+        whole = cache.whole().positions
+        for points, volume in zip(whole, volumes(whole, cache.faces), strict=True):
+            assert volume == pytest.approx(trimesh.Trimesh(points, cache.faces, process=False).volume, rel=1e-5)
+
+
+def test_closed_parts_are_found_among_open_ones() -> None:
+    """A cube of 36 corners, another with a face missing, and a third with a face turned inside out."""
+    shape = cube(1.0)
+    turned = shape.faces.copy()
+    turned[0] = turned[0][::-1]
+    faces = np.concatenate([shape.faces, shape.faces[1:] + 36, turned + 72])
+    points = np.concatenate([shape.positions, shape.positions + 3, shape.positions + 6])
+    closed = closed_faces(points, faces)
+    assert closed.tolist() == [True] * 12 + [False] * 23
+    assert volumes(points[None], faces[closed]) == pytest.approx([1])
+    assert closed_faces(points, faces[:0]).tolist() == []
+
+
+def test_an_open_mesh_has_no_volume_but_an_index() -> None:
+    of = tube()
+    body = of.instances[0].mesh
+    of = Scene(of.skeleton, (replace(of.instances[0], mesh=replace(body, faces=body.faces[5:])),))
+    (found,) = collapse(of, turned("y", 90), times=np.zeros(1))
+    assert (found.closed, found.methods[0].volume) == (0, None)
+    assert found.worst.index == pytest.approx(np.sqrt(0.5), abs=1e-6)
+
+
+def test_flat_joints_do_not_collapse() -> None:
+    body = mesh([[1, 0, 0]], [[0, 1]], [[0.5, 0.5]])
+    (found,) = collapse(scene(body, [-1, 0], scale=[[1, 1, 1], [0, 0, 0]]), clip(), times=np.zeros(1))
+    assert found.worst.index == 1
+
+
+@pytest.mark.parametrize("angle", [90.0, 170.0])
+def test_a_mirrored_character_has_the_numbers_of_the_one_in_the_mirror(angle: float) -> None:
+    """One root above all joints mirrors and doubles: nothing collapses that does not without it."""
+    plain = tube()
+    above = replace(
+        plain.skeleton,
+        names=(*plain.skeleton.names, "mirror"),
+        parents=np.append(np.where(plain.skeleton.parents < 0, len(plain.skeleton), plain.skeleton.parents), -1),
+        translation=np.vstack((plain.skeleton.translation, [0, 0, 0])),
+        rotation=np.vstack((plain.skeleton.rotation, [0, 0, 0, 1])),
+        scale=np.vstack((plain.skeleton.scale, [-2, 2, 2])),
+    )
+    (wanted,) = collapse(plain, turned("y", 0, angle), times=np.linspace(0, 1, 4))
+    (found,) = collapse(replace(plain, skeleton=above), turned("y", 0, angle), times=np.linspace(0, 1, 4))
+    assert found.indices == pytest.approx(wanted.indices, abs=1e-5)
+    assert (found.low, found.inverted) == (wanted.low, wanted.inverted)
+    for one, other in zip(found.methods, wanted.methods, strict=True):
+        assert one.volume == pytest.approx(other.volume, abs=1e-4)
+        assert one.bulge == pytest.approx(other.bulge, abs=1e-4)
+
+
+def test_what_a_clip_alone_mirrors_is_inside_out() -> None:
+    (found,) = collapse(tube(), clip(track("scale", [0], [[-1, 1, 1]])), times=np.zeros(1))
+    assert (found.worst.index, found.inverted) == (0, 1)
+    assert found.methods[0].volume == pytest.approx([-1], abs=1e-5)
+
+
+def test_without_a_skin_there_is_nothing_to_say() -> None:
+    of = reader.scene(opened_fixture("morph_cube"))
+    with pytest.raises(NotFoundError, match="no skinned mesh"):
+        collapse(of, clip(), times=np.zeros(1))
+
+
+def told(axis: str, angle: float, *methods: str, clamped: bool = False) -> list[str]:
+    """The advice on a tube that is turned by an angle."""
+    time, methods = np.array([1.0]), methods or ("lbs", "dqs")
+    seen = collapse(tube(), turned(axis, 0, angle), times=time, methods=methods, bulge_clamp=clamped)
+    return list(advice([Found(0, "turn", each) for each in seen], clamped=clamped))
+
+
+def made_up(index: float, *, closed: bool = True, **methods: tuple[float | None, float]) -> Found:
+    """A mesh with an index, and of each method the volume and the bulge."""
+    worst = Narrow(index, 0, "arm", "hand", 0.0, 1.5, twist=False)
+    fared = tuple(
+        Fared(name, None if volume is None else np.full(2, volume), bulge, 0.5, 0, "arm", 0.5)
+        for name, (volume, bulge) in methods.items()
+    )
+    return Found(0, "turn", MeshCollapse("m", 0, 9, np.arange(2.0), np.ones(2), worst, 0, 0, float(closed), fared))
+
+
+def test_advice() -> None:
+    (fine,) = told("y", 0)
+    assert fine.startswith("linear blending is good enough: no vertex falls below 0.7 (least 1.000), 100 %")
+    pinched, bake_it, share = told("y", 120)
+    assert pinched.startswith("1 clip pinches; worst 0.50 in 'turn': 'lower' against 'upper', 120° at 1.00 s")
+    assert bake_it == (
+        "to bake it with dqs (lbs keeps 50 %, dqs keeps 100 % of the volume): "
+        "gltf-anim bake IN OUT --method dqs --clip '#0'"
+    )
+    assert share.startswith("or share the twist among 4 joints between 'lower' and 'upper' (97 %")
+    bent = told("x", 120)
+    assert not any("twist" in line for line in bent)
+    assert bent[-3].startswith("dqs bulges up to ")
+    assert list(advice([])) == ["there is no clip to look at"]
+
+
+@pytest.mark.parametrize(("angle", "is_pinched"), [(44, False), (45.6, True), (90, True)])
+def test_a_tenth_of_the_volume_is_pinching_though_no_vertex_is(angle: float, is_pinched: bool) -> None:
+    """1 − ⅔ sin²(θ/2) is 0.9 at θ = 45.57°, where the index is still 0.92."""
+    least = 1 - 2 / 3 * np.sin(np.radians(angle) / 2) ** 2
+    assert (least < 0.9) == is_pinched
+    first = told("y", angle)[0]
+    assert first.startswith("1 clip pinches" if is_pinched else "linear blending is good enough")
+    assert f"{100 * least:.0f} %" in first
+
+
+def test_the_limit_of_the_volume_is_a_quarter_turn_over_three_tenths() -> None:
+    assert pytest.approx(1 - 2 / 3 * 0.3 * np.sin(np.pi / 4) ** 2) == KEPT
+
+
+def test_what_every_method_loses_is_no_pinching() -> None:
+    """A joint that shrinks takes volume from all methods: another one would be no help."""
+    sizes = np.array([[1, 1, 1], [1e-3, 1e-3, 1e-3]])
+    shrunk = clip(track("scale", [0, 1], sizes, node=1), name="shrink")
+    (found,) = collapse(tube(), shrunk, times=np.array([1.0]))
+    assert found.methods[0].volume is not None
+    assert found.methods[0].volume[0] < 0.8
+    assert not pinches(found)
+    (line,) = advice([Found(0, "shrink", found)])
+    assert "good enough" not in line
+    assert line.endswith("is left at worst, and no method that was measured keeps more")
+
+
+def test_of_what_was_measured_the_best_is_recommended() -> None:
+    """CesiumMan's figures: cor keeps more and bulges less, so nobody is told to bake dqs or to try cor."""
+    lines = list(advice([made_up(0.68, lbs=(0.94, 1.46), dqs=(0.96, 1.78), cor=(0.97, 1.57))]))
+    assert lines[1].startswith("to bake it with cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume): ")
+    assert lines[2:] == [
+        "cor bulges up to 1.57× at 'arm' (turn, 0.50 s)",
+        "to see what a clamp makes of the bulge: gltf-anim collapse IN --method lbs --method dqs --method cor "
+        "--bulge-clamp --clip '#0'",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("dqs", "cor", "chosen"),
+    [
+        ((0.99, 1.9), (0.9, 1.1), "dqs"),  # volume counts first
+        ((0.99, 1.9), (0.98, 1.1), "cor"),  # alike: the one that bulges less
+        ((1.2, 1.9), (0.99, 1.1), "cor"),  # more than bind pose is no gain
+        ((0.99, 1.1), (0.99, 1.1), "dqs"),  # equal: the first
+        ((None, 1.9), (None, 1.1), "cor"),  # nothing closed: bulge alone
+    ],
+)
+def test_the_best_by_volume_then_by_bulge(
+    dqs: tuple[float | None, float], cor: tuple[float | None, float], chosen: str
+) -> None:
+    meshes = [made_up(0.5, lbs=(None if dqs[0] is None else 0.5, 1.0), dqs=dqs, cor=cor).mesh]
+    found = best(standings(meshes))
+    assert found is not None
+    assert found.method == chosen
+
+
+def test_standings_are_the_worst_over_all_meshes() -> None:
+    two = [made_up(0.5, dqs=(0.9, 1.0)).mesh, made_up(0.5, dqs=(0.8, 1.2)).mesh, made_up(0.5, dqs=(None, 1.1)).mesh]
+    assert standings(two) == (Standing("dqs", 0.8, 1.2),)
+
+
+def test_only_what_was_not_measured_is_to_be_tried() -> None:
+    clamp, other = told("x", 120)[-2:]
+    assert clamp.endswith(": gltf-anim collapse IN --method lbs --method dqs --bulge-clamp --clip '#0'")
+    assert other == (
+        "to see what cor makes of it: gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'"
+    )
+    assert told("x", 120, "lbs", "dqs", "cor")[-1].endswith("--method cor --bulge-clamp --clip '#0'")
+    assert told("y", 120, "lbs")[1] == (
+        "bake it with another method; to see first what dqs and cor would keep: "
+        "gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'"
+    )
+    assert told("y", 120, "cor")[1].startswith("to bake it with cor (cor keeps 100 % of the volume): ")
+    clamped = told("x", 120, "lbs", "dqs", clamped=True)
+    assert clamped[1].endswith("gltf-anim bake IN OUT --method dqs --bulge-clamp --clip '#0'")
+    assert not any("a clamp" in line for line in clamped)
+
+
+def test_nobody_is_warned_of_a_bulge_that_nobody_needs() -> None:
+    (line,) = advice([made_up(0.71, lbs=(0.93, 1.15), dqs=(1.0, 1.6))])
+    assert line.startswith("linear blending is good enough")
+    both = [made_up(0.71, lbs=(0.93, 1.0), dqs=(1.0, 1.9)), made_up(0.5, lbs=(0.8, 1.0), dqs=(1.0, 1.0))]
+    assert not any("bulges" in each for each in advice(both)), "it bulges where nothing pinches"
+
+
+def test_a_method_that_loses_more_than_lbs_is_not_recommended() -> None:
+    lines = list(advice([made_up(0.6, lbs=(0.97, 1.0), dqs=(0.9, 1.9))]))
+    assert lines[1:] == [
+        "no other method that was measured keeps more of the volume than lbs (lbs keeps 97 %, dqs keeps 90 %)"
+    ]
+
+
+def test_without_lbs_nothing_is_said_of_its_volume() -> None:
+    (line,) = told("y", 90, "cor")
+    assert line == (
+        "no vertex falls below 0.7 (least 0.707); to see what linear blending leaves of the volume: "
+        "gltf-anim collapse IN --method cor --method lbs --clip '#0'"
+    )
+    (line,) = advice([made_up(0.8, closed=False, dqs=(None, 1.0))])
+    assert line == "linear blending is good enough: no vertex falls below 0.7 (least 0.800)"
+
+
+def test_the_clamp_is_that_of_bake() -> None:
+    """The bent tube by the two ways: its volume by trimesh from a clamped bake; lbs is never clamped."""
+    of, bend, time = tube(), turned("x", 0, 90), np.array([1.0])
+    (free,) = collapse(of, bend, times=time)
+    (held,) = collapse(of, bend, times=time, bulge_clamp=True)
+    whole = bake(of, bend, times=time, method="dqs", bulge_clamp=True).whole()
+    faces = of.instances[0].mesh.faces
+    wanted = [
+        trimesh.Trimesh(each, faces, process=False).volume
+        for each in (whole.positions[0], of.instances[0].mesh.positions)
+    ]
+    assert held.methods[1].volume == pytest.approx([wanted[0] / wanted[1]], rel=1e-4)
+    assert held.methods[1].bulge < free.methods[1].bulge - 0.3
+    assert held.methods[0].volume == pytest.approx(free.methods[0].volume)
+    with pytest.raises(RangeError, match="bulge clamp needs another method than lbs"):
+        collapse(of, bend, times=time, methods=("lbs",), bulge_clamp=True)
+
+
+@pytest.mark.parametrize(("degrees", "joints"), [(10, 1), (36, 1), (37, 2), (90, 3), (180, 5)])
+def test_twist_joints_leave_95_percent(degrees: float, joints: int) -> None:
+    assert twist_joints(np.radians(degrees)) == joints
+    assert np.cos(np.radians(degrees) / (2 * joints)) > 0.949
+
+
+def test_the_biped_in_all_its_clips() -> None:
+    document = opened_fixture("biped")
+    of = reader.scene(document)
+    for played in reader.clips(document):
+        for found in collapse(of, played, times=grid(played.start, played.end, fps=15)):
+            assert 0 <= found.worst.index <= 1 + 1e-6
+            assert found.indices.min() == pytest.approx(found.worst.index, abs=1e-6)
