@@ -19,8 +19,8 @@ def drop_redundant_keys(solutions: Mapping[int, Solution], skeleton: Skeleton, r
     """Return the solutions, by number of the clip, that take fewer bytes without redundant keys; no others.
 
     Redundant is what `removable_keys` of `anim.measure.inspect.track_statistics` finds in all clips together, as
-    `inspect` counts it; first and last keys stay. The motion changes by about a millionth of each track's range: judge it again.
-    Tracks that must stay exact keep all keys.
+    `inspect` counts it; first and last keys stay. The motion changes by about a millionth of each track's range: judge
+    it again. Tracks that must stay exact keep all keys.
     """
     places = [(n, k) for n, each in solutions.items() for k in range(len(each.stored))]
     free = [(n, k) for n, k in places if not _is_exact(solutions[n].clip.tracks[k], request)]
