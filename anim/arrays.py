@@ -17,10 +17,10 @@ Bools: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
 
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
-_checked_axes: WeakValueDictionary[int, AnyArray] = WeakValueDictionary()
+_CHECKED_AXES: WeakValueDictionary[int, AnyArray] = WeakValueDictionary()
 
 
-def floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
+def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     """Return `values` as a read-only float64 array of the named shape, every number finite.
 
     shape: one word per axis, a number for a fixed length and a letter for any: "K 3", "F N 4", "K C".
@@ -42,15 +42,15 @@ def floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     return read_only(array) if fresh else own(array)
 
 
-def times(values: ArrayLike, *, name: str = "times") -> Floats:
+def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
     """Return key times (K,) in seconds as a read-only float64 array: K ≥ 1, finite, ≥ 0, strictly increasing.
 
     The same array object is checked once only, since many tracks share one time axis.
     Raises ShapeError, or RangeError that names the first bad key.
     """
-    if isinstance(values, np.ndarray) and _checked_axes.get(id(values)) is values:
+    if isinstance(values, np.ndarray) and _CHECKED_AXES.get(id(values)) is values:
         return values
-    array = floats(values, "K", name=name)
+    array = as_floats(values, "K", name=name)
     if len(array) == 0:
         raise RangeError(f"{name} are empty (expected at least one key)")
     if array[0] < 0:
@@ -59,7 +59,7 @@ def times(values: ArrayLike, *, name: str = "times") -> Floats:
     if len(steps) and steps.min() <= 0:
         k = int(np.argmax(steps <= 0)) + 1
         raise RangeError(f"{name} not increasing at key {k} ({array[k]:g} s after {array[k - 1]:g} s)")
-    _checked_axes[id(array)] = array
+    _CHECKED_AXES[id(array)] = array
     return array
 
 
@@ -74,7 +74,7 @@ def check_shape(array: AnyArray, shape: str, *, name: str = "array") -> None:
         raise ShapeError(f"{name} has shape {array.shape} (expected ({', '.join(shape.split())}))")
 
 
-def sorted_unique(values: Floats) -> Floats:
+def unique_sorted(values: Floats) -> Floats:
     """Return the distinct values in increasing order (np.unique loads a quarter of numpy for that)."""
     ordered = np.sort(values)
     return ordered[np.concatenate(([True], ordered[1:] > ordered[:-1]))] if len(ordered) else ordered

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anim.arrays import Floats
-from anim.model import FLOAT32, Clip, Interpolation, Skeleton, Storage, Track
+from anim.model import FLOAT32, AccessorFormat, Clip, Interpolation, Skeleton, Track
 
 STEP, LINEAR, CUBICSPLINE = Interpolation.STEP, Interpolation.LINEAR, Interpolation.CUBICSPLINE
 
@@ -22,7 +22,7 @@ def track(
     *,
     node: int | None = 0,
     tangents: tuple[ArrayLike, ArrayLike] | None = None,
-    storage: Storage = FLOAT32,
+    storage: AccessorFormat = FLOAT32,
 ) -> Track:
     """Return a track on a node, or on what a pointer names where `path` starts with a slash. tangents: in, out."""
     keys: tuple[Any, Any] = (times, values)

@@ -17,7 +17,7 @@ from anim.measure.error.metric import SLACK, Ruler, check_times
 from anim.measure.error.surface import placed, surfaces
 from anim.model import Clip, Scene
 from anim.ops.resample import resample
-from anim.sampling import pose
+from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from tests.clips import about, clip, track
 from tests.files import glb_of, opened, opened_fixture, opened_path
@@ -184,7 +184,7 @@ def _at_node(scene: Scene, found: ClipVerdict, before: Clip, after: Clip) -> flo
 def _placed(scene: Scene, found: ClipVerdict, clip: Clip) -> list[Floats]:
     assert found.time is not None
     skeleton = scene.skeleton
-    world = world_by_node(skeleton, pose(skeleton, clip, np.array([found.time])))
+    world = world_by_node(skeleton, sample_pose(skeleton, clip, np.array([found.time])))
     theirs = (each for each in surfaces(scene) if skeleton.names[each.owner] == found.node)
     return [placed(each, world[each.nodes, 0], each.rest_weights) for each in theirs]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.caches.storage import PIECE, Inputs, read_exactly, size_of
 from anim.errors import FormatError
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 
 def check_size(file: BinaryIO, header: int, frames: int, vertices: int) -> None:
@@ -24,7 +24,7 @@ def check_size(file: BinaryIO, header: int, frames: int, vertices: int) -> None:
         raise FormatError(f"has {found - expected} bytes too many for {frames} frames of {vertices} points")
 
 
-def chunks(inputs: Inputs, header: int, frames: int, vertices: int, dtype: str) -> Iterator[Chunk]:
+def chunks(inputs: Inputs, header: int, frames: int, vertices: int, dtype: str) -> Iterator[FrameChunk]:
     """Yield the frames of the main file, float32 of `dtype` ("<f4" or ">f4") behind the header."""
     step = per_chunk(vertices)
     with inputs.open(inputs.main) as file:
@@ -36,7 +36,7 @@ def chunks(inputs: Inputs, header: int, frames: int, vertices: int, dtype: str) 
             if not np.isfinite(positions).all():
                 bad = first + int(np.argmin(np.isfinite(positions).all(axis=(1, 2))))
                 raise FormatError(f"frame {bad} holds NaN or infinity")
-            yield Chunk(first, positions)
+            yield FrameChunk(first, positions)
 
 
 def write(cache: VertexCache, file: BinaryIO, dtype: str) -> str:

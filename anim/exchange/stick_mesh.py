@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.model import Mesh, Skeleton, Skin
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
 
 NAME = "sticks"
 SHOULDER = 0.18  # share of a stick's length from the joint, where it is widest
@@ -24,7 +24,7 @@ def sticks(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[Mesh
     """
     joints: Ints = np.array([i for i in range(len(skeleton)) if i not in ends], np.int64)
     place_of = {int(node): place for place, node in enumerate(joints)}
-    world = world_matrices(skeleton, rest(skeleton))[0]
+    world = world_matrices(skeleton, rest_pose(skeleton))[0]
     places = world[:, :, 3]
     size = float(np.ptp(places, axis=0).max()) or 1.0
     pieces, owners = [], []

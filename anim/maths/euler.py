@@ -19,18 +19,18 @@ from anim.errors import RangeError
 from anim.maths import quaternion
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ")
-LOCK = 5e-8  # rad from lock, below which float64 no longer tells first and third angle apart
-TURN = 2 * np.pi
+GIMBAL_TOLERANCE_RAD = 5e-8  # rad from lock, below which float64 no longer tells first and third angle apart
+FULL_TURN_RAD = 2 * np.pi
 
 
-class Frame(StrEnum):
+class AxesConvention(StrEnum):
     """Whose axes the turns are about."""
 
     INTRINSIC = "intrinsic"
     EXTRINSIC = "extrinsic"
 
 
-def to_quaternion(angles: Floats, *, order: str, frame: Frame = Frame.INTRINSIC) -> Floats:
+def to_quaternion(angles: Floats, *, order: str, frame: AxesConvention = AxesConvention.INTRINSIC) -> Floats:
     """Return unit quaternions (..., 4) of angles (..., A) in radians about the A axes of `order`.
 
     order: any sequence of X, Y, Z, as long as the last axis of `angles`; "" gives no turn.
@@ -45,11 +45,11 @@ def to_quaternion(angles: Floats, *, order: str, frame: Frame = Frame.INTRINSIC)
         if i == 0:
             result = turn
         else:
-            result = quaternion.multiply(*((result, turn) if frame == Frame.INTRINSIC else (turn, result)))
+            result = quaternion.multiply(*((result, turn) if frame == AxesConvention.INTRINSIC else (turn, result)))
     return result
 
 
-def from_quaternion(q: Floats, *, order: str, frame: Frame = Frame.INTRINSIC) -> Floats:
+def from_quaternion(q: Floats, *, order: str, frame: AxesConvention = AxesConvention.INTRINSIC) -> Floats:
     """Return angles (..., 3) in radians of unit quaternions (..., 4), each on its own.
 
     The middle angle lies in −π/2 … π/2, of proper orders (first axis = third) in 0 … π; the others in −π … π.
@@ -58,16 +58,18 @@ def from_quaternion(q: Floats, *, order: str, frame: Frame = Frame.INTRINSIC) ->
     Raises RangeError for an unknown order. Source: Bernardes & Viollet 2022.
     """
     a, b, c, d = _parts(q, order, frame)
-    middle, half_sum, half_difference, near, far = _observed(a, b, c, d, LOCK)
+    middle, half_sum, half_difference, near, far = _extract_angles(a, b, c, d, GIMBAL_TOLERANCE_RAD)
     half_difference = np.where(near, 0.0, half_difference)
     half_sum = np.where(far, 0.0, half_sum)
     raw = np.stack((half_sum - half_difference, middle, half_sum + half_difference), axis=-1)
-    angles = _finished(raw, order, frame)
-    angles[..., 0::2] = wrapped(angles[..., 0::2])
+    angles = _complete_triple(raw, order, frame)
+    angles[..., 0::2] = wrap_angles(angles[..., 0::2])
     return angles
 
 
-def continuous(q: Floats, *, order: str, frame: Frame = Frame.INTRINSIC, lock: float = LOCK) -> Floats:
+def unwrap(
+    q: Floats, *, order: str, frame: AxesConvention = AxesConvention.INTRINSIC, lock: float = GIMBAL_TOLERANCE_RAD
+) -> Floats:
     """Return angles (K, ..., 3) in radians that run on without jumps over unit quaternions (K, ..., 4).
 
     Each key gets the equivalent triple (both families, any whole turns) nearest to that of the key before; the first
@@ -81,23 +83,23 @@ def continuous(q: Floats, *, order: str, frame: Frame = Frame.INTRINSIC, lock: f
         return np.zeros((*q.shape[:-1], 3))
     flat = q.reshape(len(q), -1, 4)
     a, b, c, d = _parts(flat, order, frame)
-    middle, half_sum, half_difference, near, far = _observed(a, b, c, d, lock)
-    raw = np.stack((wrapped(half_sum - half_difference), middle, wrapped(half_sum + half_difference)), axis=-1)
+    middle, half_sum, half_difference, near, far = _extract_angles(a, b, c, d, lock)
+    raw = np.stack((wrap_angles(half_sum - half_difference), middle, wrap_angles(half_sum + half_difference)), axis=-1)
     locked = near | far
     free = ~locked.any(axis=0)
-    raw[:, free] = _unwound(raw[:, free])
+    raw[:, free] = _unwind(raw[:, free])
     for i in np.flatnonzero(~free).tolist():
-        raw[:, i] = _through_lock(raw[:, i], half_sum[:, i], half_difference[:, i], near[:, i], far[:, i])
-    return _finished(raw, order, frame).reshape(*q.shape[:-1], 3)
+        raw[:, i] = _interpolate_in_lock(raw[:, i], half_sum[:, i], half_difference[:, i], near[:, i], far[:, i])
+    return _complete_triple(raw, order, frame).reshape(*q.shape[:-1], 3)
 
 
-def distance_to_lock(q: Floats, *, order: str) -> Floats:
+def gimbal_distance(q: Floats, *, order: str) -> Floats:
     """Return the angle (...) in radians, 0 … π/2, of unit quaternions (..., 4) from the lock of an intrinsic order.
 
     The extrinsic order with the axes reversed has the same.
     distance_to_lock([0, 0, 0, 1], order="XYZ") → π/2
     """
-    a, b, c, d = _parts(q, order, Frame.INTRINSIC)
+    a, b, c, d = _parts(q, order, AxesConvention.INTRINSIC)
     first, second = np.hypot(a, b), np.hypot(c, d)
     return np.asarray(2 * np.arctan2(np.minimum(first, second), np.maximum(first, second)))
 
@@ -114,21 +116,21 @@ def check_order(order: str) -> str:
     return order.upper()
 
 
-def wrapped(angles: Floats) -> Floats:
+def wrap_angles(angles: Floats) -> Floats:
     """Return angles moved by whole turns into −π … π; those inside stay as they are."""
-    return np.asarray(angles - TURN * np.rint(angles / TURN))
+    return np.asarray(angles - FULL_TURN_RAD * np.rint(angles / FULL_TURN_RAD))
 
 
-def _axes(order: str, frame: Frame) -> tuple[int, int, int, float]:
+def _axes(order: str, frame: AxesConvention) -> tuple[int, int, int, float]:
     """First, second and another axis of the extrinsic sequence, and whether they are right-handed (1) or not (−1)."""
-    listed = check_order(order) if frame == Frame.EXTRINSIC else check_order(order)[::-1]
+    listed = check_order(order) if frame == AxesConvention.EXTRINSIC else check_order(order)[::-1]
     i, j, k = ("XYZ".index(axis) for axis in listed)
     if i == k:
         k = 3 - i - j
     return i, j, k, (i - j) * (j - k) * (k - i) / 2
 
 
-def _parts(q: Floats, order: str, frame: Frame) -> tuple[Floats, Floats, Floats, Floats]:
+def _parts(q: Floats, order: str, frame: AxesConvention) -> tuple[Floats, Floats, Floats, Floats]:
     """a + ib and c + id, whose lengths give the middle angle and whose directions half sum and half difference."""
     i, j, k, sign = _axes(order, frame)
     x, y, z, w = q[..., i], q[..., j], q[..., k] * sign, q[..., 3]
@@ -137,43 +139,45 @@ def _parts(q: Floats, order: str, frame: Frame) -> tuple[Floats, Floats, Floats,
     return w - y, x + z, y + w, z - x
 
 
-def _observed(a: Floats, b: Floats, c: Floats, d: Floats, lock: float) -> tuple[Floats, Floats, Floats, Bools, Bools]:
+def _extract_angles(
+    a: Floats, b: Floats, c: Floats, d: Floats, lock: float
+) -> tuple[Floats, Floats, Floats, Bools, Bools]:
     first, second = np.hypot(a, b), np.hypot(c, d)
     middle = 2 * np.arctan2(second, first)
     return middle, np.arctan2(b, a), np.arctan2(d, c), middle <= lock, np.pi - middle <= lock
 
 
-def _finished(raw: Floats, order: str, frame: Frame) -> Floats:
+def _complete_triple(raw: Floats, order: str, frame: AxesConvention) -> Floats:
     """Angles of the order itself, in its own sequence, from the proper ones."""
     sign = _axes(order, frame)[3]
     angles = raw.copy()
     if not is_proper(order):
         angles[..., 1] -= np.pi / 2
         angles[..., 2] *= sign
-    return angles if frame == Frame.EXTRINSIC else angles[..., ::-1].copy()
+    return angles if frame == AxesConvention.EXTRINSIC else angles[..., ::-1].copy()
 
 
-def _unwound(raw: Floats) -> Floats:
+def _unwind(raw: Floats) -> Floats:
     """Triples (K, ..., 3), each the equivalent one nearest to its predecessor.
 
     The other family, (first + π, −middle, third + π), is as far from itself as the one is from itself, so whether a
     key changes sides does not depend on the side: the sides are a running sum of changes.
     """
     other = raw * [1, -1, 1] + [np.pi, 0, np.pi]
-    same = (wrapped(raw[1:] - raw[:-1]) ** 2).sum(axis=-1)
-    changed = (wrapped(other[1:] - raw[:-1]) ** 2).sum(axis=-1)
+    same = (wrap_angles(raw[1:] - raw[:-1]) ** 2).sum(axis=-1)
+    changed = (wrap_angles(other[1:] - raw[:-1]) ** 2).sum(axis=-1)
     side = np.zeros(raw.shape[:-1], np.int64)
     side[1:] = np.cumsum(changed < same - 1e-12, axis=0) % 2
     chosen = np.where(side[..., None] == 1, other, raw)
     return np.asarray(np.unwrap(chosen, axis=0))
 
 
-def _through_lock(raw: Floats, half_sum: Floats, half_difference: Floats, near: Bools, far: Bools) -> Floats:
+def _interpolate_in_lock(raw: Floats, half_sum: Floats, half_difference: Floats, near: Bools, far: Bools) -> Floats:
     """Triples (K, 3) of one curve with keys at lock, filled in between those that are not."""
     keys = np.arange(len(raw))
     free = keys[~(near | far)]
     if len(free):
-        unwound = _unwound(raw[free])
+        unwound = _unwind(raw[free])
         about = np.stack([np.interp(keys, free, unwound[:, axis]) for axis in range(3)], axis=-1)
     else:
         unwound, about = raw[:0], np.zeros_like(raw)
@@ -182,7 +186,7 @@ def _through_lock(raw: Floats, half_sum: Floats, half_difference: Floats, near: 
     total = np.where(near, _nearest(2 * half_sum, total, len(free) > 0), total)
     difference = np.where(far, _nearest(2 * half_difference, difference, len(free) > 0), difference)
     base = np.where(near, 0.0, np.pi)
-    middle = base + TURN * np.rint((about[:, 1] - base) / TURN)
+    middle = base + FULL_TURN_RAD * np.rint((about[:, 1] - base) / FULL_TURN_RAD)
     filled = np.stack(((total - difference) / 2, middle, (total + difference) / 2), axis=-1)
     filled[free] = unwound
     return filled
@@ -190,4 +194,8 @@ def _through_lock(raw: Floats, half_sum: Floats, half_difference: Floats, near: 
 
 def _nearest(angle: Floats, goal: Floats, has_goal: bool) -> Floats:
     """`angle` (K,) moved by whole turns next to `goal`, or next to itself where there is none."""
-    return angle + TURN * np.rint((goal - angle) / TURN) if has_goal else np.asarray(np.unwrap(wrapped(angle)))
+    return (
+        angle + FULL_TURN_RAD * np.rint((goal - angle) / FULL_TURN_RAD)
+        if has_goal
+        else np.asarray(np.unwrap(wrap_angles(angle)))
+    )

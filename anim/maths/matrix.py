@@ -71,7 +71,7 @@ def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     floor = SHORT * scale.max(axis=-1, keepdims=True)
     directions = axes / np.where(scale > 0, scale, 1)[..., None]
     if not scale.all():
-        directions = _completed(directions, scale)
+        directions = _complete_axes(directions, scale)
     cosines = directions @ np.swapaxes(directions, -1, -2)
     skewed = (np.abs(cosines * (1 - np.eye(3))) > STRAIGHT).any()
     lengths = scale + floor
@@ -86,7 +86,7 @@ def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return matrix[..., 3].copy(), quaternion.from_matrix(np.swapaxes(directions, -1, -2)), scale, shear
 
 
-def chained(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
+def accumulate_world(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
     """Return world matrices (N, F, 3, 4) from local ones: one batched product per level of the hierarchy.
 
     parents: (N,), −1 for roots. levels: node numbers by depth, roots first.
@@ -97,18 +97,18 @@ def chained(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
     return world
 
 
-def _completed(directions: Floats, scale: Floats) -> Floats:
+def _complete_axes(directions: Floats, scale: Floats) -> Floats:
     """Directions (..., 3, 3) in rows, those of zero length replaced so that all three are orthogonal."""
     flat, lengths = directions.reshape(-1, 3, 3).copy(), scale.reshape(-1, 3)
     for n in np.flatnonzero((lengths == 0).any(axis=1)):
         for i in np.flatnonzero(lengths[n] == 0).tolist():
             normal = np.cross(flat[n, (i + 1) % 3], flat[n, (i + 2) % 3])
             length = np.linalg.norm(normal)
-            flat[n, i] = normal / length if length > 0 else _orthogonal(flat[n], i)
+            flat[n, i] = normal / length if length > 0 else _orthogonalize(flat[n], i)
     return flat.reshape(directions.shape)
 
 
-def _orthogonal(rows: Floats, missing: int) -> Floats:
+def _orthogonalize(rows: Floats, missing: int) -> Floats:
     """A unit vector at a right angle to the rows that are there."""
     there = [row for i, row in enumerate(rows) if i != missing and row.any()]
     if not there:

@@ -2,26 +2,26 @@
 
 from anim.model.clip import Clip
 from anim.model.pose import Pose
-from anim.model.scene import Instance, Mesh, Primitive, Scene, Skin
+from anim.model.scene import Mesh, MeshInstance, PrimitiveRange, Scene, Skin
 from anim.model.skeleton import Skeleton
-from anim.model.track import FLOAT32, Interpolation, Kind, Storage, Track
-from anim.model.vertex_cache import Chunk, Part, VertexCache
+from anim.model.track import FLOAT32, AccessorFormat, Interpolation, Track, ValueKind
+from anim.model.vertex_cache import FrameChunk, MeshPart, VertexCache
 
 __all__ = [
     "FLOAT32",
-    "Chunk",
+    "AccessorFormat",
     "Clip",
-    "Instance",
+    "FrameChunk",
     "Interpolation",
-    "Kind",
     "Mesh",
-    "Part",
+    "MeshInstance",
+    "MeshPart",
     "Pose",
-    "Primitive",
+    "PrimitiveRange",
     "Scene",
     "Skeleton",
     "Skin",
-    "Storage",
     "Track",
+    "ValueKind",
     "VertexCache",
 ]

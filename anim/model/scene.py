@@ -30,7 +30,7 @@ class Skin:
 
 
 @dataclass(frozen=True, slots=True)
-class Primitive:
+class PrimitiveRange:
     """How many vertices and faces of a mesh are one primitive's. material: its number in the file, −1 for none."""
 
     vertices: int
@@ -61,7 +61,7 @@ class Mesh:
     rest_weights: Floats
     normals: Floats | None = None
     normal_targets: Floats | None = None
-    primitives: tuple[Primitive, ...] = ()
+    primitives: tuple[PrimitiveRange, ...] = ()
     tangents: Floats | None = None
     tangent_targets: Floats | None = None
     weight_sums: Floats | None = None
@@ -79,7 +79,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True)
-class Instance:
+class MeshInstance:
     """A mesh on a node; with a skin, the joints place the vertices and the node does not count.
 
     weights: (M,) morph weights at rest: the node's own, or the mesh's.
@@ -96,7 +96,7 @@ class Scene:
     """The skeleton and every mesh instance, in depth-first order of nodes."""
 
     skeleton: Skeleton
-    instances: tuple[Instance, ...]
+    instances: tuple[MeshInstance, ...]
 
     @property
     def vertex_count(self) -> int:

@@ -35,13 +35,13 @@ class Skeleton:
         set_field(self, "parents", arrays.own(np.asarray(self.parents, dtype=np.int64)))
         arrays.check_shape(self.parents, "N", name="parents")
         for name, shape in (("translation", "N 3"), ("rotation", "N 4"), ("scale", "N 3")):
-            array = arrays.floats(getattr(self, name), shape, name=name)
+            array = arrays.as_floats(getattr(self, name), shape, name=name)
             if len(array) != len(self.names) or len(self.parents) != len(self.names):
                 raise ShapeError(f"{name} has {len(array)} rows for {len(self.names)} names")
             set_field(self, name, array)
         set_field(self, "sheared", arrays.own(np.asarray(self.sheared, dtype=np.int64)))
         arrays.check_shape(self.sheared, "X", name="sheared")
-        set_field(self, "sheared_local", arrays.floats(self.sheared_local, "X 3 4", name="sheared_local"))
+        set_field(self, "sheared_local", arrays.as_floats(self.sheared_local, "X 3 4", name="sheared_local"))
         if len(self.sheared_local) != len(self.sheared):
             raise ShapeError(f"sheared_local has {len(self.sheared_local)} matrices for {len(self.sheared)} nodes")
         self.levels()

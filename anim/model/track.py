@@ -24,7 +24,7 @@ class Interpolation(StrEnum):
     CUBICSPLINE = "CUBICSPLINE"
 
 
-class Kind(StrEnum):
+class ValueKind(StrEnum):
     """What a value is, hence how it may be interpolated."""
 
     VECTOR = "vector"  # component by component
@@ -33,7 +33,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Storage:
+class AccessorFormat:
     """How a file holds values: glTF's component type, whether integers mean fractions, and the element type.
 
     element: "SCALAR", "VEC3", …; None where the path says it all.
@@ -44,7 +44,7 @@ class Storage:
     element: str | None = None
 
 
-FLOAT32 = Storage()
+FLOAT32 = AccessorFormat()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +70,7 @@ class Track:
     in_tangents: Floats | None = None
     out_tangents: Floats | None = None
     pointer: str | None = None
-    storage: Storage = field(default=FLOAT32)
+    storage: AccessorFormat = field(default=FLOAT32)
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
@@ -78,7 +78,7 @@ class Track:
             set_field(self, "node", _node(self.node, self.path))
         if type(self.interpolation) is not Interpolation:
             set_field(self, "interpolation", _interpolation(self.interpolation))
-        times, values = arrays.times(self.times), arrays.floats(self.values, "K C", name="values")
+        times, values = arrays.as_key_times(self.times), arrays.as_floats(self.values, "K C", name="values")
         set_field(self, "times", times)
         set_field(self, "values", values)
         shape = (len(times), WIDTHS.get(self.path, int(values.shape[1])))
@@ -116,7 +116,7 @@ class Track:
         return (None, self.pointer or "") if self.path == "pointer" else (self.node, self.path)
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> ValueKind:
         """How values may be interpolated: see `kind_of`."""
         return kind_of(self)
 
@@ -152,23 +152,23 @@ def _interpolation(name: str) -> Interpolation:
 
 
 def _tangents(values: Floats, shape: tuple[int, int], name: str) -> Floats:
-    tangents = arrays.floats(values, "K C", name=name)
+    tangents = arrays.as_floats(values, "K C", name=name)
     if tangents.shape != shape:
         raise ShapeError(f"{name} have shape {tangents.shape} (expected {shape})")
     return tangents
 
 
-def kind_of(track: Track) -> Kind:
+def kind_of(track: Track) -> ValueKind:
     """Return what the values of `track` are.
 
     A pointer that ends in "/rotation" and has four components is a quaternion; integers that are not normalized
     under STEP are bools or integers of the object model (KHR_animation_pointer allows nothing else for those).
     """
     if track.path == "rotation":
-        return Kind.ROTATION
+        return ValueKind.ROTATION
     if track.pointer is None:
-        return Kind.VECTOR
+        return ValueKind.VECTOR
     if track.pointer.endswith("/rotation") and track.values.shape[1] == 4:
-        return Kind.ROTATION
+        return ValueKind.ROTATION
     integers = track.storage.component_type != 5126 and not track.storage.normalized
-    return Kind.DISCRETE if integers and track.interpolation is Interpolation.STEP else Kind.VECTOR
+    return ValueKind.DISCRETE if integers and track.interpolation is Interpolation.STEP else ValueKind.VECTOR

@@ -14,7 +14,7 @@ from anim.errors import ShapeError
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
+class FrameChunk:
     """Some frames in a row: `first` is the number of the first, positions (n, V, 3) m, normals and
     tangents (n, V, 3), all float32."""
 
@@ -23,14 +23,14 @@ class Chunk:
     normals: AnyArray | None = None
     tangents: AnyArray | None = None
 
-    def changed(self, change: Callable[[AnyArray], AnyArray]) -> Chunk:
+    def changed(self, change: Callable[[AnyArray], AnyArray]) -> FrameChunk:
         """Return the chunk with the same done to positions, normals and tangents."""
         turned = (None if each is None else change(each) for each in (self.normals, self.tangents))
-        return Chunk(self.first, change(self.positions), *turned)
+        return FrameChunk(self.first, change(self.positions), *turned)
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class MeshPart:
     """The vertices and faces of one primitive within a cache: half-open ranges, and what it was called.
 
     vertices: (first, beyond the last) of V; faces: the same of T. material: its number in the file, −1 for none.
@@ -43,7 +43,7 @@ class Part:
     material: int = -1
 
 
-Chunks: TypeAlias = Callable[[], Iterator[Chunk]]
+Chunks: TypeAlias = Callable[[], Iterator[FrameChunk]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +63,13 @@ class VertexCache:
     chunks: Chunks
     rest: Floats | None = None
     has_normals: bool = False
-    parts: tuple[Part, ...] = field(default=())
+    parts: tuple[MeshPart, ...] = field(default=())
     up: str = "y"
     handedness: Floats | None = None
     chosen: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "times", arrays.times(self.times))
+        object.__setattr__(self, "times", arrays.as_key_times(self.times))
         arrays.check_shape(self.faces, "T 3", name="faces")
         if self.faces.size and int(self.faces.max()) >= self.vertex_count:
             raise ShapeError(f"a face uses vertex {int(self.faces.max())} of {self.vertex_count}")
@@ -84,11 +84,13 @@ class VertexCache:
         """Whether every chunk carries tangents."""
         return self.handedness is not None
 
-    def whole(self) -> Chunk:
+    def whole(self) -> FrameChunk:
         """Return all frames at once: 12 bytes times F times V, so for short or small caches only."""
         chunks = list(self.chunks())
         positions = np.concatenate([each.positions for each in chunks])
-        return Chunk(0, positions, _joined(each.normals for each in chunks), _joined(each.tangents for each in chunks))
+        return FrameChunk(
+            0, positions, _joined(each.normals for each in chunks), _joined(each.tangents for each in chunks)
+        )
 
 
 def from_arrays(
@@ -99,11 +101,13 @@ def from_arrays(
     Raises ShapeError where these don't fit together, RangeError for times that don't increase.
     from_arrays([0, 1], positions of shape (2, 4, 3), [[0, 1, 2]]) → a cache of 2 frames of 4 vertices
     """
-    times = arrays.times(times)
+    times = arrays.as_key_times(times)
     arrays.check_shape(np.asarray(positions), f"{len(times)} V 3", name="positions")
     if normals is not None:
         arrays.check_shape(np.asarray(normals), f"{len(times)} {positions.shape[1]} 3", name="normals")
-    chunk = Chunk(0, np.asarray(positions, np.float32), None if normals is None else np.asarray(normals, np.float32))
+    chunk = FrameChunk(
+        0, np.asarray(positions, np.float32), None if normals is None else np.asarray(normals, np.float32)
+    )
     return VertexCache(
         times, positions.shape[1], faces, lambda: iter((chunk,)), rest=rest, has_normals=normals is not None
     )

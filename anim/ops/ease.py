@@ -10,11 +10,11 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.curves.easing.function import Easing
 from anim.curves.fitting import adaptive_keys
-from anim.curves.fitting.easing_fit import cubic_pieces, fit_linear
+from anim.curves.fitting.easing_fit import fit_linear, fit_segments
 from anim.errors import RangeError
-from anim.model import Clip, Interpolation, Kind, Track
-from anim.ops.cubic_segments import held, spline_track, step_track
-from anim.ops.ease_track import EasedTrack, eased_pieces, stepped_pieces
+from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.ops.cubic_segments import to_cubicspline, to_step, with_keys
+from anim.ops.ease_track import EasedTrack, ease_segments, ease_steps
 from anim.sampling import segment
 
 TOLERANCE = 1e-3  # of a piece's range
@@ -74,17 +74,17 @@ class _Job:
         if track.interpolation is Interpolation.STEP or not inside.any() or self.easing.name == "linear":
             return track
         if self.easing.stepped:
-            pieces = stepped_pieces(track, inside, self.easing, angle_tolerance=self.tolerances.angle)
-            return step_track(track, pieces) if inside.all() else spline_track(track, pieces)
+            pieces = ease_steps(track, inside, self.easing, angle_tolerance=self.tolerances.angle)
+            return to_step(track, pieces) if inside.all() else to_cubicspline(track, pieces)
         straight = track.interpolation is Interpolation.LINEAR
         if self.interpolation == "linear":
-            lines = straight and track.kind is not Kind.ROTATION
+            lines = straight and track.kind is not ValueKind.ROTATION
             return self._lines(track, inside) if lines else self._sampled(track, inside)
         return self._exact(track, inside) if straight else self._followed(track, inside)
 
     def _exact(self, track: Track, inside: Bools) -> Track:
         tolerances = (self.tolerances.share, self.tolerances.angle)
-        return spline_track(track, eased_pieces(track, inside, self.easing, *tolerances))
+        return to_cubicspline(track, ease_segments(track, inside, self.easing, *tolerances))
 
     def _lines(self, track: Track, inside: Bools) -> Track:
         u = fit_linear(self.easing.value, self.easing.breakpoints, self.tolerances.share)[1:-1]
@@ -93,43 +93,43 @@ class _Job:
         for k in range(len(track.times) - 1):
             if inside[k]:
                 times.append(track.times[k] + (track.times[k + 1] - track.times[k]) * u)
-                values.append(segment.values(track, np.full(len(u), k), shares))
+                values.append(segment.evaluate(track, np.full(len(u), k), shares))
             times.append(track.times[k + 1 : k + 2])
             values.append(track.values[k + 1 : k + 2])
-        return held(track, np.concatenate(times), np.concatenate(values), Interpolation.LINEAR)
+        return with_keys(track, np.concatenate(times), np.concatenate(values), Interpolation.LINEAR)
 
     def _followed(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        return adaptive_keys.spline_track(track, adaptive_keys.cubic_keys(motion, corners, tolerance=tolerance))
+        return adaptive_keys.to_cubicspline(track, adaptive_keys.cubic_keys(motion, corners, tolerance=tolerance))
 
     def _sampled(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
         keys = adaptive_keys.linear_keys(motion, corners, tolerance=tolerance)
-        return held(track, keys.times, keys.values, Interpolation.LINEAR)
+        return with_keys(track, keys.times, keys.values, Interpolation.LINEAR)
 
-    def _motion(self, track: Track, inside: Bools) -> tuple[adaptive_keys.Motion, Floats, float]:
+    def _motion(self, track: Track, inside: Bools) -> tuple[adaptive_keys.TrackFunction, Floats, float]:
         """The eased track as functions of time, with the times where it is not smooth, and how near to follow it."""
         allowed, speed = self._allowed(track, inside)
         near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
         near = 2.0 ** math.floor(math.log2(near))  # few different fits for many tracks
-        cubics = cubic_pieces(self.easing, tolerance=max(near, MIN_TOLERANCE))
+        cubics = fit_segments(self.easing, tolerance=max(near, MIN_TOLERANCE))
         breaks = np.array([p.start for p in cubics[1:]])
         starts, durations = track.times[:-1][inside], np.diff(track.times)[inside]
         corners = np.concatenate((track.times, (starts[:, None] + durations[:, None] * breaks).reshape(-1)))
         eased = EasedTrack(track, inside, cubics)
         return (
-            adaptive_keys.Motion(eased.values, eased.rates, track.kind is Kind.ROTATION),
+            adaptive_keys.TrackFunction(eased.values, eased.rates, track.kind is ValueKind.ROTATION),
             np.sort(corners),
             allowed / 2,
         )
 
     def _allowed(self, track: Track, inside: Bools) -> tuple[float, float]:
         """How far keys may be off, and how fast the track changes per share of a piece: an ease's error times that."""
-        speed = segment.fastest(track, np.flatnonzero(inside))
-        if track.kind is Kind.ROTATION:
+        speed = segment.max_rate(track, np.flatnonzero(inside))
+        if track.kind is ValueKind.ROTATION:
             return self.tolerances.angle, speed
         ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]
         moving = ranges[ranges > 0]
-        return adaptive_keys.reachable(
+        return adaptive_keys.float32_tolerance(
             track, self.tolerances.share * float(moving.min() if len(moving) else 1.0)
         ), speed

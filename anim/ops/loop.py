@@ -9,14 +9,14 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError
 from anim.maths import hermite, quaternion
-from anim.model import Clip, Interpolation, Kind, Track
+from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
 SPARSE = 6  # keys that a blend needs at least; sparser LINEAR tracks get more
 
 
-def with_last_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
+def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
     """Return the clip one frame longer, its last key the first one again: for a loop that lacks its last frame."""
     end = clip.end + 1 / fps
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
@@ -33,7 +33,7 @@ def open_tracks(clip: Clip) -> frozenset[int]:
 
 def _is_closed(track: Track) -> bool:
     first, last = track.values[0], track.values[-1]
-    return bool((first == last).all() or (track.kind is Kind.ROTATION and (first == -last).all()))
+    return bool((first == last).all() or (track.kind is ValueKind.ROTATION and (first == -last).all()))
 
 
 def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> Clip:
@@ -54,7 +54,7 @@ def _extended(track: Track, clip: Clip, end: float) -> Track:
     if len(track.times) == 1 or track.times[-1] < clip.end - 1e-6:
         return track
     first = sample(track, np.array([clip.start]))
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         first = first * np.where(quaternion.dot(first, track.values[-1:]) < 0, -1.0, 1.0)
     times, values = np.append(track.times, end), np.concatenate((track.values, first))
     if track.in_tangents is None or track.out_tangents is None:
@@ -81,7 +81,7 @@ def _closed(track: Track, clip: Clip, blend: float) -> Track:
 
 
 def _gap(track: Track, first: Floats, last: Floats) -> Floats:
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(last), first))
     return first - last
 
@@ -125,7 +125,7 @@ def _times(track: Track, correction: _Correction) -> Floats:
 
 
 def _bent(track: Track, values: Floats, added: Floats) -> Floats:
-    if track.kind is not Kind.ROTATION:
+    if track.kind is not ValueKind.ROTATION:
         return values + added
     return quaternion.align_signs(quaternion.multiply(values, quaternion.from_rotation_vector(added)))
 
@@ -135,7 +135,7 @@ def _bent_spline(track: Track, correction: _Correction) -> Track:
     before = rates(track, times, before=True) + correction.slope(times)
     after = rates(track, times, before=False) + correction.slope(times)
     values = _bent(track, sample(track, times), correction.value(times))
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0
     return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)

@@ -9,10 +9,10 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Kind, Track
+from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.sampling import derivatives
 from anim.sampling.batch import Batch, batches
-from anim.sampling.times import grid, key_times
+from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"
 UNIT = 1e-6  # of a squared length; what rounding to float32 leaves
@@ -37,7 +37,7 @@ def resample(
     """
     if interpolation not in INTERPOLATIONS:
         raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
-    times = key_times(grid(clip.start, clip.end, fps=fps))
+    times = key_times(frame_times(clip.start, clip.end, fps=fps))
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
@@ -49,7 +49,7 @@ def resample(
 
 
 def _goal(track: Track, interpolation: str) -> Interpolation:
-    if track.kind is Kind.DISCRETE:
+    if track.kind is ValueKind.DISCRETE:
         return Interpolation.STEP
     return track.interpolation if interpolation == KEEP else Interpolation(interpolation.upper())
 
@@ -81,7 +81,7 @@ def _sampled(tracks: list[Track], times: Floats) -> list[Floats]:
     found: dict[int, Floats] = {}
     for batch in batches(tracks):
         values = batch.sample(times)
-        if batch.kind is Kind.ROTATION:
+        if batch.kind is ValueKind.ROTATION:
             values = quaternion.align_signs(_with_keys(batch, times, values))
         found.update((id(track), values[:, g]) for g, track in enumerate(batch.tracks))
     return [found[id(track)] for track in tracks]
@@ -113,7 +113,9 @@ def _tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floa
     at = np.minimum(np.searchsorted(track.times, times), len(track.times) - 1)
     same = track.times[at] == times
     whole = np.flatnonzero(same[:-1] & same[1:] & (np.diff(at) == 1))
-    signs = np.where(quaternion.dot(values, track.values[at]) < 0, -1.0, 1.0) if track.kind is Kind.ROTATION else 1.0
+    signs = (
+        np.where(quaternion.dot(values, track.values[at]) < 0, -1.0, 1.0) if track.kind is ValueKind.ROTATION else 1.0
+    )
     own = np.broadcast_to(np.asarray(signs), (len(times),))[:, None]
     after[whole] = (track.out_tangents[at] * own)[whole]
     before[whole + 1] = (track.in_tangents[at] * own)[whole + 1]

@@ -44,18 +44,18 @@ def retime(
     offset = _checked_offset(offset, start)
     steps: list[Callable[[Track], Track]] = []
     if factor != 1:
-        steps.append(lambda track: stretched(track, start, factor))
+        steps.append(lambda track: scale_time(track, start, factor))
     if reverse:
-        steps.append(lambda track: reversed_track(track, start, end))
+        steps.append(lambda track: reverse_track(track, start, end))
     if ping_pong:
-        steps.append(lambda track: there_and_back(track, start, end))
+        steps.append(lambda track: ping_pong_track(track, start, end))
     if offset:
-        steps.append(lambda track: shifted(track, offset))
+        steps.append(lambda track: shift_time(track, offset))
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(clip.name, tuple(_all(steps, t) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
-def stretched(track: Track, start: float, factor: float) -> Track:
+def scale_time(track: Track, start: float, factor: float) -> Track:
     """Return the track with every time `factor` times as far from `start`."""
     times = start + (track.times - start) * factor
     if track.in_tangents is None or track.out_tangents is None:
@@ -63,12 +63,12 @@ def stretched(track: Track, start: float, factor: float) -> Track:
     return replace(track, times=times, in_tangents=track.in_tangents / factor, out_tangents=track.out_tangents / factor)
 
 
-def shifted(track: Track, offset: float) -> Track:
+def shift_time(track: Track, offset: float) -> Track:
     """Return the track `offset` seconds later."""
     return replace(track, times=np.maximum(track.times + offset, 0.0))
 
 
-def reversed_track(track: Track, start: float, end: float) -> Track:
+def reverse_track(track: Track, start: float, end: float) -> Track:
     """Return the track as it runs from `end` back to `start` (s, of the clip); twice reversed it is itself again.
 
     What STEP holds from a key to the next it holds between the same two moments; the value that it ends on shows first,
@@ -85,11 +85,11 @@ def reversed_track(track: Track, start: float, end: float) -> Track:
     )
 
 
-def there_and_back(track: Track, start: float, end: float) -> Track:
+def ping_pong_track(track: Track, start: float, end: float) -> Track:
     """Return the track followed by itself reversed, from `end` to twice as far from `start` (s, of the clip)."""
     if len(track.times) == 1:
         return track
-    back = shifted(reversed_track(track, start, end), end - start)
+    back = shift_time(reverse_track(track, start, end), end - start)
     if track.interpolation is not Interpolation.STEP:
         return _joined(track, back, drop_first=bool(track.times[-1] == end))
     first_of_back = int(np.searchsorted(back.times, max(end, float(track.times[-1])), side="right"))

@@ -24,12 +24,12 @@ class Selection:
 
         Raises NotFoundError for a glob that matches no clip, and says which name is near.
         """
-        return matching(self.clips, [name or f"#{i}" for i, name in enumerate(names)], "clip")
+        return match_names(self.clips, [name or f"#{i}" for i, name in enumerate(names)], "clip")
 
     def chosen_nodes(self, skeleton: Skeleton) -> list[int]:
         """Return the numbers of the nodes that are meant; a node without a name is called by its number."""
         names = [name or str(i) for i, name in enumerate(skeleton.names)]
-        return matching(self.nodes, names, "node")
+        return match_names(self.nodes, names, "node")
 
     def chosen_tracks(self, clip: Clip, skeleton: Skeleton) -> frozenset[int]:
         """Return the numbers of the tracks of `clip` that are meant; pointers only where neither node nor path is."""
@@ -41,7 +41,7 @@ class Selection:
         )
 
 
-def matching(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
+def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
     """Return the numbers of the names that match any of the globs; of all without a glob. what: "clip", for messages.
 
     "#3" is number 3, whatever it is called.

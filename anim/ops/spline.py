@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from anim.curves.tangents.rule import TangentRule
-from anim.curves.tangents.table import rotation_keys, spline_keys
+from anim.curves.tangents.table import apply_rotation_tangents, apply_tangents
 from anim.errors import AnimError
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Kind, Track
+from anim.model import Clip, Interpolation, Track, ValueKind
 
 
 def spline(
@@ -41,7 +41,7 @@ def spline(
     return Clip(clip.name, tuple(new))
 
 
-def departure(before: Clip, after: Clip) -> tuple[float, float]:
+def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
     """Return how far keys were moved at most: largest change of a vector value, and largest turn in radians.
 
     Both clips have the same tracks with the same keys.
@@ -50,7 +50,7 @@ def departure(before: Clip, after: Clip) -> tuple[float, float]:
     for old, new in zip(before.tracks, after.tracks, strict=True):
         if old is new or old.values.shape != new.values.shape:
             continue
-        if old.kind is Kind.ROTATION:
+        if old.kind is ValueKind.ROTATION:
             a, b = quaternion.normalize(old.values), quaternion.normalize(new.values)
             turned = max(turned, float(quaternion.angle_between(a, b).max()))
         else:
@@ -59,9 +59,9 @@ def departure(before: Clip, after: Clip) -> tuple[float, float]:
 
 
 def _splined(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
-    if track.interpolation is Interpolation.STEP or track.kind is Kind.DISCRETE or len(track.times) == 1:
+    if track.interpolation is Interpolation.STEP or track.kind is ValueKind.DISCRETE or len(track.times) == 1:
         return track
-    make = rotation_keys if track.kind is Kind.ROTATION else spline_keys
+    make = apply_rotation_tangents if track.kind is ValueKind.ROTATION else apply_tangents
     keys = make(track.times, track.values, rule, cyclic=cyclic)
     return replace(
         track,

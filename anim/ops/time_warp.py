@@ -9,17 +9,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
-from anim.curves.easing.function import Easing, Piece, evaluate
+from anim.arrays import Floats, unique_sorted
+from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.fitting import adaptive_keys
-from anim.curves.fitting.easing_fit import cubic_pieces
+from anim.curves.fitting.easing_fit import fit_segments
 from anim.errors import RangeError
-from anim.model import Clip, Interpolation, Kind, Track
-from anim.ops.cubic_segments import held
+from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.ops.cubic_segments import with_keys
 from anim.ops.ease_track import slope
 from anim.sampling import segment
 from anim.sampling.derivatives import rates
-from anim.sampling.times import apart
+from anim.sampling.times import distinct_float32
 from anim.sampling.track import sample
 
 TOLERANCE = 1e-3  # of a track's range, where no cubic is exact
@@ -58,7 +58,7 @@ def warp(
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     new = []
     corners: dict[
-        tuple[int, tuple[Piece, ...]], Floats
+        tuple[int, tuple[CubicSegment, ...]], Floats
     ] = {}  # tracks on one time axis under one map share the search for keys
     for i, track in enumerate(clip.tracks):
         if i not in chosen or len(track.times) == 1 or not _moves(track):
@@ -66,14 +66,14 @@ def warp(
             continue
         allowed = (
             angle_tolerance
-            if track.kind is Kind.ROTATION
-            else adaptive_keys.reachable(track, tolerance * _extent(track))
+            if track.kind is ValueKind.ROTATION
+            else adaptive_keys.float32_tolerance(track, tolerance * _extent(track))
         )
         times = _map(track, easing, first, last, allowed)
         key = (id(track.times), times.cubics)
         if key not in corners:
             reached = times.reaching(track.times)
-            corners[key] = reached[apart(reached)]
+            corners[key] = reached[distinct_float32(reached)]
         new.append(_warped(track, times, corners[key], allowed, interpolation))
     return Clip(clip.name, tuple(new))
 
@@ -85,7 +85,7 @@ class TimeMap:
     cubics: the ease, or what follows it closely. value: what counts: that of the cubics, or the ease's own.
     """
 
-    cubics: tuple[Piece, ...]
+    cubics: tuple[CubicSegment, ...]
     value: Callable[[Floats], Floats]
     start: float
     end: float
@@ -114,22 +114,22 @@ class TimeMap:
             within = keys[(keys > min(a, b)) & (keys < max(a, b))]
             shares = (within - self.start) / duration
             found.append(self.start + duration * _inverse(self.value, low, high, shares, rising=bool(b > a)))
-        return sorted_unique(np.concatenate(found))
+        return unique_sorted(np.concatenate(found))
 
 
 def _map(track: Track, easing: Easing, start: float, end: float, allowed: float) -> TimeMap:
     """The map for one track: an ease that is no cubic is followed so closely that its error stays half of `allowed`."""
     if track.interpolation is Interpolation.STEP:
-        return TimeMap(cubic_pieces(easing, tolerance=TOLERANCE), easing.value, start, end)
-    near = allowed / 2 / max(segment.fastest_per_second(track) * (end - start), allowed)
+        return TimeMap(fit_segments(easing, tolerance=TOLERANCE), easing.value, start, end)
+    near = allowed / 2 / max(segment.max_rate_per_second(track) * (end - start), allowed)
     near = 2.0 ** math.floor(math.log2(max(near, MIN_TOLERANCE)))  # few different fits for many tracks
-    cubics = cubic_pieces(easing, tolerance=max(near, MIN_TOLERANCE))
+    cubics = fit_segments(easing, tolerance=max(near, MIN_TOLERANCE))
     return TimeMap(cubics, lambda u: evaluate(cubics, u), start, end)
 
 
 def _moves(track: Track) -> bool:
     changes = (track.values != track.values[0]).any()
-    return bool(changes) or (track.in_tangents is not None and segment.fastest_per_second(track) > 0)
+    return bool(changes) or (track.in_tangents is not None and segment.max_rate_per_second(track) > 0)
 
 
 def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float, interpolation: str) -> Track:
@@ -138,15 +138,15 @@ def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float, inter
     corners = corners[inside | np.append(inside[1:], False) | np.insert(inside[:-1], 0, False)]
     if track.interpolation is Interpolation.STEP:
         values = sample(track, times.old(np.append((corners[:-1] + corners[1:]) / 2, corners[-1])))
-        return _without_repeats(held(track, corners, values, Interpolation.STEP))
+        return _without_repeats(with_keys(track, corners, values, Interpolation.STEP))
     motion = _motion(track, times)
     if interpolation == "linear":
         keys = adaptive_keys.linear_keys(motion, corners, tolerance=allowed / 2)
-        return held(track, keys.times, keys.values, Interpolation.LINEAR)
-    return adaptive_keys.spline_track(track, adaptive_keys.cubic_keys(motion, corners, tolerance=allowed / 2))
+        return with_keys(track, keys.times, keys.values, Interpolation.LINEAR)
+    return adaptive_keys.to_cubicspline(track, adaptive_keys.cubic_keys(motion, corners, tolerance=allowed / 2))
 
 
-def _motion(track: Track, times: TimeMap) -> adaptive_keys.Motion:
+def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
     def values(at: Floats) -> Floats:
         return sample(track, _snapped(times.old(at), track.times))
 
@@ -157,7 +157,7 @@ def _motion(track: Track, times: TimeMap) -> adaptive_keys.Motion:
         forward, back = rates(track, old, before=before), rates(track, old, before=not before)
         return np.asarray(np.where((tempo >= 0)[:, None], forward, back) * tempo[:, None])
 
-    return adaptive_keys.Motion(values, changes, track.kind is Kind.ROTATION)
+    return adaptive_keys.TrackFunction(values, changes, track.kind is ValueKind.ROTATION)
 
 
 def _snapped(times: Floats, keys: Floats) -> Floats:
@@ -178,7 +178,7 @@ def _extent(track: Track) -> float:
     return extent or 1.0
 
 
-def _monotone(cubics: Sequence[Piece]) -> list[tuple[float, float]]:
+def _monotone(cubics: Sequence[CubicSegment]) -> list[tuple[float, float]]:
     """The parts of u between which the ease only rises or only falls, in order."""
     parts: list[tuple[float, float]] = []
     for p in cubics:

@@ -11,8 +11,8 @@ from anim.arrays import Floats
 from anim.curves.fitting import adaptive_keys
 from anim.errors import RangeError
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Kind, Track
-from anim.ops.retime import shifted
+from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.ops.retime import shift_time
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
@@ -42,7 +42,7 @@ def trim(
     first = min((float(clip.tracks[i].times[0]) for i in chosen), default=0.0)
     if not rebase or first == 0:
         return clip
-    return Clip(clip.name, tuple(shifted(t, -first) if i in chosen else t for i, t in enumerate(clip.tracks)))
+    return Clip(clip.name, tuple(shift_time(t, -first) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
 def _cut(clip: Clip, start: float | None, end: float | None, chosen: frozenset[int]) -> Clip:
@@ -71,7 +71,7 @@ def _trimmed(track: Track, start: float, end: float) -> Track:
         return _cut_spline(track, start, end, inner)
     times = np.concatenate(([start], track.times[inner], [end]))
     values = np.concatenate((sample(track, times[:1]), track.values[inner], sample(track, times[-1:])))
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         values = quaternion.align_signs(values)
     return replace(track, times=times, values=values)
 
@@ -93,11 +93,11 @@ def _single(track: Track, start: float) -> Track:
 
 def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Track:
     times = np.concatenate(([start], track.times[inner], [end]))
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         times = _with_cuts(track, times)
     values = sample(track, times)
     before, after = rates(track, times, before=True), rates(track, times, before=False)
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         values = quaternion.align_signs(values)
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     exact = np.isin(times, track.times)
@@ -108,7 +108,7 @@ def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[
 
 def _with_cuts(track: Track, times: Floats) -> Floats:
     """The times with more of them in the cut pieces at both ends, where a rotation's cubic is normalized anew."""
-    motion = adaptive_keys.Motion(
+    motion = adaptive_keys.TrackFunction(
         lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
     )
     parts = [times]
@@ -131,7 +131,7 @@ def _restore(
     assert track.out_tangents is not None
     at = np.searchsorted(track.times, times[exact])
     signs = np.ones(len(at))
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         signs = np.where(quaternion.dot(values[exact], track.values[at]) < 0, -1.0, 1.0)
     values[exact] = track.values[at] * signs[:, None]
     whole_before, whole_after = exact & np.insert(exact[:-1], 0, False), exact & np.append(exact[1:], False)

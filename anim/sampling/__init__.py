@@ -1,6 +1,6 @@
 """Time to value: frames, tracks, poses, world matrices."""
 
-from anim.sampling.pose import pose, rest, world_matrices
-from anim.sampling.times import grid
+from anim.sampling.pose import rest_pose, sample_pose, world_matrices
+from anim.sampling.times import frame_times
 
-__all__ = ["grid", "pose", "rest", "world_matrices"]
+__all__ = ["frame_times", "rest_pose", "sample_pose", "world_matrices"]

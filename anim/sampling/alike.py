@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from anim.arrays import Floats
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 
-Rule: TypeAlias = tuple[str, Interpolation, Kind, int]
+Rule: TypeAlias = tuple[str, Interpolation, ValueKind, int]
 Tangents: TypeAlias = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Alike:
+class TrackGroup:
     """Tracks of one rule, see `rule`."""
 
     tracks: tuple[Track, ...]
@@ -30,7 +30,7 @@ class Alike:
         return self.tracks[0].interpolation
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> ValueKind:
         """The one kind of all tracks."""
         return self.tracks[0].kind
 
@@ -40,7 +40,7 @@ def rule(track: Track) -> Rule:
     return track.path, track.interpolation, track.kind, track.values.shape[1]
 
 
-def put_together(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:
+def stack_values(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:
     """Return the values of tracks of one rule, and their in and out tangents, None where they have none.
 
     join: makes one array of each track's (K, C).

@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import segment as piece
 
 
@@ -16,7 +16,7 @@ def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Float
     values: as sampled; rotations with any signs, which their tangents follow.
     """
     before, after = rates(track, times, before=True), rates(track, times, before=False)
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         return quaternion.derivative(values, before), quaternion.derivative(values, after)
     return before, after
 
@@ -27,7 +27,7 @@ def rates(track: Track, times: Floats, *, before: bool) -> Floats:
     Of rotations the angular velocity (F, 3) in rad/s along the turning node's own axes. STEP has rate 0, and outside
     its keys every track stands still.
     """
-    result = np.zeros((len(times), 3 if track.kind is Kind.ROTATION else track.values.shape[1]))
+    result = np.zeros((len(times), 3 if track.kind is ValueKind.ROTATION else track.values.shape[1]))
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
         return result
     keys = track.times
@@ -36,5 +36,5 @@ def rates(track: Track, times: Floats, *, before: bool) -> Floats:
     left = segment[inside]
     duration = keys[left + 1] - keys[left]
     share = (times[inside] - keys[left]) / duration
-    result[inside] = piece.rates(track, left, share) / duration[:, None]
+    result[inside] = piece.derivative(track, left, share) / duration[:, None]
     return result

@@ -9,14 +9,14 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.model import Track
-from anim.sampling.alike import Alike, Rule, Tangents, put_together, rule
-from anim.sampling.track import Located, interpolate
+from anim.sampling.alike import Rule, Tangents, TrackGroup, rule, stack_values
+from anim.sampling.track import KeyInterval, interpolate
 
 KEYS_AT_ONCE = 4096  # in one group: what is computed from them stays in the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
-class Joined(Alike):
+class ConcatenatedTracks(TrackGroup):
     """T tracks of one rule, one after the other: S keys in all.
 
     numbers: (T,) which of the given tracks they are. counts: (T,) keys of each. starts: (T,) where each one begins.
@@ -34,7 +34,7 @@ class Joined(Alike):
         """Return the values (T, F, C) of each track at times of its own: `at` (T, F) in seconds."""
         return interpolate(self._located(at), self.values, self.tangents, self.interpolation, self.kind)
 
-    def _located(self, at: Floats) -> Located:
+    def _located(self, at: Floats) -> KeyInterval:
         """Where the times lie, as `sampling.track.locate` says: keys at or before each of them are counted."""
         before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
         last = self.counts[:, None] - 1
@@ -44,10 +44,10 @@ class Joined(Alike):
         duration = self.times[right] - self.times[left]
         inside = (at > self.times[left]) & (duration > 0)
         u = np.where(inside, (at - self.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
-        return Located(left, right, u, duration)
+        return KeyInterval(left, right, u, duration)
 
 
-def joined(tracks: Sequence[Track]) -> list[Joined]:
+def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
     """Return the tracks by `alike.rule`, each group laid end to end in their order.
 
     A group of over KEYS_AT_ONCE keys is split between its tracks.
@@ -63,11 +63,11 @@ def joined(tracks: Sequence[Track]) -> list[Joined]:
         groups[key][-1].append(i)
         room[key] = left - len(track.times)
     parts = [numbers for group in groups.values() for numbers in group]
-    return [_laid(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts]
+    return [_flatten_keys(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts]
 
 
-def _laid(tracks: tuple[Track, ...], numbers: Ints) -> Joined:
+def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints) -> ConcatenatedTracks:
     counts = np.array([len(track.times) for track in tracks])
     starts = np.cumsum(counts) - counts
     times = np.concatenate([track.times for track in tracks])
-    return Joined(tracks, numbers, counts, starts, times, *put_together(tracks, np.concatenate))
+    return ConcatenatedTracks(tracks, numbers, counts, starts, times, *stack_values(tracks, np.concatenate))

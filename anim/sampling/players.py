@@ -15,17 +15,17 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Kind, Skeleton
+from anim.model import Clip, Interpolation, Skeleton, ValueKind
 from anim.sampling.batch import Batch
-from anim.sampling.pose import Poses, Sampler
-from anim.sampling.track import Located
+from anim.sampling.pose import PoseSampler, Sampler
+from anim.sampling.track import KeyInterval
 
 SHORT_OF_THREE = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
 SHORT_OF_RAW = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this dot product on the chord as it is
 
 
 @dataclass(frozen=True, slots=True)
-class Player:
+class PlayerModel:
     """A way to play rotations.
 
     about: who does so. between: (a, b, u) with keys (..., 4) and shares (..., 1) → (..., 4), None for glTF's own rule.
@@ -37,16 +37,16 @@ class Player:
     normalizes: bool = True
 
 
-def played(skeleton: Skeleton, clip: Clip, *, player: str = "spec") -> Poses:
+def sampler_for(skeleton: Skeleton, clip: Clip, *, player: str = "spec") -> PoseSampler:
     """Return the clip on the skeleton as a player shows it, to be asked for poses at any times.
 
     player: a name in PLAYERS. With one that does not normalize, rotations of the poses are not of unit length, and
     world matrices from them scale, as they do in that player.
     """
-    return Poses(skeleton, clip, sampler(player))
+    return PoseSampler(skeleton, clip, sampler(player))
 
 
-def pair(player: str) -> tuple[str, str]:
+def parse_pair(player: str) -> tuple[str, str]:
     """Return who plays the clip before and who the one after: "nlerp" plays both, "spec,nlerp" one each.
 
     Raises RangeError for a name that is not in PLAYERS.
@@ -65,9 +65,9 @@ def sampler(player: str) -> Sampler:
     return lambda batch, at, place: _sampled(chosen, batch, at, place)
 
 
-def _sampled(player: Player, batch: Batch, at: Floats, place: Located) -> Floats:
+def _sampled(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) -> Floats:
     """Values (F, G, C) of tracks on one axis; all but linear and stepped rotations are played the same everywhere."""
-    if player.between is None or batch.kind is not Kind.ROTATION:
+    if player.between is None or batch.kind is not ValueKind.ROTATION:
         return batch.sample(at, place)
     if batch.interpolation is Interpolation.CUBICSPLINE:
         return batch.sample(at, place)
@@ -112,10 +112,10 @@ def _near(a: Floats, b: Floats) -> Floats:
 
 
 PLAYERS = {
-    "spec": Player("as glTF says: slerp of normalized keys"),
-    "three": Player(
+    "spec": PlayerModel("as glTF says: slerp of normalized keys"),
+    "three": PlayerModel(
         "three.js: slerp of keys as stored, normalized only where they are near each other", _as_three, False
     ),
-    "raw": Player("Babylon.js: slerp of keys as stored, never normalized", _as_stored, False),
-    "nlerp": Player("Unity (glTFast), Blender: component by component, then normalized", _chord, True),
+    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _as_stored, False),
+    "nlerp": PlayerModel("Unity (glTFast), Blender: component by component, then normalized", _chord, True),
 }

@@ -13,21 +13,21 @@ from anim.arrays import Floats
 from anim.errors import NotFoundError
 from anim.maths import matrix
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling.batch import Batch, stacks
-from anim.sampling.track import Located, locate
+from anim.sampling.batch import Batch, lazy_batches
+from anim.sampling.track import KeyInterval, find_interval
 
-Sampler: TypeAlias = Callable[[Batch, Floats, Located], Floats]
+Sampler: TypeAlias = Callable[[Batch, Floats, KeyInterval], Floats]
 
 
-def pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
+def sample_pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
     """Return the local transforms of all nodes at times `at` (F,) in seconds; what no track moves stays at rest.
 
     Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.
     """
-    return Poses(skeleton, clip).at(at)
+    return PoseSampler(skeleton, clip).at(at)
 
 
-class Poses:
+class PoseSampler:
     """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked where they are needed.
 
     sample: gives the values of tracks at times, by default as glTF says.
@@ -44,9 +44,9 @@ class Poses:
                 f"there is no node {highest} (the skeleton has {nodes}, from 0 on)",
                 where=f"clip '{clip.name}'" if clip.name else "",
             )
-        self._stacks = stacks(moving)
+        self._stacks = lazy_batches(moving)
 
-    def sampled(self, sample: Sampler) -> Poses:
+    def sampled(self, sample: Sampler) -> PoseSampler:
         """Return the same clip on the same skeleton, with the values of its tracks given by another sampler."""
         other = copy(self)
         other._sample = sample
@@ -54,18 +54,18 @@ class Poses:
 
     def at(self, at: Floats) -> Pose:
         """Return the local transforms of all nodes at times `at` (F,) in seconds."""
-        at = arrays.floats(at, "F", name="times")
+        at = arrays.as_floats(at, "F", name="times")
         parts = {
-            "translation": _at_rest(self._skeleton.translation, len(at)),
-            "rotation": _at_rest(self._skeleton.rotation, len(at)),
-            "scale": _at_rest(self._skeleton.scale, len(at)),
+            "translation": _rest_values(self._skeleton.translation, len(at)),
+            "rotation": _rest_values(self._skeleton.rotation, len(at)),
+            "scale": _rest_values(self._skeleton.scale, len(at)),
         }
         weights: dict[int, Floats] = {}
-        places: dict[int, Located] = {}
+        places: dict[int, KeyInterval] = {}
         for stack in self._stacks:
             found = places.get(id(stack.times))
             if found is None:
-                found = places[id(stack.times)] = locate(stack.times, at)
+                found = places[id(stack.times)] = find_interval(stack.times, at)
             batch, place = stack.at(found)
             values = self._sample(batch, at, place)
             numbers = [track.node for track in batch.tracks if track.node is not None]
@@ -83,7 +83,7 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
 def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return world_from_node (N, F, 3, 4): the order in which it is fast to compute."""
-    return matrix.chained(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
+    return matrix.accumulate_world(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
 
 
 def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
@@ -95,10 +95,10 @@ def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
     return local
 
 
-def rest(skeleton: Skeleton) -> Pose:
+def rest_pose(skeleton: Skeleton) -> Pose:
     """Return the rest pose, as one frame at 0 s."""
-    return pose(skeleton, Clip("", ()), np.zeros(1))
+    return sample_pose(skeleton, Clip("", ()), np.zeros(1))
 
 
-def _at_rest(values: Floats, frames: int) -> Floats:
+def _rest_values(values: Floats, frames: int) -> Floats:
     return np.repeat(values[None], frames, axis=0)

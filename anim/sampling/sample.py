@@ -9,14 +9,14 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
-from anim.sampling.pose import pose, world_matrices
+from anim.sampling.pose import sample_pose, world_matrices
 from anim.sampling.track import sample as sampled
 
 SPACES = ("local", "world")
 
 
 @dataclass(frozen=True, slots=True)
-class Sampled:
+class PoseTable:
     """All nodes at F times, in their parents' space or in the world's.
 
     times: (F,) s. translation (F, N, 3) m, rotation (F, N, 4) unit xyzw, scale (F, N, 3); in world space those of
@@ -34,7 +34,7 @@ class Sampled:
     pointers: Mapping[str, Floats]
 
 
-def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") -> Sampled:
+def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") -> PoseTable:
     """Return where every node of the skeleton is at times `at` (F,) in seconds; before and after the clip it holds.
 
     space: "local", in the parent's space, or "world". Raises RangeError for another.
@@ -42,13 +42,13 @@ def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") 
     """
     if space not in SPACES:
         raise RangeError(f"space is '{space}' (expected local or world)")
-    local = pose(skeleton, clip, at)
+    local = sample_pose(skeleton, clip, at)
     pointers = {
         track.pointer: sampled(track, at) for track in clip.tracks if track.node is None and track.pointer is not None
     }
     if space == "local":
         parts = (local.translation, local.rotation, local.scale)
-        return Sampled(local.times, *parts, None, local.weights, pointers)
+        return PoseTable(local.times, *parts, None, local.weights, pointers)
     world = world_matrices(skeleton, local)
     translation, rotation, scale, _ = matrix.decompose(world)
-    return Sampled(local.times, translation, rotation, scale, world, local.weights, pointers)
+    return PoseTable(local.times, translation, rotation, scale, world, local.weights, pointers)

@@ -6,10 +6,10 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 
 
-def values(track: Track, left: Ints, share: Floats) -> Floats:
+def evaluate(track: Track, left: Ints, share: Floats) -> Floats:
     """Return the values (F, C) at a share (F,) of the way through pieces `left` (F,); rotations are unit.
 
     A share below 0 or above 1 is where the piece's own line, arc or cubic leads: nothing is clamped.
@@ -19,16 +19,16 @@ def values(track: Track, left: Ints, share: Floats) -> Floats:
         result = np.where(share[:, None] < 1, start, end)
     elif track.interpolation is Interpolation.CUBICSPLINE:
         result = hermite.evaluate(share[:, None], *_cubic(track, left))
-    elif track.kind is Kind.ROTATION:
+    elif track.kind is ValueKind.ROTATION:
         return quaternion.slerp(quaternion.normalize(start), quaternion.normalize(end), share)
     else:
         return np.asarray(start + share[:, None] * (end - start))
-    return quaternion.normalize(result) if track.kind is Kind.ROTATION else result
+    return quaternion.normalize(result) if track.kind is ValueKind.ROTATION else result
 
 
-def rates(track: Track, left: Ints, share: Floats) -> Floats:
+def derivative(track: Track, left: Ints, share: Floats) -> Floats:
     """Return the change per share of a piece (F, C); of rotations the turn (F, 3) in rad about the node's own axes."""
-    rotation = track.kind is Kind.ROTATION
+    rotation = track.kind is ValueKind.ROTATION
     if track.interpolation is Interpolation.STEP:
         return np.zeros((len(left), 3 if rotation else track.values.shape[1]))
     if track.interpolation is Interpolation.CUBICSPLINE:
@@ -45,17 +45,17 @@ def rates(track: Track, left: Ints, share: Floats) -> Floats:
     return np.asarray(end - start)
 
 
-def fastest(track: Track, pieces: Ints) -> float:
+def max_rate(track: Track, pieces: Ints) -> float:
     """Return the greatest change per share of a piece anywhere in `pieces`: length of the vector, or angle in rad."""
     left = np.repeat(pieces, len(_SHARES))
-    found = rates(track, left, np.tile(_SHARES, len(pieces)))
+    found = derivative(track, left, np.tile(_SHARES, len(pieces)))
     return float(np.sqrt((found * found).sum(axis=1)).max(initial=0.0))
 
 
-def fastest_per_second(track: Track) -> float:
+def max_rate_per_second(track: Track) -> float:
     """Return the greatest rate of change of the track per second: length of the vector, or angular speed in rad/s."""
     left = np.repeat(np.arange(len(track.times) - 1), len(_SHARES))
-    found = rates(track, left, np.tile(_SHARES, len(track.times) - 1))
+    found = derivative(track, left, np.tile(_SHARES, len(track.times) - 1))
     duration = track.times[left + 1] - track.times[left]
     return float((np.sqrt((found * found).sum(axis=1)) / duration).max(initial=0.0))
 

@@ -18,7 +18,7 @@ SLIVER = 1e-3  # frames; a last step shorter than this, or than float32 tells ap
 MAX_FRAMES = 10_000_000
 
 
-def grid(start: float, end: float, *, fps: float) -> Floats:
+def frame_times(start: float, end: float, *, fps: float) -> Floats:
     """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
 
     fps: frames per second, > 0. Raises RangeError otherwise, or for a grid of over ten million frames.
@@ -38,10 +38,10 @@ def grid(start: float, end: float, *, fps: float) -> Floats:
 
 def key_times(seconds: Floats) -> Floats:
     """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
-    return arrays.read_only(arrays.sorted_unique(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
+    return arrays.read_only(arrays.unique_sorted(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
 
 
-def apart(seconds: Floats) -> Ints:
+def distinct_float32(seconds: Floats) -> Ints:
     """Return the numbers of the times (K,), not decreasing, to keep so that they increase as float32.
 
     The first and the last stay; of times that fall together the first does, at the end the last.

@@ -9,13 +9,13 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 
 VANISHING = 1e-9  # a quaternion whose largest component is below this has no direction
 
 
 @dataclass(frozen=True, slots=True)
-class Located:
+class KeyInterval:
     """Times placed between keys: looked up once per time axis, used by every track on it.
 
     left: (F,) key at or before each time (the first key before the first). right: (F,) the next key, or the last.
@@ -28,7 +28,7 @@ class Located:
     duration: Floats
 
 
-def locate(times: Floats, at: Floats) -> Located:
+def find_interval(times: Floats, at: Floats) -> KeyInterval:
     """Return where times `at` (F,) lie between the keys `times` (K,); outside they are held at the nearest end."""
     last = len(times) - 1
     left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, last)
@@ -36,7 +36,7 @@ def locate(times: Floats, at: Floats) -> Located:
     duration = times[right] - times[left]
     inside = (at > times[left]) & (duration > 0)
     u = np.where(inside, (at - times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
-    return Located(left, right, u, duration)
+    return KeyInterval(left, right, u, duration)
 
 
 def sample(track: Track, at: Floats) -> Floats:
@@ -49,12 +49,16 @@ def sample(track: Track, at: Floats) -> Floats:
     tangents = None
     if track.in_tangents is not None and track.out_tangents is not None:
         tangents = (track.in_tangents, track.out_tangents)
-    place = locate(track.times, arrays.floats(at, "F", name="times"))
+    place = find_interval(track.times, arrays.as_floats(at, "F", name="times"))
     return interpolate(place, track.values, tangents, track.interpolation, track.kind)
 
 
 def interpolate(
-    place: Located, values: Floats, tangents: tuple[Floats, Floats] | None, interpolation: Interpolation, kind: Kind
+    place: KeyInterval,
+    values: Floats,
+    tangents: tuple[Floats, Floats] | None,
+    interpolation: Interpolation,
+    kind: ValueKind,
 ) -> Floats:
     """Return the values (..., C) at places (...) between keys `values` (K, C): of G tracks on one axis (..., G, C).
 
@@ -62,15 +66,15 @@ def interpolate(
     """
     start = values[place.left]
     if interpolation is Interpolation.STEP or not place.u.any():  # all at keys, where the curve's own value is theirs
-        return quaternion.normalize(start) if kind is Kind.ROTATION else start
+        return quaternion.normalize(start) if kind is ValueKind.ROTATION else start
     shape = place.u.shape + (1,) * (values.ndim - 1)
     u, end = place.u.reshape(shape), values[place.right]
     if interpolation is Interpolation.CUBICSPLINE and tangents is not None:
         arriving, leaving = tangents
         duration = place.duration.reshape(shape)
         result = hermite.evaluate(u, start, duration * leaving[place.left], end, duration * arriving[place.right])
-        return _unit(result, start) if kind is Kind.ROTATION else result
-    if kind is Kind.ROTATION:
+        return _unit(result, start) if kind is ValueKind.ROTATION else result
+    if kind is ValueKind.ROTATION:
         return quaternion.slerp(quaternion.normalize(start), quaternion.normalize(end), u[..., 0])
     return start + u * (end - start)
 

@@ -11,7 +11,7 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError, UnsupportedError
-from anim.model import Clip, Instance, Part, Primitive, Scene, VertexCache
+from anim.model import Clip, MeshInstance, MeshPart, PrimitiveRange, Scene, VertexCache
 from anim.skinning.binding import Rig
 from anim.skinning.bound_mesh import Layer, Make, layer
 from anim.skinning.chunk_pipeline import Stream
@@ -123,7 +123,7 @@ class Baker:
     layers: tuple[Layer, ...]
     vertices: int
     faces: Ints
-    parts: tuple[Part, ...]
+    parts: tuple[MeshPart, ...]
     rest: Floats
     normals: bool
     handedness: Floats | None
@@ -136,7 +136,7 @@ class Baker:
         Nothing is computed before frames are asked for, and then a chunk at a time: memory doesn't grow with F.
         progress: called with the number of frames done, after each chunk.
         """
-        seconds = arrays.times(times)
+        seconds = arrays.as_key_times(times)
         wanted = (self.normals, self.handedness is not None)
         stream = Stream(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads)
         return VertexCache(
@@ -151,7 +151,7 @@ class Baker:
         )
 
 
-def baked(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[Instance]:
+def baked(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[MeshInstance]:
     """Return the mesh instances that have vertices and are baked: skinned or morphed ones, with `rigid` all."""
     return [
         instance
@@ -162,7 +162,7 @@ def baked(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = No
     ]
 
 
-def _handedness(chosen: Sequence[Instance]) -> Floats:
+def _handedness(chosen: Sequence[MeshInstance]) -> Floats:
     """The signs (V,) that with normal and tangent give the bitangent; a mirrored joint does not change them.
 
     That is what players make of them (three.js: TANGENT.w as it is).
@@ -208,16 +208,16 @@ def _hint(scene: Scene, *, rigid: bool) -> str:
     return "" if rigid else "meshes that only nodes move are baked with --rigid"
 
 
-def _parts(scene: Scene, layers: Sequence[Layer]) -> Iterator[Part]:
+def _parts(scene: Scene, layers: Sequence[Layer]) -> Iterator[MeshPart]:
     face = 0
     for each in layers:
         mesh, vertex = each.instance.mesh, each.at
         name = mesh.name or scene.skeleton.names[each.instance.node]
-        primitives = mesh.primitives or (Primitive(len(mesh.positions), len(mesh.faces)),)
+        primitives = mesh.primitives or (PrimitiveRange(len(mesh.positions), len(mesh.faces)),)
         for primitive in primitives:
             ends = vertex + primitive.vertices, face + primitive.faces
             if primitive.vertices:
-                yield Part(name, (vertex, ends[0]), (face, ends[1]), each.instance.node, primitive.material)
+                yield MeshPart(name, (vertex, ends[0]), (face, ends[1]), each.instance.node, primitive.material)
             vertex, face = ends
 
 

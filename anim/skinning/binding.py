@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
-from anim.model import Instance
+from anim.model import MeshInstance
 from anim.skinning.kernels.layout import Held, Singles
 
 
@@ -41,7 +41,7 @@ class Rig:
         return Held(self.weight, self.joint, self.start, self.most)
 
 
-def rig(instance: Instance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> Rig:
+def rig(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> Rig:
     """Return the rig of a mesh instance; one without a skin hangs on its own node, whole.
 
     parents: (N,) of the skeleton. normals, tangents: keep the mesh's, if it has them.

@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import AnimError, RangeError
 from anim.maths import matrix
-from anim.model import Instance, Skeleton
+from anim.model import MeshInstance, Skeleton
 from anim.skinning.binding import Rig, rig
 from anim.skinning.kernels.layout import NOTHING, Shape, Singles, Target
 from anim.skinning.methods.skinner import Skinner, filled
@@ -29,7 +29,7 @@ class Layer:
     where they are wanted and the mesh has none. still: its vertices where no morph target counts.
     """
 
-    instance: Instance
+    instance: MeshInstance
     rig: Rig
     skinner: Skinner
     at: int
@@ -110,7 +110,7 @@ class Layer:
 
 
 def layer(
-    skeleton: Skeleton, instance: Instance, make: Make, *, at: int, space: str, normals: bool, tangents: bool
+    skeleton: Skeleton, instance: MeshInstance, make: Make, *, at: int, space: str, normals: bool, tangents: bool
 ) -> Layer:
     """Return the layer of an instance. make: gets its rig, and whether its points never change and are all it needs."""
     name = instance.mesh.name or skeleton.names[instance.node] or f"node {instance.node}"

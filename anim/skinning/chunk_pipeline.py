@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import Chunk, Clip, Skeleton
+from anim.model import Clip, FrameChunk, Skeleton
 from anim.skinning.bound_mesh import Layer
 from anim.skinning.kernels.layout import LANES, NOTHING, Target
 from anim.skinning.pose_blocks import Frames, Playback
@@ -35,7 +35,7 @@ class Stream:
     tangents: bool
     threads: int
 
-    def chunks(self, clip: Clip, times: Floats, progress: Callable[[int], None]) -> Iterator[Chunk]:
+    def chunks(self, clip: Clip, times: Floats, progress: Callable[[int], None]) -> Iterator[FrameChunk]:
         """Yield the frames at `times` (F,) s in order. progress: called with how many the caller is done with.
 
         While the caller uses one chunk the next is skinned, and the poses of the one after it are sampled.
@@ -77,13 +77,13 @@ class Stream:
                     next(next_share).append((layer, parts, block, first, last))
         return [share for share in shares if share]
 
-    def _finish(self, first: int, started: _Started) -> Chunk:
+    def _finish(self, first: int, started: _Started) -> FrameChunk:
         for future in started.futures:
             future.result()
         for layer in self.layers:
             layer.finish(started.frames, started.whole)
         _, positions, normals, tangents = started.whole
-        return Chunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
+        return FrameChunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import Clip, Skeleton
-from anim.sampling.pose import Poses, world_by_node
+from anim.sampling.pose import PoseSampler, world_by_node
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Playback:
     """A clip on a skeleton, to be asked for many stretches of time: its keys are put in order once."""
 
     def __init__(self, skeleton: Skeleton, clip: Clip) -> None:
-        self._skeleton, self._poses = skeleton, Poses(skeleton, clip)
+        self._skeleton, self._poses = skeleton, PoseSampler(skeleton, clip)
 
     def at(self, times: Floats) -> Frames:
         """Return the frames at `times` (F,) in seconds."""

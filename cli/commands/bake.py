@@ -12,13 +12,13 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.caches.transforms import bounds, up_axis
 from anim.caches.transforms import vertex_order as orders
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene, VertexCache
 from anim.ops.selection import Selection
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 from anim.skinning.analysis.inbetween_error import Missed, between
 from anim.skinning.analysis.method_deviation import Deviation, deviation, linear_baker
 from anim.skinning.bake import SPACES, Baker, baked, baker
@@ -258,5 +258,5 @@ def _summary(done: list[_Done], method: str) -> str:
 
 def _times(clip: Clip, fps: float | None) -> Floats:
     if fps is not None:
-        return grid(clip.start, clip.end, fps=fps)
-    return sorted_unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+        return frame_times(clip.start, clip.end, fps=fps)
+    return unique_sorted(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)

@@ -11,7 +11,7 @@ import typer
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.ops.selection import Selection
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 from anim.show.plots.collapse_plot import collapse as picture_of
 from anim.skinning.analysis.collapse import Comparison
 from anim.skinning.analysis.recommendations import Found
@@ -73,7 +73,7 @@ def collapse(
         )
         progress = Progress("collapse", len(numbers), shown=not quiet)
         for done, i in enumerate(numbers):
-            times = grid(clips[i].start, clips[i].end, fps=fps)
+            times = frame_times(clips[i].start, clips[i].end, fps=fps)
             found += [
                 Found(i, reader.clip_name(clips[i].name, i), each) for each in comparison.of(clips[i], times=times)
             ]

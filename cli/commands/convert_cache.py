@@ -13,7 +13,7 @@ from anim.caches.options import Reading
 from anim.caches.registry import CACHE_FORMATS
 from anim.caches.transforms import bounds, resample, up_axis
 from anim.caches.transforms import vertex_order as orders
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 from cli import text, units
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
@@ -119,7 +119,7 @@ def _changed(
 def _counted(cache: VertexCache, progress: Progress) -> VertexCache:
     """The cache, which says how far it was read."""
 
-    def chunks() -> Iterator[Chunk]:
+    def chunks() -> Iterator[FrameChunk]:
         for chunk in cache.chunks():
             yield chunk
             progress(chunk.first + len(chunk.positions))

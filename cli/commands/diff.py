@@ -21,7 +21,7 @@ from anim.measure.inspect.storage_cost import Footprint, footprints
 from anim.measure.inspect.stored_bytes import stored
 from anim.model import Clip, Scene
 from anim.ops.selection import Selection
-from anim.sampling.players import PLAYERS, pair
+from anim.sampling.players import PLAYERS, parse_pair
 from anim.show.plots import error_plot as picture
 from anim.show.plots.figure import FORMATS
 from cli import units
@@ -121,7 +121,7 @@ def _players(new: str | None, player: str, players: str | None) -> str:
         return player
     if new is not None or player != SPEC:
         raise UsageError("--players is about one file (expected neither B nor --player)")
-    first, second = pair(players)
+    first, second = parse_pair(players)
     if first == second:
         raise UsageError(f"--players is '{players}' (expected two different ones of {', '.join(PLAYERS)})")
     return players

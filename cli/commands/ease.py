@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from anim.curves.easing.function import Easing
-from anim.curves.easing.table import EASING_MAKERS, EASINGS, parse, sparkline
+from anim.curves.easing.table import EASING_FACTORIES, EASINGS, parse, sparkline
 from anim.gltf.reading import reader
 from anim.model import Clip, Track
 from anim.ops import ease as by_segment
@@ -160,7 +160,7 @@ def _table() -> str:
     """All eases with a sparkline; then those that take arguments."""
     width = max(len(name) for name in EASINGS)
     lines = [f"{name:{width}}  {sparkline(each)}{_mark(each)}" for name, each in EASINGS.items()]
-    makers = [f"{maker.usage}" for maker in EASING_MAKERS.values()]
+    makers = [f"{maker.usage}" for maker in EASING_FACTORIES.values()]
     exact = "exact: written as CUBICSPLINE without any error; others within --tolerance"
     return "\n".join([*lines, "", "with arguments:", *(f"  {each}" for each in makers), "", exact]) + "\n"
 

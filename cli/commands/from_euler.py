@@ -25,7 +25,7 @@ from anim.exchange.retarget.retarget import Floor
 from anim.exchange.split_skins import trees
 from anim.exchange.stick_mesh import sticks
 from anim.gltf import authoring
-from anim.maths.euler import Frame, check_order
+from anim.maths.euler import AxesConvention, check_order
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import documents
@@ -63,7 +63,7 @@ def from_euler(
         typer.Option("--order", metavar="ORDER", help="Of the axes as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
     ] = None,
     frame: Annotated[
-        Frame | None, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+        AxesConvention | None, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = None,
     unit: Annotated[Unit | None, typer.Option("--unit", help="Unit of the angles (CSV, JSON).")] = None,
     keys: Annotated[Keys, typer.Option("--keys", help="Where keys stand; auto keeps recordings' grid.")] = Keys.AUTO,

@@ -111,7 +111,7 @@ def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float |
     root = traveling_root(skin.skeleton, clip)
     found = judge(skin, clip, root=root)
     if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
-        clip = closing.with_last_frame(clip, fps=found.fps, tracks=tracks)
+        clip = closing.append_first_frame(clip, fps=found.fps, tracks=tracks)
     elif found.kind is not LoopKind.CLOSED and blend is None:
         raise UsageError(_problem(found), help=HELP)
     if blend is None:

@@ -11,14 +11,14 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton
 from anim.ops.selection import Selection
-from anim.sampling.sample import SPACES, Sampled
+from anim.sampling.sample import SPACES, PoseTable
 from anim.sampling.sample import sample as sampled
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 from cli import tables
 from cli.errors import UsageError
 from cli.io import documents
@@ -93,7 +93,7 @@ def sample(
         documents.write_text(write(taken, skeleton, nodes, space), output)
 
 
-Taken = list[tuple[int, Clip, Sampled]]
+Taken = list[tuple[int, Clip, PoseTable]]
 
 
 def _format_of(output: str) -> Format:
@@ -109,8 +109,8 @@ def _times(clip: Clip, at: list[float] | None, fps: float | None) -> Floats:
     if at:
         return np.array(at, np.float64)
     if fps is not None:
-        return grid(clip.start, clip.end, fps=fps)
-    return sorted_unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+        return frame_times(clip.start, clip.end, fps=fps)
+    return unique_sorted(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
 
 
 def _json(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> str:
@@ -124,7 +124,7 @@ def _json(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> s
     return json.dumps({"schema": SCHEMA, "space": str(space), "clips": clips}, allow_nan=False) + "\n"
 
 
-def _node(i: int, skeleton: Skeleton, poses: Sampled) -> dict[str, Any]:
+def _node(i: int, skeleton: Skeleton, poses: PoseTable) -> dict[str, Any]:
     about: dict[str, Any] = {
         "index": i,
         "name": skeleton.names[i],

@@ -8,13 +8,13 @@ from typing import Annotated
 
 import typer
 
-from anim.curves.tangents.table import DEFAULT, TANGENT_MAKERS, TANGENTS, parse
+from anim.curves.tangents.table import DEFAULT, TANGENT_FACTORIES, TANGENTS, parse
 from anim.gltf.reading import reader
 from anim.measure.loops.recommendations import closing_command
 from anim.model import Clip, Scene
 from anim.ops.loop import open_tracks
 from anim.ops.selection import Selection
-from anim.ops.spline import departure
+from anim.ops.spline import max_key_change
 from anim.ops.spline import spline as splined
 from cli.io import documents
 from cli.options import common
@@ -67,7 +67,7 @@ def spline(
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:
     """How far the curve passes keys by."""
-    found = {i: departure(old, after[i]) for i, old in before.items()}
+    found = {i: max_key_change(old, after[i]) for i, old in before.items()}
     found = {i: each for i, each in found.items() if each[0] or each[1] > SEEN}
     if found:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))
@@ -97,5 +97,5 @@ _ABOUT = {
 def _table() -> str:
     width = max(len(name) for name in TANGENTS)
     lines = [f"{name:{width}}  {_ABOUT.get(name, '')}".rstrip() for name in TANGENTS]
-    makers = [f"  {maker.usage}" for maker in TANGENT_MAKERS.values()]
+    makers = [f"  {maker.usage}" for maker in TANGENT_FACTORIES.values()]
     return "\n".join([*lines, "", "with arguments:", *makers]) + "\n"

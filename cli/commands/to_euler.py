@@ -18,7 +18,7 @@ from anim.exchange.formats.registry import TRACK_FORMATS, TrackFormat, of_path
 from anim.exchange.retarget.bind_pose import bind_pose, completed
 from anim.gltf.document import Document, items
 from anim.gltf.reading import reader
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Clip
 from anim.ops.selection import Selection
 from cli import text, units
@@ -47,8 +47,8 @@ def to_euler(
         ),
     ] = USUAL,
     frame: Annotated[
-        Frame, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
-    ] = Frame.INTRINSIC,
+        AxesConvention, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+    ] = AxesConvention.INTRINSIC,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of the angles; BVH has degrees.")] = Unit.DEG,
     fps: Annotated[
         float | None, typer.Option("--fps", metavar="N", help="Frames per second; else the source's keys.")
@@ -123,14 +123,14 @@ def _orders(text: str, kind: TrackFormat) -> Orders:
     return orders
 
 
-def _check(kind: TrackFormat, unit: Unit, frame: Frame, scale: float | None, limit: float | None) -> None:
+def _check(kind: TrackFormat, unit: Unit, frame: AxesConvention, scale: float | None, limit: float | None) -> None:
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
     if kind is not TRACK_FORMATS["bvh"]:
         if scale is not None:
             raise UsageError("--scale is the unit of a BVH (CSV and JSON are in meters)")
         return
-    if unit is not Unit.DEG or frame is not Frame.INTRINSIC:
+    if unit is not Unit.DEG or frame is not AxesConvention.INTRINSIC:
         raise UsageError(
             "a BVH's angles are intrinsic, in degrees", help="an extrinsic order is an intrinsic one reversed"
         )
@@ -154,7 +154,7 @@ def _motion(
     clip: Clip,
     kind: TrackFormat,
     orders: Orders,
-    frame: Frame,
+    frame: AxesConvention,
     fps: float | None,
     limit: float | None,
     scale: float,

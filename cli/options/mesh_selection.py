@@ -8,7 +8,7 @@ import typer
 
 from anim.exchange.retarget.ground_contact import at_or_below
 from anim.model import Scene
-from anim.ops.selection import matching
+from anim.ops.selection import match_names
 
 Meshes = Annotated[
     list[str] | None,
@@ -32,7 +32,7 @@ def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:
         return None
     meshes = [each.mesh.name or str(each.node) for each in scene.instances]
     nodes = [scene.skeleton.names[each.node] or str(each.node) for each in scene.instances]
-    return [scene.instances[i % len(meshes)].node for i in matching(globs, [*meshes, *nodes], "mesh")]
+    return [scene.instances[i % len(meshes)].node for i in match_names(globs, [*meshes, *nodes], "mesh")]
 
 
 def shown(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> list[int] | None:
@@ -46,7 +46,7 @@ def shown(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> li
         return chosen
     names = [name or str(i) for i, name in enumerate(scene.skeleton.names)]
     meshes = [each.mesh.name or str(each.node) for each in scene.instances]
-    found = matching(hidden, [*names, *meshes], "mesh or node")
+    found = match_names(hidden, [*names, *meshes], "mesh or node")
     above = {i for i in found if i < len(names)}
     gone = {scene.instances[i - len(names)].node for i in found if i >= len(names)}
     gone.update(at_or_below(scene.skeleton, above).tolist())

@@ -13,7 +13,7 @@ from anim.errors import RangeError, ShapeError
 
 @pytest.mark.parametrize("values", [[[0, 1, 2]], ((0, 1, 2),), np.array([[0, 1, 2]], np.int8), np.zeros((1, 3), "f4")])
 def test_anything_with_numbers_becomes_float64(values: Any) -> None:
-    found = arrays.floats(values, "K 3")
+    found = arrays.as_floats(values, "K 3")
     assert found.dtype == np.float64
     assert found.tolist() == np.asarray(values).tolist()
     assert not found.flags.writeable
@@ -40,24 +40,24 @@ def test_shapes(shape: str, good: list[tuple[int, ...]], bad: list[tuple[int, ..
 @pytest.mark.parametrize("values", [["a"], [None, "b"], [[1], [1, 2]], [1j], {"a": 1}])
 def test_what_is_no_number_is_refused(values: Any) -> None:
     with pytest.raises(ShapeError):
-        arrays.floats(values, "K")
+        arrays.as_floats(values, "K")
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
 def test_the_first_number_that_is_not_finite_is_named(bad: float) -> None:
     values: list[list[float]] = [[1, 2], [bad, bad]]
     with pytest.raises(RangeError, match=r"values holds -?(nan|inf) at \[1, 0\]"):
-        arrays.floats(values, "K 2", name="values")
+        arrays.as_floats(values, "K 2", name="values")
 
 
 @pytest.mark.parametrize("values", [[3.4e38, 3.4e38], [1e150, -1e150], [5e-324]])
 def test_large_and_small_numbers_are_finite(values: list[float]) -> None:
-    assert arrays.floats(values, "K").tolist() == values
+    assert arrays.as_floats(values, "K").tolist() == values
 
 
 def test_times_by_hand() -> None:
-    assert arrays.times([0, 0.5, 2]).tolist() == [0, 0.5, 2]
-    assert arrays.times([3.0]).tolist() == [3.0]
+    assert arrays.as_key_times([0, 0.5, 2]).tolist() == [0, 0.5, 2]
+    assert arrays.as_key_times([3.0]).tolist() == [3.0]
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,12 @@ def test_times_by_hand() -> None:
 )
 def test_times_that_can_not_be_are_refused(values: list[float], message: str) -> None:
     with pytest.raises(RangeError, match=message):
-        arrays.times(values)
+        arrays.as_key_times(values)
 
 
 def test_checked_times_are_the_same_object_again() -> None:
-    once = arrays.times([0, 1, 2])
-    assert arrays.times(once) is once
+    once = arrays.as_key_times([0, 1, 2])
+    assert arrays.as_key_times(once) is once
 
 
 def test_read_only_leaves_the_callers_array_alone() -> None:
@@ -89,7 +89,7 @@ def test_read_only_leaves_the_callers_array_alone() -> None:
     assert arrays.read_only(theirs) is theirs
 
 
-@pytest.mark.parametrize("gate", [lambda mine: arrays.floats(mine, "K"), arrays.times])
+@pytest.mark.parametrize("gate", [lambda mine: arrays.as_floats(mine, "K"), arrays.as_key_times])
 def test_later_writes_of_the_owner_change_nothing(gate: Any) -> None:
     mine = np.arange(3.0)
     found = gate(mine)
@@ -99,4 +99,4 @@ def test_later_writes_of_the_owner_change_nothing(gate: Any) -> None:
 
 def test_what_is_read_only_already_is_shared() -> None:
     mine = arrays.read_only(np.arange(3.0))
-    assert arrays.floats(mine, "K") is mine
+    assert arrays.as_floats(mine, "K") is mine

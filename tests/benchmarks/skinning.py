@@ -28,8 +28,8 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats
-from anim.model import Clip, Instance, Interpolation, Mesh, Scene, Skeleton, Skin, Track
-from anim.sampling import pose, world_matrices
+from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene, Skeleton, Skin, Track
+from anim.sampling import sample_pose, world_matrices
 
 SIZES = {
     "small": (3_000, 30, 60),
@@ -50,7 +50,7 @@ def rig(vertices: int, joints: int, frames: int) -> tuple[Scene, Clip, Floats]:
     offsets = random.normal(size=(joints, 3)) * 0.1
     still = np.tile([0.0, 0, 0, 1], (joints, 1))
     skeleton = Skeleton(tuple(f"j{j}" for j in range(joints)), parents, offsets, still, np.ones((joints, 3)))
-    world = world_matrices(skeleton, pose(skeleton, Clip("", ()), np.zeros(1)))[0]
+    world = world_matrices(skeleton, sample_pose(skeleton, Clip("", ()), np.zeros(1)))[0]
     inverse = np.concatenate([world[:, :, :3].transpose(0, 2, 1), -world[:, :, 3:]], axis=2)  # no rotation at rest
     middle = np.arange(vertices) * joints // vertices
     near = (middle[:, None] + random.integers(0, 6, (vertices, INFLUENCES))) % joints
@@ -60,13 +60,13 @@ def rig(vertices: int, joints: int, frames: int) -> tuple[Scene, Clip, Floats]:
     points = world[middle, :, 3] + random.normal(size=(vertices, 3)) * 0.05
     faces = np.arange(vertices // 3 * 3).reshape(-1, 3)
     mesh = Mesh("mesh", points, faces, near, weights, np.empty((0, vertices, 3)), np.empty(0))
-    times = arrays.times(np.arange(frames) / FPS)  # one array: tracks of a file share theirs
+    times = arrays.as_key_times(np.arange(frames) / FPS)  # one array: tracks of a file share theirs
     tracks = []
     for j in range(joints):
         half = 0.4 * np.sin(times[:, None] * random.uniform(1, 4) + random.uniform(0, 6, 3)) / 2
         q = np.concatenate([half, np.sqrt(1 - (half * half).sum(axis=1, keepdims=True))], axis=1)
         tracks.append(Track(j, "rotation", Interpolation.LINEAR, times, q, None, None))
-    scene = Scene(skeleton, (Instance(0, mesh, Skin(np.arange(joints), inverse), np.empty(0)),))
+    scene = Scene(skeleton, (MeshInstance(0, mesh, Skin(np.arange(joints), inverse), np.empty(0)),))
     return scene, Clip("clip", tuple(tracks)), times
 
 
@@ -175,7 +175,7 @@ def _stage(scene: Scene, clip: Clip, times: Floats, method: str) -> tuple[Any, A
     skeleton.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(bind.transpose(0, 2, 1))))
     animation = UsdSkel.Animation.Define(stage, "/root/skeleton/animation")
     animation.CreateJointsAttr(names)
-    world = world_matrices(scene.skeleton, pose(scene.skeleton, clip, times))
+    world = world_matrices(scene.skeleton, sample_pose(scene.skeleton, clip, times))
     four = np.tile(np.eye(4), (*world.shape[:2], 1, 1))
     four[:, :, :3] = world
     moves = [animation.CreateTranslationsAttr(), animation.CreateRotationsAttr(), animation.CreateScalesAttr()]

@@ -11,8 +11,8 @@ import pytest
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.sampling import pose, world_matrices
-from anim.sampling.times import grid
+from anim.sampling import sample_pose, world_matrices
+from anim.sampling.times import frame_times
 from anim.skinning.bake import bake as baked
 from cli.progress import Progress
 from fixtures.broken.pieces import buffered, text
@@ -32,7 +32,9 @@ def test_what_it_writes_is_what_the_library_bakes(call: Call, fixture: Fixture, 
     assert "dqs of 'twist', 25 frames of 530 vertices" in run.err
     document = opened_fixture("arm")
     twist = next(clip for clip in reader.clips(document) if clip.name == "twist")
-    cache = baked(reader.scene(document, normals=True), twist, times=grid(0, 1, fps=24), method="dqs", normals=True)
+    cache = baked(
+        reader.scene(document, normals=True), twist, times=frame_times(0, 1, fps=24), method="dqs", normals=True
+    )
     found, whole = np.load(out), cache.whole()
     assert np.array_equal(found["positions"], whole.positions)
     assert np.array_equal(found["normals"], whole.normals)  # type: ignore[arg-type]
@@ -217,7 +219,7 @@ def test_tangents_of_a_real_file(call: Call, asset: Find, tmp_path: Path) -> Non
     of, (played,) = reader.scene(document, tangents=True), reader.clips(document)
     with np.load(tmp_path / "a.npz") as arrays:
         found, times, handedness = arrays["tangents"], arrays["times"], arrays["handedness"]
-    world = world_matrices(of.skeleton, pose(of.skeleton, played, times))
+    world = world_matrices(of.skeleton, sample_pose(of.skeleton, played, times))
     at = 0
     for instance in of.instances:
         own = instance.mesh.tangents

@@ -14,7 +14,7 @@ from anim.caches.transforms.vertex_order import ordered
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
-from anim.sampling import grid
+from anim.sampling import frame_times
 from anim.skinning.bake import bake
 from tests.blender import needs_blender, vertices
 from tests.cli.conftest import Call, Find
@@ -41,7 +41,7 @@ def test_morph_targets_are_the_bake(
     assert run.code == 0, run.err
     document = opened_path(source)
     (chosen,) = (each for each in reader.clips(document) if each.name == clip)
-    times = grid(chosen.start, chosen.end, fps=48)
+    times = frame_times(chosen.start, chosen.end, fps=48)
     truth = bake(reader.scene(document), chosen, times=times, rigid=bool(options))
     assert _error(out, ordered(truth, "blender")) < BOUND
 

@@ -16,7 +16,7 @@ from anim.errors import FormatError, RangeError
 from anim.gltf.document import Document, items
 from anim.gltf.io import container
 from anim.gltf.reading.accessors import Accessors
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 Write: TypeAlias = Callable[[VertexCache, Outputs, Writing], Written]
 
@@ -78,11 +78,11 @@ def _pages(document: Document, children: list[int], up: str) -> VertexCache:
     has_normals, has_tangents = (all(name in each for each in attributes) for name in ("NORMAL", "TANGENT"))
     handedness = accessors.floats(attributes[0]["TANGENT"])[:, 3] if has_tangents else None
 
-    def chunks() -> Iterator[Chunk]:
+    def chunks() -> Iterator[FrameChunk]:
         for i, each in enumerate(attributes):
             normals = _rows(accessors, each["NORMAL"], count) if has_normals else None
             tangents = _rows(accessors, each["TANGENT"], count, 4)[..., :3] if has_tangents else None
-            yield Chunk(i, _rows(accessors, each["POSITION"], count), normals, tangents)
+            yield FrameChunk(i, _rows(accessors, each["POSITION"], count), normals, tangents)
 
     return VertexCache(np.array(times), count, faces, chunks, has_normals=has_normals, up=up, handedness=handedness)
 

@@ -14,7 +14,7 @@ from anim.arrays import AnyArray, Floats
 from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive, signed
 from anim.caches.options import Writing, Written
 from anim.caches.storage import Outputs
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 NAME = "flipbook"
 EXTRAS = "gltf_anim"
@@ -67,7 +67,7 @@ def _write(cache: VertexCache, outputs: Outputs, *, by_scale: bool) -> None:
     file.write(outputs, outputs.main)
 
 
-def _attributes(file: GlbFile, chunk: Chunk, i: int, handedness: Floats | None) -> dict[str, int]:
+def _attributes(file: GlbFile, chunk: FrameChunk, i: int, handedness: Floats | None) -> dict[str, int]:
     """The accessors of frame i of a chunk."""
     found = {"POSITION": file.add(chunk.positions[i].astype("<f4"), target=VERTICES, bounds=True)}
     if chunk.normals is not None:

@@ -21,7 +21,7 @@ from anim.caches.transforms import bounds
 from anim.caches.transforms.frame_reduction import kept_frames
 from anim.caches.transforms.pca import basis
 from anim.errors import RangeError, UnsupportedError
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given
 MOST_BYTES = 1 << 30  # of positions, which are in memory here, three times over
@@ -107,7 +107,7 @@ def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
     return worst
 
 
-def _write(cache: VertexCache, whole: Chunk, form: Form, outputs: Outputs, *, quantize: bool) -> None:
+def _write(cache: VertexCache, whole: FrameChunk, form: Form, outputs: Outputs, *, quantize: bool) -> None:
     from pygltflib import Animation, AnimationChannel, AnimationChannelTarget, AnimationSampler, Mesh, Node
 
     file = GlbFile()

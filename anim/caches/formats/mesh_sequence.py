@@ -15,7 +15,7 @@ from anim.caches.options import Reading, Writing, Written
 from anim.caches.storage import Inputs, Outputs, whole
 from anim.caches.transforms import frame_spacing
 from anim.errors import FormatError
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 DEFAULT_FPS = 24.0  # for files of others, which say nothing
 HEAD = 1024  # bytes in which our remark lies
@@ -115,7 +115,7 @@ def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
     return np.arange(len(names)) / (fps or DEFAULT_FPS)
 
 
-def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.Still, ending: str) -> Iterator[Chunk]:
+def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.Still, ending: str) -> Iterator[FrameChunk]:
     vertices, has_normals = len(start.positions), start.normals is not None
     step = frame_blocks.per_chunk(vertices)
     for first in range(0, len(names), step):
@@ -129,4 +129,4 @@ def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.Still, endin
                 raise FormatError(f"'{name}' has no normals (the first has)")
             stills.append(frame)
         normals = np.stack([f.normals for f in stills if f.normals is not None]) if has_normals else None
-        yield Chunk(first, np.stack([frame.positions for frame in stills]), normals)
+        yield FrameChunk(first, np.stack([frame.positions for frame in stills]), normals)

@@ -32,7 +32,7 @@ from anim.caches import frame_blocks
 from anim.caches.options import Reading, Writing, Written
 from anim.caches.storage import PIECE, Inputs, Outputs
 from anim.errors import AnimError, FormatError
-from anim.model import Chunk, Part, VertexCache
+from anim.model import FrameChunk, MeshPart, VertexCache
 
 SCHEMA = 1
 DIRECTIONS = ("normals", "tangents")
@@ -173,11 +173,11 @@ def _meta(archive: zipfile.ZipFile) -> dict[str, Any]:
     return meta if isinstance(meta, dict) else {}
 
 
-def parts_of(meta: dict[str, Any]) -> tuple[Part, ...]:
+def parts_of(meta: dict[str, Any]) -> tuple[MeshPart, ...]:
     """Return the parts that `meta` lists. Raises FormatError where they are not understood."""
     try:
         return tuple(
-            Part(str(p["name"]), _pair(p["vertices"]), _pair(p["faces"]), int(p["node"]), int(p["material"]))
+            MeshPart(str(p["name"]), _pair(p["vertices"]), _pair(p["faces"]), int(p["node"]), int(p["material"]))
             for p in meta.get("parts", ())
         )
     except (KeyError, TypeError, ValueError):
@@ -189,7 +189,7 @@ def _pair(values: list[int]) -> tuple[int, int]:
     return int(first), int(end)
 
 
-def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> Iterator[Chunk]:
+def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> Iterator[FrameChunk]:
     frames, vertices = shape[:2]
     with ExitStack() as stack:
         following = {
@@ -199,7 +199,7 @@ def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> I
         step = frame_blocks.per_chunk(vertices)
         for start in range(0, frames, step):
             count = min(step, frames - start)
-            yield Chunk(start, **{name: rows(count) for name, rows in following.items()})
+            yield FrameChunk(start, **{name: rows(count) for name, rows in following.items()})
 
 
 def _frames(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> Callable[[int], AnyArray]:

@@ -16,7 +16,7 @@ from anim.caches.formats.npz import parts_of
 from anim.caches.options import Reading
 from anim.caches.storage import Inputs
 from anim.errors import FormatError
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 
 def read(inputs: Inputs, reading: Reading) -> VertexCache:
@@ -162,7 +162,7 @@ def _fans(counts: Ints, corners: Ints) -> Ints:
     return chosen
 
 
-def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangents: bool) -> Iterator[Chunk]:
+def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangents: bool) -> Iterator[FrameChunk]:
     step = frame_blocks.per_chunk(vertices)
     with _opened(inputs) as stage:
         for first in range(0, len(codes), step):
@@ -172,7 +172,7 @@ def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangent
             positions = np.stack(rows) * stage.unit
             wanted = ((normals, stage.normals), (tangents, stage.tangents))
             turned = (np.stack([of(code) for code in some]).astype(np.float32) if want else None for want, of in wanted)
-            yield Chunk(first, positions.astype(np.float32), *turned)
+            yield FrameChunk(first, positions.astype(np.float32), *turned)
 
 
 def _checked(rows: Floats | None, vertices: int, code: float) -> Floats:

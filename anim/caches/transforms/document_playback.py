@@ -12,7 +12,7 @@ from anim.errors import NotFoundError
 from anim.gltf.document import Document, items
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
-from anim.sampling import grid
+from anim.sampling import frame_times
 from anim.skinning.analysis.weight_sums import bad_sums
 from anim.skinning.bake import bake
 
@@ -33,7 +33,7 @@ def play(
     chosen = clips[clip] if clips else Clip("", ())
     if not scene.vertex_count:
         raise NotFoundError("has no mesh with vertices")
-    times = grid(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
+    times = frame_times(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
     said = f"{reader.label(chosen.name, clip)}, one of {len(clips)}" if len(clips) > 1 else ""
     return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
 

@@ -11,8 +11,8 @@ import numpy as np
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.frame_blocks import per_chunk
 from anim.errors import RangeError
-from anim.model import Chunk, VertexCache
-from anim.sampling import grid
+from anim.model import FrameChunk, VertexCache
+from anim.sampling import frame_times
 
 Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents of one frame
 
@@ -37,7 +37,7 @@ def at_times(cache: VertexCache, times: Floats) -> VertexCache:
 
 def at_rate(cache: VertexCache, fps: float) -> VertexCache:
     """Return the cache with frames at start + k / fps, and one at its end. Raises RangeError unless fps is above 0."""
-    return at_times(cache, grid(float(cache.times[0]), float(cache.times[-1]), fps=fps))
+    return at_times(cache, frame_times(float(cache.times[0]), float(cache.times[-1]), fps=fps))
 
 
 def at_time(cache: VertexCache, time: float) -> VertexCache:
@@ -48,7 +48,7 @@ def at_time(cache: VertexCache, time: float) -> VertexCache:
     return at_times(cache, np.array([min(max(time, first), last)]))
 
 
-def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Iterator[Chunk]:
+def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Iterator[FrameChunk]:
     """New frames in chunks, from one pass over the old ones."""
     step = per_chunk(cache.vertex_count)
     window = _Window(cache)
@@ -57,7 +57,7 @@ def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Itera
         found = [window.between(int(left[i]), int(right[i]), np.float32(share[i])) for i in rows]
         positions, normals, tangents = (_stacked(arrays) for arrays in zip(*found, strict=True))
         assert positions is not None
-        yield Chunk(first, positions, normals, tangents)
+        yield FrameChunk(first, positions, normals, tangents)
 
 
 class _Window:
@@ -87,7 +87,7 @@ def _stacked(arrays: tuple[AnyArray | None, ...]) -> AnyArray | None:
     return np.stack(there) if len(there) == len(arrays) else None
 
 
-def _arrays(chunk: Chunk) -> Frame:
+def _arrays(chunk: FrameChunk) -> Frame:
     return chunk.positions, chunk.normals, chunk.tangents
 
 

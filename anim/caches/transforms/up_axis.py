@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import AnyArray
 from anim.errors import RangeError
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 UPS = ("y", "z")
 
@@ -25,7 +25,7 @@ def turned(cache: VertexCache, up: str) -> VertexCache:
         return cache
     turn = _y_to_z if up == "z" else _z_to_y
 
-    def chunks() -> Iterator[Chunk]:
+    def chunks() -> Iterator[FrameChunk]:
         for chunk in cache.chunks():
             yield chunk.changed(turn)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Ints
 from anim.errors import RangeError
-from anim.model import Chunk, Part, VertexCache
+from anim.model import FrameChunk, MeshPart, VertexCache
 
 ORDERS = ("file", "blender")
 
@@ -40,8 +40,8 @@ def _only_used(cache: VertexCache) -> VertexCache:
     return _taken(cache, kept, places[cache.faces], parts)
 
 
-def _taken(cache: VertexCache, kept: Ints, faces: Ints, parts: tuple[Part, ...]) -> VertexCache:
-    def chunks() -> Iterator[Chunk]:
+def _taken(cache: VertexCache, kept: Ints, faces: Ints, parts: tuple[MeshPart, ...]) -> VertexCache:
+    def chunks() -> Iterator[FrameChunk]:
         for chunk in cache.chunks():
             yield chunk.changed(lambda rows: rows[:, kept])
 

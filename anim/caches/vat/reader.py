@@ -15,7 +15,7 @@ from anim.caches.vat.writer import Packed, of_directions
 from anim.errors import FormatError
 from anim.gltf.io import container
 from anim.gltf.reading import reader as gltf
-from anim.model import Chunk, Mesh, VertexCache
+from anim.model import FrameChunk, Mesh, VertexCache
 
 
 def read(inputs: Inputs, reading: Reading) -> VertexCache:
@@ -33,7 +33,7 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
         numbers = numbers + presets.to_engine(mesh.positions, engine)
     positions = presets.from_engine(numbers, engine).astype(np.float32)
     normals = None if about.normal is None else _normals(inputs, about.normal, about, engine)
-    chunk = Chunk(0, positions, normals)
+    chunk = FrameChunk(0, positions, normals)
     return VertexCache(
         np.array(about.times),
         about.vertices,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import Easing, Piece, spelled
+from anim.curves.easing.function import CubicSegment, Easing, format_call
 from anim.errors import RangeError
 
 JUMPS = ("jump-start", "jump-end", "jump-both", "jump-none")
@@ -39,11 +39,11 @@ def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") 
 
     exact = None
     if max(abs(x1 - 1 / 3), abs(x2 - 2 / 3)) < THIRD:
-        exact = (Piece(0, 1, 0, 1, 3 * y1, 3 * (1 - y2)),)
+        exact = (CubicSegment(0, 1, 0, 1, 3 * y1, 3 * (1 - y2)),)
     elif x1 == y1 and x2 == y2:
-        exact = (Piece(0, 1, 0, 1, 1, 1),)
+        exact = (CubicSegment(0, 1, 0, 1, 1, 1),)
     upright = (0.5,) if exact is None and x1 == 1 and x2 == 0 else ()
-    return Easing(name or spelled("cubic-bezier", x1, y1, x2, y2), value, derivative, upright, exact)
+    return Easing(name or format_call("cubic-bezier", x1, y1, x2, y2), value, derivative, upright, exact)
 
 
 def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
@@ -69,7 +69,8 @@ def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
 
     breaks = tuple(edges[:-1].tolist())
     exact = [
-        Piece(a, b, v, v, 0, 0) for a, b, v in zip((0.0, *breaks), (*breaks, 1.0), levels[:-1].tolist(), strict=True)
+        CubicSegment(a, b, v, v, 0, 0)
+        for a, b, v in zip((0.0, *breaks), (*breaks, 1.0), levels[:-1].tolist(), strict=True)
     ]
     return Easing(name or f"steps({count}, {jump})", value, np.zeros_like, breaks, tuple(exact))
 

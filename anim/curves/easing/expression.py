@@ -18,14 +18,14 @@ SUGGESTIONS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Maker(Generic[T]):
+class Factory(Generic[T]):
     """One name that takes arguments: how to write it, and what makes the thing of the argument texts."""
 
     usage: str
     make: Callable[[tuple[str, ...]], T]
 
 
-def resolve(text: str, ready: Mapping[str, T], makers: Mapping[str, Maker[T]], *, kind: str) -> T:
+def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str) -> T:
     """Return what `text` names: an entry of `ready`, or one made by `makers` with the arguments in parentheses.
 
     kind: what the table holds, "ease", for the messages. Case and spaces around names and arguments do not matter.

@@ -18,7 +18,7 @@ ROUNDING = 1e-9  # overshoots smaller than this are rounding
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class CubicSegment:
     """One cubic of an ease, from u = `start` to `end`: its end values and its end slopes per u of the whole ease.
 
     On a segment of duration t_d from v0 to v1 the key values are v0 + value · (v1 − v0) and the CUBICSPLINE tangents
@@ -47,7 +47,7 @@ class Easing:
     value: Function
     derivative: Function
     breakpoints: tuple[float, ...] = ()
-    exact: tuple[Piece, ...] | None = None
+    exact: tuple[CubicSegment, ...] | None = None
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -67,12 +67,12 @@ class Easing:
         return self.exact is not None and all(p.value0 == p.value1 and p.slope0 == p.slope1 == 0 for p in self.exact)
 
 
-def spelled(name: str, *arguments: float) -> str:
+def format_call(name: str, *arguments: float) -> str:
     """Return the name with its arguments, as it is asked for: spelled("spring", 100, 10) → spring(100, 10)."""
     return f"{name}({', '.join(f'{argument:.15g}' for argument in arguments)})"
 
 
-def evaluate(pieces: tuple[Piece, ...], u: Floats) -> Floats:
+def evaluate(pieces: tuple[CubicSegment, ...], u: Floats) -> Floats:
     """Return the values at u (any shape, in 0 … 1) of cubics that cover 0 … 1; after the jump where there is one.
 
     evaluate((Piece(0, 1, 0, 1, 0, 0),), 0.5) → 0.5
@@ -84,7 +84,7 @@ def evaluate(pieces: tuple[Piece, ...], u: Floats) -> Floats:
     return hermite.evaluate(local, value0[at], length[at] * slope0[at], value1[at], length[at] * slope1[at])
 
 
-def mirrored(ease: Easing, name: str) -> Easing:
+def ease_out_from(ease: Easing, name: str) -> Easing:
     """Return the ease run backwards from its end, 1 − f(1 − u): the out form of an in form, and the other way."""
     exact = None if ease.exact is None else tuple(_mirror(piece) for piece in reversed(ease.exact))
     return Easing(
@@ -96,7 +96,7 @@ def mirrored(ease: Easing, name: str) -> Easing:
     )
 
 
-def doubled(ease: Easing, name: str) -> Easing:
+def ease_in_out_from(ease: Easing, name: str) -> Easing:
     """Return the in-out form of an in form: half of it up to u = ½, then the same mirrored. A breakpoint lies at ½."""
 
     def value(u: Floats) -> Floats:
@@ -109,10 +109,12 @@ def doubled(ease: Easing, name: str) -> Easing:
     halves = tuple(b / 2 for b in ease.breakpoints)
     exact = None
     if ease.exact is not None:
-        first = tuple(Piece(p.start / 2, p.end / 2, p.value0 / 2, p.value1 / 2, p.slope0, p.slope1) for p in ease.exact)
+        first = tuple(
+            CubicSegment(p.start / 2, p.end / 2, p.value0 / 2, p.value1 / 2, p.slope0, p.slope1) for p in ease.exact
+        )
         exact = first + tuple(_mirror(piece) for piece in reversed(first))
     return Easing(name, value, derivative, (*halves, 0.5, *(1 - b for b in reversed(halves))), exact)
 
 
-def _mirror(p: Piece) -> Piece:
-    return Piece(1 - p.end, 1 - p.start, 1 - p.value1, 1 - p.value0, p.slope1, p.slope0)
+def _mirror(p: CubicSegment) -> CubicSegment:
+    return CubicSegment(1 - p.end, 1 - p.start, 1 - p.value1, 1 - p.value0, p.slope1, p.slope0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import Easing, Piece, doubled, mirrored, spelled
+from anim.curves.easing.function import CubicSegment, Easing, ease_in_out_from, ease_out_from, format_call
 from anim.errors import RangeError
 
 OVERSHOOT = 1.70158  # back: leaves the range by 10 %
@@ -22,14 +22,14 @@ EXPO_RISE = 1023.0  # 2¹⁰ − 1
 def penner() -> list[Easing]:
     """Return the whole family: quad-in, quad-out, quad-in-out, cubic-in and so on."""
     table = [form for name, n in _POWERS for form in _forms(_power(name, n))]
-    table += [_sine(), mirrored(_sine(), "sine-out"), _sine_in_out()]
+    table += [_sine(), ease_out_from(_sine(), "sine-out"), _sine_in_out()]
     table += [*_forms(_expo()), *_forms(_circ())]
     table += [back_in(OVERSHOOT, name="back-in"), back_out(OVERSHOOT, name="back-out")]
     table += [back_in_out(OVERSHOOT, name="back-in-out")]
-    table += [_elastic(PERIOD), mirrored(_elastic(PERIOD), "elastic-out")]
-    table += [doubled(_elastic(IN_OUT_PERIOD), "elastic-in-out")]
-    bounce = mirrored(_bounce_out(), "bounce-in")
-    return [*table, bounce, _bounce_out(), doubled(bounce, "bounce-in-out")]
+    table += [_elastic(PERIOD), ease_out_from(_elastic(PERIOD), "elastic-out")]
+    table += [ease_in_out_from(_elastic(IN_OUT_PERIOD), "elastic-in-out")]
+    bounce = ease_out_from(_bounce_out(), "bounce-in")
+    return [*table, bounce, _bounce_out(), ease_in_out_from(bounce, "bounce-in-out")]
 
 
 def back_in(overshoot: float, *, name: str = "") -> Easing:
@@ -41,21 +41,21 @@ def back_in(overshoot: float, *, name: str = "") -> Easing:
     if not (np.isfinite(s) and s >= 0):
         raise RangeError(f"overshoot is {s:g} (expected 0 or more; 1.70158 is 10 % of the way)")
     return Easing(
-        name or spelled("back-in", s),
+        name or format_call("back-in", s),
         lambda u: u * u * (1 + (s + 1) * (u - 1)),
         lambda u: u * (3 * (s + 1) * u - 2 * s),
-        exact=(Piece(0, 1, 0, 1, 0, s + 3),),
+        exact=(CubicSegment(0, 1, 0, 1, 0, s + 3),),
     )
 
 
 def back_out(overshoot: float, *, name: str = "") -> Easing:
     """Return the ease that goes past its end and comes back: back_in mirrored."""
-    return mirrored(back_in(overshoot), name or spelled("back-out", overshoot))
+    return ease_out_from(back_in(overshoot), name or format_call("back-out", overshoot))
 
 
 def back_in_out(overshoot: float, *, name: str = "") -> Easing:
     """Return the ease that swings back first and goes past its end: halves of back_in with 1.525 · `overshoot`."""
-    return doubled(back_in(overshoot * IN_OUT_OVERSHOOT), name or spelled("back-in-out", overshoot))
+    return ease_in_out_from(back_in(overshoot * IN_OUT_OVERSHOOT), name or format_call("back-in-out", overshoot))
 
 
 _POWERS = (("quad", 2), ("cubic", 3), ("quart", 4), ("quint", 5))
@@ -64,11 +64,11 @@ _POWERS = (("quad", 2), ("cubic", 3), ("quart", 4), ("quint", 5))
 def _forms(ease: Easing) -> tuple[Easing, Easing, Easing]:
     """Return an in form with the out and in-out forms made of it."""
     family = ease.name.removesuffix("-in")
-    return ease, mirrored(ease, f"{family}-out"), doubled(ease, f"{family}-in-out")
+    return ease, ease_out_from(ease, f"{family}-out"), ease_in_out_from(ease, f"{family}-in-out")
 
 
 def _power(name: str, n: int) -> Easing:
-    exact = (Piece(0, 1, 0, 1, 0, n),) if n <= 3 else None
+    exact = (CubicSegment(0, 1, 0, 1, 0, n),) if n <= 3 else None
     return Easing(f"{name}-in", lambda u: u**n, lambda u: n * u ** (n - 1), exact=exact)
 
 
@@ -127,7 +127,7 @@ def _bounce_out() -> Easing:
 
     edges = (0.0, *breaks.tolist(), 1.0)
     exact = tuple(
-        Piece(a, b, 0.0 if a == 0 else 1.0, 1.0, 15.125 * (a - c), 15.125 * (b - c))
+        CubicSegment(a, b, 0.0 if a == 0 else 1.0, 1.0, 15.125 * (a - c), 15.125 * (b - c))
         for a, b, c in zip(edges, edges[1:], centers.tolist(), strict=False)
     )
     return Easing("bounce-out", value, derivative, edges[1:-1], exact)

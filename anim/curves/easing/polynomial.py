@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import Easing, Piece, spelled
+from anim.curves.easing.function import CubicSegment, Easing, format_call
 from anim.errors import RangeError
 from anim.maths import hermite as cubic
 
@@ -22,16 +22,16 @@ def hermite(slope0: float, slope1: float, *, name: str = "") -> Easing:
         raise RangeError(f"slopes are {slope0:g} and {slope1:g} (expected finite numbers)")
     m0, m1 = np.asarray(slope0, dtype=np.float64), np.asarray(slope1, dtype=np.float64)
     return Easing(
-        name or spelled("hermite", slope0, slope1),
+        name or format_call("hermite", slope0, slope1),
         lambda u: cubic.evaluate(u, ZERO, m0, ONE, m1),
         lambda u: cubic.first_derivative(u, ZERO, m0, ONE, m1),
-        exact=(Piece(0, 1, 0, 1, float(slope0), float(slope1)),),
+        exact=(CubicSegment(0, 1, 0, 1, float(slope0), float(slope1)),),
     )
 
 
 def linear() -> Easing:
     """Return constant speed."""
-    return Easing("linear", lambda u: 1.0 * u, np.ones_like, exact=(Piece(0, 1, 0, 1, 1, 1),))
+    return Easing("linear", lambda u: 1.0 * u, np.ones_like, exact=(CubicSegment(0, 1, 0, 1, 1, 1),))
 
 
 def smoothstep() -> Easing:
@@ -40,7 +40,7 @@ def smoothstep() -> Easing:
     def value(u: Floats) -> Floats:
         return u * u * (3 - 2 * u)
 
-    return Easing("smoothstep", value, lambda u: 6 * u * (1 - u), exact=(Piece(0, 1, 0, 1, 0, 0),))
+    return Easing("smoothstep", value, lambda u: 6 * u * (1 - u), exact=(CubicSegment(0, 1, 0, 1, 0, 0),))
 
 
 def smootherstep() -> Easing:

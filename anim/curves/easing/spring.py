@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import Easing, spelled
+from anim.curves.easing.function import Easing, format_call
 from anim.errors import RangeError
 
 SETTLED = 1e-3  # the spring has settled when it stays this near to 1
@@ -24,7 +24,7 @@ def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
     end = settle_time(stiffness, damping)
     last = float(_position(np.array(end), stiffness, damping))
     return Easing(
-        name or spelled("spring", stiffness, damping),
+        name or format_call("spring", stiffness, damping),
         lambda u: _position(u * end, stiffness, damping) / last,
         lambda u: _speed(u * end, stiffness, damping) * end / last,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.curves.easing.css import JUMPS, cubic_bezier, steps
-from anim.curves.easing.expression import Maker, number, numbers, resolve
+from anim.curves.easing.expression import Factory, number, numbers, parse_call
 from anim.curves.easing.function import Easing
 from anim.curves.easing.penner import back_in, back_in_out, back_out, penner
 from anim.curves.easing.polynomial import hermite, linear, smootherstep, smoothstep
@@ -38,15 +38,15 @@ def _steps(arguments: tuple[str, ...]) -> Easing:
 
 EASINGS: dict[str, Easing] = _easings()
 
-EASING_MAKERS: dict[str, Maker[Easing]] = {
-    "cubic-bezier": Maker("cubic-bezier(x1, y1, x2, y2)", lambda args: cubic_bezier(*numbers(args, 4))),
-    "steps": Maker("steps(n, jump-start|jump-end|jump-both|jump-none)", _steps),
-    "spring": Maker("spring(stiffness, damping)", lambda args: spring(*numbers(args, 2))),
-    "hermite": Maker("hermite(slope0, slope1)", lambda args: hermite(*numbers(args, 2))),
-    "back": Maker("back(overshoot), which is back-out(overshoot)", lambda args: back_out(*numbers(args, 1))),
-    "back-in": Maker("back-in(overshoot)", lambda args: back_in(*numbers(args, 1))),
-    "back-out": Maker("back-out(overshoot)", lambda args: back_out(*numbers(args, 1))),
-    "back-in-out": Maker("back-in-out(overshoot)", lambda args: back_in_out(*numbers(args, 1))),
+EASING_FACTORIES: dict[str, Factory[Easing]] = {
+    "cubic-bezier": Factory("cubic-bezier(x1, y1, x2, y2)", lambda args: cubic_bezier(*numbers(args, 4))),
+    "steps": Factory("steps(n, jump-start|jump-end|jump-both|jump-none)", _steps),
+    "spring": Factory("spring(stiffness, damping)", lambda args: spring(*numbers(args, 2))),
+    "hermite": Factory("hermite(slope0, slope1)", lambda args: hermite(*numbers(args, 2))),
+    "back": Factory("back(overshoot), which is back-out(overshoot)", lambda args: back_out(*numbers(args, 1))),
+    "back-in": Factory("back-in(overshoot)", lambda args: back_in(*numbers(args, 1))),
+    "back-out": Factory("back-out(overshoot)", lambda args: back_out(*numbers(args, 1))),
+    "back-in-out": Factory("back-in-out(overshoot)", lambda args: back_in_out(*numbers(args, 1))),
 }
 
 
@@ -56,7 +56,7 @@ def parse(text: str) -> Easing:
     Raises RangeError for an unknown name, with the nearest ones in its help, and for arguments that do not fit.
     parse("cubic-bezier(.2, 0, 0, 1)").value(0.5) → 0.87
     """
-    return resolve(text, EASINGS, EASING_MAKERS, kind="ease")
+    return parse_call(text, EASINGS, EASING_FACTORIES, kind="ease")
 
 
 def sparkline(easing: Easing, width: int = 24) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track
-from anim.sampling.times import apart
+from anim.sampling.times import distinct_float32
 
 SAMPLES = np.array([0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97])  # of a piece; errors hide at ½
 WIDEST_TURN = np.radians(120)  # of one piece: beyond, players and splines of quaternions go wrong
@@ -19,7 +19,7 @@ LEVELS = 24  # halvings of a piece at most
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class TrackFunction:
     """A motion over time as functions.
 
     values: times (F,) s → values (F, C), unit quaternions where `rotation`.
@@ -33,7 +33,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Keys:
+class KeySet:
     """Keys: times (K,) s, values (K, C), tangents (K, C) per second."""
 
     times: Floats
@@ -42,12 +42,12 @@ class Keys:
     out_tangents: Floats
 
 
-def reachable(track: Track, tolerance: float) -> float:
+def float32_tolerance(track: Track, tolerance: float) -> float:
     """Return a tolerance for vector values that float32 can reach: no tighter than four steps of its largest value."""
     return max(tolerance, 4 * float(np.spacing(np.float32(np.abs(track.values).max(initial=0.0)))))
 
 
-def spline_track(track: Track, keys: Keys) -> Track:
+def to_cubicspline(track: Track, keys: KeySet) -> Track:
     """Return `track` with these keys as CUBICSPLINE."""
     return replace(
         track,
@@ -59,31 +59,31 @@ def spline_track(track: Track, keys: Keys) -> Track:
     )
 
 
-def cubic_keys(motion: Motion, corners: Floats, *, tolerance: float) -> Keys:
+def cubic_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
     """Return CUBICSPLINE keys that follow `motion` within `tolerance`: value units, or radians for rotations.
 
     corners: (K,) s, increasing: where keys must lie, both ends among them; between two the motion must be smooth.
     """
-    times = _halved(motion, corners, tolerance, _cubic_piece)
+    times = _bisect(motion, corners, tolerance, _cubic_piece)
     values = _values(motion, times)
     before, after = motion.rates(times, True), motion.rates(times, False)
     if motion.rotation:
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0
-    return Keys(times, values, before, after)
+    return KeySet(times, values, before, after)
 
 
-def linear_keys(motion: Motion, corners: Floats, *, tolerance: float) -> Keys:
+def linear_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
     """Return LINEAR keys that follow `motion` within `tolerance`; tangents are 0 and unused."""
-    times = _halved(motion, corners, tolerance, _straight_piece)
+    times = _bisect(motion, corners, tolerance, _straight_piece)
     values = _values(motion, times)
-    return Keys(times, values, np.zeros_like(values), np.zeros_like(values))
+    return KeySet(times, values, np.zeros_like(values), np.zeros_like(values))
 
 
-Between = Callable[[Motion, Floats, Floats], Floats]  # starts, ends (P,) → values (P, S, C) at SAMPLES
+Between = Callable[[TrackFunction, Floats, Floats], Floats]  # starts, ends (P,) → values (P, S, C) at SAMPLES
 
 
-def _halved(motion: Motion, corners: Floats, tolerance: float, between: Between) -> Floats:
+def _bisect(motion: TrackFunction, corners: Floats, tolerance: float, between: Between) -> Floats:
     done = [corners]
     start, end = corners[:-1], corners[1:]
     for _ in range(LEVELS):
@@ -96,10 +96,10 @@ def _halved(motion: Motion, corners: Floats, tolerance: float, between: Between)
         done.append(middle)
         start, end = np.concatenate((start[bad], middle)), np.concatenate((middle, end[bad]))
     times = np.sort(np.concatenate(done))
-    return times[apart(times)]
+    return times[distinct_float32(times)]
 
 
-def _off(motion: Motion, start: Floats, end: Floats, between: Between) -> Floats:
+def _off(motion: TrackFunction, start: Floats, end: Floats, between: Between) -> Floats:
     """How far each piece is off at worst (P,); infinite where it turns too far."""
     at = start[:, None] + (end - start)[:, None] * SAMPLES
     true = motion.values(at.reshape(-1)).reshape(*at.shape, -1)
@@ -111,7 +111,7 @@ def _off(motion: Motion, start: Floats, end: Floats, between: Between) -> Floats
     return np.where(turned > WIDEST_TURN, np.inf, off)
 
 
-def _cubic_piece(motion: Motion, start: Floats, end: Floats) -> Floats:
+def _cubic_piece(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
     a, b = motion.values(start), motion.values(end)
     leaving, arriving = motion.rates(start, False), motion.rates(end, True)
     if motion.rotation:
@@ -123,13 +123,13 @@ def _cubic_piece(motion: Motion, start: Floats, end: Floats) -> Floats:
     return quaternion.normalize(result) if motion.rotation else result
 
 
-def _straight_piece(motion: Motion, start: Floats, end: Floats) -> Floats:
+def _straight_piece(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
     a, b = motion.values(start)[:, None], motion.values(end)[:, None]
     if motion.rotation:
         return quaternion.slerp(a, b, np.broadcast_to(SAMPLES, (len(start), len(SAMPLES))))
     return np.asarray(a + SAMPLES[None, :, None] * (b - a))
 
 
-def _values(motion: Motion, times: Floats) -> Floats:
+def _values(motion: TrackFunction, times: Floats) -> Floats:
     values = motion.values(times)
     return quaternion.align_signs(values) if motion.rotation else values

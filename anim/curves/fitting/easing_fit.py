@@ -7,13 +7,13 @@ from functools import lru_cache
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import Easing, Function, Piece, evaluate
-from anim.curves.fitting.hermite_fit import SAFETY, SAMPLES, Path, errors, slopes
+from anim.curves.easing.function import CubicSegment, Easing, Function, evaluate
+from anim.curves.fitting.hermite_fit import SAFETY, SAMPLES, FitTarget, fit_end_slopes, fit_errors
 from anim.curves.fitting.subdivision import subdivide
 
 
 @lru_cache(maxsize=256)
-def cubic_pieces(easing: Easing, *, tolerance: float) -> tuple[Piece, ...]:
+def fit_segments(easing: Easing, *, tolerance: float) -> tuple[CubicSegment, ...]:
     """Return an ease as cubics: its exact ones if it has them, else the fewest within `tolerance` (share of the way).
 
     cubic_pieces(EASINGS["bounce-out"], tolerance=1e-3) → its four parabolas
@@ -24,7 +24,7 @@ def cubic_pieces(easing: Easing, *, tolerance: float) -> tuple[Piece, ...]:
     return fit_cubic(easing.value, easing.derivative, easing.breakpoints, tolerance)
 
 
-def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], tolerance: float) -> tuple[Piece, ...]:
+def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], tolerance: float) -> tuple[CubicSegment, ...]:
     """Return the fewest cubics that follow f over 0 … 1 with values and slopes of its own at their ends.
 
     f, df: a continuous function of u (any shape) and its slope, which may be ±inf: there the best finite slope is used.
@@ -33,12 +33,12 @@ def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], toleran
     fit_cubic(smootherstep, 30u²(1−u)², (), 1e-3) → 4 pieces
     Source: notes/algorithms.md C2; Hermite error h⁴/384 · max|f⁗| sets the lengths, but here it is measured.
     """
-    path = Path(lambda u: f(u)[..., None], lambda u: np.ones((*u.shape, 1)), df, _difference, breakpoints)
-    ends = np.array(subdivide(lambda a, b: errors(path, a, b), (0.0, *breakpoints, 1.0), tolerance))
+    path = FitTarget(lambda u: f(u)[..., None], lambda u: np.ones((*u.shape, 1)), df, _difference, breakpoints)
+    ends = np.array(subdivide(lambda a, b: fit_errors(path, a, b), (0.0, *breakpoints, 1.0), tolerance))
     a, b = ends[:-1], ends[1:]
-    rate0, rate1 = slopes(path, a, b)
+    rate0, rate1 = fit_end_slopes(path, a, b)
     columns = (a, b, f(a), f(b), rate0, rate1)
-    return tuple(Piece(*row) for row in np.stack(columns, axis=1).tolist())
+    return tuple(CubicSegment(*row) for row in np.stack(columns, axis=1).tolist())
 
 
 def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) -> Floats:
@@ -57,7 +57,7 @@ def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) ->
     return np.array(subdivide(chord_errors, (0.0, *breakpoints, 1.0), tolerance))
 
 
-def fit_error(f: Function, pieces: tuple[Piece, ...]) -> float:
+def fit_error(f: Function, pieces: tuple[CubicSegment, ...]) -> float:
     """Return the greatest |error| of cubics that cover 0 … 1 against f: what a fit promises, measured."""
     u = np.concatenate([p.start + (p.end - p.start) * SAMPLES for p in pieces])
     return float(np.abs(evaluate(pieces, u) - f(u)).max() * SAFETY)

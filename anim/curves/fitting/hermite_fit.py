@@ -20,7 +20,7 @@ VERTICAL = 1e4  # slopes above are not followed but chosen: least squares
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class FitTarget:
     """A path (..., D) that turns u (...) into points, moving along `direction` (..., D) at `rate` (...) per u.
 
     distance: the error (...) of a point (..., D) against the true one (..., D).
@@ -34,7 +34,7 @@ class Path:
     breakpoints: tuple[float, ...] = ()
 
 
-def slopes(path: Path, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def fit_end_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Return the rates (B,) at which pieces from u = a (B,) to b (B,) leave and arrive.
 
     They are the path's own, from inside the piece. If one is vertical, both are those of the least squared error:
@@ -48,24 +48,24 @@ def slopes(path: Path, a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return np.where(free, best0, rate0), np.where(free, best1, rate1)
 
 
-def errors(path: Path, a: Floats, b: Floats, rates: tuple[Floats, Floats] | None = None) -> Floats:
+def fit_errors(path: FitTarget, a: Floats, b: Floats, rates: tuple[Floats, Floats] | None = None) -> Floats:
     """Return the greatest distances (B,) of Hermite pieces from a (B,) to b (B,) from the path.
 
     rates: those (B,) at both ends, if not the ones that `slopes` finds.
     """
     u = a[:, None] + (b - a)[:, None] * SAMPLES
-    fitted = _pieces(path, a, b, *(rates or slopes(path, a, b)))
+    fitted = _pieces(path, a, b, *(rates or fit_end_slopes(path, a, b)))
     return np.asarray(path.distance(fitted, path.point(u)).max(axis=1) * SAFETY)
 
 
-def _pieces(path: Path, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
+def _pieces(path: FitTarget, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
     """Return the points (B, S, D) of the pieces at SAMPLES."""
     m0 = ((b - a) * rate0)[:, None] * path.direction(a)
     m1 = ((b - a) * rate1)[:, None] * path.direction(b)
     return hermite.evaluate(SAMPLES[:, None], path.point(a)[:, None], m0[:, None], path.point(b)[:, None], m1[:, None])
 
 
-def _free_slopes(path: Path, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def _free_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Return the rates (B,) at both ends that together leave the least squared error at SAMPLES."""
     none = np.zeros_like(a)
     left = path.point(a[:, None] + (b - a)[:, None] * SAMPLES) - _pieces(path, a, b, none, none)
@@ -82,6 +82,6 @@ def _product(x: Floats, y: Floats) -> Floats:
     return np.asarray((x * y).sum(axis=(1, 2)))
 
 
-def _nudged(u: Floats, path: Path, by: float) -> Floats:
+def _nudged(u: Floats, path: FitTarget, by: float) -> Floats:
     at_break: Bools = np.isin(u, path.breakpoints)
     return np.where(at_break, u + by, u)

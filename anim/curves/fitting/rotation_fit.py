@@ -9,12 +9,12 @@ import numpy as np
 
 from anim.arrays import Floats, read_only
 from anim.curves.easing.function import Easing
-from anim.curves.fitting.hermite_fit import Path, errors, slopes
+from anim.curves.fitting.hermite_fit import FitTarget, fit_end_slopes, fit_errors
 from anim.curves.fitting.subdivision import subdivide
 from anim.errors import RangeError
 from anim.maths import quaternion as quat
 
-WIDEST = np.radians(120)  # turn of one piece; above, the chord of unit quaternions gets short
+MAX_ANGLE_RAD = np.radians(120)  # turn of one piece; above, the chord of unit quaternions gets short
 ANGLE_STEP = np.pi / 32  # fits are shared by turns up to the next multiple
 
 
@@ -45,11 +45,13 @@ def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> Ro
         raise RangeError(f"'{easing.name}' jumps (expected a continuous ease; write STEP keys)")
     turn = quat.rotation_vector(quat.multiply(quat.conjugate(q0), q1))
     angle = float(np.sqrt(turn @ turn))
-    ends, rate0, rate1, error = turn_pieces(easing, float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP, tolerance)
+    ends, rate0, rate1, error = fit_rotation_segments(
+        easing, float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP, tolerance
+    )
     if angle > 0:
         error = _error(easing, angle, ends, rate0, rate1)
     if error > tolerance:
-        ends, rate0, rate1, error = turn_pieces(easing, angle, tolerance)
+        ends, rate0, rate1, error = fit_rotation_segments(easing, angle, tolerance)
     rotations = quat.multiply(q0, quat.from_rotation_vector(easing.value(ends)[:, None] * turn))
     rotations[0], rotations[-1] = q0, q1 if quat.dot(q0, q1) >= 0 else -q1
     in_tangents = quat.derivative(rotations, np.append(0.0, rate1)[:, None] * turn)
@@ -58,7 +60,7 @@ def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> Ro
 
 
 @dataclass(frozen=True, slots=True)
-class TurnPieces:
+class RotationFit:
     """Cubics for turns of up to one angle: key u (P + 1,), rates e′ (P,) at which pieces leave and arrive, and error.
 
     Tangents per u are ½ q ⊗ (rate · turn). error: the greatest angle in radians off the eased turn.
@@ -70,14 +72,14 @@ class TurnPieces:
     error: float
 
 
-def turn_pieces_for(easing: Easing, angle: float, tolerance: float) -> TurnPieces:
+def rotation_segments_for(easing: Easing, angle: float, tolerance: float) -> RotationFit:
     """Return the fewest cubics for a turn by `angle` radians; turns up to the next multiple of π/32 share one fit."""
     rounded = float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP
-    return TurnPieces(*turn_pieces(easing, rounded, tolerance))
+    return RotationFit(*fit_rotation_segments(easing, rounded, tolerance))
 
 
 @lru_cache(maxsize=1024)
-def turn_pieces(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
+def fit_rotation_segments(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
     """Return key u (K,), the rates e′ (K − 1,) at which pieces leave and arrive, and the angle that they are off."""
     edges = (0.0, *easing.breakpoints, 1.0)
     if angle == 0:
@@ -86,19 +88,19 @@ def turn_pieces(easing: Easing, angle: float, tolerance: float) -> tuple[Floats,
     path = _circle(easing, angle)
 
     def turn_errors(a: Floats, b: Floats) -> Floats:
-        wide = np.abs(easing.value(b) - easing.value(a)) * angle > WIDEST + 1e-9
-        return np.where(wide, np.inf, errors(path, a, b))
+        wide = np.abs(easing.value(b) - easing.value(a)) * angle > MAX_ANGLE_RAD + 1e-9
+        return np.where(wide, np.inf, fit_errors(path, a, b))
 
     ends = read_only(np.array(subdivide(turn_errors, edges, tolerance)))
-    rate0, rate1 = slopes(path, ends[:-1], ends[1:])
+    rate0, rate1 = fit_end_slopes(path, ends[:-1], ends[1:])
     return ends, rate0, rate1, _error(easing, angle, ends, rate0, rate1)
 
 
 def _error(easing: Easing, angle: float, ends: Floats, rate0: Floats, rate1: Floats) -> float:
-    return float(errors(_circle(easing, angle), ends[:-1], ends[1:], (rate0, rate1)).max())
+    return float(fit_errors(_circle(easing, angle), ends[:-1], ends[1:], (rate0, rate1)).max())
 
 
-def _circle(easing: Easing, angle: float) -> Path:
+def _circle(easing: Easing, angle: float) -> FitTarget:
     """Return the turn's path in the plane of its two quaternions: a circle, run through at half the angle."""
 
     def point(u: Floats) -> Floats:
@@ -109,7 +111,7 @@ def _circle(easing: Easing, angle: float) -> Path:
         half = easing.value(u) * angle / 2
         return np.stack((-np.sin(half), np.cos(half)), axis=-1) * (angle / 2)
 
-    return Path(point, direction, easing.derivative, _angle, easing.breakpoints)
+    return FitTarget(point, direction, easing.derivative, _angle, easing.breakpoints)
 
 
 def _angle(fitted: Floats, true: Floats) -> Floats:

@@ -14,7 +14,7 @@ from anim.errors import RangeError
 SHORTEST_KNOT = 1e-9  # of the longest: keeps repeated points apart in the centripetal parameter
 
 
-def time_aware(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+def bessel(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return the slopes of the parabolas through three keys; those at the ends go through the first and last three.
 
     (h_k d_{k−1} + h_{k−1} d_k) / (h_{k−1} + h_k). Exact for parabolas, whatever the spacing.
@@ -69,7 +69,7 @@ def akima(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     from scipy.interpolate import Akima1DInterpolator
 
     if len(times) == 2:
-        return time_aware(times, values)
+        return bessel(times, values)
     slopes = np.asarray(Akima1DInterpolator(times, values, axis=0).derivative()(times))
     return slopes, slopes
 

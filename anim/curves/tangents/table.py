@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from anim import arrays
 from anim.arrays import Floats
-from anim.curves.easing.expression import Maker, numbers, resolve
+from anim.curves.easing.expression import Factory, numbers, parse_call
 from anim.curves.tangents import c2 as smooth
 from anim.curves.tangents import local
 from anim.curves.tangents.rule import SplineKeys, TangentRule, local_rule
@@ -19,7 +19,7 @@ CLOSED = 1e-3  # radians: how near the ends of a loop of rotations must be for a
 TANGENTS: dict[str, TangentRule] = {
     rule.name: rule
     for rule in (
-        local_rule("time-aware", local.time_aware),
+        local_rule("time-aware", local.bessel),
         local_rule("catmull-rom", local.catmull_rom),
         local_rule("centripetal", local.centripetal),
         local_rule("monotone", local.monotone),
@@ -32,9 +32,9 @@ TANGENTS: dict[str, TangentRule] = {
     )
 }
 
-TANGENT_MAKERS: dict[str, Maker[TangentRule]] = {
-    "cardinal": Maker("cardinal(tension)", lambda args: local.cardinal(*numbers(args, 1))),
-    "tcb": Maker("tcb(tension, continuity, bias)", lambda args: local.tcb(*numbers(args, 3))),
+TANGENT_FACTORIES: dict[str, Factory[TangentRule]] = {
+    "cardinal": Factory("cardinal(tension)", lambda args: local.cardinal(*numbers(args, 1))),
+    "tcb": Factory("tcb(tension, continuity, bias)", lambda args: local.tcb(*numbers(args, 3))),
 }
 
 DEFAULT = "time-aware"
@@ -46,10 +46,10 @@ def parse(text: str) -> TangentRule:
     Raises RangeError for an unknown name, with the nearest ones in its help, and for arguments that do not fit.
     parse("tcb(0, 0, 0.5)"), parse("akima")
     """
-    return resolve(text, TANGENTS, TANGENT_MAKERS, kind="tangent rule")
+    return parse_call(text, TANGENTS, TANGENT_FACTORIES, kind="tangent rule")
 
 
-def spline_keys(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
+def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
     """Return CUBICSPLINE keys for times (K,) s and values (K, C): the values and the rule's tangents per second.
 
     cyclic: the last key is the first one of the next lap, so speed has no seam there (nor acceleration, for C2 rules:
@@ -58,11 +58,13 @@ def spline_keys(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cycli
     Raises RangeError or ShapeError for arrays that are no keys.
     keys 0, 1, 2 s with 0, 1, 0 by time-aware → out-tangents 2, 0, (0), in-tangents (0), 0, −2
     """
-    t, v = _checked(times, arrays.floats(values, "K C", name="values"))
+    t, v = _checked(times, arrays.as_floats(values, "K C", name="values"))
     return _bounded(_keys(t, v, rule, cyclic))
 
 
-def rotation_keys(times: ArrayLike, rotations: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
+def apply_rotation_tangents(
+    times: ArrayLike, rotations: ArrayLike, rule: TangentRule, *, cyclic: bool = False
+) -> SplineKeys:
     """Return CUBICSPLINE keys for times (K,) s and quaternions (K, 4): signs aligned, the rule's tangents per second.
 
     Local rules work on the turns from key to key, rolled out into a curve of rotation vectors in the body's own axes:
@@ -72,7 +74,7 @@ def rotation_keys(times: ArrayLike, rotations: ArrayLike, rule: TangentRule, *, 
     Raises RangeError for a loop that is open, for C2 rules, or a quaternion of length 0.
     Source: notes/algorithms.md C4, rotations (b).
     """
-    t, checked = _checked(times, arrays.floats(rotations, "K 4", name="rotations"))
+    t, checked = _checked(times, arrays.as_floats(rotations, "K 4", name="rotations"))
     q = quat.align_signs(quat.normalize(checked))
     if rule.smooth:
         return _bounded(_component_keys(t, q, rule, rule.loop or (cyclic and rule.cyclic is not rule.open)))
@@ -85,7 +87,7 @@ def rotation_keys(times: ArrayLike, rotations: ArrayLike, rule: TangentRule, *, 
 
 
 def _checked(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
-    t = arrays.times(times)
+    t = arrays.as_key_times(times)
     if len(t) != len(values):
         raise ShapeError(f"{len(values)} values for {len(t)} times (expected as many)")
     return t, values

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints, sorted_unique
+from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.errors import RangeError
 from anim.maths import quaternion
 
@@ -80,7 +80,7 @@ def refined(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floats:
             raise RangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
         a, b = _split(a[again], b[again], pieces[again])
         found.append(a)
-    return sorted_unique(np.concatenate(found))
+    return unique_sorted(np.concatenate(found))
 
 
 def _wanted(path: Path, a: Floats, b: Floats, tolerance: float) -> Ints:

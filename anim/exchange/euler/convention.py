@@ -7,7 +7,7 @@ from typing import Any
 
 from anim.errors import FormatError, RangeError
 from anim.exchange.euler.motion import Convention, Unit
-from anim.maths.euler import ORDERS, Frame, check_order
+from anim.maths.euler import ORDERS, AxesConvention, check_order
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,7 @@ class Stated:
     """What one side says; None where it says nothing."""
 
     order: str | None = None
-    frame: Frame | None = None
+    frame: AxesConvention | None = None
     unit: Unit | None = None
 
 
@@ -31,13 +31,13 @@ def stated(values: dict[str, Any], where: str) -> Stated:
     frame, unit = (word.casefold() if isinstance(word, str) else word for word in map(values.get, ("frame", "unit")))
     if order is not None and str(order).upper() not in ORDERS:
         raise FormatError(f"order is '{order}' (expected one of {', '.join(ORDERS)})", where=where)
-    if frame is not None and frame not in list(Frame):
-        raise FormatError(f"frame is '{frame}' (expected {' or '.join(Frame)})", where=where)
+    if frame is not None and frame not in list(AxesConvention):
+        raise FormatError(f"frame is '{frame}' (expected {' or '.join(AxesConvention)})", where=where)
     if unit is not None and unit not in list(Unit):
         raise FormatError(f"unit is '{unit}' (expected {' or '.join(Unit)})", where=where)
     return Stated(
         None if order is None else str(order).upper(),
-        None if frame is None else Frame(frame),
+        None if frame is None else AxesConvention(frame),
         None if unit is None else Unit(unit),
     )
 

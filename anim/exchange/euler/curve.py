@@ -50,11 +50,11 @@ class Curve:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "times", arrays.times(self.times))
+        set_field(self, "times", arrays.as_key_times(self.times))
         for name in ("values", *HANDLES):
             given = getattr(self, name)
             if given is not None:
-                set_field(self, name, arrays.floats(given, str(len(self.times)), name=name))
+                set_field(self, name, arrays.as_floats(given, str(len(self.times)), name=name))
             if given is not None and name in WEIGHTS and not ((given >= 0) & (given <= 1)).all():
                 raise RangeError(f"{name} go from {given.min():g} to {given.max():g} (expected shares, 0 … 1)")
         arrays.check_shape(self.modes, str(len(self.times)), name="modes")

@@ -12,7 +12,7 @@ from anim.exchange.euler.curve import Curve, evaluate
 from anim.exchange.euler.motion import PLAIN, EulerMotion, EulerNode
 from anim.maths import euler, quaternion
 from anim.model import Skeleton
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
 
 
 def rotation_at(node: EulerNode, at: Floats, before: bool = False) -> Floats:
@@ -67,7 +67,7 @@ def skeleton(motion: EulerMotion) -> Skeleton:
 
 def rest_positions(skeleton: Skeleton) -> Floats:
     """Return where all nodes are at rest, in world space (N, 3) in metres."""
-    return world_matrices(skeleton, rest(skeleton))[0, :, :, 3]
+    return world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
 
 
 def extent(skeleton: Skeleton) -> float:

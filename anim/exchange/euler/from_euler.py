@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.errors import AnimError, RangeError
 from anim.exchange.euler import adaptive_keys as placing
 from anim.exchange.euler.adaptive_keys import Path
@@ -78,7 +78,7 @@ class _Axes:
         arrays = {id(curve.times): curve.times for curve in curves}
         found = self._unions.get(tuple(arrays))
         if found is None:
-            found = self._unions[tuple(arrays)] = self.shared(sorted_unique(np.concatenate([*arrays.values()])))
+            found = self._unions[tuple(arrays)] = self.shared(unique_sorted(np.concatenate([*arrays.values()])))
         return found
 
     def shared(self, times: Floats) -> Floats:

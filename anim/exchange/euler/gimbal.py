@@ -9,7 +9,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.exchange.euler.motion import PLAIN, EulerMotion, Pivots
 from anim.maths import euler, quaternion
-from anim.maths.euler import ORDERS, Frame
+from anim.maths.euler import ORDERS, AxesConvention
 from anim.model import Clip, Interpolation, Track
 from anim.sampling.track import sample
 
@@ -53,11 +53,11 @@ def gimbal(motion: EulerMotion, clip: Clip) -> tuple[GimbalRow, ...]:
     for times, nodes, values in _stacked(
         [_looked_at(motion, node, t) for node, t in turning if _has_lock(motion, node)]
     ):
-        by_order = {order: euler.distance_to_lock(values, order=order) for order in ORDERS}
+        by_order = {order: euler.gimbal_distance(values, order=order) for order in ORDERS}
         nearest = {order: distance.min(axis=0) for order, distance in by_order.items()}
         for i, node in enumerate(nodes):
             about = motion.nodes[node]
-            order = about.order if about.frame == Frame.INTRINSIC else about.order[::-1]
+            order = about.order if about.frame == AxesConvention.INTRINSIC else about.order[::-1]
             best = max(ORDERS, key=lambda each: float(nearest[each][i]))
             if nearest[best][i] <= nearest[order][i] + 1e-9:
                 best = order
@@ -117,6 +117,6 @@ def _row(motion: EulerMotion, node: int, times: Floats, distance: Floats, best: 
         float(spans[distance < NEAR].sum()),
         float(np.sqrt((1 + sine) / (1 - sine))),
         f"{about.order[0]} and {about.order[2]}" if about.order[0] != about.order[2] else f"both {about.order[0]}",
-        best if about.frame == Frame.INTRINSIC else best[::-1],
+        best if about.frame == AxesConvention.INTRINSIC else best[::-1],
         float(np.degrees(best_nearest)),
     )

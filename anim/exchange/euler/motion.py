@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.euler.curve import Curve
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
 ZERO = np.zeros(3)
 NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
@@ -33,7 +33,7 @@ class Convention:
     """How three angles make a rotation: one of 24 conventions, and the unit. See `anim.maths.euler`."""
 
     order: str
-    frame: Frame
+    frame: AxesConvention
     unit: Unit
 
     def __str__(self) -> str:
@@ -74,7 +74,7 @@ class EulerNode:
     parent: int
     translation: Floats
     order: str
-    frame: Frame
+    frame: AxesConvention
     angles: Floats
     rotation: tuple[Curve | None, ...]
     moves: Mapping[int, Curve] = field(default_factory=dict)

@@ -12,7 +12,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import NotFoundError, RangeError
 from anim.maths import euler
-from anim.maths.euler import ORDERS, Frame
+from anim.maths.euler import ORDERS, AxesConvention
 
 BEST = "auto"
 USUAL = "ZXY"  # what most recorders write
@@ -35,13 +35,13 @@ class Orders:
         """Whether all nodes have the same."""
         return not self.rules and self.otherwise != BEST
 
-    def of(self, name: str, q: Floats, frame: Frame = Frame.INTRINSIC) -> str:
+    def of(self, name: str, q: Floats, frame: AxesConvention = AxesConvention.INTRINSIC) -> str:
         """Return the order for a node and its rotations (..., 4)."""
         order = next((order for glob, order in self.rules if fnmatchcase(name, glob)), self.otherwise)
         if order != BEST:
             return order
         found = _best(q.reshape(-1, 4))
-        return found if frame == Frame.INTRINSIC else found[::-1]
+        return found if frame == AxesConvention.INTRINSIC else found[::-1]
 
     def check(self, names: Sequence[str]) -> None:
         """Raise NotFoundError for a rule that fits no name."""
@@ -72,6 +72,6 @@ def parse(text: str) -> Orders:
 
 def _best(q: Floats) -> str:
     """The intrinsic order farthest from lock; the usual one where others are no better."""
-    nearest = {order: float(euler.distance_to_lock(q, order=order).min()) for order in CANDIDATES}
+    nearest = {order: float(euler.gimbal_distance(q, order=order).min()) for order in CANDIDATES}
     best = max(CANDIDATES, key=lambda order: nearest[order])
     return USUAL if nearest[best] <= nearest[USUAL] + np.radians(1.0) else best

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, linear
 from anim.exchange.euler.motion import NO_TURN, ZERO, EulerMotion, EulerNode
@@ -15,9 +15,9 @@ from anim.exchange.euler.to_euler import FILE_LOCK
 from anim.exchange.formats.labels import label_of, labels, left_out, unique
 from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import euler, quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Clip, Skeleton
-from anim.sampling import pose, rest, world_matrices
+from anim.sampling import rest_pose, sample_pose, world_matrices
 
 EVEN = 1e-3  # share of a frame by which frames may be off an even grid
 MAX_FRAMES = 10_000_000
@@ -64,7 +64,7 @@ class _Figure:
     """The nodes to write, numbered in their order, and where they are at times (F,) and at rest."""
 
     def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
-        moving, still = pose(skeleton, clip, times), rest(skeleton)
+        moving, still = sample_pose(skeleton, clip, times), rest_pose(skeleton)
         self.skeleton, self.clip = skeleton, clip
         self.numbers = {node: i for i, node in enumerate(chosen)}
         self._places, self._home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
@@ -86,13 +86,13 @@ def _node(figure: _Figure, node: int, name: str, orders: Orders, shown: Floats, 
     moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * figure.size)
     end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
     order = orders.of(name, turn)
-    angles = euler.continuous(turn, order=order, frame=Frame.INTRINSIC, lock=FILE_LOCK)
+    angles = euler.unwrap(turn, order=order, frame=AxesConvention.INTRINSIC, lock=FILE_LOCK)
     return EulerNode(
         name,
         figure.numbers.get(parent, -1),
         offset / meters_per_unit,
         order,
-        Frame.INTRINSIC,
+        AxesConvention.INTRINSIC,
         np.zeros(3),
         (None, None, None) if end else tuple(_curves(shown, angles)),
         dict(enumerate(_curves(shown, path / meters_per_unit))) if moved else {},
@@ -110,7 +110,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     """Frame times (F,) on an even grid from 0, and where to sample the clip for them: at its keys where they meet."""
     start, end = clip.start, clip.end
     arrays = {id(track.times): track.times for track in clip.tracks}
-    keys: Floats = sorted_unique(np.concatenate([*arrays.values()])) if arrays else np.zeros(1)
+    keys: Floats = unique_sorted(np.concatenate([*arrays.values()])) if arrays else np.zeros(1)
     if fps is not None:
         if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
             raise RangeError(f"fps is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")

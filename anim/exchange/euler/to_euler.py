@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.errors import RangeError
 from anim.exchange.euler.curve import Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 from anim.exchange.euler.rotation_order import Orders
 from anim.exchange.formats.labels import label_of, labels, left_out
 from anim.maths import euler, quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Clip, Interpolation, Skeleton, Track
-from anim.sampling import grid
+from anim.sampling import frame_times
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
 
@@ -42,7 +42,7 @@ def to_euler(
     clip: Clip,
     *,
     order: str | Orders,
-    frame: Frame = Frame.INTRINSIC,
+    frame: AxesConvention = AxesConvention.INTRINSIC,
     fps: float | None = None,
     tolerance: float | None = None,
     without: Collection[int] = (),
@@ -59,7 +59,7 @@ def to_euler(
     orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
     if tolerance is not None and not 1e-6 <= tolerance < np.inf:
         raise RangeError(f"tolerance is {tolerance:g} rad (expected 1e-06 or more)")
-    frames = key_times(grid(clip.start, clip.end, fps=fps)) if fps is not None else None
+    frames = key_times(frame_times(clip.start, clip.end, fps=fps)) if fps is not None else None
     names = labels(skeleton)
     orders.check(names)
     by_node, lost = _by_node(clip, names)
@@ -75,7 +75,7 @@ class _Asked:
     """How curves shall be. frames: (F,) s, where their keys stand; None for the tracks' own. tolerance: rad."""
 
     orders: Orders
-    frame: Frame
+    frame: AxesConvention
     frames: Floats | None
     tolerance: float | None
 
@@ -125,7 +125,7 @@ def _renumbered(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...
 def _seen(track: Track) -> Floats:
     """Rotations at the keys and half way between."""
     halves = (track.times[1:] + track.times[:-1]) / 2
-    return sample(track, sorted_unique(np.concatenate((track.times, halves))))
+    return sample(track, unique_sorted(np.concatenate((track.times, halves))))
 
 
 def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...], float]:
@@ -133,7 +133,7 @@ def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...
     stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
     times = track.times if asked.frames is None or stepped else asked.frames
     for _ in range(ROUNDS):
-        angles = euler.continuous(sample(track, times), order=order, frame=frame, lock=FILE_LOCK)
+        angles = euler.unwrap(sample(track, times), order=order, frame=frame, lock=FILE_LOCK)
         if stepped or len(times) == 1:
             mode = Mode.STEP if stepped else Mode.LINEAR
             return _curves(times, angles, mode), 0.0
@@ -147,7 +147,7 @@ def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...
     return _curves(times, angles, Mode.LINEAR), float(errors.max())
 
 
-def _between(track: Track, times: Floats, angles: Floats, order: str, frame: Frame) -> Floats:
+def _between(track: Track, times: Floats, angles: Floats, order: str, frame: AxesConvention) -> Floats:
     """How far straight curves leave the motion in each piece (K − 1,), rad; 0 in a jump, where no float32 time lies."""
     u = BETWEEN[:, None]
     at = times[:-1] + (times[1:] - times[:-1]) * u

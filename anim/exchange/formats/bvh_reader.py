@@ -15,7 +15,7 @@ from anim.exchange.formats import bvh_frames, bvh_hierarchy, bvh_writer
 from anim.exchange.formats.bvh_hierarchy import BvhJoint
 from anim.exchange.formats.labels import unique
 from anim.exchange.formats.text import text_of
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
 
 class BvhPosition(StrEnum):
@@ -51,7 +51,7 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
     """Return the motion as a BVH, see `bvh_write`. Raises UnsupportedError for extrinsic angles: BVH has none."""
-    if convention.frame != Frame.INTRINSIC:
+    if convention.frame != AxesConvention.INTRINSIC:
         raise UnsupportedError("a BVH's angles are intrinsic", help="give --frame intrinsic; the order reads backwards")
     return bvh_writer.write(motion)
 
@@ -68,4 +68,6 @@ def _node(joint: BvhJoint, name: str, times: Floats, rows: Floats, position: Bvh
             at = "XYZ".index(axis)
             moves[at] = Curve(times, values + (offset[at] if position == BvhPosition.ADD else 0.0), modes)
     angles = np.zeros(len(order))
-    return EulerNode(name, joint.parent, offset, order, Frame.INTRINSIC, angles, tuple(rotation), moves, end=joint.end)
+    return EulerNode(
+        name, joint.parent, offset, order, AxesConvention.INTRINSIC, angles, tuple(rotation), moves, end=joint.end
+    )

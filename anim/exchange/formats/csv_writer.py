@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from anim.arrays import sorted_unique
+from anim.arrays import unique_sorted
 from anim.errors import UnsupportedError
 from anim.exchange.euler.convention import axis_names
 from anim.exchange.euler.curve import HANDLES, Curve, Mode
@@ -52,7 +52,7 @@ def _columns(node: EulerNode, convention: Convention) -> list[Column]:
 def _write_frames(rows: Any, columns: list[Column]) -> None:
     rows.writerow(["time", *(f"{node}.{channel}" for node, channel, _ in columns)])
     arrays = {id(curve.times): curve.times for _, _, curve in columns}
-    times = sorted_unique(np.concatenate([*arrays.values()])) if arrays else np.zeros(0)
+    times = unique_sorted(np.concatenate([*arrays.values()])) if arrays else np.zeros(0)
     cells = [[_text(time)] + [""] * len(columns) for time in times.tolist()]
     places = {key: np.searchsorted(times, axis).tolist() for key, axis in arrays.items()}
     for number, (_, _, curve) in enumerate(columns, 1):

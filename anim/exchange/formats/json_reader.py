@@ -50,7 +50,7 @@ from anim.exchange.formats.node_builder import MAX_UNIT, Draft, checked, finishe
 from anim.exchange.formats.text import LIMIT
 from anim.gltf.io import json_text
 from anim.maths import euler, quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
 __all__ = ["read", "write"]
 
@@ -139,7 +139,9 @@ def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivo
                 raise FormatError(f"{key} is zero (expected a unit quaternion)", where=where)
             turns[key] = quaternion.normalize(given)
         else:
-            turns[key] = euler.to_quaternion(given * convention.unit.radians, order="XYZ", frame=Frame.EXTRINSIC)
+            turns[key] = euler.to_quaternion(
+                given * convention.unit.radians, order="XYZ", frame=AxesConvention.EXTRINSIC
+            )
     offsets = {key: _numbers(node, key, (3,), np.zeros(3), where) for key in OFFSETS}
     return Pivots(**turns, **offsets)
 

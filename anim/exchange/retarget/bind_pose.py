@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, Skin, Track
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
 
 MIN_DISTANCE = 1e-3  # of the joints' size, by which a joint must be off its place when bound
 MIN_ANGLE = np.radians(1)
@@ -33,7 +33,7 @@ def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose
     that are no joints, and joints whose matrix has another scale than the others', keep their place in their parent.
     skins: by the node of the mesh, see `read.skins`.
     """
-    world = world_matrices(skeleton, rest(skeleton))[0]
+    world = world_matrices(skeleton, rest_pose(skeleton))[0]
     bound: dict[int, Floats] = {}
     for holder, skin in skins:
         for node, place in _bound(skeleton, world, (holder, skin), bound).items():

@@ -10,8 +10,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.model import Instance, Scene, Skeleton
-from anim.sampling import rest, world_matrices
+from anim.model import MeshInstance, Scene, Skeleton
+from anim.sampling import rest_pose, world_matrices
 
 LOWEST = 5.0  # percentile of a foot's lowest height that is taken for the ground under it
 DOWN = 0.03  # share of the height that the lowest foot may be above its ground while it is down
@@ -47,7 +47,7 @@ def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> 
     positions: (N, 3) of all nodes at rest. roles: (role, node), with a foot or toe among them (`has_feet`). Without
     skin there, the joints themselves.
     """
-    world = world_matrices(scene.skeleton, rest(scene.skeleton))[0]
+    world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
     below = {int(node) for node in at_or_below(scene.skeleton, {node for role, node in roles if role.endswith(FEET)})}
     nodes, points, lowest = list[int](), list[Floats](), [float(positions[sorted(below), 1].min())]
     for instance in scene.instances:
@@ -125,7 +125,7 @@ def _smoothed(times: Floats, values: Floats) -> Floats:
     return np.interp(times, grid[half : half + len(even)], even)
 
 
-def _placed(instance: Instance, world: Floats) -> tuple[Floats, Ints]:
+def _placed(instance: MeshInstance, world: Floats) -> tuple[Floats, Ints]:
     """Vertices (V, 3) of a skinned mesh at rest, and the node (V,) that holds each most."""
     assert instance.skin is not None
     mesh, skin = instance.mesh, instance.skin

@@ -12,7 +12,7 @@ from anim.exchange.retarget.apply import Onto
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, Track
-from anim.sampling import pose
+from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
 
@@ -36,8 +36,8 @@ def with_left_over(done: Onto, stay: Sequence[Track], skeleton: Skeleton) -> Cli
     if not below:
         return Clip(done.clip.name, (*done.clip.tracks, *stay))
     times = key_times(np.concatenate([track.times for track in done.clip.tracks]))
-    wanted = world_by_node(skeleton, pose(skeleton, done.clip, times))
-    world = world_by_node(skeleton, pose(skeleton, Clip("", (*stay, *done.clip.tracks)), times))
+    wanted = world_by_node(skeleton, sample_pose(skeleton, done.clip, times))
+    world = world_by_node(skeleton, sample_pose(skeleton, Clip("", (*stay, *done.clip.tracks)), times))
     tracks = {(track.node, track.path): track for track in done.clip.tracks}
     for node in below:
         parent = int(skeleton.parents[node])

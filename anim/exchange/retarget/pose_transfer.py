@@ -17,8 +17,8 @@ from anim.exchange.retarget.same_hierarchy import same_tree
 from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling import pose as posed
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
+from anim.sampling import sample_pose as posed
 from anim.sampling.pose import local_by_node, world_by_node
 
 FLAT = 1e-9  # of a unit cube's volume, below which a scale leaves nothing of an axis
@@ -69,7 +69,7 @@ class Transfer:
         of_source = world_by_node(self.source, motion)
         rotations = self._rotations(world_rotations(self.source, motion.rotation))
         scales = {b: self._scale(a, b, motion.scale[:, a]) for a, b in self.pairs.items()}
-        still = rest(self.target)
+        still = rest_pose(self.target)
         local = local_by_node(self.target, _with(still, len(times), rotations, scales))
         world = self._place(local, of_source, motion, lowered)
         return Followed(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, of_source, world)
@@ -154,8 +154,8 @@ def transfer(source: Skeleton, clip: Clip, target: Skeleton, matching: Matching,
     """
     if rest_at is not None and not clip.start <= rest_at <= clip.end:
         raise RangeError(f"rest at {rest_at:g} s (the motion runs from {clip.start:g} to {clip.end:.4g} s)")
-    still = rest(source) if rest_at is None else posed(source, clip, np.array([rest_at]))
-    of_source, at_rest = _rest_pose(source, still), _rest_pose(target, rest(target))
+    still = rest_pose(source) if rest_at is None else posed(source, clip, np.array([rest_at]))
+    of_source, at_rest = _rest_pose(source, still), _rest_pose(target, rest_pose(target))
     of_one_tree = not matching.unmatched and bool(same_tree(source, target, [*matching.pairs]))
     aligned = alignment(of_source, at_rest, matching, of_one_tree=of_one_tree)
     chosen = anchors(source, target, matching.pairs)
@@ -234,7 +234,7 @@ def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int,
 
 def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
     """Positions (N, 3) of the source's nodes at rest, standing on the floor."""
-    at_rest = world_matrices(source, rest(source))[0, :, :, 3]
+    at_rest = world_matrices(source, rest_pose(source))[0, :, :, 3]
     looks = np.linspace(clip.start, clip.end, LOOKS)
     heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
     return at_rest + raised(at_rest, target.positions, heights, top) * UP

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.euler import refinement
 from anim.exchange.euler.from_euler import Converted
@@ -19,7 +19,7 @@ from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.step_keys import is_held, just_before, linear, step, within
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Scene, Track
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
 
 LONGEST = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
 STILL = 1e-7  # rad, factor, and share of the target's size: what rounding leaves of no motion
@@ -101,7 +101,7 @@ def retarget(
     follow = transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
     size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
     knots, before = _times(source.clip)
-    times = sorted_unique(np.concatenate((knots, before)))
+    times = unique_sorted(np.concatenate((knots, before)))
     looked_at, lowered = times, np.zeros(len(times))
     if floor == Floor.CONTACT and not follow.aligned.alike and has_feet(matching.target_roles):
         looked_at = times if source.tolerance is None else _no_farther(times, CONTACT_STEP)
@@ -125,13 +125,13 @@ def _times(clip: Clip) -> tuple[Floats, Floats]:
     """All key times (T,), and float32 times just before those at which a step may jump."""
     arrays = {id(track.times): track.times for track in clip.tracks}
     steps = {id(t.times): just_before(t.times[1:]) for t in clip.tracks if t.interpolation is Interpolation.STEP}
-    return sorted_unique(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
+    return unique_sorted(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
 
 
 def _no_farther(times: Floats, step: float) -> Floats:
     """Times with others between them so that none is farther from the next than `step`."""
     grid = np.arange(times[0], times[-1], step)
-    return sorted_unique(np.concatenate((times, grid)))
+    return unique_sorted(np.concatenate((times, grid)))
 
 
 def _too_high(follow: Transfer, target: Scene, matching: Matching, times: Floats) -> Floats:
@@ -147,7 +147,7 @@ def _too_high(follow: Transfer, target: Scene, matching: Matching, times: Floats
 def _lengths(follow: Transfer) -> dict[int, float]:
     """Meters per unit of the space that each matched node of the target moves in, at rest."""
     skeleton = follow.target
-    world = world_matrices(skeleton, rest(skeleton))[0]
+    world = world_matrices(skeleton, rest_pose(skeleton))[0]
     lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
     return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
 

@@ -10,7 +10,7 @@ from anim.errors import AnimError, FormatError, RangeError, ShapeError
 from anim.gltf.document import Document, Json, items
 from anim.gltf.reading.accessors import FLOAT, Accessors
 from anim.gltf.validation import channel_targets
-from anim.model import Interpolation, Storage, Track
+from anim.model import AccessorFormat, Interpolation, Track
 from anim.model.track import WIDTHS
 
 INTERPOLATIONS = {name.value: name for name in Interpolation}
@@ -86,7 +86,7 @@ class Reader:
                 got = f"{about['type']} of {about['componentType']}"
                 raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
             try:
-                found = arrays.times(arrays.read_only(self._accessors.floats(index))[:, 0])
+                found = arrays.as_key_times(arrays.read_only(self._accessors.floats(index))[:, 0])
             except AnimError as error:
                 raise FormatError(error.problem, where=error.where, help=error.help) from None
             self._times[index] = found
@@ -123,5 +123,5 @@ def _check_rotations(keys: Floats) -> None:
 
 
 @cache
-def _storage(component_type: int, normalized: bool, element: str) -> Storage:
-    return Storage(component_type, normalized, element)
+def _storage(component_type: int, normalized: bool, element: str) -> AccessorFormat:
+    return AccessorFormat(component_type, normalized, element)

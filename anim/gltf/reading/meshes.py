@@ -12,7 +12,7 @@ from anim.gltf.document import Document, Json, items
 from anim.gltf.reading import draco
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.skin_weights import read_influences
-from anim.model import Mesh, Primitive
+from anim.model import Mesh, PrimitiveRange
 
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
 
@@ -85,7 +85,7 @@ class Meshes:
         about = primitive.get("targets", ())
         targets = self._displacements(about, "POSITION", len(positions))
         faces = self._faces(primitive, len(positions)) if faces is None else faces
-        part = Primitive(len(positions), len(faces), primitive.get("material", -1))
+        part = PrimitiveRange(len(positions), len(faces), primitive.get("material", -1))
         return Mesh(
             "",
             positions,
@@ -179,7 +179,7 @@ def _nothing(targets: int) -> Mesh:
     none = np.empty((0, 0))
     faces = np.empty((0, 3), np.int64)
     joints, positions = none.astype(np.int64), np.empty((0, 3))
-    displacements, part = np.empty((targets, 0, 3)), Primitive(0, 0)
+    displacements, part = np.empty((targets, 0, 3)), PrimitiveRange(0, 0)
     return Mesh(
         "", positions, faces, joints, none, displacements, np.zeros(targets), positions, None, (part,), np.empty((0, 4))
     )

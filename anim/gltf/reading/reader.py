@@ -13,7 +13,7 @@ from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import Meshes
 from anim.gltf.validation import hierarchy
-from anim.model import Clip, Instance, Scene, Skeleton, Skin
+from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin
 
 LISTED = 3  # clips that a message names
 
@@ -100,7 +100,7 @@ def scene(
             continue
         skin = skins[node["skin"]] if "skin" in node else None
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
-        instances.append(Instance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
+        instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
     return Scene(skeleton(document), tuple(instances))
 
 

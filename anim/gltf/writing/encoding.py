@@ -15,11 +15,14 @@ from anim.gltf.meshopt import storage
 from anim.gltf.meshopt.storage import Filtered
 from anim.gltf.reading.accessors import DTYPES, FLOAT, denormalized
 from anim.gltf.validation.buffer_layout import COMPONENTS
-from anim.model import Interpolation, Storage, Track
+from anim.model import AccessorFormat, Interpolation, Track
 
 ELEMENTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-DECODED = {"QUATERNION": Storage(5122, normalized=True), "EXPONENTIAL": Storage()}  # what a filter's codes become
+DECODED = {
+    "QUATERNION": AccessorFormat(5122, normalized=True),
+    "EXPONENTIAL": AccessorFormat(),
+}  # what a filter's codes become
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,7 @@ def values(track: Track, filtered: Filtered | None = None) -> Numbers:
     return Numbers(data, kind, element, normalized, filtered=filtered, key_size=key_size)
 
 
-def _stored(rows: Floats, storage: Storage) -> NDArray[Any]:
+def _stored(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
     if storage.component_type != FLOAT:
         integers = _integers(rows, np.dtype(DTYPES[storage.component_type]), storage.normalized)
         if integers is not None:

@@ -18,8 +18,8 @@ from anim.maths import matrix
 from anim.measure.compare import name_matching
 from anim.measure.error.point_groups import Carried
 from anim.measure.error.surface import Surface
-from anim.model import Instance, Scene, Skin
-from anim.sampling import rest
+from anim.model import MeshInstance, Scene, Skin
+from anim.sampling import rest_pose as rest
 from anim.sampling.pose import local_by_node
 
 AGREE = 0.01  # of a mesh's size: vertices that are farther apart than this are not the same ones
@@ -74,14 +74,14 @@ class _Pairing:
         rest_pose = rest(scene.skeleton)
         self._local = local_by_node(scene.skeleton, rest_pose)[:, 0]
 
-    def partner(self, number: int, instance: Instance) -> Instance | None:
+    def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
         """The instance of the other scene that has the same vertices: on the same node, of the same name, in order."""
         choices = [self._on_node.get(int(self.nodes[instance.node]))]
         choices.append(self._new[self._named[number]] if self._named[number] >= 0 else None)
         choices.append(self._new[number] if len(self._new) == len(self._named) else None)
         return next((each for each in choices if each is not None and _agree(instance, each)), None)
 
-    def carried(self, surface: Surface, instance: Instance, partner: Instance | None) -> Carried:
+    def carried(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Carried:
         """What carries an instance's surface in the other scene."""
         if instance.skin is None:
             found = self._rigid(surface, instance, partner)
@@ -99,7 +99,7 @@ class _Pairing:
         bind = np.array([matrix.multiply(local, bind) for (_, local), bind in zip(places, surface.bind, strict=True)])
         return Carried(joints, bind.reshape(-1, 3, 4), -1, surface.rest_weights)
 
-    def _rigid(self, surface: Surface, instance: Instance, partner: Instance | None) -> Carried:
+    def _rigid(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Carried:
         node = int(self.nodes[instance.node])
         there = partner or self._on_node.get(node)
         if there is None or there.skin is not None:
@@ -110,7 +110,7 @@ class _Pairing:
             return self._above(surface)
         return Carried(np.array([there.node]), space[None], -1, surface.rest_weights)
 
-    def _skinned(self, surface: Surface, skin: Skin, instance: Instance, partner: Instance | None) -> Carried:
+    def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Carried:
         """What carries a skinned surface: joints of the skin that has most of them, the others by their nodes."""
         plain = self.by_nodes(surface)
         skins = {id(each.skin): each.skin for each in self._new if each.skin is not None}
@@ -150,7 +150,7 @@ class _Pairing:
             node = int(self._scene.skeleton.parents[node])
         return (int(self.nodes[node]) if node >= 0 else -1), local
 
-    def _below(self, instance: Instance) -> Instance | None:
+    def _below(self, instance: MeshInstance) -> MeshInstance | None:
         """The only instance on a child of the node that stands for an instance's own: peers put meshes there."""
         node = int(self.nodes[instance.node])
         parents = self._other.skeleton.parents
@@ -158,7 +158,7 @@ class _Pairing:
         return children[0] if len(children) == 1 else None
 
 
-def _agree(old: Instance, new: Instance) -> bool:
+def _agree(old: MeshInstance, new: MeshInstance) -> bool:
     """Whether both have the same vertices in the same order, be it in another mesh space."""
     a, b = old.mesh.positions, new.mesh.positions
     if len(a) != len(b) or (old.skin is None) is not (new.skin is None):

@@ -13,7 +13,7 @@ from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import FPS, MotionError, Ruler, dense_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Scene
-from anim.sampling.players import pair
+from anim.sampling.players import parse_pair
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ def _compared(prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, p
     times = dense_times(before, after, fps=fps)
     look = ruler.look(before, after, times, player=player)
     error, bound = look.error, None
-    if len(set(pair(player))) == 1:
+    if len(set(parse_pair(player))) == 1:
         proof = prover.certified(before, after, times, {player: look})
         error, bound = proof.error, proof.bound
     found = statistics(ruler, before, after, times=times, player=player, fps=fps)

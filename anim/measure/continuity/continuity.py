@@ -19,7 +19,7 @@ from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.measure.continuity import knots
 from anim.measure.continuity.knots import FLOAT32, PAIR, Joints, lengths
-from anim.model import Clip, Interpolation, Kind, Skeleton, Track
+from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
 
 SAME = 1e-3  # of the track's RMS speed or acceleration, or rad between two directions; jumps below are none
 CLOSED = 1e-3  # of the track's range; a loop's end this near its start is meant to be the same
@@ -122,7 +122,7 @@ def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
         target=target or "",
         path=track.path,
         interpolation=str(track.interpolation),
-        unit="rad" if track.kind is Kind.ROTATION else UNITS.get(track.path, "1"),
+        unit="rad" if track.kind is ValueKind.ROTATION else UNITS.get(track.path, "1"),
         still=analysis.still,
         interior_keys=len(keys.times),
         jumps=count[Grade.JUMP],
@@ -177,7 +177,7 @@ class _Analysis:
         """The jumps at joints with their grades; values may differ by `allowed` and rounding."""
         speed = lengths(at.rates[1] - at.rates[0])
         acceleration = lengths(at.accelerations[1] - at.accelerations[0])
-        if self.track.kind is Kind.ROTATION:
+        if self.track.kind is ValueKind.ROTATION:
             value = quaternion.angle_between(*(quaternion.normalize(values) for values in at.values))
         else:
             value = lengths(at.values[1] - at.values[0])
@@ -228,7 +228,7 @@ class _Analysis:
 
     def _range(self) -> float:
         values = self.track.values
-        if self.track.kind is Kind.ROTATION:
+        if self.track.kind is ValueKind.ROTATION:
             unit = quaternion.normalize(values)
             return float(quaternion.angle_between(unit, unit[:1]).max())
         return float(lengths(values.max(axis=0) - values.min(axis=0)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import derivatives
 from anim.sampling.track import sample
 
@@ -87,7 +87,7 @@ def accelerations(track: Track, times: Floats, *, before: bool) -> Floats:
     Of rotations the angular acceleration along the node's own axes: ω = 2 vec(q* q′) / |q|², so
     ω′ = 2 vec(q* q″) / |q|² − 2 ω (q · q′) / |q|², since q′* q′ has no vector part.
     """
-    keys, rotation = track.times, track.kind is Kind.ROTATION
+    keys, rotation = track.times, track.kind is ValueKind.ROTATION
     result = np.zeros((len(times), 3 if rotation else track.values.shape[1]))
     if track.in_tangents is None or track.out_tangents is None:
         return result

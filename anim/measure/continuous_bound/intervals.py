@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints, sorted_unique
+from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.model import Clip
 
 LONG = 0.05  # s; longer gaps are split at all times looked at: how much a motion bends is bounded gap by gap
@@ -76,13 +76,13 @@ def gaps(times: Floats, *clips: Clip) -> Gaps:
     are between them.
     """
     axes = [axis for clip in clips for axis in clip.axes]
-    keys = sorted_unique(np.concatenate([times[:1], *axes, times[-1:]]))
+    keys = unique_sorted(np.concatenate([times[:1], *axes, times[-1:]]))
     keys = keys[(keys >= times[0]) & (keys <= times[-1])]
     lengths = np.diff(keys)
     if not len(lengths):
         return Gaps(keys)
     within = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(lengths) - 1)
-    return Gaps(sorted_unique(np.concatenate((keys, times[lengths[within] > LONG]))))
+    return Gaps(unique_sorted(np.concatenate((keys, times[lengths[within] > LONG]))))
 
 
 def placed(keys: Floats, where: Gaps) -> Placed:

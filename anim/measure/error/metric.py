@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.measure.compare.correspondence import Pairs, paired
 from anim.measure.error.displacement import longest
 from anim.measure.error.point_groups import Measured, Part, Posed
@@ -21,9 +21,9 @@ from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.shell_points import Shells, hidden
 from anim.measure.error.surface import diagonal, has_vertices, surfaces
 from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
-from anim.sampling.players import pair, played, sampler
-from anim.sampling.pose import Poses
-from anim.sampling.times import grid
+from anim.sampling.players import parse_pair, sampler, sampler_for
+from anim.sampling.pose import PoseSampler
+from anim.sampling.times import frame_times
 
 NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
 SLACK = 1.001  # a bound this close to what was found is as good as found
@@ -141,8 +141,8 @@ class Ruler:
         overlap: how many of a block's last times the next one starts with.
         """
         old, new = (
-            played(scene.skeleton, clip, player=name)
-            for scene, clip, name in zip((self.scene, self.other), (before, after), pair(player), strict=True)
+            sampler_for(scene.skeleton, clip, player=name)
+            for scene, clip, name in zip((self.scene, self.other), (before, after), parse_pair(player), strict=True)
         )
         for start in range(0, max(len(times) - overlap, 1), self.length):
             chosen = times[start : start + self.length + overlap]
@@ -168,7 +168,7 @@ class Ruler:
 
 
 def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> Posed:
-    poses = Poses(skeleton, clip)
+    poses = PoseSampler(skeleton, clip)
     each = [poses.sampled(sampler(player)).at(times) for player, times in asked]
     weights = {node: np.concatenate([one.weights[node] for one in each]) for node in each[0].weights}
     return Posed(
@@ -194,7 +194,7 @@ def check_times(*clips: Clip) -> Floats:
     axes = [times for clip in clips for times in clip.axes]
     if not axes:
         return np.zeros(1)
-    keys = sorted_unique(np.concatenate(axes))
+    keys = unique_sorted(np.concatenate(axes))
     return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
 
 
@@ -214,7 +214,7 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     before = [np.nextafter(times[1:], 0) for times in steps.values()]
     end = max((clip.end for clip in clips), default=0.0)
     keys = check_times(*clips)
-    frames = grid(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
+    frames = frame_times(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
     after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
     apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
-    return sorted_unique(np.concatenate((keys, frames[apart > SAME_MOMENT], *before)))
+    return unique_sorted(np.concatenate((keys, frames[apart > SAME_MOMENT], *before)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import Clip, Kind, Track
+from anim.model import Clip, Track, ValueKind
 from anim.sampling.track import sample
 
 
@@ -27,7 +27,7 @@ def pointer_error(before: Clip, after: Clip, times: Floats) -> tuple[float, str]
 
 def _relative_difference(old: Track, new: Track, times: Floats) -> float:
     a, b = sample(old, times), sample(new, times)
-    if old.kind is Kind.ROTATION:
+    if old.kind is ValueKind.ROTATION:
         return float(np.minimum(np.abs(a - b).max(axis=1), np.abs(a + b).max(axis=1)).max())
     extent = float((a.max(axis=0) - a.min(axis=0)).max())
     return float(np.abs(a - b).max()) / (extent or max(float(np.abs(a).max()), 1e-30))

@@ -9,7 +9,7 @@ from anim.measure.error.displacement import Field, Groups, Linear, Longest
 from anim.measure.error.point_groups import Posed
 from anim.measure.error.surface import Surface
 from anim.model import Skeleton
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
 
 ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # of the six points, along the node's own axes
 
@@ -62,7 +62,7 @@ class Shells:
 
 def shells(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
     """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
-    axes = world_matrices(skeleton, rest(skeleton))[0][nodes, :, :3]
+    axes = world_matrices(skeleton, rest_pose(skeleton))[0][nodes, :, :3]
     scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
     return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])
 

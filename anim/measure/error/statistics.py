@@ -13,7 +13,7 @@ from anim.measure.error.displacement import lengths, longest
 from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, Ruler, dense_times
 from anim.measure.error.shell_points import Shells
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 
 FRAMES = 64  # times that mean and p99 are taken over
 MOST = 4_000_000  # vertices times frames that they are taken over
@@ -78,7 +78,7 @@ def speed_error(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec"
 
     It is never less than the true one on that grid, and no more than 1 % above. time: the middle of the frame's step.
     """
-    times = grid(0.0, max(before.end, after.end), fps=fps)
+    times = frame_times(0.0, max(before.end, after.end), fps=fps)
     worst = Peak()
     for block in ruler.blocks(before, after, times, player=player, overlap=1):
         step = np.diff(block.times)

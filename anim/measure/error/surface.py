@@ -9,8 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.model import Instance, Scene
-from anim.sampling import rest, world_matrices
+from anim.model import MeshInstance, Scene
+from anim.sampling import rest_pose, world_matrices
 
 SHELL = 0.01  # half the edge of the cube around a node without vertices, as a share of the scene's diagonal
 
@@ -56,7 +56,7 @@ def diagonal(scene: Scene) -> float:
 
     Of the vertices, skinned and morphed; of the nodes where there are none.
     """
-    world = world_matrices(scene.skeleton, rest(scene.skeleton))[0]
+    world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
     meshes = [_of_instance(scene, i) for i in scene.instances if len(i.mesh.positions)]
     points = [placed(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [world[:, :, 3]]
     every = np.concatenate(points)
@@ -85,7 +85,7 @@ def skinned(surface: Surface, points: Floats, bound: Floats) -> Floats:
     return moved
 
 
-def _of_instance(scene: Scene, instance: Instance) -> Surface:
+def _of_instance(scene: Scene, instance: MeshInstance) -> Surface:
     mesh = instance.mesh
     name = mesh.name or scene.skeleton.names[instance.node] or f"node {instance.node}"
     if instance.skin is not None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Bools, sorted_unique
+from anim.arrays import Bools, unique_sorted
 from anim.errors import AnimError
 from anim.gltf.document import Document, items
 from anim.gltf.io.lenient import Broken
@@ -22,8 +22,8 @@ from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import Seam, SkinMotion
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
-from anim.model.scene import Instance
-from anim.sampling.joined import Joined, joined
+from anim.model.scene import MeshInstance
+from anim.sampling.joined import ConcatenatedTracks, concatenate
 
 
 def inspect(
@@ -49,7 +49,7 @@ def inspect(
     wanted = clips.keys() if chosen is None else chosen
     numbers = [i for i in wanted if i in clips and i not in lost_clips]
     looked_at = [clips[i] for i in numbers]
-    groups = joined([track for clip in looked_at for track in clip.tracks])
+    groups = concatenate([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
     ways = root_motion.travels(skeleton, looked_at, groups)
@@ -99,7 +99,7 @@ def inspect(
     )
 
 
-def _seams(skin: SkinMotion, clips: list[Clip], groups: list[Joined]) -> list[Seam]:
+def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]) -> list[Seam]:
     """The seams of whole clips, as `loop` measures them."""
     roots = (root_motion.traveling_root(skin.skeleton, clip) for clip in clips)
     parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
@@ -123,7 +123,7 @@ def _clip(
     start, end, axes = clip.start, clip.end, clip.axes
     counted = _with_end(clip, counted)
     stored_bytes = round(packed * cost.data)
-    estimated = frame_rate.estimate(sorted_unique(np.concatenate(axes))) if axes else None
+    estimated = frame_rate.estimate(unique_sorted(np.concatenate(axes))) if axes else None
     return ClipFacts(
         index=number,
         name=clip.name,
@@ -231,7 +231,7 @@ def _skin(number: int, document: Document, scene: Scene | None) -> SkinFacts:
     )
 
 
-def _useful(instances: list[Instance], joints: list[int], skeleton: Skeleton) -> set[int]:
+def _useful(instances: list[MeshInstance], joints: list[int], skeleton: Skeleton) -> set[int]:
     """Joints of a skin that carry a vertex, and those above them."""
     useful: set[int] = set()
     for instance in instances:

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.measure.loops.clip_ends import poses_of_clips
 from anim.model import Clip, Skeleton
-from anim.sampling.joined import Joined
+from anim.sampling.joined import ConcatenatedTracks
 from anim.sampling.pose import world_by_node
 
 ONWARD = 0.7
@@ -28,7 +28,9 @@ class Travel:
     speed: float
 
 
-def travels(skeleton: Skeleton, clips: Sequence[Clip], groups: Sequence[Joined] | None = None) -> list[Travel]:
+def travels(
+    skeleton: Skeleton, clips: Sequence[Clip], groups: Sequence[ConcatenatedTracks] | None = None
+) -> list[Travel]:
     """Return one Travel per clip; a clip without time between start and end has none.
 
     groups: the tracks of all clips, `joined`, for callers that have them.

@@ -10,8 +10,8 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.measure.inspect.redundant_keys import removable
-from anim.model import Interpolation, Kind, Skeleton, Track
-from anim.sampling.joined import Joined, joined
+from anim.model import Interpolation, Skeleton, Track, ValueKind
+from anim.sampling.joined import ConcatenatedTracks, concatenate
 
 FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two stored values are the same
 REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing
@@ -46,7 +46,7 @@ class TrackStats:
         return TrackStats(*(getattr(self, each.name)[part] for each in fields(self)))
 
 
-def stats(groups: Sequence[Joined], skeleton: Skeleton) -> TrackStats:
+def stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> TrackStats:
     """Return the facts about tracks that were `joined`, in the order that they had before."""
     result, masks = _all_stats(groups, skeleton)
     result.redundant[:] += np.array([mask.sum() for mask in masks], np.int64)
@@ -58,13 +58,13 @@ def removable_keys(tracks: Sequence[Track], skeleton: Skeleton) -> list[Bools]:
 
     (keys at 0, 1, 2 s with the values 0, 5, 10) → [False, True, False]
     """
-    return _all_stats(joined(tracks), skeleton)[1]
+    return _all_stats(concatenate(tracks), skeleton)[1]
 
 
 def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
     """Return how many keys of each track are rotations off unit length, beyond what their storage excuses."""
     found = [0] * len(tracks)
-    turning = [i for i, track in enumerate(tracks) if track.kind is Kind.ROTATION]
+    turning = [i for i, track in enumerate(tracks) if track.kind is ValueKind.ROTATION]
     if not turning:
         return found
     chosen = [tracks[i] for i in turning]
@@ -82,7 +82,7 @@ def _off_unit(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[int]
     return np.asarray(np.abs(lengths - 1) > np.repeat(np.where(bytes_only, UNIT_BYTE, UNIT), counts))
 
 
-def _all_stats(groups: Sequence[Joined], skeleton: Skeleton) -> tuple[TrackStats, list[Bools]]:
+def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tuple[TrackStats, list[Bools]]:
     """The facts, with redundant keys of constants only, and which keys of all other tracks are redundant."""
     count = sum(len(group.tracks) for group in groups)
     result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
@@ -94,10 +94,10 @@ def _all_stats(groups: Sequence[Joined], skeleton: Skeleton) -> tuple[TrackStats
     return result, removable([tracks[i] for i in range(count)], given)
 
 
-def _count(group: Joined, skeleton: Skeleton, result: TrackStats, given: dict[int, Bools]) -> None:
+def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, given: dict[int, Bools]) -> None:
     """Put the facts about a group into `result`, and which keys of tracks that move could go into `given`."""
     values = group.values
-    if group.kind is Kind.ROTATION:
+    if group.kind is ValueKind.ROTATION:
         values = _turns(group, result)
     constant = _same_values(group, values)
     result.constant[group.numbers] = constant
@@ -108,7 +108,7 @@ def _count(group: Joined, skeleton: Skeleton, result: TrackStats, given: dict[in
     given.update((number, masks[i]) for i, number in enumerate(group.numbers.tolist()) if not constant[i])
 
 
-def _turns(group: Joined, result: TrackStats) -> Floats:
+def _turns(group: ConcatenatedTracks, result: TrackStats) -> Floats:
     """The rotations (S, 4) at unit length, signs aligned within each track; what is counted goes into `result`."""
     lengths = np.sqrt(quaternion.dot(group.values, group.values))
     values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
@@ -125,7 +125,7 @@ def _turns(group: Joined, result: TrackStats) -> Floats:
     return values * np.cumprod(np.where(dots < 0, -1.0, 1.0))[:, None]
 
 
-def _same_values(group: Joined, values: Floats) -> Bools:
+def _same_values(group: ConcatenatedTracks, values: Floats) -> Bools:
     least, most = _extent(group, values)
     first = values[group.starts]
     off = np.maximum(most - first, first - least).max(axis=1)
@@ -138,19 +138,19 @@ def _same_values(group: Joined, values: Floats) -> Bools:
     return same
 
 
-def _at_rest(group: Joined, constant: Bools, skeleton: Skeleton) -> Bools:
+def _at_rest(group: ConcatenatedTracks, constant: Bools, skeleton: Skeleton) -> Bools:
     if group.path not in ("translation", "rotation", "scale"):
         return np.zeros(len(constant), np.bool_)
     nodes = [track.node if track.node is not None else -1 for track in group.tracks]
     resting: Floats = getattr(skeleton, group.path)[nodes]
     first = group.values[group.starts]
-    if group.kind is Kind.ROTATION:
+    if group.kind is ValueKind.ROTATION:
         first = first * np.where(quaternion.dot(first, resting) < 0, -1.0, 1.0)[:, None]
     near: Bools = np.abs(first - resting).max(axis=1) <= 1e-6 * (1 + np.abs(resting).max(axis=1))
     return constant & near
 
 
-def _redundant(group: Joined, values: Floats, constant: Bools) -> Bools:
+def _redundant(group: ConcatenatedTracks, values: Floats, constant: Bools) -> Bools:
     """Which keys (S,) inside a track that moves what is around them gives anyway."""
     of_track = np.repeat(np.arange(len(constant)), group.counts)
     inner = ~constant[of_track]
@@ -160,7 +160,7 @@ def _redundant(group: Joined, values: Floats, constant: Bools) -> Bools:
     return np.asarray(inner)
 
 
-def _given(group: Joined, values: Floats, of_track: Ints, at: Ints) -> Bools:
+def _given(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints) -> Bools:
     """For each of the keys `at` (A,), none at an end of its track, whether the keys next to it give it."""
     before, here, after = values[at - 1], values[at], values[at + 1]
     if group.interpolation is Interpolation.STEP:
@@ -171,7 +171,7 @@ def _given(group: Joined, values: Floats, of_track: Ints, at: Ints) -> Bools:
     u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
         return _given_by_cubic(group.tangents, values, at, u[:, None], duration[:, None], allowed)
-    if group.kind is not Kind.ROTATION:
+    if group.kind is not ValueKind.ROTATION:
         between = before + u[:, None] * (after - before)
         return np.asarray(_widest(here - between) <= allowed)
     same = _widest(here - quaternion.slerp(before, after, u)) <= allowed
@@ -179,7 +179,7 @@ def _given(group: Joined, values: Floats, of_track: Ints, at: Ints) -> Bools:
     return np.asarray(same & narrow & _same_lengths(group, of_track, at, u, allowed))
 
 
-def _same_lengths(group: Joined, of_track: Ints, at: Ints, u: Floats, allowed: Floats) -> Bools:
+def _same_lengths(group: ConcatenatedTracks, of_track: Ints, at: Ints, u: Floats, allowed: Floats) -> Bools:
     """Whether quaternions as stored are as long as between their neighbors, but for rounding to integers."""
     before, here, after = (np.sqrt(quaternion.dot(q, q)) for q in (group.values[at + k] for k in (-1, 0, 1)))
     steps = np.array([STEPS.get(track.storage.component_type, np.inf) for track in group.tracks])
@@ -198,17 +198,17 @@ def _given_by_cubic(
     return np.asarray((off <= allowed) & (bend <= 10 * allowed))
 
 
-def _sums(group: Joined, counted: Bools) -> Ints:
+def _sums(group: ConcatenatedTracks, counted: Bools) -> Ints:
     """How many keys of each track (T,) count."""
     return np.add.reduceat(counted, group.starts, dtype=np.int64)
 
 
-def _largest(group: Joined, sizes: Floats) -> Floats:
+def _largest(group: ConcatenatedTracks, sizes: Floats) -> Floats:
     """The largest number at any key of each track (T,)."""
     return np.maximum.reduceat(sizes, group.starts)
 
 
-def _extent(group: Joined, values: Floats) -> tuple[Floats, Floats]:
+def _extent(group: ConcatenatedTracks, values: Floats) -> tuple[Floats, Floats]:
     """The least and the greatest value (T, C) of each track."""
     return np.minimum.reduceat(values, group.starts), np.maximum.reduceat(values, group.starts)
 

@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.measure.continuity.knots import FLOAT32, PAIR
 from anim.measure.error import orientation_probes
 from anim.model import Clip, Interpolation, Pose, Skeleton
-from anim.sampling.joined import Joined, joined
+from anim.sampling.joined import ConcatenatedTracks, concatenate
 from anim.sampling.pose import world_by_node
 
 PARTS = ("translation", "rotation", "scale")
@@ -69,7 +69,9 @@ class AtEnds:
     weights: dict[int, Floats]
 
 
-def at_ends(skeleton: Skeleton, parts: Sequence[LoopRange], groups: Sequence[Joined] | None = None) -> list[AtEnds]:
+def at_ends(
+    skeleton: Skeleton, parts: Sequence[LoopRange], groups: Sequence[ConcatenatedTracks] | None = None
+) -> list[AtEnds]:
     """Return each range around its ends, the way of its root taken off.
 
     groups: the tracks of all their clips, `joined`, for callers that have them.
@@ -89,7 +91,7 @@ def poses_of_clips(
     times: Floats,
     *,
     held: Floats | None = None,
-    groups: Sequence[Joined] | None = None,
+    groups: Sequence[ConcatenatedTracks] | None = None,
 ) -> tuple[Pose, list[dict[int, Floats]]]:
     """Return clips at times of their own (clips, T), one after the other: one pose of clips × T frames; and the morph
     weights (T, M) of each, by node.
@@ -99,7 +101,7 @@ def poses_of_clips(
     parts = {name: np.tile(getattr(skeleton, name), (*times.shape, 1, 1)) for name in PARTS}
     weights: list[dict[int, Floats]] = [{} for _ in clips]
     clip_of_track: Ints = np.repeat(np.arange(len(clips)), [len(clip.tracks) for clip in clips])
-    for group in joined([track for clip in clips for track in clip.tracks]) if groups is None else groups:
+    for group in concatenate([track for clip in clips for track in clip.tracks]) if groups is None else groups:
         at = held if held is not None and group.interpolation is Interpolation.STEP else times
         clip = clip_of_track[group.numbers]
         if group.path in parts:

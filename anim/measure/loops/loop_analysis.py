@@ -7,12 +7,12 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import sorted_unique
+from anim.arrays import unique_sorted
 from anim.measure.inspect import frame_rate
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import JointGap, Seam, SkinMotion
 from anim.model import Clip, Scene
-from anim.sampling.pose import pose, world_by_node
+from anim.sampling.pose import sample_pose, world_by_node
 
 CLOSED = (1e-5, 1e-3)  # of the model's size: a seam below the first is rounding, one above the second is seen
 UNSEEN = 0.1  # of the usual motion per frame; between these two, a smaller seam is not seen
@@ -152,12 +152,12 @@ def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, 
 
 
 def _fps(clip: Clip) -> float:
-    found = frame_rate.estimate(sorted_unique(np.concatenate(clip.axes))) if clip.axes else None
+    found = frame_rate.estimate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
     return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
 
 
 def _travel(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> float:
     if root < 0:
         return 0.0
-    both = world_by_node(skin.skeleton, pose(skin.skeleton, clip, np.array([start, end])))[root, :, :, 3]
+    both = world_by_node(skin.skeleton, sample_pose(skin.skeleton, clip, np.array([start, end])))[root, :, :, 3]
     return float(np.linalg.norm(both[1] - both[0]))

@@ -16,8 +16,8 @@ from anim.measure.error.surface import Surface, has_vertices, morphed, skinned, 
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import AtEnds, LoopRange
 from anim.model import Clip, Pose, Scene
-from anim.sampling.joined import Joined
-from anim.sampling.pose import pose, rest, world_by_node
+from anim.sampling.joined import ConcatenatedTracks
+from anim.sampling.pose import rest_pose, sample_pose, world_by_node
 
 PARTS = ("translation", "rotation", "scale")
 STEPS = np.array([[-1.0, 1, 0], [0, -1, 1], [1, -2, 1]])  # of three frames: two moves, and how much they differ
@@ -67,7 +67,7 @@ class SkinMotion:
         self._scene = scene
         self.is_skin = has_vertices(scene)
         self._surfaces = surfaces(scene) if self.is_skin else []
-        self._rest_world = world_by_node(scene.skeleton, rest(scene.skeleton))
+        self._rest_world = world_by_node(scene.skeleton, rest_pose(scene.skeleton))
         self._lever = (
             orientation_probes.LEVER * orientation_probes.size(self._rest_world[..., 3]) if len(scene.skeleton) else 0.0
         )
@@ -98,7 +98,7 @@ class SkinMotion:
 
     def places(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
         """Return where the points that stick out are (P, F, 3) at times (F,), the way of node `root` taken off."""
-        world = world_by_node(self.skeleton, pose(self.skeleton, clip, times))
+        world = world_by_node(self.skeleton, sample_pose(self.skeleton, clip, times))
         clip_ends.take_off(self.skeleton, world, root)
         return self.points.places(world)
 
@@ -107,7 +107,7 @@ class SkinMotion:
         third, and how much these two moves differ: the largest of each, the way of node `root` taken off.
         """
         frames = times.shape[1]
-        poses = pose(self.skeleton, clip, times.reshape(-1))
+        poses = sample_pose(self.skeleton, clip, times.reshape(-1))
         world = world_by_node(self.skeleton, poses)
         clip_ends.take_off(self.skeleton, world, root)
         world = world.reshape(len(world), 3, frames, 3, 4)
@@ -132,7 +132,7 @@ class SkinMotion:
             most = np.maximum(most, np.sqrt((moved * moved).sum(axis=-1).max(axis=-1)))
         return np.asarray(most)
 
-    def seams(self, parts: Sequence[LoopRange], groups: Sequence[Joined] | None = None) -> list[Seam]:
+    def seams(self, parts: Sequence[LoopRange], groups: Sequence[ConcatenatedTracks] | None = None) -> list[Seam]:
         """Return how the end of each part meets its start, in pose and speed.
 
         groups: the tracks of all their clips, `joined`, for callers that have them.
@@ -184,7 +184,7 @@ class SkinMotion:
 
         The translation of `root` does not count. Morph weights count for the node of their mesh.
         """
-        both = pose(self.skeleton, clip, np.array([start, end]))
+        both = sample_pose(self.skeleton, clip, np.array([start, end]))
         nodes = self._moved_between(both, root)
         found = dict(zip(nodes.tolist(), self._carried(both, nodes, root), strict=True))
         rows = [JointGap(self._name(node), node, float(gap)) for node, gap in found.items()]
@@ -196,7 +196,7 @@ class SkinMotion:
     def moving(self, clip: Clip, start: float, end: float, frame: float, root: int = -1) -> set[int]:
         """Return the nodes that move in the first or in the last frame, and carry a point."""
         frames = (np.array([start, start + frame]), np.array([end - frame, end]))
-        found = [self._moved_between(pose(self.skeleton, clip, times), root) for times in frames]
+        found = [self._moved_between(sample_pose(self.skeleton, clip, times), root) for times in frames]
         return {node for node in np.concatenate(found).tolist() if self._carries(node)}
 
     def _name(self, node: int) -> str:

@@ -70,7 +70,7 @@ class Strains:
         local = self._local.copy()
         changing = self._changing
         local[changing] = matrix.from_trs(*(part[changing] for part in shown))
-        return matrix.chained(local, self._skeleton.parents, list(self._truth.levels))
+        return matrix.accumulate_world(local, self._skeleton.parents, list(self._truth.levels))
 
 
 def _longest(moved: Floats) -> Floats:

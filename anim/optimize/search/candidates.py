@@ -16,7 +16,7 @@ from anim.optimize.search.time_axes import Axis
 from anim.optimize.tracks import quantization
 from anim.optimize.tracks.loop_closure import close_ends
 from anim.optimize.tracks.quantization import Form, Stored
-from anim.sampling.track import Located, locate
+from anim.sampling.track import KeyInterval, find_interval
 
 MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
 
@@ -37,7 +37,7 @@ class Candidates:
         self._packing = packing
         self._paths = [PATHS.index(each.path) for each in truth.moving]
         self._closures = np.array([each.closure for each in truth.moving])
-        self._places: dict[bytes, Located] = {}
+        self._places: dict[bytes, KeyInterval] = {}
         self._fits: dict[bytes, Fit] = {}
         self._keys: dict[tuple[bytes, int], Floats] = {}
         self._made: dict[tuple[bytes, int, Form], Candidate] = {}
@@ -110,14 +110,14 @@ class Candidates:
             self._kept += fit.numbers
         return self._fits[name]
 
-    def _place(self, axis: Axis, name: bytes) -> Located:
+    def _place(self, axis: Axis, name: bytes) -> KeyInterval:
         if name not in self._places:
-            self._places[name] = locate(self._truth.grid[axis.keys], self._truth.at)
+            self._places[name] = find_interval(self._truth.grid[axis.keys], self._truth.at)
             self._kept += 4 * len(self._truth.at)
         return self._places[name]
 
 
-def _candidates(stored: Sequence[Stored], place: Located, *, rotations: bool) -> list[Candidate]:
+def _candidates(stored: Sequence[Stored], place: KeyInterval, *, rotations: bool) -> list[Candidate]:
     keys = np.stack([each.values for each in stored], axis=1)
     way = playback.along_arcs if rotations and len(keys) > 1 else playback.on_lines
     shown = way(keys, place)

@@ -16,7 +16,7 @@ from anim.model import Clip, Scene, Skeleton
 from anim.optimize.options import Bounds, Effort, Policy
 from anim.optimize.tracks import morph_weights
 from anim.optimize.tracks.quantization import Coding
-from anim.sampling.pose import rest, world_by_node
+from anim.sampling.pose import rest_pose, world_by_node
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ def setting(
     shells = set(np.flatnonzero(unseen & _moved(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
-    world = world_by_node(skeleton, rest(skeleton))[:, 0]
+    world = world_by_node(skeleton, rest_pose(skeleton))[:, 0]
     points = points_.of_scene(scene, shells, bounds.shell, extra)
     driven = sorted({track.node for clip in clips for track in clip.tracks if track.node is not None})
     places = points.places(world[:, None])[:, 0]

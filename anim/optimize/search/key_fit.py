@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.optimize.search import playback
-from anim.sampling.track import Located
+from anim.sampling.track import KeyInterval
 
 ENDS = 4.0  # weight of the first and the last moment: loops and cuts must still meet
 STEPS = 1  # Gauss-Newton steps for rotations
@@ -22,7 +22,7 @@ Solver: TypeAlias = Callable[[Floats], Floats]  # values (W, n) → keys (K, n)
 class Fit:
     """Least squares on one time axis, prepared once for all tracks that use it."""
 
-    def __init__(self, place: Located, keys: int) -> None:
+    def __init__(self, place: KeyInterval, keys: int) -> None:
         weights = np.ones(len(place.u))
         weights[0] = weights[-1] = ENDS
         self._place = place
@@ -49,7 +49,7 @@ class Fit:
         return keys
 
 
-def _dense(place: Located, keys: int, weights: Floats) -> Solver:
+def _dense(place: KeyInterval, keys: int, weights: Floats) -> Solver:
     """One small matrix for all there is to do."""
     hats = np.zeros((len(weights), keys))
     every = np.arange(len(weights))
@@ -60,7 +60,7 @@ def _dense(place: Located, keys: int, weights: Floats) -> Solver:
     return lambda values: np.asarray(solve @ values)
 
 
-def _banded(place: Located, keys: int, weights: Floats) -> Solver:
+def _banded(place: KeyInterval, keys: int, weights: Floats) -> Solver:
     """The same in time and memory that grow with the number of keys, not with its square: hats meet only neighbors."""
     from scipy.linalg import solveh_banded
     from scipy.sparse import csr_array

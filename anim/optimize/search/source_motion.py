@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints, sorted_unique
+from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.maths import quaternion
 from anim.measure.error.point_matrix import Points, stacked
 from anim.model import Clip, Interpolation, Skeleton, Track
@@ -16,8 +16,8 @@ from anim.optimize.options import Reference
 from anim.optimize.search import playback
 from anim.optimize.search.world_matrices import needed_levels, worlds
 from anim.optimize.tracks.loop_closure import closure_sign
-from anim.sampling import pose, times
-from anim.sampling.track import locate
+from anim.sampling import sample_pose, times
+from anim.sampling.track import find_interval
 
 CUBIC_STEP = 1 / 60  # s; a spline is looked at this often, and CUBIC_PIECES times a piece at least
 CUBIC_PIECES = 8
@@ -131,7 +131,7 @@ def moments(grid: Floats, tracks: Sequence[Track]) -> Floats:
     jumps = [track.times for track in tracks if track.interpolation is Interpolation.STEP]
     jumps = [axis[(axis > grid[0]) & (axis < grid[-1])] for axis in jumps]
     before = [np.nextafter(axis, -np.inf) for axis in jumps]
-    return sorted_unique(np.concatenate([grid, (grid[1:] + grid[:-1]) / 2, *jumps, *before]))
+    return unique_sorted(np.concatenate([grid, (grid[1:] + grid[:-1]) / 2, *jumps, *before]))
 
 
 def _on_splines(axis: Floats) -> Floats:
@@ -141,7 +141,7 @@ def _on_splines(axis: Floats) -> Floats:
 
 
 def _local(skeleton: Skeleton, clip: Clip, at: Floats) -> tuple[Floats, Floats, Floats]:
-    shown = pose(skeleton, clip, at)
+    shown = sample_pose(skeleton, clip, at)
     rotation = quaternion.align_signs(shown.rotation)
     parts = (np.ascontiguousarray(np.swapaxes(part, 0, 1)) for part in (shown.translation, rotation, shown.scale))
     translation, rotation, scale = parts
@@ -154,7 +154,7 @@ def _by_chords(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> 
     for track in clip.tracks:
         if track.path == "rotation" and track.interpolation is Interpolation.LINEAR and track.node is not None:
             keys = quaternion.normalize(track.values)[:, None]
-            rotation[track.node] = playback.along_chords(keys, locate(track.times, at))[:, 0]
+            rotation[track.node] = playback.along_chords(keys, find_interval(track.times, at))[:, 0]
     return local[0], rotation, local[2]
 
 

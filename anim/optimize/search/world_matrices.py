@@ -24,7 +24,7 @@ def needed_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
 def worlds(skeleton: Skeleton, local: Sequence[Floats], levels: Sequence[Ints]) -> Floats:
     """Return world matrices (N, F, 3, 4) from translation, rotation and scale (N, F, ·); rotations as they are, unit or
     not. Nodes outside `levels` hold no meaning."""
-    return matrix.chained(local_matrices(skeleton, local), skeleton.parents, list(levels))
+    return matrix.accumulate_world(local_matrices(skeleton, local), skeleton.parents, list(levels))
 
 
 def local_matrices(skeleton: Skeleton, local: Sequence[Floats]) -> Floats:

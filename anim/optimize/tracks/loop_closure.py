@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.model import Clip, Kind, Track
+from anim.model import Clip, Track, ValueKind
 
 
 def closure_sign(values: Floats, tolerance: float) -> float:
@@ -51,4 +51,4 @@ def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:
 def _is_closed(track: Track) -> bool:
     """Whether the first and the last value, which are held to the clip's ends, are equal to the bit; q and −q are."""
     first, last = track.values[[0, -1]].tolist()  # numpy takes longer for so few numbers
-    return bool(first == last or (track.kind is Kind.ROTATION and first == [-each for each in last]))
+    return bool(first == last or (track.kind is ValueKind.ROTATION and first == [-each for each in last]))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools
-from anim.model import FLOAT32, Interpolation, Storage, Track
+from anim.model import FLOAT32, AccessorFormat, Interpolation, Track
 
-INT16 = Storage(5122, normalized=True)
+INT16 = AccessorFormat(5122, normalized=True)
 UNIT = 1e-12  # off the length 1: nothing, in float64
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.error.surface import Surface
-from anim.model import Interpolation, Storage, Track
+from anim.model import AccessorFormat, Interpolation, Track
 from anim.optimize.options import Packing
 from anim.optimize.tracks import quantization
 from anim.optimize.tracks.quantization import Stored
@@ -18,7 +18,7 @@ from anim.sampling.track import sample
 OF_KEYS = 0.6  # share of the bound that leaving out keys may use
 OF_STORING = 0.35  # share that storing may use
 FEW = 8  # keys up to which meshopt's filter, 4 bytes a weight before its codec, is not better than integers
-FORMS = (Storage(5121, normalized=True), Storage(5123, normalized=True))
+FORMS = (AccessorFormat(5121, normalized=True), AccessorFormat(5123, normalized=True))
 LARGEST = {5121: 255.0, 5123: 65535.0}
 
 
@@ -90,7 +90,7 @@ def _off(difference: Floats, reach: Floats) -> float:
     return float((np.abs(difference) @ reach).max(initial=0.0))
 
 
-def _stored(keys: Floats, reach: Floats, bound: float, packing: Packing) -> tuple[Floats, Storage, Stored]:
+def _stored(keys: Floats, reach: Floats, bound: float, packing: Packing) -> tuple[Floats, AccessorFormat, Stored]:
     largest = float(reach.sum(axis=0).max(initial=0.0))  # m, where all weights are off by 1
     if packing is Packing.CORE or len(keys) <= FEW:
         for form in FORMS:
@@ -99,6 +99,6 @@ def _stored(keys: Floats, reach: Floats, bound: float, packing: Packing) -> tupl
                 rounded = np.rint(keys * scale) / scale
                 return rounded, form, Stored(rounded, "integers")
         exact = keys.astype(np.float32).astype(np.float64)
-        return exact, Storage(), Stored(exact, "float32")
+        return exact, AccessorFormat(), Stored(exact, "float32")
     found = quantization.stored(keys, quantization.form(keys, "weights", bound / max(largest, 1e-30), packing))
-    return found.values, Storage(), found
+    return found.values, AccessorFormat(), found

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 from anim.optimize.tracks.key_reduction import needed
 from anim.optimize.tracks.lossless import lossless
 from anim.sampling.track import sample
@@ -20,9 +20,9 @@ def thinned(track: Track, bound: float) -> Track:
     Only lines are thinned; jumps and splines keep every key that changes something.
     """
     extent = float(np.ptp(track.values, axis=0).max(initial=0.0))
-    if bound <= 0 or extent == 0 or track.interpolation is not Interpolation.LINEAR or track.kind is Kind.DISCRETE:
+    if bound <= 0 or extent == 0 or track.interpolation is not Interpolation.LINEAR or track.kind is ValueKind.DISCRETE:
         return lossless(track)
-    if track.kind is Kind.ROTATION:
+    if track.kind is ValueKind.ROTATION:
         extent = 1.0
     scaled = sample(track, track.times) / (MARGIN * bound * extent)
     keep = needed(scaled[None], track.times)[0]

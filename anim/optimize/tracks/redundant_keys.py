@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, times
+from anim.arrays import Bools, Floats, as_key_times
 from anim.measure.inspect.track_statistics import removable_keys
 from anim.model import Clip, Skeleton, Track
 from anim.optimize.request import Request
@@ -52,7 +52,7 @@ def _without_redundant(pairs: Sequence[tuple[Track, Stored]], skeleton: Skeleton
 
 def _with_shared_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
     """The tracks with equal times in one array, as one accessor of the file holds them."""
-    shared = [axes.setdefault(track.times.tobytes(), times(track.times)) for track in tracks]
+    shared = [axes.setdefault(track.times.tobytes(), as_key_times(track.times)) for track in tracks]
     return [
         track if track.times is axis else replace(track, times=axis) for track, axis in zip(tracks, shared, strict=True)
     ]

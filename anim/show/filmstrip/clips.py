@@ -14,8 +14,8 @@ from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import sticks
 from anim.gltf.document import Document, items
 from anim.gltf.reading import reader
-from anim.model import Clip, Instance, Mesh, Scene, Skeleton, VertexCache
-from anim.sampling import grid
+from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
+from anim.sampling import frame_times
 from anim.show.filmstrip import heat_map, palette, root_path
 from anim.show.filmstrip.filmstrip import MOST_POINTS, Extent, Row
 from anim.show.filmstrip.ground import ground_height
@@ -67,7 +67,7 @@ class When:
             return at[(at >= start - SAME) & (at <= end + SAME)]
         first, last = self.span(start, end)
         if self.fps is not None and self.count is None:
-            found = grid(first, last, fps=self.fps)
+            found = frame_times(first, last, fps=self.fps)
             if len(found) > MOST_FRAMES:
                 raise RangeError(f"{len(found)} frames are too many for a picture (limit {MOST_FRAMES})")
             return found
@@ -199,7 +199,7 @@ def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
     mesh, skin = sticks(scene.skeleton, _ends(scene.skeleton))
     if not len(mesh.positions):
         raise NotFoundError("has neither a mesh nor joints to draw")
-    return Scene(scene.skeleton, (Instance(0, _thicker(mesh), skin, np.zeros(0)),))
+    return Scene(scene.skeleton, (MeshInstance(0, _thicker(mesh), skin, np.zeros(0)),))
 
 
 def _thicker(mesh: Mesh) -> Mesh:

@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.curves.easing.function import Easing
-from anim.curves.fitting.easing_fit import cubic_pieces
+from anim.curves.fitting.easing_fit import fit_segments
 from anim.errors import RangeError
 from anim.show.plots.figure import (
     ACCENT,
@@ -187,4 +187,4 @@ def _in_gltf(easing: Easing) -> str:
         return "exact as STEP keys"
     if easing.exact is not None:
         return f"exact as {len(easing.exact)} cubic{'s' if len(easing.exact) > 1 else ''}"
-    return f"{len(cubic_pieces(easing, tolerance=TOLERANCE))} cubics within 0.1 %"
+    return f"{len(fit_segments(easing, tolerance=TOLERANCE))} cubics within 0.1 %"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 from anim.show.plots import polylines
 from anim.show.plots.figure import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, short, spread
 from anim.show.plots.polylines import Line
@@ -33,7 +33,7 @@ UNITS = ((1e6, "µm", 1e-4), (1e3, "mm", 5e-2))  # factor, name, and the length 
 def kinds(each: Shown) -> list[str]:
     """Return what a track is drawn as, from top to bottom: names of DRAW."""
     names = ["value"]
-    if each.track.kind is Kind.ROTATION:
+    if each.track.kind is ValueKind.ROTATION:
         names.append("angle" if each.view in (FROM_REST, COMPONENTS) else "lock")
     if any(np.nan_to_num(polylines.speed_line(track).values).any() for track in _tracks(each)):
         names.append("speed")
@@ -121,7 +121,7 @@ def _speed(axes: Axes, each: Shown) -> str:
     found = [polylines.speed_line(track) for track in _tracks(each)]
     factor, unit = _unit(each, max(float(np.nanmax(line.values)) for line in found if len(line.times)))
     _single(axes, found, factor, SPEED)
-    if each.track.kind is Kind.ROTATION:
+    if each.track.kind is ValueKind.ROTATION:
         return "turning speed, °/s"
     return f"speed, {unit}/s" if unit else "speed, per second"
 
@@ -199,12 +199,12 @@ def _origin(each: Shown, curve: Curve) -> Floats:
     values = curve.keys
     width = float(np.ptp(values, axis=0).max())
     far = values.shape[1] <= COLORED and float(values.max() - values.min()) > FAR * width > 0
-    return values[0] if far and each.track.kind is not Kind.ROTATION else np.zeros(values.shape[1])
+    return values[0] if far and each.track.kind is not ValueKind.ROTATION else np.zeros(values.shape[1])
 
 
 def _unit(each: Shown, most: float) -> tuple[float, str]:
     """Factor and name of the unit in which values up to `most` are easy to read."""
-    if each.track.kind is Kind.ROTATION:
+    if each.track.kind is ValueKind.ROTATION:
         return DEGREES, "°"
     if each.track.path != "translation":
         return 1.0, ""

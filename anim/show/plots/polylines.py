@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, sorted_unique
+from anim.arrays import Bools, Floats, unique_sorted
 from anim.maths import quaternion
 from anim.measure.continuity.knots import FLOAT32, PAIR, lengths
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import derivatives
 from anim.sampling.track import sample
 
@@ -29,7 +29,7 @@ def value_line(track: Track) -> Line:
     """Return the values of a track; STEP breaks at every key."""
     if track.interpolation is Interpolation.STEP:
         return _holds(track)
-    if track.interpolation is Interpolation.LINEAR and track.kind is not Kind.ROTATION:
+    if track.interpolation is Interpolation.LINEAR and track.kind is not ValueKind.ROTATION:
         return Line(track.times, track.values)
     times = _points(track, pieces_only=False)[0].reshape(-1)
     return Line(times, sample(track, times))
@@ -74,9 +74,9 @@ def difference_line(track: Track, other: Track) -> Line:
     """Return how far two tracks of one target are apart (P, 1), rad for rotations, over the time of both."""
     start, end = min(track.times[0], other.times[0]), max(track.times[-1], other.times[-1])
     keys = np.concatenate((track.times, other.times, np.linspace(start, end, POINTS)))
-    times = sorted_unique(keys)
+    times = unique_sorted(keys)
     a, b = sample(track, times), sample(other, times)
-    off = quaternion.angle_between(a, b) if track.kind is Kind.ROTATION else lengths(a - b)
+    off = quaternion.angle_between(a, b) if track.kind is ValueKind.ROTATION else lengths(a - b)
     return Line(times, off[:, None])
 
 
@@ -97,7 +97,7 @@ def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
     steps = np.diff(track.times)
     real = np.asarray(steps > PAIR + 2 * FLOAT32 * track.times[1:])
     chosen = np.flatnonzero(real) if pieces_only else np.arange(len(steps))
-    straight = track.interpolation is Interpolation.LINEAR and (pieces_only or track.kind is not Kind.ROTATION)
+    straight = track.interpolation is Interpolation.LINEAR and (pieces_only or track.kind is not ValueKind.ROTATION)
     count = LEAST if straight else int(np.clip(POINTS // max(len(chosen), 1), 4, MOST))
     shares = np.linspace(0, 1, count)
     times = track.times[chosen][:, None] + steps[chosen][:, None] * shares

@@ -48,7 +48,7 @@ def degrees(q: Floats, *, view: str, rest: Floats) -> Floats:
     unit = quaternion.normalize(q)
     if view == FROM_REST:
         return _continuous(quaternion.multiply(quaternion.conjugate(rest), unit))
-    return np.degrees(euler.continuous(unit, order=view, lock=FLOAT32))
+    return np.degrees(euler.unwrap(unit, order=view, lock=FLOAT32))
 
 
 def lock_line(track: Track, *, order: str) -> Line:
@@ -59,9 +59,9 @@ def lock_line(track: Track, *, order: str) -> Line:
         line = polylines.value_line(track)
         held = np.isnan(line.values[:, 0])
         q = quaternion.normalize(np.where(held[:, None], track.values[:1], line.values))
-        return Line(line.times, np.where(held, np.nan, euler.distance_to_lock(q, order=order))[:, None])
+        return Line(line.times, np.where(held, np.nan, euler.gimbal_distance(q, order=order))[:, None])
     q = quaternion.normalize(sample(track, times))
-    return Line(times, euler.distance_to_lock(q, order=order)[:, None])
+    return Line(times, euler.gimbal_distance(q, order=order)[:, None])
 
 
 def _continuous(q: Floats) -> Floats:

@@ -47,7 +47,7 @@ def through(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, kind: 
     """
     if not 0 < len(rules) <= LIMIT:
         raise RangeError(f"{len(rules)} tangent rules are to be drawn (expected 1 to {LIMIT})")
-    t, v = arrays.times(times), arrays.floats(values, "K", name="values")
+    t, v = arrays.as_key_times(times), arrays.as_floats(values, "K", name="values")
     if len(t) != len(v) or len(v) < 2:
         raise ShapeError(f"{len(v)} values for {len(t)} times (expected as many, and at least two)")
     curves = [_curve(t, v, rule) for rule in rules]
@@ -124,7 +124,7 @@ def _track(times: Floats, values: Floats, name: str) -> tuple[Track, float]:
     column = values[:, None]
     if name in WITHOUT_RULE:
         return Track(0, "weights", WITHOUT_RULE[name], times, column), 0.0
-    keys = table.spline_keys(times, column, table.parse(name))
+    keys = table.apply_tangents(times, column, table.parse(name))
     cubic = Interpolation.CUBICSPLINE
     return Track(0, "weights", cubic, times, keys.values, keys.in_tangents, keys.out_tangents), keys.departure
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from anim.arrays import Floats, sorted_unique
+from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError
 from anim.gltf.document import Document, items
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.inspect import frame_rate
-from anim.model import Clip, Interpolation, Kind, Skeleton, Track
+from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
 from anim.ops.selection import Selection
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
 
@@ -49,7 +49,7 @@ class Shown:
     @property
     def is_in_degrees(self) -> bool:
         """Whether a rotation is drawn as angles, not as the components of its quaternion."""
-        return self.track.kind is Kind.ROTATION and self.view != COMPONENTS
+        return self.track.kind is ValueKind.ROTATION and self.view != COMPONENTS
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -74,7 +74,7 @@ def choose(document: Document, selection: Selection, *, limit: int, view: str = 
     """
     found = _selected(document, selection, view)
     if view not in (FROM_REST, COMPONENTS):
-        found = [each for each in found if each.track.kind is Kind.ROTATION]
+        found = [each for each in found if each.track.kind is ValueKind.ROTATION]
     if not found:
         raise NotFoundError("no track is selected", help="gltf-anim inspect IN --tracks lists them")
     moving = [each for each in found if _moves(each.track)] or found
@@ -103,7 +103,7 @@ def _with(each: Shown, partner: Shown | None) -> Shown:
     if partner is None or partner.track.values.shape[1] != each.track.values.shape[1]:
         return each
     track = partner.track
-    if track.kind is Kind.ROTATION and quaternion.dot(track.values[0], each.track.values[0]) < 0:
+    if track.kind is ValueKind.ROTATION and quaternion.dot(track.values[0], each.track.values[0]) < 0:
         track = _scaled(track, np.full((len(track.times), 1), -1.0))
     return replace(
         each, other=track, start=min(each.start, partner.start), end=max(each.end, partner.end), fps=each.fps
@@ -131,7 +131,7 @@ def _aligned(track: Track) -> Track:
 
     CUBICSPLINE stays: there a sign is part of the way.
     """
-    if track.kind is not Kind.ROTATION or track.interpolation is Interpolation.CUBICSPLINE:
+    if track.kind is not ValueKind.ROTATION or track.interpolation is Interpolation.CUBICSPLINE:
         return track
     signs = np.where(quaternion.dot(quaternion.align_signs(track.values), track.values) < 0, -1.0, 1.0)
     return track if (signs > 0).all() else _scaled(track, signs[:, None])
@@ -144,7 +144,7 @@ def _scaled(track: Track, signs: Floats) -> Track:
 
 
 def _rate(clip: Clip) -> float | None:
-    estimated = frame_rate.estimate(sorted_unique(np.concatenate(clip.axes))) if clip.axes else None
+    estimated = frame_rate.estimate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
     if estimated is None or estimated.regular < REGULAR or estimated.fps < SLOWEST:
         return None
     return estimated.fps
@@ -158,7 +158,7 @@ def _target(track: Track, skeleton: Skeleton) -> str:
 
 def _labels(track: Track, targets: Mapping[str, Sequence[str]], view: str) -> tuple[str, ...]:
     count = track.values.shape[1]
-    if track.kind is Kind.ROTATION and view != COMPONENTS:
+    if track.kind is ValueKind.ROTATION and view != COMPONENTS:
         return tuple("xyz") if view == FROM_REST else _euler_labels(view)
     if named := _weight_names(track, targets):
         return named
@@ -228,7 +228,7 @@ def _shortened(names: Sequence[str]) -> tuple[str, ...]:
 def _moves(track: Track) -> bool:
     values = track.values
     tangents = (track.in_tangents, track.out_tangents)
-    tolerance = STILL * (1 if track.kind is Kind.ROTATION else max(float(np.abs(values).max()), 1e-30))
+    tolerance = STILL * (1 if track.kind is ValueKind.ROTATION else max(float(np.abs(values).max()), 1e-30))
     return bool((np.abs(values - values[0]) > tolerance).any()) or any(
         each is not None and len(values) > 1 and bool(np.abs(each).max() > tolerance) for each in tangents
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
-from anim.model import Chunk, Clip, Skeleton
+from anim.model import Clip, FrameChunk, Skeleton
 from anim.skinning.analysis.enclosed_volume import closed_faces, volumes
 from anim.skinning.analysis.method_deviation import farthest, model_size
 from anim.skinning.bake import Baker
@@ -99,7 +99,7 @@ class _Seen:
         self._when = np.zeros(len(of.watched), np.int64)
         self._off = np.zeros(frames)
 
-    def add(self, chunk: Chunk, linear: Chunk, frames: Frames) -> None:
+    def add(self, chunk: FrameChunk, linear: FrameChunk, frames: Frames) -> None:
         """Look at some frames. linear: the same frames by linear blending."""
         of, rig = self._of, self._of.layer.rig
         matrices = of.layer.matrices(frames, slice(None))

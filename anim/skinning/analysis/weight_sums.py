@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from anim.model import Instance
+from anim.model import MeshInstance
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class BadSums:
             yield f"{start} {_vertices(self.none)} are all 0; they follow the first joint listed, as in three.js"
 
 
-def bad_sums(instances: Iterable[Instance]) -> list[BadSums]:
+def bad_sums(instances: Iterable[MeshInstance]) -> list[BadSums]:
     """Return the skinned meshes with vertices whose weights don't add up to 1, each mesh once.
 
     Sums that only rounding moved off 1 don't count: 8 bits leave up to 4/255 of four weights.

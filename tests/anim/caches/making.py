@@ -12,10 +12,10 @@ from anim.arrays import AnyArray
 from anim.caches.options import Reading, Writing, Written
 from anim.caches.registry import reader_for, writer_for
 from anim.caches.storage import Memory
-from anim.model import Chunk, Part, VertexCache
+from anim.model import FrameChunk, MeshPart, VertexCache
 
 FACES = np.array([[0, 1, 2], [2, 1, 3], [4, 6, 5], [5, 6, 7]])
-PARTS = (Part("one", (0, 4), (0, 2), 3, 0), Part("two", (4, 9), (2, 4), 5, 1))
+PARTS = (MeshPart("one", (0, 4), (0, 2), 3, 0), MeshPart("two", (4, 9), (2, 4), 5, 1))
 
 
 def cache(
@@ -37,7 +37,7 @@ def cache(
         9,
         FACES,
         lambda: (
-            Chunk(
+            FrameChunk(
                 f,
                 positions[f : f + step],
                 turns[f : f + step] if normals else None,
@@ -59,7 +59,7 @@ def smooth(frames: int = 40, vertices: int = 60) -> VertexCache:
     t = np.linspace(0, 2 * np.pi, frames)[:, None, None]
     positions = (a + 0.3 * np.sin(t) * b + 0.2 * np.cos(t) * c).astype(np.float32)
     faces = np.arange(vertices).reshape(-1, 3)
-    return VertexCache(np.arange(frames) / 24, vertices, faces, lambda: iter((Chunk(0, positions),)))
+    return VertexCache(np.arange(frames) / 24, vertices, faces, lambda: iter((FrameChunk(0, positions),)))
 
 
 def written(cache: VertexCache, name: str, writing: Writing | None = None) -> tuple[Memory, Written]:

@@ -16,7 +16,7 @@ from anim.caches.registry import reader_for, writer_for
 from anim.caches.storage import Memory
 from anim.caches.transforms.resample import at_rate
 from anim.caches.transforms.up_axis import turned
-from anim.model import Chunk, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 FRAMES, VERTICES = 1200, 4000
 WHOLE = 12 * FRAMES * VERTICES  # 57.6 MB
@@ -52,9 +52,9 @@ class Sink:
         return self.files[name]  # type: ignore[return-value]
 
 
-def frames() -> Iterator[Chunk]:
+def frames() -> Iterator[FrameChunk]:
     for first in range(0, FRAMES, 4):
-        yield Chunk(first, POSITIONS + np.arange(first, first + 4, dtype=np.float32)[:, None, None])
+        yield FrameChunk(first, POSITIONS + np.arange(first, first + 4, dtype=np.float32)[:, None, None])
 
 
 SOURCE = VertexCache(np.arange(FRAMES) / 30, VERTICES, np.arange(3999).reshape(-1, 3), frames)

@@ -8,15 +8,15 @@ import pytest
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import euler, quaternion
-from anim.maths.euler import ORDERS, Frame
+from anim.maths.euler import ORDERS, AxesConvention
 
-CONVENTIONS = [(order, frame) for order in ORDERS for frame in Frame]
+CONVENTIONS = [(order, frame) for order in ORDERS for frame in AxesConvention]
 GRID = np.arange(-4, 5) * np.pi / 4  # lock in every order is among them
 
 
-def _scipy(order: str, frame: Frame, angles: Floats) -> Floats:
+def _scipy(order: str, frame: AxesConvention, angles: Floats) -> Floats:
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation
-    q: Floats = rotation.from_euler(order if frame == Frame.INTRINSIC else order.lower(), angles).as_quat()
+    q: Floats = rotation.from_euler(order if frame == AxesConvention.INTRINSIC else order.lower(), angles).as_quat()
     return q
 
 
@@ -29,14 +29,14 @@ def _angles(seed: int = 5) -> Floats:
 
 
 @pytest.mark.parametrize(("order", "frame"), CONVENTIONS)
-def test_quaternions_are_scipys(order: str, frame: Frame) -> None:
+def test_quaternions_are_scipys(order: str, frame: AxesConvention) -> None:
     angles = _angles()
     ours = euler.to_quaternion(angles, order=order, frame=frame)
     assert quaternion.angle_between(ours, _scipy(order, frame, angles)).max() < 1e-9
 
 
 @pytest.mark.parametrize(("order", "frame"), CONVENTIONS)
-def test_back_to_angles_and_again_is_the_same_rotation(order: str, frame: Frame) -> None:
+def test_back_to_angles_and_again_is_the_same_rotation(order: str, frame: AxesConvention) -> None:
     q = _scipy(order, frame, _angles())
     angles = euler.from_quaternion(q, order=order, frame=frame)
     assert quaternion.angle_between(euler.to_quaternion(angles, order=order, frame=frame), q).max() < 1e-7
@@ -47,28 +47,28 @@ def test_back_to_angles_and_again_is_the_same_rotation(order: str, frame: Frame)
 
 
 @pytest.mark.parametrize(("order", "frame"), CONVENTIONS)
-def test_curves_keep_every_rotation(order: str, frame: Frame) -> None:
+def test_curves_keep_every_rotation(order: str, frame: AxesConvention) -> None:
     q = _scipy(order, frame, _angles())
-    angles = euler.continuous(q, order=order, frame=frame)
+    angles = euler.unwrap(q, order=order, frame=frame)
     assert quaternion.angle_between(euler.to_quaternion(angles, order=order, frame=frame), q).max() < 1e-7
     assert np.abs(np.diff(angles, axis=0)).max() <= np.pi * 1.5
 
 
 @pytest.mark.parametrize(("order", "frame"), CONVENTIONS)
 @pytest.mark.parametrize("steps", [10, 11, 100])
-def test_straight_through_lock_the_curves_stay_straight(order: str, frame: Frame, steps: int) -> None:
+def test_straight_through_lock_the_curves_stay_straight(order: str, frame: AxesConvention, steps: int) -> None:
     """The middle angle runs over every lock, twice around; the keys at lock itself are among the samples."""
     true = np.tile((0.3, 0.0, -0.4), (20 * steps + 1, 1))
     true[:, 1] = np.pi / 2 * np.arange(len(true)) / steps
     q = euler.to_quaternion(true, order=order, frame=frame)
-    angles = euler.continuous(q, order=order, frame=frame)
+    angles = euler.unwrap(q, order=order, frame=frame)
     assert np.abs(np.diff(angles, axis=0)).max() < np.pi / 2 / steps + 1e-6
     assert quaternion.angle_between(euler.to_quaternion(angles, order=order, frame=frame), q).max() < 1e-7
 
 
 @pytest.mark.parametrize(("order", "frame"), CONVENTIONS)
 @pytest.mark.parametrize("miss", [0.0, 1e-9, 1e-6, 1e-3, 0.1])
-def test_a_second_of_smooth_motion_by_lock_has_no_jump(order: str, frame: Frame, miss: float) -> None:
+def test_a_second_of_smooth_motion_by_lock_has_no_jump(order: str, frame: AxesConvention, miss: float) -> None:
     """One turn about a slanted axis in a second at 240 frames, through lock or past it."""
     start = euler.to_quaternion(
         np.array((0.2, np.pi / 2 * (not euler.is_proper(order)), 0.1)), order=order, frame=frame
@@ -77,7 +77,7 @@ def test_a_second_of_smooth_motion_by_lock_has_no_jump(order: str, frame: Frame,
     swing = quaternion.from_rotation_vector(t * [2.0, -1.5, 1.0])
     aside = quaternion.from_rotation_vector(np.array((miss, miss, 0.0)))
     q = quaternion.multiply(quaternion.multiply(swing, aside), start)
-    angles = euler.continuous(q, order=order, frame=frame)
+    angles = euler.unwrap(q, order=order, frame=frame)
     assert np.abs(np.diff(angles, axis=0)).max() < np.pi
     assert quaternion.angle_between(euler.to_quaternion(angles, order=order, frame=frame), q).max() < 1e-7
 
@@ -85,7 +85,7 @@ def test_a_second_of_smooth_motion_by_lock_has_no_jump(order: str, frame: Frame,
 def test_a_pose_that_stays_at_lock_has_quiet_curves() -> None:
     angles = np.stack((np.linspace(0, 1, 50), np.full(50, np.pi / 2), np.linspace(0, 2, 50)), axis=-1)
     q = euler.to_quaternion(angles, order="XYZ")
-    found = euler.continuous(q, order="XYZ")
+    found = euler.unwrap(q, order="XYZ")
     assert np.abs(np.diff(found, axis=0)).max() < 0.1
     assert quaternion.angle_between(euler.to_quaternion(found, order="XYZ"), q).max() < 1e-7
 
@@ -93,14 +93,14 @@ def test_a_pose_that_stays_at_lock_has_quiet_curves() -> None:
 def test_spins_keep_their_turns() -> None:
     true = np.stack((np.linspace(0, 30, 300), np.full(300, 0.2), np.full(300, -0.1)), axis=-1)
     q = euler.to_quaternion(true, order="YXZ")
-    np.testing.assert_allclose(euler.continuous(q, order="YXZ"), true, atol=1e-9)
+    np.testing.assert_allclose(euler.unwrap(q, order="YXZ"), true, atol=1e-9)
 
 
 def test_many_curves_at_once_are_each_as_alone() -> None:
-    q = np.stack([_scipy("ZXY", Frame.INTRINSIC, _angles(seed)) for seed in (1, 2, 3)], axis=1)
-    together = euler.continuous(q, order="YXZ")
+    q = np.stack([_scipy("ZXY", AxesConvention.INTRINSIC, _angles(seed)) for seed in (1, 2, 3)], axis=1)
+    together = euler.unwrap(q, order="YXZ")
     for i in range(3):
-        np.testing.assert_array_equal(together[:, i], euler.continuous(q[:, i], order="YXZ"))
+        np.testing.assert_array_equal(together[:, i], euler.unwrap(q[:, i], order="YXZ"))
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -109,7 +109,7 @@ def test_distance_to_lock_is_that_of_the_middle_angle(order: str) -> None:
     q = euler.to_quaternion(angles, order=order)
     middle = euler.from_quaternion(q, order=order)[:, 1]
     sine = np.sin(middle) if euler.is_proper(order) else np.cos(middle)
-    np.testing.assert_allclose(np.sin(euler.distance_to_lock(q, order=order)), np.abs(sine), atol=1e-9)
+    np.testing.assert_allclose(np.sin(euler.gimbal_distance(q, order=order)), np.abs(sine), atol=1e-9)
 
 
 def test_fewer_axes_are_fewer_turns() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.errors import FormatError, ShapeError
-from anim.model import Instance, Mesh, Scene, Skin
+from anim.model import Mesh, MeshInstance, Scene, Skin
 from tests.clips import skeleton
 
 
@@ -26,7 +26,7 @@ def _mesh(**fields: Any) -> Mesh:
 
 def test_a_scene_counts_its_vertices() -> None:
     mesh = _mesh()
-    scene = Scene(skeleton([-1]), (Instance(0, mesh, None, np.empty(0)),) * 2)
+    scene = Scene(skeleton([-1]), (MeshInstance(0, mesh, None, np.empty(0)),) * 2)
     assert scene.vertex_count == 6
     assert Scene(skeleton([]), ()).vertex_count == 0
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from anim.errors import RangeError, ShapeError
-from anim.model import FLOAT32, Clip, Interpolation, Kind, Storage, Track
+from anim.model import FLOAT32, AccessorFormat, Clip, Interpolation, Track, ValueKind
 from tests.clips import CUBICSPLINE, LINEAR, STEP, track
 
-BYTES = Storage(5121, False, "SCALAR")
-FRACTIONS = Storage(5121, True, "SCALAR")
+BYTES = AccessorFormat(5121, False, "SCALAR")
+FRACTIONS = AccessorFormat(5121, True, "SCALAR")
 
 
 def test_keys_are_read_only_float64() -> None:
@@ -69,19 +69,19 @@ def test_tangents_have_the_values_shape(bad: Any) -> None:
 @pytest.mark.parametrize(
     ("path", "width", "mode", "storage", "kind"),
     [
-        ("translation", 3, LINEAR, FLOAT32, Kind.VECTOR),
-        ("rotation", 4, STEP, FLOAT32, Kind.ROTATION),
-        ("weights", 4, LINEAR, FRACTIONS, Kind.VECTOR),
-        ("/materials/0/pbrMetallicRoughness/baseColorFactor", 4, LINEAR, FLOAT32, Kind.VECTOR),
-        ("/extensions/EXT_lights_image_based/lights/0/rotation", 4, LINEAR, FLOAT32, Kind.ROTATION),
-        ("/materials/0/extensions/KHR_texture_transform/rotation", 1, LINEAR, FLOAT32, Kind.VECTOR),
-        ("/nodes/0/extensions/KHR_node_visibility/visible", 1, STEP, BYTES, Kind.DISCRETE),
-        ("/materials/0/alphaCutoff", 1, STEP, FLOAT32, Kind.VECTOR),
-        ("/materials/0/alphaCutoff", 1, STEP, FRACTIONS, Kind.VECTOR),
-        ("/materials/0/alphaCutoff", 1, LINEAR, BYTES, Kind.VECTOR),
+        ("translation", 3, LINEAR, FLOAT32, ValueKind.VECTOR),
+        ("rotation", 4, STEP, FLOAT32, ValueKind.ROTATION),
+        ("weights", 4, LINEAR, FRACTIONS, ValueKind.VECTOR),
+        ("/materials/0/pbrMetallicRoughness/baseColorFactor", 4, LINEAR, FLOAT32, ValueKind.VECTOR),
+        ("/extensions/EXT_lights_image_based/lights/0/rotation", 4, LINEAR, FLOAT32, ValueKind.ROTATION),
+        ("/materials/0/extensions/KHR_texture_transform/rotation", 1, LINEAR, FLOAT32, ValueKind.VECTOR),
+        ("/nodes/0/extensions/KHR_node_visibility/visible", 1, STEP, BYTES, ValueKind.DISCRETE),
+        ("/materials/0/alphaCutoff", 1, STEP, FLOAT32, ValueKind.VECTOR),
+        ("/materials/0/alphaCutoff", 1, STEP, FRACTIONS, ValueKind.VECTOR),
+        ("/materials/0/alphaCutoff", 1, LINEAR, BYTES, ValueKind.VECTOR),
     ],
 )
-def test_kinds(path: str, width: int, mode: Any, storage: Storage, kind: Kind) -> None:
+def test_kinds(path: str, width: int, mode: Any, storage: AccessorFormat, kind: ValueKind) -> None:
     values = np.tile([0.0, 0, 0, 1][-width:], (1, 1))
     assert track(path, [0], values, mode, storage=storage).kind is kind
 

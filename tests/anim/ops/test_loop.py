@@ -15,7 +15,7 @@ from anim.measure.loops.loop_analysis import LoopKind, best_ranges
 from anim.measure.loops.loop_analysis import loop as judged
 from anim.measure.loops.seam import SkinMotion
 from anim.model import Clip, Scene, Track
-from anim.ops.loop import loop, with_last_frame
+from anim.ops.loop import append_first_frame, loop
 from anim.ops.spline import spline
 from anim.ops.trim import trim
 from anim.sampling.derivatives import rates
@@ -42,7 +42,7 @@ def test_without_its_last_frame_it_is_open_by_one() -> None:
     cut = trim(WALK, end=23 / 24)
     found = judged(SCENE, cut)
     assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
-    closed = with_last_frame(cut, fps=found.fps)
+    closed = append_first_frame(cut, fps=found.fps)
     assert closed.end == pytest.approx(1.0, abs=1e-6)
     assert judged(SCENE, closed).kind is LoopKind.CLOSED
     assert judged(SCENE, closed).seam < 1e-6

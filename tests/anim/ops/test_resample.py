@@ -13,14 +13,14 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.model import Interpolation, Kind, Storage, Track
+from anim.model import AccessorFormat, Interpolation, Track, ValueKind
 from anim.ops.resample import INTERPOLATIONS, resample
-from anim.sampling.times import grid, key_times
+from anim.sampling.times import frame_times, key_times
 from anim.sampling.track import sample
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, track
 from tests.files import opened_fixture
 
-BYTES = Storage(5121, False, "SCALAR")
+BYTES = AccessorFormat(5121, False, "SCALAR")
 
 LINE = track("translation", [0, 1], [[0, 0, 0], [4, 0, 0]])
 ZIGZAG = track("translation", [0, 0.3, 1], [[0, 0, 0], [3, 0, 0], [10, 0, 0]])
@@ -120,7 +120,7 @@ def test_bools_behind_pointers_stay_steps_and_bytes(interpolation: str) -> None:
         assert set(np.unique(made.tracks[0].values)) <= {0, 1}
         written = reader.clips(writer.replace_clips(document, {number: made}))[number].tracks[0]
         assert written.storage == BYTES
-        assert (written.kind, written.interpolation) == (Kind.DISCRETE, STEP)
+        assert (written.kind, written.interpolation) == (ValueKind.DISCRETE, STEP)
 
 
 @pytest.mark.parametrize("name", ["color", "turn", "light", "weights", "one_weight"])
@@ -175,7 +175,7 @@ def test_frames_show_what_they_showed(made: Track, interpolation: str) -> None:
     goal = made.interpolation if interpolation == "keep" else Interpolation(interpolation.upper())
     assert new.interpolation is goal
     assert (new.in_tangents is not None) == (goal is CUBICSPLINE)
-    frames = key_times(grid(whole.start, whole.end, fps=20))
+    frames = key_times(frame_times(whole.start, whole.end, fps=20))
     np.testing.assert_allclose(_aligned(sample(new, frames)), _aligned(sample(made, frames)), atol=1e-12)
 
 

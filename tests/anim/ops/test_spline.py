@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from anim.curves.tangents.table import TANGENTS, parse
 from anim.maths import quaternion
 from anim.model import Clip, Track
-from anim.ops.spline import departure, spline
+from anim.ops.spline import max_key_change, spline
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 from tests import clips
@@ -65,12 +65,12 @@ def test_holds_and_single_keys_stay() -> None:
 def test_bspline_says_how_far_it_leaves_the_keys() -> None:
     before = Clip("", (LINE, TRACKS["slerp"]))
     after = spline(before, tangents=TANGENTS["bspline"])
-    moved, turned = departure(before, after)
+    moved, turned = max_key_change(before, after)
     assert moved == pytest.approx(np.abs(after.tracks[0].values - LINE.values).max())
     assert moved > 0.1
     angles = quaternion.angle_between(after.tracks[1].values, TRACKS["slerp"].values)
     assert turned == pytest.approx(angles.max())
-    assert departure(before, spline(before, tangents=TANGENTS["natural"]))[0] == 0
+    assert max_key_change(before, spline(before, tangents=TANGENTS["natural"]))[0] == 0
 
 
 def test_tangents_that_were_there_go() -> None:

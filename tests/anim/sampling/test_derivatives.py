@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
-from anim.model import Kind, Track
+from anim.model import Track, ValueKind
 from anim.sampling import derivatives
 from anim.sampling.track import sample
 from tests.anim.sampling.test_track import TIMES, TRACKS
@@ -55,7 +55,7 @@ def test_a_steady_turn_by_hand() -> None:
     np.testing.assert_allclose(derivatives.rates(flipped, np.array([1.0]), before=False), expected, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", [name for name in TRACKS if TRACKS[name].kind is Kind.ROTATION])
+@pytest.mark.parametrize("name", [name for name in TRACKS if TRACKS[name].kind is ValueKind.ROTATION])
 def test_tangents_of_rotations_follow_the_values_sign_and_stand_at_a_right_angle(name: str) -> None:
     values = sample(TRACKS[name], BETWEEN)
     for sign in (1, -1):
@@ -81,6 +81,6 @@ def _difference(made: Track, early: Floats, late: Floats) -> Floats:
     """The mean rate between two times; of rotations the angular velocity along the node's own axes, by scipy."""
     a, b = sample(made, early), sample(made, late)
     step = (late - early)[:, None]
-    if made.kind is not Kind.ROTATION:
+    if made.kind is not ValueKind.ROTATION:
         return np.asarray((b - a) / step)
     return np.asarray((Rotation.from_quat(a).inv() * Rotation.from_quat(b)).as_rotvec() / step)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.sampling import joined as module
-from anim.sampling.joined import joined
+from anim.sampling.joined import concatenate
 from anim.sampling.track import sample
 from tests import clips
 from tests.anim.ops.tracks import TRACKS
@@ -23,7 +23,7 @@ def test_each_track_is_sampled_at_its_own_times_as_it_is_alone(limit: int, monke
     rng = np.random.default_rng(3)
     at = np.column_stack((rng.uniform(-1, 4, (len(ALL), 5)), np.full(len(ALL), 1.25)))  # before, after, and on a key
     seen = []
-    for group in joined(ALL):
+    for group in concatenate(ALL):
         values = group.sample(at[group.numbers])
         for i, number in enumerate(group.numbers.tolist()):
             assert group.tracks[i] is ALL[number]
@@ -35,7 +35,7 @@ def test_each_track_is_sampled_at_its_own_times_as_it_is_alone(limit: int, monke
 def test_tracks_lie_one_after_the_other_with_their_tangents() -> None:
     one = clips.track("scale", [0.0, 1], np.ones((2, 3)), CUBICSPLINE, tangents=(np.full((2, 3), 5.0), np.ones((2, 3))))
     other = clips.track("scale", [0.0, 2, 3], np.zeros((3, 3)), CUBICSPLINE, tangents=(np.ones((3, 3)),) * 2)
-    (group,) = joined([one, other])
+    (group,) = concatenate([one, other])
     assert group.counts.tolist() == [2, 3]
     assert group.starts.tolist() == [0, 2]
     assert group.times.tolist() == [0, 1, 0, 2, 3]
@@ -45,4 +45,4 @@ def test_tracks_lie_one_after_the_other_with_their_tangents() -> None:
 
 
 def test_no_tracks_are_no_groups() -> None:
-    assert joined([]) == []
+    assert concatenate([]) == []

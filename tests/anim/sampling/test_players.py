@@ -14,14 +14,14 @@ from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.maths import matrix, quaternion
 from anim.measure.error.metric import Ruler, dense_times
-from anim.model import Clip, Interpolation, Storage, Track
-from anim.sampling import pose
-from anim.sampling.players import PLAYERS, played
+from anim.model import AccessorFormat, Clip, Interpolation, Track
+from anim.sampling import sample_pose
+from anim.sampling.players import PLAYERS, sampler_for
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, skeleton, track
 from tests.files import glb_of, opened_fixture
 from tests.judge import judge, needs_judge
 
-INT16 = Storage(5122, True)
+INT16 = AccessorFormat(5122, True)
 NAMES = sorted(PLAYERS)
 
 
@@ -30,16 +30,16 @@ def test_unit_keys_near_each_other_are_played_the_same_everywhere(player: str) -
     """Within 2° the chord and the arc differ by less than a millionth of a turn."""
     turning = clip(track("rotation", [0, 1, 2], about("y", [0, 1, 3])))
     times = np.linspace(-0.5, 2.5, 61)
-    expected = pose(skeleton([-1]), turning, times).rotation
-    found = played(skeleton([-1]), turning, player=player).at(times).rotation
+    expected = sample_pose(skeleton([-1]), turning, times).rotation
+    found = sampler_for(skeleton([-1]), turning, player=player).at(times).rotation
     assert quaternion.angle_between(quaternion.normalize(found), expected).max() < 1e-6
 
 
 def test_the_spec_is_the_plain_way() -> None:
     moving = clip(track("rotation", [0, 1], 1.01 * about("y", [0, 90])))
     times = np.linspace(0, 1, 11)
-    expected = pose(skeleton([-1]), moving, times).rotation
-    assert np.array_equal(played(skeleton([-1]), moving).at(times).rotation, expected)
+    expected = sample_pose(skeleton([-1]), moving, times).rotation
+    assert np.array_equal(sampler_for(skeleton([-1]), moving).at(times).rotation, expected)
 
 
 def test_component_by_component_over_a_quarter_turn_is_092_degrees_off() -> None:
@@ -95,22 +95,22 @@ def test_steps_and_splines(player: str) -> None:
     assert np.linalg.norm(step) == pytest.approx(1.01 if is_raw else 1)
     zero = np.zeros((2, 4))
     spline = clip(track("rotation", [0, 1], keys, CUBICSPLINE, tangents=(zero, zero)))
-    assert np.linalg.norm(played(skeleton([-1]), spline, player=player).at(np.array([0.5])).rotation) == pytest.approx(
-        1
-    )
+    assert np.linalg.norm(
+        sampler_for(skeleton([-1]), spline, player=player).at(np.array([0.5])).rotation
+    ) == pytest.approx(1)
 
 
 def test_other_tracks_are_played_alike() -> None:
     moving = clip(track("translation", [0, 1], [[0, 0, 0], [1, 2, 3]]), track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]]))
     for player in NAMES:
-        found = played(skeleton([-1]), moving, player=player).at(np.array([0.5]))
+        found = sampler_for(skeleton([-1]), moving, player=player).at(np.array([0.5]))
         assert found.translation[0, 0].tolist() == [0.5, 1, 1.5]
         assert found.scale[0, 0].tolist() == [1.5] * 3
 
 
 @needs_judge
-@pytest.mark.parametrize("storage", [INT16, Storage(5120, True)], ids=["int16", "int8"])
-def test_three_plays_quantized_rotations_so(storage: Storage, tmp_path: Path) -> None:
+@pytest.mark.parametrize("storage", [INT16, AccessorFormat(5120, True)], ids=["int16", "int8"])
+def test_three_plays_quantized_rotations_so(storage: AccessorFormat, tmp_path: Path) -> None:
     """int8 keys are up to 1 % too long or too short; three.js takes them so, and so does its player here."""
     document = opened_fixture("biped")
     number = next(i for i, name in enumerate(reader.names(document)) if name == "walk")
@@ -127,16 +127,16 @@ def test_three_plays_quantized_rotations_so(storage: Storage, tmp_path: Path) ->
 
 def _turned(player: str, keys: Floats, at: ArrayLike, mode: Interpolation = LINEAR) -> Floats:
     turning = clip(track("rotation", [0, 1], keys, mode))
-    return played(skeleton([-1]), turning, player=player).at(np.asarray(at, float)).rotation[:, 0]
+    return sampler_for(skeleton([-1]), turning, player=player).at(np.asarray(at, float)).rotation[:, 0]
 
 
-def _stored(before: Clip, storage: Storage) -> Clip:
+def _stored(before: Clip, storage: AccessorFormat) -> Clip:
     """The clip with rotations rounded to integers, and stored so."""
     most = {5122: 32767, 5120: 127}[storage.component_type]
     return Clip(before.name, tuple(_rounded(each, storage, most) for each in before.tracks))
 
 
-def _rounded(each: Track, storage: Storage, most: int) -> Track:
+def _rounded(each: Track, storage: AccessorFormat, most: int) -> Track:
     if each.path != "rotation":
         return each
     values = np.round(each.values * most) / most

@@ -13,11 +13,11 @@ from anim.arrays import Floats
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
 from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton
-from anim.sampling import pose, rest, world_matrices
-from anim.sampling.batch import stacks
+from anim.sampling import rest_pose, sample_pose, world_matrices
+from anim.sampling.batch import lazy_batches
 from anim.sampling.players import PLAYERS, sampler
-from anim.sampling.pose import Poses
-from anim.sampling.track import locate, sample
+from anim.sampling.pose import PoseSampler
+from anim.sampling.track import find_interval, sample
 from fixtures.broken.pieces import text
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened, opened_fixture
@@ -27,7 +27,7 @@ RNG = np.random.default_rng(5)
 
 def test_what_no_track_moves_is_at_rest() -> None:
     nodes = skeleton([-1, 0], translation=[[1, 2, 3], [4, 5, 6]], scale=[[1, 1, 1], [2, 2, 2]])
-    found = pose(nodes, clip(track("translation", [0, 1], [[0, 0, 0], [2, 2, 2]], node=1)), np.array([0.5, 9.0]))
+    found = sample_pose(nodes, clip(track("translation", [0, 1], [[0, 0, 0], [2, 2, 2]], node=1)), np.array([0.5, 9.0]))
     assert found.translation.tolist() == [[[1, 2, 3], [1, 1, 1]], [[1, 2, 3], [2, 2, 2]]]
     assert found.scale.tolist() == [[[1, 1, 1], [2, 2, 2]]] * 2
     assert found.rotation.tolist() == [[[0, 0, 0, 1]] * 2] * 2
@@ -39,7 +39,7 @@ def test_every_track_lands_at_its_node_and_part() -> None:
     document = opened_fixture("interpolations")
     (walk,) = reader.clips(document)
     at = np.linspace(0, 2.5, 26)
-    found = pose(reader.skeleton(document), walk, at)
+    found = sample_pose(reader.skeleton(document), walk, at)
     for each in walk.tracks:
         assert each.node is not None
         part: Floats = getattr(found, each.path)
@@ -50,7 +50,7 @@ def test_weights_are_by_node() -> None:
     document = opened_fixture("morph_cube")
     for each in reader.clips(document):
         at = np.array([0.0, 0.25, 0.75])
-        found = pose(reader.skeleton(document), each, at)
+        found = sample_pose(reader.skeleton(document), each, at)
         assert list(found.weights) == [each.tracks[0].node]
         np.testing.assert_array_equal(found.weights[0], sample(each.tracks[0], at))
 
@@ -59,10 +59,10 @@ def test_pointers_at_node_properties_move_the_node_and_others_nothing() -> None:
     document = opened_fixture("pointer")
     nodes, clips = reader.skeleton(document), {each.name: each for each in reader.clips(document)}
     at = np.array([0.0, 0.5])
-    np.testing.assert_allclose(pose(nodes, clips["turn"], at).rotation[1, 0], about("y", 90), atol=1e-7)
-    assert list(pose(nodes, clips["weights"], at).weights) == [0]
+    np.testing.assert_allclose(sample_pose(nodes, clips["turn"], at).rotation[1, 0], about("y", 90), atol=1e-7)
+    assert list(sample_pose(nodes, clips["weights"], at).weights) == [0]
     for name in ("color", "blink", "light"):
-        found = pose(nodes, clips[name], at)
+        found = sample_pose(nodes, clips[name], at)
         np.testing.assert_array_equal(found.rotation, np.tile(nodes.rotation, (2, 1, 1)))
 
 
@@ -97,7 +97,7 @@ def test_a_sheared_matrix_stands_whole_in_the_chain() -> None:
         {"translation": [0, 1, 0], "scale": [2, 2, 2]},
     ]
     document = opened(text({"nodes": nodes}))
-    found = world_matrices(reader.skeleton(document), rest(reader.skeleton(document)))[0]
+    found = world_matrices(reader.skeleton(document), rest_pose(reader.skeleton(document)))[0]
     turned = np.array([[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
     child = np.array([[2, 0, 0, 0], [0, 2, 0, 1], [0, 0, 2, 0], [0, 0, 0, 1.0]])
     np.testing.assert_allclose(found[1], (turned @ sheared)[:3], atol=1e-15)
@@ -106,14 +106,14 @@ def test_a_sheared_matrix_stands_whole_in_the_chain() -> None:
 
 def test_no_nodes_and_no_times_are_fine() -> None:
     nothing = skeleton([])
-    assert world_matrices(nothing, rest(nothing)).shape == (1, 0, 3, 4)
+    assert world_matrices(nothing, rest_pose(nothing)).shape == (1, 0, 3, 4)
     one = skeleton([-1])
     moved = clip(track("translation", [0], [[1, 2, 3]]))
-    assert world_matrices(one, pose(one, moved, np.empty(0))).shape == (0, 1, 3, 4)
+    assert world_matrices(one, sample_pose(one, moved, np.empty(0))).shape == (0, 1, 3, 4)
 
 
 def _check_world(nodes: Skeleton, moved: Clip, at: Floats) -> None:
-    found = world_matrices(nodes, pose(nodes, moved, at))
+    found = world_matrices(nodes, sample_pose(nodes, moved, at))
     for frame, t in enumerate(at):
         for node in range(len(nodes)):
             np.testing.assert_allclose(found[frame, node], _world(nodes, moved, node, float(t))[:3], atol=1e-12)
@@ -145,8 +145,8 @@ def test_stretches_of_time_are_the_whole(name: str) -> None:
     for played in reader.clips(document):
         times = np.linspace(played.start - 0.1, played.end + 0.1, 301)
         for player in PLAYERS:
-            wanted = Poses(skeleton, played, sampler(player)).at(times)
-            stretch = Poses(skeleton, played, sampler(player))
+            wanted = PoseSampler(skeleton, played, sampler(player)).at(times)
+            stretch = PoseSampler(skeleton, played, sampler(player))
             for _ in range(2):
                 for low in range(0, len(times), 7):
                     part = stretch.at(times[low : low + 7])
@@ -157,23 +157,23 @@ def test_stretches_of_time_are_the_whole(name: str) -> None:
 
 
 def test_keys_are_stacked_where_they_are_needed_and_all_in_the_end() -> None:
-    times = arrays.times(np.arange(100))
+    times = arrays.as_key_times(np.arange(100))
     moving = [track("translation", times, np.tile(times[:, None], 3), node=node) for node in (0, 1)]
-    (stack,) = stacks(moving)
+    (stack,) = lazy_batches(moving)
     for low in range(0, 200, 10):
         at = np.linspace(low % 100 + 0.5, low % 100 + 3.5, 5)
-        batch, place = stack.at(locate(stack.times, at))
+        batch, place = stack.at(find_interval(stack.times, at))
         assert len(batch.times) == 5
         assert batch.sample(at, place)[:, 1, 2].tolist() == at.tolist()
-    seen = [len(stack.at(locate(stack.times, np.array([low + 0.5])))[0].times) for low in range(60)]
+    seen = [len(stack.at(find_interval(stack.times, np.array([low + 0.5])))[0].times) for low in range(60)]
     assert (seen[0], seen[-1]) == (2, 100)
-    (fresh,) = stacks(moving)
-    assert len(fresh.at(locate(times, times[:60]))[0].times) == 100, "half of them at once"
+    (fresh,) = lazy_batches(moving)
+    assert len(fresh.at(find_interval(times, times[:60]))[0].times) == 100, "half of them at once"
 
 
 def test_a_node_that_the_skeleton_lacks_is_refused() -> None:
     with pytest.raises(NotFoundError, match="there is no node 999"):
-        pose(skeleton([-1]), clip(track("scale", [0], [[1, 1, 1]], node=999)), np.zeros(1))
+        sample_pose(skeleton([-1]), clip(track("scale", [0], [[1, 1, 1]], node=999)), np.zeros(1))
 
 
 @pytest.mark.parametrize(
@@ -182,6 +182,6 @@ def test_a_node_that_the_skeleton_lacks_is_refused() -> None:
 def test_times_that_are_none_are_refused(at: Any, error: type[AnimError]) -> None:
     moving = track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]])
     with pytest.raises(error, match="times"):
-        pose(skeleton([-1]), clip(moving), at)
+        sample_pose(skeleton([-1]), clip(moving), at)
     with pytest.raises(error, match="times"):
         sample(moving, at)

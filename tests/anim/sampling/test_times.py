@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from anim.errors import RangeError
-from anim.sampling.times import MAX_FRAMES, grid, key_times
+from anim.sampling.times import MAX_FRAMES, frame_times, key_times
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ from anim.sampling.times import MAX_FRAMES, grid, key_times
     ],
 )
 def test_by_hand(start: float, end: float, fps: float, frames: list[float]) -> None:
-    assert grid(start, end, fps=fps).tolist() == frames
+    assert frame_times(start, end, fps=fps).tolist() == frames
 
 
 @pytest.mark.parametrize("fps", [24, 25, 29.97, 30, 60, 23.976])
@@ -36,7 +36,7 @@ def test_an_end_rounded_to_float32_gives_no_sliver_of_a_frame(fps: float, second
     whole = round(seconds * fps)
     for nudge in (-np.inf, np.inf):
         end = float(np.nextafter(np.float32(whole / fps), np.float32(nudge)))
-        times = grid(0, end, fps=fps)
+        times = frame_times(0, end, fps=fps)
         assert len(times) == whole + 1
         assert times[-1] == end
         assert np.diff(times).min() > 0.99 / fps
@@ -44,7 +44,7 @@ def test_an_end_rounded_to_float32_gives_no_sliver_of_a_frame(fps: float, second
 
 @given(start=st.floats(0, 1000, width=32), length=st.floats(0, 100, width=32), fps=st.floats(0.1, 240))
 def test_frames_are_start_and_whole_numbers_of_steps_and_the_exact_end(start: float, length: float, fps: float) -> None:
-    times = grid(start, start + length, fps=fps)
+    times = frame_times(start, start + length, fps=fps)
     assert times[0] == start
     assert times.tolist()[:-1] == [start + k / fps for k in range(len(times) - 1)]
     assert (np.diff(times) > 0).all()
@@ -58,14 +58,14 @@ def test_frames_are_start_and_whole_numbers_of_steps_and_the_exact_end(start: fl
 @pytest.mark.parametrize("fps", [0, -1, float("nan"), float("inf"), -float("inf")])
 def test_a_rate_is_a_number_above_0(fps: float) -> None:
     with pytest.raises(RangeError, match="fps is"):
-        grid(0, 1, fps=fps)
+        frame_times(0, 1, fps=fps)
 
 
 def test_too_many_frames_are_refused_at_once() -> None:
     with pytest.raises(RangeError, match="limit"):
-        grid(0, 1, fps=MAX_FRAMES + 1)
+        frame_times(0, 1, fps=MAX_FRAMES + 1)
     with pytest.raises(RangeError, match="limit"):
-        grid(0, 1e300, fps=1e300)
+        frame_times(0, 1e300, fps=1e300)
 
 
 def test_key_times_are_float32_and_distinct() -> None:

@@ -12,9 +12,9 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
 from anim.gltf.reading import reader
-from anim.model import Interpolation, Kind, Track
+from anim.model import Interpolation, Track, ValueKind
 from anim.sampling.batch import batches
-from anim.sampling.track import locate, sample
+from anim.sampling.track import find_interval, sample
 from tests.clips import CUBICSPLINE, STEP, about, track
 from tests.files import opened_fixture
 
@@ -74,7 +74,7 @@ def test_splines_are_scipys_hermite_pieces() -> None:
 def test_keys_are_exact(name: str) -> None:
     """Rotations as exactly as their unit length can be told."""
     found = sample(TRACKS[name], TRACKS[name].times)
-    if TRACKS[name].kind is Kind.ROTATION:
+    if TRACKS[name].kind is ValueKind.ROTATION:
         np.testing.assert_allclose(found, TRACKS[name].values, atol=3e-16)
     else:
         np.testing.assert_array_equal(found, TRACKS[name].values)
@@ -98,7 +98,7 @@ def test_outside_the_keys_the_ends_hold(name: str) -> None:
     np.testing.assert_array_equal(after, np.tile(ends[1], (3, 1)))
 
 
-@pytest.mark.parametrize("name", [name for name in TRACKS if TRACKS[name].kind is Kind.ROTATION])
+@pytest.mark.parametrize("name", [name for name in TRACKS if TRACKS[name].kind is ValueKind.ROTATION])
 def test_rotations_are_unit(name: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(sample(TRACKS[name], AT), axis=1), 1, atol=1e-15)
 
@@ -149,7 +149,7 @@ def test_small_turns_stay_at_constant_speed(angle: float) -> None:
 @given(st.sets(st.floats(0, 1e4, width=32), min_size=1, max_size=6), st.lists(st.floats(-10, 2e4), max_size=6))
 def test_locate_is_a_plain_search(keys: set[float], at: list[float]) -> None:
     times = sorted(keys)
-    place = locate(np.array(times), np.array(at))
+    place = find_interval(np.array(times), np.array(at))
     for i, t in enumerate(at):
         left = max((k for k in range(len(times)) if times[k] <= t), default=0)
         right = min(left + 1, len(times) - 1)
@@ -183,7 +183,9 @@ def _plain(made: Track, t: float) -> list[float]:
         return _unit(made, a)
     if made.interpolation is Interpolation.LINEAR:
         return (
-            _slerp(a, b, u) if made.kind is Kind.ROTATION else [(1 - u) * x + u * y for x, y in zip(a, b, strict=True)]
+            _slerp(a, b, u)
+            if made.kind is ValueKind.ROTATION
+            else [(1 - u) * x + u * y for x, y in zip(a, b, strict=True)]
         )
     assert made.in_tangents is not None
     assert made.out_tangents is not None
@@ -204,7 +206,7 @@ def _slerp(a: list[float], b: list[float], u: float) -> list[float]:
 
 
 def _unit(made: Track, value: list[float]) -> list[float]:
-    if made.kind is not Kind.ROTATION:
+    if made.kind is not ValueKind.ROTATION:
         return value
     length = math.sqrt(sum(x * x for x in value))
     return [x / length for x in value]

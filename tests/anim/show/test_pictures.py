@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from anim.curves.easing.table import EASINGS, parse
-from anim.curves.fitting.easing_fit import cubic_pieces
+from anim.curves.fitting.easing_fit import fit_segments
 from anim.curves.tangents.table import TANGENTS
 from anim.errors import RangeError, ShapeError, UnsupportedError
 from anim.show.plots.easing_plot import LIMIT, eases
@@ -19,7 +19,7 @@ from tests.anim.show.reading import png_size, words
 
 def test_eases_say_what_they_are() -> None:
     said = words(eases([parse("smoothstep"), parse("back-out"), parse("steps(4)"), parse("sine-in-out")], kind="svg"))
-    count = len(cubic_pieces(parse("sine-in-out"), tolerance=1e-3))
+    count = len(fit_segments(parse("sine-in-out"), tolerance=1e-3))
     for expected in (
         "smoothstep", "exact as 1 cubic", "back-out", "+10 %", "exact as STEP keys", f"{count} cubics within 0.1 %",
         "speed f′, at most 1.5×", "speed f′, only jumps", "tempo: every 1/20 of the time",

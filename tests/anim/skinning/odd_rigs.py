@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.model import Instance, Scene, Skin
+from anim.model import MeshInstance, Scene, Skin
 
 FLOAT = 5126
 UNIT = 100.0  # of the mesh, in metres
@@ -33,7 +33,7 @@ def with_root_without_weight(of: Scene) -> Scene:
     )
     binds = np.concatenate((np.eye(4)[None, :3], skin.inverse_bind / [UNIT, UNIT, UNIT, 1]))
     larger = replace(body, positions=body.positions * UNIT, joints=body.joints + 1)
-    moved = Instance(instance.node, larger, Skin(np.append(count, skin.joints), binds), instance.weights)
+    moved = MeshInstance(instance.node, larger, Skin(np.append(count, skin.joints), binds), instance.weights)
     return Scene(skeleton, (moved,))
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.model import Clip, Instance, Mesh, Scene, Skin
-from anim.sampling import pose, world_matrices
+from anim.model import Clip, Mesh, MeshInstance, Scene, Skin
+from anim.sampling import sample_pose, world_matrices
 from tests.clips import skeleton
 
 TRIANGLE = np.array([[0, 1, 2]])
@@ -36,7 +36,7 @@ def scene(of: Mesh, parents: Sequence[int], *, inverse_bind: Any = None, **rest:
     if inverse_bind is None:
         inverse_bind = np.tile(np.eye(4)[:3], (count, 1, 1))
     skin = Skin(np.arange(count), np.asarray(inverse_bind, float))
-    return Scene(nodes, (Instance(count, of, skin, of.rest_weights),))
+    return Scene(nodes, (MeshInstance(count, of, skin, of.rest_weights),))
 
 
 def random_scene(seed: int, *, joints: int = 9, vertices: int = 150, stretch: float = 0.0, **more: Any) -> Scene:
@@ -63,7 +63,7 @@ def random_scene(seed: int, *, joints: int = 9, vertices: int = 150, stretch: fl
 
 def skinning_matrices(of: Scene, clip: Clip, times: Floats) -> Floats:
     """Return world_from_mesh (F, J, 3, 4) of the one mesh's joints."""
-    world = world_matrices(of.skeleton, pose(of.skeleton, clip, times))
+    world = world_matrices(of.skeleton, sample_pose(of.skeleton, clip, times))
     (instance,) = of.instances
     assert instance.skin is not None
     return matrix.multiply(world[:, instance.skin.joints], instance.skin.inverse_bind)

@@ -13,9 +13,9 @@ from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
-from anim.sampling import pose
+from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 from anim.skinning.bake import baker
 from anim.skinning.bound_mesh import Layer
 from anim.skinning.pose_blocks import Frames
@@ -44,9 +44,9 @@ def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
     made = baker(of, method=method)
     compared = 0
     for played in clips:
-        times = grid(played.start, played.end, fps=6)
+        times = frame_times(played.start, played.end, fps=6)
         whole = made.bake(played, times=times).whole().positions
-        local = pose(of.skeleton, played, times)
+        local = sample_pose(of.skeleton, played, times)
         frames = Frames(times, world_by_node(of.skeleton, local), local.weights)
         for layer in made.layers:
             if layer.instance.skin is None:

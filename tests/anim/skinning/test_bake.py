@@ -12,8 +12,8 @@ from anim.gltf.document import Json
 from anim.gltf.reading import reader
 from anim.maths import matrix
 from anim.measure.error.surface import placed, surfaces
-from anim.model import Clip, Instance, Scene
-from anim.sampling import pose, world_matrices
+from anim.model import Clip, MeshInstance, Scene
+from anim.sampling import sample_pose, world_matrices
 from anim.skinning import chunk_pipeline
 from anim.skinning.analysis.weight_sums import bad_sums
 from anim.skinning.bake import bake, baker
@@ -32,7 +32,7 @@ def test_every_mesh_in_order_as_the_ruler_places_it(name: str) -> None:
     for played in reader.clips(opened_fixture(name)):
         times = np.linspace(played.start, played.end, 37)
         cache = bake(of, played, times=times, rigid=True)
-        local = pose(of.skeleton, played, times)
+        local = sample_pose(of.skeleton, played, times)
         world, at = world_matrices(of.skeleton, local), 0
         whole = cache.whole().positions
         for surface in surfaces(of):
@@ -85,7 +85,7 @@ def test_mesh_space_is_the_node_away_from_world_space(method: str) -> None:
     of = Scene(of.skeleton, (replace(of.instances[0], mesh=replace(of.instances[0].mesh, normals=_normals(of))),))
     worldly = bake(of, played, times=TIMES, method=method, normals=True).whole()
     own = bake(of, played, times=TIMES, method=method, normals=True, space="mesh").whole()
-    at = world_matrices(of.skeleton, pose(of.skeleton, played, TIMES))[:, node]
+    at = world_matrices(of.skeleton, sample_pose(of.skeleton, played, TIMES))[:, node]
     back = matrix.apply(at, own.positions.astype(float))
     assert np.abs(back - worldly.positions).max() < 1e-5 * np.abs(back).max()
     assert own.normals is not None
@@ -263,7 +263,7 @@ def test_a_mesh_on_two_nodes_is_baked_twice() -> None:
     body = mesh([[1, 0, 0]], [[0]], [[1]], targets=[[[0, 1, 0]]])
     plain = replace(body, joints=np.empty((1, 0), np.int64), weights=np.empty((1, 0)))
     nodes = skeleton([-1, -1], translation=[[0, 0, 0], [5, 0, 0]])
-    of = Scene(nodes, (Instance(0, plain, None, np.array([0.0])), Instance(1, plain, None, np.array([0.5]))))
+    of = Scene(nodes, (MeshInstance(0, plain, None, np.array([0.0])), MeshInstance(1, plain, None, np.array([0.5]))))
     found = bake(of, clip(), times=np.zeros(1)).whole().positions[0]
     assert found.tolist() == [[1, 0, 0], [6, 0.5, 0]]
 

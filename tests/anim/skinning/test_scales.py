@@ -12,8 +12,8 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
-from anim.model import Instance, Mesh, Scene, Skin
-from anim.sampling.times import grid
+from anim.model import Mesh, MeshInstance, Scene, Skin
+from anim.sampling.times import frame_times
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 from tests.anim.skinning.methods.test_linear_blend import TIMES, baked, moving
@@ -31,7 +31,7 @@ def test_a_joint_without_weight_may_have_any_bind_scale(method: str, asset: Call
     """CesiumMan in hundredths, under a joint that carries nothing and is bound by the identity."""
     document = opened_path(asset("CesiumMan.glb"))
     of, (walk,) = reader.scene(document), reader.clips(document)
-    times = grid(walk.start, walk.end, fps=12)
+    times = frame_times(walk.start, walk.end, fps=12)
     plain = bake(of, walk, times=times, method=method).whole().positions
     odd = bake(with_root_without_weight(of), walk, times=times, method=method).whole().positions
     assert np.abs(odd - plain).max() < CLOSE * diagonal(of)
@@ -134,4 +134,4 @@ def _in_unit(of: Scene, unit: Any) -> Scene:
 
 def _with(of: Scene, body: Mesh, skin: Skin) -> Scene:
     (instance,) = of.instances
-    return Scene(of.skeleton, (Instance(instance.node, body, skin, instance.weights),))
+    return Scene(of.skeleton, (MeshInstance(instance.node, body, skin, instance.weights),))

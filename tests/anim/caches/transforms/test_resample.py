@@ -11,7 +11,7 @@ from anim.caches.transforms import bounds
 from anim.caches.transforms.resample import at_rate, at_time, at_times
 from anim.caches.transforms.vertex_order import ordered
 from anim.errors import FormatError, RangeError, UnsupportedError
-from anim.model import Part
+from anim.model import MeshPart
 from tests.anim.caches.making import cache, positions_of, written
 
 
@@ -51,14 +51,14 @@ def test_blenders_order_leaves_unused_vertices_out() -> None:
     found = ordered(source, "blender")
     assert found.vertex_count == 8
     assert (positions_of(found) == positions_of(source)[:, :8]).all()
-    assert found.parts == (source.parts[0], Part("two", (4, 8), (2, 4), 5, 1))
+    assert found.parts == (source.parts[0], MeshPart("two", (4, 8), (2, 4), 5, 1))
     assert ordered(source, "file") is source
 
 
 def test_blenders_order_keeps_points() -> None:
     source = cache()
     points = source.__class__(
-        source.times, 9, source.faces[:2], source.chunks, parts=(source.parts[0], Part("points", (4, 9), (2, 2)))
+        source.times, 9, source.faces[:2], source.chunks, parts=(source.parts[0], MeshPart("points", (4, 9), (2, 2)))
     )
     assert ordered(points, "blender").vertex_count == 9
 

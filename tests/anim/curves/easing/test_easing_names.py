@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.curves.easing.table import EASING_MAKERS, EASINGS, parse, sparkline
+from anim.curves.easing.table import EASING_FACTORIES, EASINGS, parse, sparkline
 from anim.errors import RangeError
 from tests.anim.curves.easing.eases import FAMILIES, SMOOTH, STEPS, U
 
@@ -55,7 +55,7 @@ def test_case_and_spaces_do_not_matter() -> None:
 
 def test_table_names_are_the_eases_names() -> None:
     assert all(name == ease.name for name, ease in EASINGS.items())
-    assert all(maker.usage.startswith(f"{name}(") for name, maker in EASING_MAKERS.items())
+    assert all(maker.usage.startswith(f"{name}(") for name, maker in EASING_FACTORIES.items())
     assert [f"{f}-{way}" for f in FAMILIES for way in ("in", "out", "in-out")] == [
         n for n in EASINGS if n.split("-")[0] in FAMILIES
     ]

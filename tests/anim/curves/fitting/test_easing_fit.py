@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from anim.arrays import Floats
 from anim.curves.easing.function import evaluate
 from anim.curves.easing.table import EASINGS, parse
-from anim.curves.fitting.easing_fit import cubic_pieces, fit_cubic, fit_error, fit_linear
+from anim.curves.fitting.easing_fit import fit_cubic, fit_error, fit_linear, fit_segments
 from anim.curves.fitting.rotation_fit import RotationKeys, fit_rotation
 from anim.errors import RangeError
 from anim.maths import hermite
@@ -35,14 +35,14 @@ TABLE = {  # ease: cubic and linear pieces at 1e-3, notes/algorithms.md C2
 def test_needs_no_more_pieces_than_the_note(name: str) -> None:
     ease = EASINGS[name]
     cubic, linear = TABLE[name]
-    assert len(cubic_pieces(ease, tolerance=1e-3)) <= cubic
+    assert len(fit_segments(ease, tolerance=1e-3)) <= cubic
     assert len(fit_linear(ease.value, ease.breakpoints, 1e-3)) - 1 <= linear
 
 
 @pytest.mark.parametrize("name", [*CURVED, "spring(100, 5)", "spring(100, 80)", "cubic-bezier(0, 1, 1, 0)"])
 def test_cubics_stay_within_the_tolerance(name: str) -> None:
     ease = parse(name)
-    pieces = cubic_pieces(ease, tolerance=1e-3)
+    pieces = fit_segments(ease, tolerance=1e-3)
     u = np.concatenate([p.start + (p.end - p.start) * MANY for p in pieces])
     worst = np.abs(evaluate(pieces, u) - ease.value(u)).max()
     assert worst <= 1e-3
@@ -55,13 +55,13 @@ def test_cubics_stay_within_the_tolerance(name: str) -> None:
 def test_tolerance_is_kept_whatever_it_is(tolerance: float) -> None:
     for name in ("smootherstep", "expo-in", "quint-in-out"):
         ease = EASINGS[name]
-        pieces = cubic_pieces(ease, tolerance=tolerance)
+        pieces = fit_segments(ease, tolerance=tolerance)
         assert np.abs(evaluate(pieces, MANY) - ease.value(MANY)).max() <= tolerance
 
 
 def test_smooth_eases_stay_c1() -> None:
     for name in ("smootherstep", "sine-in-out", "ease", "elastic-out"):
-        pieces = cubic_pieces(EASINGS[name], tolerance=1e-3)
+        pieces = fit_segments(EASINGS[name], tolerance=1e-3)
         slopes = [(a.slope1, b.slope0) for a, b in pairwise(pieces)]
         assert all(before == after for before, after in slopes)
 
@@ -81,7 +81,7 @@ def test_fewer_pieces_are_not_enough() -> None:
         fitted = hermite.evaluate(MANY, np.zeros(1), slopes[0], ease.value(np.array([end])), slopes[1])
         return float(np.abs(fitted - ease.value(u)).max())
 
-    pieces = cubic_pieces(ease, tolerance=1e-3)
+    pieces = fit_segments(ease, tolerance=1e-3)
     longest = max(end for end in np.linspace(0.01, 1, 300) if worst(end) <= 1e-3)
     assert pieces[0].end <= longest + 1e-9
     assert longest + longest < 1  # by symmetry two pieces can't do
@@ -105,7 +105,7 @@ def test_parabola_has_evenly_spaced_chords() -> None:
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-8, np.inf, np.nan])
 def test_tolerance_out_of_range(tolerance: float) -> None:
     with pytest.raises(RangeError, match="tolerance is"):
-        cubic_pieces(EASINGS["sine-in"], tolerance=tolerance)
+        fit_segments(EASINGS["sine-in"], tolerance=tolerance)
 
 
 # Rotations

@@ -15,16 +15,18 @@ from anim.exchange.euler.evaluate import rotation_at, translation_at
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import OFFSETS, EulerMotion, EulerNode, Pivots
 from anim.maths import euler, quaternion
-from anim.maths.euler import ORDERS, Frame
+from anim.maths.euler import ORDERS, AxesConvention
 from anim.model import Interpolation, Track
 from anim.sampling.track import sample
 
-CONVENTIONS = [(order, frame) for order in ORDERS for frame in Frame]
+CONVENTIONS = [(order, frame) for order in ORDERS for frame in AxesConvention]
 TOLERANCE = np.radians(0.05)
 WIDEST = np.radians(120) + 1e-4
 
 
-def _node(curves: Sequence[Curve | None], order: str = "XYZ", frame: Frame = Frame.INTRINSIC) -> EulerNode:
+def _node(
+    curves: Sequence[Curve | None], order: str = "XYZ", frame: AxesConvention = AxesConvention.INTRINSIC
+) -> EulerNode:
     return EulerNode("a", -1, np.zeros(3), order, frame, np.zeros(3), tuple(curves))
 
 
@@ -37,9 +39,9 @@ def _straight(*degrees: tuple[float, float]) -> list[Curve]:
     return [linear(np.array((0.0, 1.0)), np.radians(pair)) for pair in degrees]
 
 
-def _scipy(order: str, frame: Frame, angles: Floats) -> Floats:
+def _scipy(order: str, frame: AxesConvention, angles: Floats) -> Floats:
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation
-    q: Floats = rotation.from_euler(order if frame == Frame.INTRINSIC else order.lower(), angles).as_quat()
+    q: Floats = rotation.from_euler(order if frame == AxesConvention.INTRINSIC else order.lower(), angles).as_quat()
     return q
 
 
@@ -64,7 +66,7 @@ def _random_curves(seed: int) -> list[Curve]:
 
 @pytest.mark.parametrize(("order", "frame"), CONVENTIONS)
 @pytest.mark.parametrize("seed", range(3))
-def test_slerp_follows_the_euler_motion(order: str, frame: Frame, seed: int) -> None:
+def test_slerp_follows_the_euler_motion(order: str, frame: AxesConvention, seed: int) -> None:
     node = _node(_random_curves(seed), order, frame)
     track = _track(node)
     assert _error(track, node, track.times).max() < 1e-9
@@ -106,7 +108,7 @@ def test_axes_with_keys_of_their_own_are_each_evaluated() -> None:
     track = _track(_node([x, y, None]))
     for t in (0.0, 0.5, 1.0, 2.0):
         angles = np.array((np.interp(t, x.times, x.values), np.interp(t, y.times, y.values), 0))
-        expected = _scipy("XYZ", Frame.INTRINSIC, angles)
+        expected = _scipy("XYZ", AxesConvention.INTRINSIC, angles)
         np.testing.assert_allclose(quaternion.angle_between(track.values[track.times == t][0], expected), 0, atol=1e-9)
 
 
@@ -169,12 +171,12 @@ def test_pre_and_post_rotation_and_pivots_are_fbxs() -> None:
     offsets = {name: random.normal(size=3) for name in OFFSETS}
     curves = tuple(_straight((0, 300), (0, 90), (20, 0)))
     start, size, pivots = random.normal(size=3), np.array((1.0, 2.0, 0.5)), Pivots(pre, post, **offsets)
-    node = EulerNode("a", -1, start, "XYZ", Frame.EXTRINSIC, np.zeros(3), curves, scale=size, pivots=pivots)
+    node = EulerNode("a", -1, start, "XYZ", AxesConvention.EXTRINSIC, np.zeros(3), curves, scale=size, pivots=pivots)
     converted = from_euler(EulerMotion((node,)), tolerance=1e-4)
     turn, place = converted.clip.tracks[1], converted.clip.tracks[0]
     for t in np.linspace(0, 1, 57):
         angles = [float(evaluate(c or constant(0), np.array(t))) for c in node.rotation]
-        r = _scipy("XYZ", Frame.EXTRINSIC, np.array(angles))
+        r = _scipy("XYZ", AxesConvention.EXTRINSIC, np.array(angles))
         chain = (
             *(_moved(by) for by in (start, offsets["rotation_offset"], offsets["rotation_pivot"])),
             *(_turned(by) for by in (pre, r, quaternion.conjugate(post))),
@@ -194,7 +196,7 @@ def test_a_cubic_translation_is_followed() -> None:
     cubic = Curve(
         np.array((0.0, 1.0)), np.array((0.0, 1.0)), uniform_modes(2, Mode.CUBIC), np.zeros(2), np.array((4.0, 0))
     )
-    node = EulerNode("a", -1, np.zeros(3), "XYZ", Frame.INTRINSIC, np.zeros(3), (None,) * 3, {1: cubic})
+    node = EulerNode("a", -1, np.zeros(3), "XYZ", AxesConvention.INTRINSIC, np.zeros(3), (None,) * 3, {1: cubic})
     track = _track(node, 1e-3, path="translation")
     at = np.linspace(0, 1, 1000)
     np.testing.assert_allclose(sample(track, at)[:, 1], evaluate(cubic, at), atol=1e-3)
@@ -210,7 +212,7 @@ def test_lock_is_no_obstacle() -> None:
     """Through lock the quaternions are those of the angles; only the angles are strained."""
     node = _node(_straight((0, 40), (80, 100), (0, -30)))
     assert _error(_track(node), node, np.linspace(0, 1, 999)).max() < TOLERANCE
-    assert euler.distance_to_lock(_track(node).values, order="XYZ").min() < 0.01
+    assert euler.gimbal_distance(_track(node).values, order="XYZ").min() < 0.01
 
 
 def _moved(by: Floats) -> Floats:

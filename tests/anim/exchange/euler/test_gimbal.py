@@ -10,13 +10,16 @@ from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.gimbal import GimbalRow, gimbal
 from anim.exchange.euler.motion import PLAIN, EulerMotion, EulerNode, Pivots
 from anim.maths import quaternion
-from anim.maths.euler import ORDERS, Frame, is_proper
+from anim.maths.euler import ORDERS, AxesConvention, is_proper
 
 TIMES = np.arange(181) / 60
 
 
 def _row(
-    angles: tuple[float, float, float], order: str = "ZXY", frame: Frame = Frame.INTRINSIC, pivots: Pivots = PLAIN
+    angles: tuple[float, float, float],
+    order: str = "ZXY",
+    frame: AxesConvention = AxesConvention.INTRINSIC,
+    pivots: Pivots = PLAIN,
 ) -> GimbalRow:
     curves = tuple(linear(TIMES, np.linspace(0, np.radians(a), len(TIMES))) for a in angles)
     motion = EulerMotion((EulerNode("a", -1, np.zeros(3), order, frame, np.zeros(3), curves, pivots=pivots),))
@@ -34,11 +37,11 @@ def test_a_motion_up_to_two_degrees_from_lock() -> None:
 
 
 @pytest.mark.parametrize("order", [order for order in ORDERS if not is_proper(order)])
-@pytest.mark.parametrize("frame", Frame)
-def test_the_condition_is_that_of_the_jacobian(order: str, frame: Frame) -> None:
+@pytest.mark.parametrize("frame", AxesConvention)
+def test_the_condition_is_that_of_the_jacobian(order: str, frame: AxesConvention) -> None:
     """Axes of the rates at the last frame: the singular values of the matrix that they are columns of."""
     row = _row((20, 80, -30), order, frame)
-    a, b, c = np.eye(3)[["XYZ".index(x) for x in (order if frame == Frame.INTRINSIC else order[::-1])]]
+    a, b, c = np.eye(3)[["XYZ".index(x) for x in (order if frame == AxesConvention.INTRINSIC else order[::-1])]]
     middle = np.radians(80)
     turned = c * np.cos(middle) + np.cross(b, c) * np.sin(middle)
     values = np.linalg.svd(np.stack((a, b, turned), axis=1), compute_uv=False)
@@ -49,7 +52,7 @@ def test_lock_between_few_keys_is_found() -> None:
     """Keys at 0° and 120°, lock at 90°."""
     times = np.array((0.0, 1.0))
     curves = (None, linear(times, np.radians((0.0, 120.0))), None)
-    motion = EulerMotion((EulerNode("a", -1, np.zeros(3), "XYZ", Frame.INTRINSIC, np.zeros(3), curves),))
+    motion = EulerMotion((EulerNode("a", -1, np.zeros(3), "XYZ", AxesConvention.INTRINSIC, np.zeros(3), curves),))
     clip = from_euler(motion, tolerance=1e-3).clip
     assert len(clip.tracks[0].times) == 2
     row = gimbal(motion, clip)[0]
@@ -68,13 +71,13 @@ def test_proper_orders_lock_at_zero() -> None:
 
 
 def test_the_best_extrinsic_order_is_the_intrinsic_one_backwards() -> None:
-    inner, outer = _row((0, 88, 0), "ZXY"), _row((0, 88, 0), "YXZ", Frame.EXTRINSIC)
+    inner, outer = _row((0, 88, 0), "ZXY"), _row((0, 88, 0), "YXZ", AxesConvention.EXTRINSIC)
     assert outer.best_order == inner.best_order[::-1]
     assert outer.best_order != outer.best_order[::-1]
 
 
-@pytest.mark.parametrize("frame", Frame)
-def test_pre_and_post_rotations_are_no_part_of_the_angles(frame: Frame) -> None:
+@pytest.mark.parametrize("frame", AxesConvention)
+def test_pre_and_post_rotations_are_no_part_of_the_angles(frame: AxesConvention) -> None:
     """80° of the middle angle are 10° from lock, whatever stands around the three turns."""
     turns = quaternion.normalize(np.random.default_rng(4).normal(size=(2, 4)))
     row = _row((30, 80, -20), "ZXY", frame, Pivots(*turns))

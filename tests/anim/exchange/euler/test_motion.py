@@ -9,7 +9,7 @@ from anim.exchange.euler.curve import linear
 from anim.exchange.euler.evaluate import rotation_at, scale_at, translation_at
 from anim.exchange.euler.motion import EulerMotion, EulerNode, Pivots, scaled, turned_up
 from anim.maths import matrix, quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
 AT = np.array((0.0, 0.3, 1.0))
 UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) → (x, z, −y)
@@ -25,7 +25,7 @@ def _pivoted() -> EulerNode:
     moves = {axis: linear(keys, random.normal(size=2)) for axis in (1, 2)}
     scales = {axis: linear(keys, random.uniform(0.5, 2, 2)) for axis in (0, 1)}
     return EulerNode(
-        "a", -1, random.normal(size=3), "ZXY", Frame.EXTRINSIC, np.zeros(3), (curves[0], curves[1], None),
+        "a", -1, random.normal(size=3), "ZXY", AxesConvention.EXTRINSIC, np.zeros(3), (curves[0], curves[1], None),
         moves, random.uniform(0.5, 2, 3), scales, Pivots(*turns, *offsets),
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from anim.arrays import Floats
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.euler.rotation_order import BEST, CANDIDATES, Orders, parse
 from anim.maths import euler
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
 NONE = np.array([[0, 0, 0, 1.0]])
 
@@ -47,16 +47,16 @@ def test_auto_keeps_the_widest_swing_out_of_the_middle(axis: int) -> None:
     """A middle angle of 90° is lock: the axis that swings by 89° must stand first or last."""
     order = Orders(BEST).of("a", _swing(axis, 89))
     assert order[1] != "XYZ"[axis]
-    assert np.degrees(euler.distance_to_lock(_swing(axis, 89), order=order).min()) > 85
+    assert np.degrees(euler.gimbal_distance(_swing(axis, 89), order=order).min()) > 85
 
 
 def test_auto_is_the_best_of_six_by_trying() -> None:
     random = np.random.default_rng(5)
     turns = euler.to_quaternion(random.uniform(-1.2, 1.2, (60, 3)), order="YXZ")
-    nearest = {order: euler.distance_to_lock(turns, order=order).min() for order in CANDIDATES}
+    nearest = {order: euler.gimbal_distance(turns, order=order).min() for order in CANDIDATES}
     found = Orders(BEST).of("a", turns)
     assert nearest[found] >= max(nearest.values()) - np.radians(1.0)
-    extrinsic = Orders(BEST).of("a", turns, Frame.EXTRINSIC)
+    extrinsic = Orders(BEST).of("a", turns, AxesConvention.EXTRINSIC)
     assert extrinsic == found[::-1]
 
 

@@ -9,7 +9,7 @@ from anim.exchange.euler.curve import Curve, Mode, evaluate, travel, uniform_mod
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 from anim.exchange.euler.weighted_bezier import parameter
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.sampling.track import sample
 
 HANDLES = [(1 / 3, 1 / 3), (0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.9, 0.7), (0.02, 0.98), (0.5, 0.25)]
@@ -61,7 +61,7 @@ def test_travel_bounds_it(leaving: float, arriving: float) -> None:
 
 def test_the_written_track_follows_it() -> None:
     curve = _curve(0.9, 0.7)
-    node = EulerNode("a", -1, np.zeros(3), "XYZ", Frame.INTRINSIC, np.zeros(3), (curve, None, None))
+    node = EulerNode("a", -1, np.zeros(3), "XYZ", AxesConvention.INTRINSIC, np.zeros(3), (curve, None, None))
     track = from_euler(EulerMotion((node,)), tolerance=1e-3).clip.tracks[0]
     at = np.linspace(2, 6, 5001)
     turned = 2 * np.arctan2(sample(track, at)[:, 0], sample(track, at)[:, 3])

@@ -18,7 +18,7 @@ from anim.exchange.formats.bvh_reader import BvhPosition
 from anim.exchange.stick_mesh import sticks
 from anim.gltf import authoring
 from anim.gltf.reading import reader
-from anim.sampling import pose, world_matrices
+from anim.sampling import sample_pose, world_matrices
 from tests.anim.exchange.forward import world_positions
 from tests.files import glb_of, opened
 
@@ -52,7 +52,7 @@ Frame Time: 0.1
 def _positions(text: str) -> tuple[list[str], np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
     converted = from_euler(bvh_reader.read(text.encode()), tolerance=TOLERANCE)
     times = converted.clip.tracks[0].times
-    world = world_matrices(converted.skeleton, pose(converted.skeleton, converted.clip, times))
+    world = world_matrices(converted.skeleton, sample_pose(converted.skeleton, converted.clip, times))
     return list(converted.skeleton.names), world[..., 3]
 
 
@@ -69,7 +69,7 @@ def test_joints_stand_where_a_plain_loop_puts_them(name: str, asset: Find) -> No
     assert list(bones.names[: len(names)]) == names
     times = next(track.times for track in clip.tracks if track.path == "translation")
     assert len(times) == len(expected)
-    found = world_matrices(bones, pose(bones, clip, times))[:, : len(names), :, 3] * 100
+    found = world_matrices(bones, sample_pose(bones, clip, times))[:, : len(names), :, 3] * 100
     height = extent(skeleton(motion))
     assert np.abs(found - expected).max() < 1e-5 * height
 
@@ -85,7 +85,7 @@ def test_joints_stand_where_bvhio_puts_them(name: str, asset: Find, tmp_path: Pa
     root = bvhio.readAsHierarchy(str(path))
     converted = from_euler(bvh_reader.read(path.read_bytes()), tolerance=TOLERANCE)
     times = converted.clip.tracks[0].times
-    world = world_matrices(converted.skeleton, pose(converted.skeleton, converted.clip, times))[..., 3]
+    world = world_matrices(converted.skeleton, sample_pose(converted.skeleton, converted.clip, times))[..., 3]
     for frame in range(0, len(times), 4):
         root.loadPose(frame)
         for joint, _, _ in root.layout():
@@ -176,7 +176,7 @@ def test_z_up_becomes_y_up() -> None:
     motion = bvh_reader.read(SMALL.encode())
     times = np.array([0.0, 0.05, 0.1])
     plain, turned = (from_euler(each, tolerance=TOLERANCE) for each in (motion, turned_up(motion)))
-    places = [world_matrices(c.skeleton, pose(c.skeleton, c.clip, times))[..., 3] for c in (plain, turned)]
+    places = [world_matrices(c.skeleton, sample_pose(c.skeleton, c.clip, times))[..., 3] for c in (plain, turned)]
     np.testing.assert_allclose(places[1], places[0][..., [0, 2, 1]] * [1, 1, -1], atol=1e-12)
 
 

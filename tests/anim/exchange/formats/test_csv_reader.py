@@ -12,9 +12,9 @@ from anim.exchange.euler.convention import NOTHING, Stated
 from anim.exchange.euler.curve import Curve, Mode
 from anim.exchange.euler.motion import Convention, EulerNode, Unit
 from anim.exchange.formats import csv_reader
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
-XYZ = Stated("XYZ", Frame.EXTRINSIC, Unit.DEG)
+XYZ = Stated("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)
 
 FRAMES = """# order=ZXY frame=intrinsic unit=deg meters_per_unit=0.01
 #node,hips,,0,90,0
@@ -80,10 +80,10 @@ def test_keys_before_zero_come_later_all_by_as_much() -> None:
 
 
 def test_proper_orders_number_their_angles() -> None:
-    arm = _node("time,a.r1,a.r2,a.r3\n0,1,2,3\n1,4,5,6\n", "a", Stated("ZXZ", Frame.INTRINSIC, Unit.RAD))
+    arm = _node("time,a.r1,a.r2,a.r3\n0,1,2,3\n1,4,5,6\n", "a", Stated("ZXZ", AxesConvention.INTRINSIC, Unit.RAD))
     assert [_curve(c).values[0] for c in arm.rotation] == [1, 2, 3]
     with pytest.raises(FormatError, match="line 1: axis 'z' has no single place in order ZXZ"):
-        csv_reader.read(b"time,a.rz\n0,1\n", Stated("ZXZ", Frame.INTRINSIC, Unit.RAD))
+        csv_reader.read(b"time,a.rz\n0,1\n", Stated("ZXZ", AxesConvention.INTRINSIC, Unit.RAD))
 
 
 @pytest.mark.parametrize("text", [FRAMES, KEYS])
@@ -107,7 +107,7 @@ def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
     motion = csv_reader.read(KEYS.encode(), XYZ)
     nodes = (replace(motion.nodes[0], name="#1"), *motion.nodes[1:])
     again = csv_reader.read(
-        csv_reader.write(replace(motion, nodes=nodes), Convention("XYZ", Frame.EXTRINSIC, Unit.DEG)), NOTHING
+        csv_reader.write(replace(motion, nodes=nodes), Convention("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)), NOTHING
     )
     assert again.nodes[0].name == "#1"
     curves = [[curve is not None for curve in each.nodes[0].rotation] for each in (motion, again)]
@@ -120,8 +120,8 @@ def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
     [
         (NOTHING, "nobody says the order"),
         (Stated("XYZ"), "nobody says the frame"),
-        (Stated("XYZ", Frame.INTRINSIC), "nobody says the unit"),
-        (Stated("XXZ", Frame.INTRINSIC, Unit.DEG), "order is 'XXZ'"),
+        (Stated("XYZ", AxesConvention.INTRINSIC), "nobody says the unit"),
+        (Stated("XXZ", AxesConvention.INTRINSIC, Unit.DEG), "order is 'XXZ'"),
     ],
 )
 def test_the_convention_is_never_guessed(stated: Stated, problem: str) -> None:
@@ -136,8 +136,8 @@ def test_the_convention_in_a_persons_spelling() -> None:
     for text in (loose.encode(), FRAMES.encode("utf-16"), FRAMES.replace("\n", "\r").encode()):
         motion = csv_reader.read(text, NOTHING)
         assert [(n.name, n.parent, n.order, n.frame) for n in motion.nodes] == [
-            ("hips", -1, "ZXY", Frame.INTRINSIC),
-            ("spine, lower", 0, "ZXY", Frame.INTRINSIC),
+            ("hips", -1, "ZXY", AxesConvention.INTRINSIC),
+            ("spine, lower", 0, "ZXY", AxesConvention.INTRINSIC),
         ]
         np.testing.assert_allclose(motion.nodes[1].translation, (0, 0.12, 0))
 

@@ -14,7 +14,7 @@ from anim.exchange.euler.curve import Mode
 from anim.exchange.euler.motion import Convention, Unit
 from anim.exchange.formats import json_reader
 from anim.maths import euler
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 
 CURVES: dict[str, Any] = {
     "schema": "euler-curves/1",
@@ -68,7 +68,7 @@ def test_the_documented_schema_is_read() -> None:
     assert (body.name, body.order, arm.name, arm.parent) == ("body", "ZXZ", "arm", 0)
     np.testing.assert_allclose(arm.translation, (0, 0.12, 0))
     np.testing.assert_allclose(arm.angles, np.radians((0, 0, 90)))
-    turned = euler.to_quaternion(np.radians((0, 0, 45.0)), order="XYZ", frame=Frame.EXTRINSIC)
+    turned = euler.to_quaternion(np.radians((0, 0, 45.0)), order="XYZ", frame=AxesConvention.EXTRINSIC)
     np.testing.assert_allclose(arm.pivots.pre_rotation, turned)
     np.testing.assert_allclose(arm.pivots.post_rotation, (0, 0, 0, 1))
     np.testing.assert_allclose(arm.rotation[1].out_tangents, np.radians((60, 0, 0)))
@@ -83,7 +83,7 @@ def test_what_is_written_is_read_as_the_same() -> None:
     for key in ("pre_rotation", "post_rotation", "rotation_pivot"):
         del content["nodes"][0][key]
     motion = _read(content)
-    again = json_reader.read(json_reader.write(motion, Convention("XYZ", Frame.EXTRINSIC, Unit.RAD)), NOTHING)
+    again = json_reader.read(json_reader.write(motion, Convention("XYZ", AxesConvention.EXTRINSIC, Unit.RAD)), NOTHING)
     one, two = motion.nodes[1], again.nodes[1]
     np.testing.assert_allclose(two.angles, one.angles)
     for a, b in zip([*one.rotation[:2], one.moves[2]], [*two.rotation[:2], two.moves[2]], strict=True):
@@ -148,9 +148,9 @@ def test_the_convention_is_never_guessed() -> None:
     del content["frame"]
     with pytest.raises(RangeError, match="nobody says the frame"):
         _read(content)
-    assert _read(content, Stated(frame=Frame.INTRINSIC)).nodes[1].frame == Frame.INTRINSIC
+    assert _read(content, Stated(frame=AxesConvention.INTRINSIC)).nodes[1].frame == AxesConvention.INTRINSIC
     with pytest.raises(RangeError, match="the file says order XYZ, the options say YXZ"):
-        _read(content, Stated("YXZ", Frame.INTRINSIC))
+        _read(content, Stated("YXZ", AxesConvention.INTRINSIC))
 
 
 def test_broken_json_has_line_and_column() -> None:

@@ -14,7 +14,7 @@ from anim.exchange.euler.motion import EulerMotion, EulerNode
 from anim.exchange.retarget.apply import onto
 from anim.gltf import authoring
 from anim.gltf.reading import reader
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Scene
 from tests.anim.exchange.figures import Find, put_on, recorded, tail
 from tests.clips import skeleton
@@ -32,14 +32,16 @@ def test_the_clip_is_added_and_nothing_else(asset: Find) -> None:
 
 def test_curves_without_a_hierarchy_are_the_nodes_own() -> None:
     curve = linear(np.array((0.0, 1.0)), np.array((0.0, 0.5)))
-    node = EulerNode("tail2", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
+    node = EulerNode("tail2", -1, np.zeros(3), "Z", AxesConvention.INTRINSIC, np.zeros(1), (curve,))
     source = from_euler(EulerMotion((node,), nested=False), tolerance=1e-4)
     done = onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=False)
     assert [(track.node, track.path) for track in done.clip.tracks] == [(1, "rotation")]
 
 
 def test_strangers_are_refused() -> None:
-    node = EulerNode("wing", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),))
+    node = EulerNode(
+        "wing", -1, np.zeros(3), "Z", AxesConvention.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),)
+    )
     source = from_euler(EulerMotion((node,)), tolerance=1e-4)
     with pytest.raises(NotFoundError, match="no joint of the motion"):
         onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True)
@@ -48,7 +50,9 @@ def test_strangers_are_refused() -> None:
 
 
 def test_the_example_pairs_the_topmost_joints() -> None:
-    node = EulerNode("wing", -1, np.zeros(3), "Z", Frame.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),))
+    node = EulerNode(
+        "wing", -1, np.zeros(3), "Z", AxesConvention.INTRINSIC, np.zeros(1), (linear(np.zeros(1), np.zeros(1)),)
+    )
     source = from_euler(EulerMotion((node,)), tolerance=1e-4)
     character = replace(skeleton([1, -1]), names=("socket", "body"))
     with pytest.raises(NotFoundError) as caught:

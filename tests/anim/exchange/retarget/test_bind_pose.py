@@ -17,7 +17,7 @@ from anim.exchange.retarget.retarget import Floor
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.model import Pose, Scene, Skeleton, Skin
-from anim.sampling import pose, rest, world_matrices
+from anim.sampling import rest_pose, sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, recorded
 
 Skins: TypeAlias = list[tuple[int, Skin]]
@@ -42,7 +42,7 @@ def _half(skin: Skin, chosen: NDArray[np.bool_]) -> Skin:
 
 def _is_upper(rig: Rig) -> NDArray[np.bool_]:
     """By joint of the first skin, whether it rests above the middle."""
-    heights = world_matrices(rig[0], rest(rig[0]))[0, rig[1][0][1].joints, 1, 3]
+    heights = world_matrices(rig[0], rest_pose(rig[0]))[0, rig[1][0][1].joints, 1, 3]
     return np.asarray(heights > heights.mean())
 
 
@@ -54,7 +54,7 @@ def in_centimeters(rig: Rig) -> Rig:
 def with_a_placed_mesh(rig: Rig) -> Rig:
     """Vertices in the space of a mesh node that is moved, turned and twice as large, as Blender exports them."""
     bones = _placed(rig, 2.0)
-    world = world_matrices(bones, rest(bones))[0]
+    world = world_matrices(bones, rest_pose(bones))[0]
     return bones, [(holder, _times(skin, world[holder])) for holder, skin in rig[1]]
 
 
@@ -66,7 +66,7 @@ def with_an_ignored_placement(rig: Rig) -> Rig:
 def with_a_placed_mesh_in_centimeters(rig: Rig) -> Rig:
     """Both: a mesh node that is moved and turned, without the scale that its vertices need."""
     bones = _placed(rig, 1.0)
-    world = world_matrices(bones, rest(bones))[0]
+    world = world_matrices(bones, rest_pose(bones))[0]
     return bones, [(h, _times(skin, matrix.multiply(world[h], CENTIMETERS))) for h, skin in rig[1]]
 
 
@@ -104,7 +104,7 @@ def under_a_scaled_armature(rig: Rig) -> Rig:
         np.concatenate((rotation, [turn])),
         np.concatenate((bones.scale, [[0.01] * 3])),
     )
-    world = world_matrices(armature, rest(armature))[0]
+    world = world_matrices(armature, rest_pose(armature))[0]
     return armature, [
         (holder, replace(skin, inverse_bind=matrix.inverse(world[skin.joints]))) for holder, skin in rig[1]
     ]
@@ -150,13 +150,13 @@ def test_the_skins_rest_is_found(build: Callable[[Rig], Rig], name: str, asset: 
     scene, rig = _rig(name, asset)
     clip = reader.clips(character(name, asset))[2]
     bones, skins = build(rig)
-    dance = pose(scene.skeleton, clip, np.array([clip.end / 2]))
+    dance = sample_pose(scene.skeleton, clip, np.array([clip.end / 2]))
     dancing = _dancing(bones, scene.skeleton, dance)
     assert bind_pose(bones, skins).num_joints == 0
     found = bind_pose(dancing, skins)
     joints = np.unique(np.concatenate([skin.joints for _, skin in skins]))
     assert found.num_joints > 3
-    expected, made = (world_matrices(each, rest(each))[0, joints] for each in (bones, found.skeleton))
+    expected, made = (world_matrices(each, rest_pose(each))[0, joints] for each in (bones, found.skeleton))
     np.testing.assert_allclose(made, expected, atol=FILE_ERROR)
 
 
@@ -165,7 +165,7 @@ def test_a_recording_moves_them_alike(build: Callable[[Rig], Rig], asset: Find) 
     scene, rig = _rig("biped", asset)
     clip = reader.clips(character("biped", asset))[2]
     bones, skins = build(rig)
-    dancing = _dancing(bones, scene.skeleton, pose(scene.skeleton, clip, np.array([clip.end / 2])))
+    dancing = _dancing(bones, scene.skeleton, sample_pose(scene.skeleton, clip, np.array([clip.end / 2])))
     instance = scene.instances[0]
     instances = tuple(replace(instance, node=holder, skin=skin) for holder, skin in skins)
     source = recorded("freebvh.bvh", asset)
@@ -175,6 +175,7 @@ def test_a_recording_moves_them_alike(build: Callable[[Rig], Rig], asset: Find) 
     )
     joints, times = skins[0][1].joints, clean.tracks[0].times
     one, two = (
-        world_matrices(each, pose(each, clip, times))[:, joints] for each, clip in ((bones, clean), (dancing, other))
+        world_matrices(each, sample_pose(each, clip, times))[:, joints]
+        for each, clip in ((bones, clean), (dancing, other))
     )
     np.testing.assert_allclose(two, one, atol=1e-4)

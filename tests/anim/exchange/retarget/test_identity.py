@@ -18,15 +18,15 @@ from anim.exchange.retarget.apply import onto
 from anim.exchange.retarget.bind_pose import bind_pose, completed
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.measure.error.metric import Ruler
 from anim.model import Clip, Scene, Skeleton, Skin
-from anim.sampling import pose, world_matrices
+from anim.sampling import sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, recorded
 from tests.clips import track
 
 CENTIMETERS = 0.01
-CONVENTION = Convention("ZXY", Frame.INTRINSIC, Unit.DEG)
+CONVENTION = Convention("ZXY", AxesConvention.INTRINSIC, Unit.DEG)
 TOLERANCE = 1e-3  # rad, of from-euler
 MAX_ERROR_M = 1e-5
 FPS = {"Knight.glb": 30.0, "Fox.glb": 120.0}  # of grids that all keys lie on, where no clip has a key at each frame
@@ -124,7 +124,7 @@ def test_a_figure_placed_elsewhere_does_the_same(name: str, kind: str, asset: Fi
     placed = _under(scene.skeleton, ASIDE, TURNED, 2.0)
     done = onto(source, replace(scene, skeleton=placed), aliases={}, nested=True)
     times = done.clip.tracks[0].times
-    expected, found = (world_matrices(placed, pose(placed, each, times)) for each in (clip, done.clip))
+    expected, found = (world_matrices(placed, sample_pose(placed, each, times)) for each in (clip, done.clip))
     np.testing.assert_allclose(found[..., 3], expected[..., 3], atol=2 * MAX_ERROR_M)
     assert done.scale == pytest.approx(2, abs=1e-6)
 
@@ -140,8 +140,8 @@ def test_a_figure_of_another_size_does_the_same(factor: float, asset: Find) -> N
     done = onto(_written(scene, clip, "json", 30), target, aliases={}, nested=True)
     assert done.scale == pytest.approx(factor, rel=1e-6)
     times = done.clip.tracks[0].times
-    expected = world_matrices(bones, pose(bones, clip, times))
-    found = world_matrices(other, pose(other, done.clip, times))
+    expected = world_matrices(bones, sample_pose(bones, clip, times))
+    found = world_matrices(other, sample_pose(other, done.clip, times))
     np.testing.assert_allclose(found[..., 3] / factor, expected[..., 3], atol=MAX_ERROR_M)
     np.testing.assert_allclose(found[..., :3], expected[..., :3], atol=MAX_ERROR_M)
 
@@ -170,7 +170,7 @@ def test_nodes_that_rest_in_a_dance_are_no_rest(name: str, asset: Find) -> None:
     """The same figure with nodes in the middle of a clip moves as the clean one, whatever the motion."""
     document = character(name, asset)
     scene, clips = reader.scene(document), reader.clips(document)
-    dance = pose(scene.skeleton, clips[2], np.array([clips[2].end / 2]))
+    dance = sample_pose(scene.skeleton, clips[2], np.array([clips[2].end / 2]))
     dancing = replace(
         scene.skeleton, translation=dance.translation[0], rotation=dance.rotation[0], scale=dance.scale[0]
     )
@@ -183,7 +183,7 @@ def test_nodes_that_rest_in_a_dance_are_no_rest(name: str, asset: Find) -> None:
     joints = _skins(scene)[0][1].joints
     times = clean.tracks[0].times
     one, two = (
-        world_matrices(bones, pose(bones, clip, times))[:, joints]
+        world_matrices(bones, sample_pose(bones, clip, times))[:, joints]
         for bones, clip in ((scene.skeleton, clean), (dancing, other))
     )
     np.testing.assert_allclose(two, one, atol=1e-4)

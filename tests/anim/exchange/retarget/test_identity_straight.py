@@ -14,9 +14,9 @@ from anim.exchange.formats import json_reader
 from anim.exchange.retarget.apply import onto
 from anim.gltf.reading import reader
 from anim.maths import quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Clip, Scene, Skeleton
-from anim.sampling import pose, world_matrices
+from anim.sampling import sample_pose, world_matrices
 from tests.clips import track
 from tests.files import opened_fixture
 
@@ -45,14 +45,16 @@ def _wave(joints: int) -> Clip:
 
 def _written(skeleton: Skeleton, clip: Clip) -> Converted:
     curves = to_euler(skeleton, clip, order="XYZ").motion
-    motion = json_reader.read(json_reader.write(curves, Convention("XYZ", Frame.INTRINSIC, Unit.DEG)), Stated())
+    motion = json_reader.read(
+        json_reader.write(curves, Convention("XYZ", AxesConvention.INTRINSIC, Unit.DEG)), Stated()
+    )
     return from_euler(motion, tolerance=1e-3, name=clip.name)
 
 
 def _error(skeleton: Skeleton, clip: Clip, found: Clip) -> float:
     """How far a joint is off at most, key times and others: in metres, or by the distance in 10 m beyond that."""
     times = np.union1d(np.linspace(clip.start, clip.end, 301), clip.tracks[0].times)
-    one, two = (world_matrices(skeleton, pose(skeleton, each, times))[..., 3] for each in (clip, found))
+    one, two = (world_matrices(skeleton, sample_pose(skeleton, each, times))[..., 3] for each in (clip, found))
     return float(np.linalg.norm(one - two, axis=-1).max() / max(1.0, np.abs(one).max() / 10))
 
 

@@ -14,9 +14,9 @@ from anim.exchange.retarget.apply import onto
 from anim.exchange.retarget.retarget import Floor
 from anim.gltf.reading import reader
 from anim.maths import quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Clip, Scene
-from anim.sampling import pose, rest, world_matrices
+from anim.sampling import rest_pose, sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, put_on, recorded
 from tests.files import opened_fixture
 
@@ -31,12 +31,12 @@ CESIUM = {
     "RightForeArm": "Skeleton_arm_joint_R__2_",
     "RightHand": "Skeleton_arm_joint_R__3_",
 }  # fmt: skip
-BVH = Convention("ZXY", Frame.INTRINSIC, Unit.DEG)
+BVH = Convention("ZXY", AxesConvention.INTRINSIC, Unit.DEG)
 
 
 def _lowest(scene: Scene, clip: Clip, times: Floats) -> tuple[Floats, float]:
     """Height of the lowest vertex at each time by a plain weighted sum, and the height of the figure."""
-    world = world_matrices(scene.skeleton, pose(scene.skeleton, clip, times))
+    world = world_matrices(scene.skeleton, sample_pose(scene.skeleton, clip, times))
     lowest, highest = np.full(len(times), np.inf), -np.inf
     for instance in scene.instances:
         if instance.skin is None:
@@ -70,7 +70,7 @@ def test_soles_stand_on_the_floor(name: str, aliases: dict[str, str], least: int
     done = put_on(document, source, aliases)
     assert len(done.matching.pairs) >= least
     times = done.clip.tracks[0].times[120::60]
-    theirs = world_matrices(source.skeleton, pose(source.skeleton, source.clip, times))[..., 1, 3].min(axis=1)
+    theirs = world_matrices(source.skeleton, sample_pose(source.skeleton, source.clip, times))[..., 1, 3].min(axis=1)
     down = theirs - np.percentile(theirs, 5) < 0.01
     assert down.mean() > 0.3
     lowest, height = _lowest(scene, done.clip, times)
@@ -94,8 +94,8 @@ def test_arms_and_legs_point_as_the_recorded_ones(name: str, asset: Find) -> Non
     bones = reader.skeleton(document)
     done = put_on(document, source, {})
     times = source.clip.tracks[0].times[::300]
-    one = world_matrices(source.skeleton, pose(source.skeleton, source.clip, times))[..., 3]
-    two = world_matrices(bones, pose(bones, done.clip, times))[..., 3]
+    one = world_matrices(source.skeleton, sample_pose(source.skeleton, source.clip, times))[..., 3]
+    two = world_matrices(bones, sample_pose(bones, done.clip, times))[..., 3]
     for side in ("left", "right"):
         for a, b in (
             ("upper_arm", "lower_arm"),
@@ -122,7 +122,7 @@ def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
     turned = onto(source, scene, aliases={}, nested=True, floor=Floor.KEEP, rest_at=5.0).clip
     bones = scene.skeleton
     hips = bones.names.index("hips")
-    at_rest = pose(bones, turned, np.array([5.0])).rotation[0, hips]
+    at_rest = sample_pose(bones, turned, np.array([5.0])).rotation[0, hips]
     assert quaternion.angle_between(at_rest, bones.rotation[hips]) < 1e-6
 
 
@@ -133,7 +133,7 @@ def test_feet_that_are_flat_stay_flat(asset: Find) -> None:
     done = put_on(document, still, {})
     bones = reader.skeleton(document)
     foot = bones.names.index("left_foot")
-    world = world_matrices(bones, pose(bones, done.clip, np.zeros(1)))
+    world = world_matrices(bones, sample_pose(bones, done.clip, np.zeros(1)))
     np.testing.assert_allclose(world[0, foot, :, :3], np.eye(3), atol=1e-6)
 
 
@@ -146,7 +146,7 @@ def test_a_characters_own_motion_comes_back(asset: Find) -> None:
     done = put_on(document, from_euler(bvh_reader.read(text), tolerance=1e-3), {}, Floor.KEEP)
     assert not done.matching.unmatched
     times = np.arange(int(walk.end * 30)) / 30
-    before, after = (world_matrices(bones, pose(bones, clip, times))[..., 3] for clip in (walk, done.clip))
+    before, after = (world_matrices(bones, sample_pose(bones, clip, times))[..., 3] for clip in (walk, done.clip))
     np.testing.assert_allclose(after, before, atol=2e-5)
     assert done.scale == pytest.approx(1, abs=1e-5)
 
@@ -159,7 +159,10 @@ def test_legs_and_feet_that_hang_elsewhere_stay_in_their_joints(asset: Find) -> 
     times = done.clip.tracks[0].times
     moved = [bones.names[track.node or 0] for track in done.clip.tracks if track.path == "translation"]
     assert sorted(moved) == ["Foot.L", "Foot.R", "Hips", "UpperLeg.L", "UpperLeg.R"]  # lower legs hang on upper ones
-    still, moving = world_matrices(bones, rest(bones))[0], world_matrices(bones, pose(bones, done.clip, times))
+    still, moving = (
+        world_matrices(bones, rest_pose(bones))[0],
+        world_matrices(bones, sample_pose(bones, done.clip, times)),
+    )
     at = {name: bones.names.index(name) for name in ("Hips", "UpperLeg.L", "LowerLeg.L", "Foot.L")}
     for holder, held in (("Hips", "UpperLeg.L"), ("LowerLeg.L", "Foot.L")):
         before, after = (

@@ -16,9 +16,9 @@ from anim.exchange.retarget.apply import onto
 from anim.exchange.retarget.retarget import Floor
 from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import quaternion
-from anim.maths.euler import Frame
+from anim.maths.euler import AxesConvention
 from anim.model import Interpolation, Scene, Track
-from anim.sampling import grid, pose, world_matrices
+from anim.sampling import frame_times, sample_pose, world_matrices
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
 from tests.anim.exchange.figures import tail
@@ -28,14 +28,22 @@ def test_other_chains_point_alike() -> None:
     times = np.array((0.0, 1.0))
     curve = linear(times, np.radians((0.0, 50.0)))
     nodes = tuple(
-        EulerNode(f"Tail.{i + 1}", i - 1, np.array((2.0 * (i > 0), 0, 0)), "Z", Frame.INTRINSIC, np.zeros(1), (curve,))
+        EulerNode(
+            f"Tail.{i + 1}",
+            i - 1,
+            np.array((2.0 * (i > 0), 0, 0)),
+            "Z",
+            AxesConvention.INTRINSIC,
+            np.zeros(1),
+            (curve,),
+        )
         for i in range(3)
     )
     source = from_euler(EulerMotion(nodes), tolerance=1e-4)
     target = tail(quaternion.from_rotation_vector(np.array((0, 1.2, 0))))
     done = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP)
     one, two = (
-        world_matrices(bones, pose(bones, clip, np.array((0.5,))))[0, :, :, 3]
+        world_matrices(bones, sample_pose(bones, clip, np.array((0.5,))))[0, :, :, 3]
         for bones, clip in ((source.skeleton, source.clip), (target, done.clip))
     )
     np.testing.assert_allclose(np.diff(two, axis=0), np.diff(one, axis=0) / 2, atol=1e-6)
@@ -49,7 +57,7 @@ def _keyed(name: str, parent: int, *degrees: tuple[float, ...], mode: Mode = Mod
         times = np.array([2.0 * key for key in range(len(values))])
         curves.append(Curve(times, np.radians(values), uniform_modes(len(values), mode)))
     offset = np.array((float(parent >= 0), 0, 0))
-    return EulerNode(name, parent, offset, "XYZ", Frame.INTRINSIC, np.zeros(3), tuple(curves))
+    return EulerNode(name, parent, offset, "XYZ", AxesConvention.INTRINSIC, np.zeros(3), tuple(curves))
 
 
 def test_keys_between_keys_keep_the_tolerance() -> None:
@@ -67,10 +75,10 @@ def test_keys_between_keys_keep_the_tolerance() -> None:
     joint, at = target.names.index("tail2"), np.linspace(0, 4, 3001)
 
     def wanted(times: Floats) -> Floats:
-        turned = world_rotations(source.skeleton, pose(source.skeleton, source.clip, times).rotation)
+        turned = world_rotations(source.skeleton, sample_pose(source.skeleton, source.clip, times).rotation)
         return quaternion.multiply(quaternion.conjugate(turned[0]), turned[2])
 
-    assert quaternion.angle_between(pose(target, clip, at).rotation[:, joint], wanted(at)).max() < tolerance
+    assert quaternion.angle_between(sample_pose(target, clip, at).rotation[:, joint], wanted(at)).max() < tolerance
     keys = np.unique(np.concatenate([track.times for track in source.clip.tracks]))
     without = Track(joint, "rotation", Interpolation.LINEAR, keys, quaternion.align_signs(wanted(keys)))
     assert quaternion.angle_between(sample(without, at), wanted(at)).max() > tolerance
@@ -109,7 +117,7 @@ def test_steps_are_exact_at_frames(fps: int) -> None:
     clip = onto(source, Scene(figure, ()), aliases={}, nested=True, floor=Floor.KEEP).clip
     (before,), (after,) = ([t for t in each.tracks if t.path == "rotation"] for each in (source.clip, clip))
     assert before.interpolation is after.interpolation is Interpolation.STEP
-    frames = key_times(grid(clip.start, clip.end, fps=fps))
+    frames = key_times(frame_times(clip.start, clip.end, fps=fps))
     assert quaternion.angle_between(sample(before, frames), sample(after, frames)).max() < 1e-7
 
 
@@ -119,7 +127,7 @@ def test_the_path_begins_from_where_the_character_stands() -> None:
     aside = replace(target, translation=target.translation + (target.parents < 0)[:, None] * [3.0, 0, -2])
     source = from_euler(EulerMotion((_keyed("tail1", -1, (0, 80, 0), (0, 0, 0), (0, 0, 0)),)), tolerance=1e-3)
     here, there = (
-        pose(each, clip, np.zeros(1)).translation[0, 0]
+        sample_pose(each, clip, np.zeros(1)).translation[0, 0]
         for each in (target, aside)
         for clip in [onto(source, Scene(each, ()), aliases={}, nested=True, floor=Floor.KEEP).clip]
     )

@@ -20,12 +20,12 @@ from anim.gltf.meshopt import storage
 from anim.gltf.meshopt.storage import Filtered
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.model import FLOAT32, Clip, Interpolation, Storage, Track
+from anim.model import FLOAT32, AccessorFormat, Clip, Interpolation, Track
 from tests import judge
 from tests.files import glb_of
 
 EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-INT16 = Storage(5122, normalized=True)
+INT16 = AccessorFormat(5122, normalized=True)
 ROOT = Path(__file__).resolve().parents[4]
 ACCESSORS = ROOT / "tests" / "threejs" / "accessors.mjs"
 

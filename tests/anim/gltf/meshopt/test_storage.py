@@ -16,7 +16,7 @@ from anim.gltf.meshopt.storage import Filtered
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
-from anim.model import Clip, Storage
+from anim.model import AccessorFormat, Clip
 from tests.anim.gltf.meshopt.packing import (
     EXTENSIONS,
     exponent_codes,
@@ -133,4 +133,4 @@ def test_decoded_quaternions_by_closed_form() -> None:
     three = rows[:, :3] / np.sqrt(2) / (rows[:, 3:].astype(int) | 3)
     largest = np.sqrt(1 - (three**2).sum(axis=1))
     np.testing.assert_allclose(storage.decoded(filtered, 4)[:, 3], largest, atol=1.01 / 32767)
-    assert Storage(5122, normalized=True) == made.storage
+    assert AccessorFormat(5122, normalized=True) == made.storage

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from anim.errors import FormatError
 from anim.gltf.reading import reader
-from anim.model import Interpolation, Kind, Storage
-from anim.sampling import rest, world_matrices
+from anim.model import AccessorFormat, Interpolation, ValueKind
+from anim.sampling import rest_pose, world_matrices
 from fixtures.broken.pieces import animated, buffered, text
 from tests.anim.gltf.pieces import triangle
 from tests.clips import about
@@ -60,7 +60,7 @@ def test_mirrors_and_flat_matrices_come_back_whole(scale: list[float]) -> None:
     matrix[:3, :3] = Rotation.from_quat([0.1, 0.5, -0.5, 0.7]).as_matrix() * scale
     skeleton = reader.skeleton(opened(text({"nodes": [{"matrix": matrix.T.ravel().tolist()}]})))
     np.testing.assert_allclose(
-        world_matrices(skeleton, rest(skeleton))[0, 0], matrix[:3], atol=1e-12 * max(map(abs, scale))
+        world_matrices(skeleton, rest_pose(skeleton))[0, 0], matrix[:3], atol=1e-12 * max(map(abs, scale))
     )
 
 
@@ -69,7 +69,7 @@ def test_a_sheared_matrix_is_kept_whole() -> None:
     matrix[0, 1], matrix[2, 3] = 0.5, 7
     skeleton = reader.skeleton(opened(text({"nodes": [{}, {"matrix": matrix.T.ravel().tolist()}]})))
     assert skeleton.sheared.tolist() == [1]
-    np.testing.assert_array_equal(world_matrices(skeleton, rest(skeleton))[0, 1], matrix[:3])
+    np.testing.assert_array_equal(world_matrices(skeleton, rest_pose(skeleton))[0, 1], matrix[:3])
 
 
 @pytest.mark.parametrize(
@@ -119,22 +119,22 @@ def test_cubic_keys_are_in_tangent_value_out_tangent() -> None:
 @pytest.mark.parametrize(
     ("name", "node", "path", "kind", "width"),
     [
-        ("color", None, "pointer", Kind.VECTOR, 4),
-        ("turn", 0, "rotation", Kind.ROTATION, 4),
-        ("blink", None, "pointer", Kind.DISCRETE, 1),
-        ("light", None, "pointer", Kind.VECTOR, 1),
-        ("weights", 0, "weights", Kind.VECTOR, 2),
-        ("one_weight", None, "pointer", Kind.VECTOR, 1),
+        ("color", None, "pointer", ValueKind.VECTOR, 4),
+        ("turn", 0, "rotation", ValueKind.ROTATION, 4),
+        ("blink", None, "pointer", ValueKind.DISCRETE, 1),
+        ("light", None, "pointer", ValueKind.VECTOR, 1),
+        ("weights", 0, "weights", ValueKind.VECTOR, 2),
+        ("one_weight", None, "pointer", ValueKind.VECTOR, 1),
     ],
 )
-def test_pointers(name: str, node: int | None, path: str, kind: Kind, width: int) -> None:
+def test_pointers(name: str, node: int | None, path: str, kind: ValueKind, width: int) -> None:
     clip = next(clip for clip in reader.clips(opened_fixture("pointer")) if clip.name == name)
     (track,) = clip.tracks
     assert (track.node, track.path, track.kind, track.values.shape) == (node, path, kind, (3, width))
     assert (track.pointer or "").startswith("/")
     if name == "blink":
         assert track.interpolation is Interpolation.STEP
-        assert track.storage == Storage(UINT8, False, "SCALAR")
+        assert track.storage == AccessorFormat(UINT8, False, "SCALAR")
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_values_have_the_types_that_their_path_may_have(
     content["animations"][0]["channels"][0]["target"]["path"] = path
     document = opened(text(content))
     if good:
-        assert reader.clips(document)[0].tracks[0].storage == Storage(component, normalized, kind)
+        assert reader.clips(document)[0].tracks[0].storage == AccessorFormat(component, normalized, kind)
     else:
         with pytest.raises(FormatError, match="component type"):
             reader.clips(document)

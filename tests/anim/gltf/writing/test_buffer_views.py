@@ -11,7 +11,7 @@ from anim.gltf.meshopt import storage as pack
 from anim.gltf.meshopt.storage import PLAIN, Packing
 from anim.gltf.writing.buffer_views import Layout, laid_out
 from anim.gltf.writing.encoding import Numbers, values
-from anim.model import Storage
+from anim.model import AccessorFormat
 from tests.anim.gltf.meshopt.packing import EXTENSIONS, exponents
 from tests.clips import track
 
@@ -111,6 +111,6 @@ def test_a_value_stored_as_the_filter_gives_it_is_int16() -> None:
     """Whatever the track's own storage says."""
     row = np.tile((0.0, 0, 0, 1), (3, 1))
     codes = pack.Filtered("QUATERNION", meshopt.encode_filter_quat(row.astype("f4"), 8, 12).tobytes())
-    for storage in (Storage(), Storage(5120, normalized=True)):
+    for storage in (AccessorFormat(), AccessorFormat(5120, normalized=True)):
         found = values(track("rotation", [0, 1, 2], row, storage=storage), codes)
         assert (found.component_type, found.normalized, found.element) == (5122, True, "VEC4")

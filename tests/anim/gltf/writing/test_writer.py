@@ -14,7 +14,7 @@ from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
-from anim.model import Clip, Storage, Track
+from anim.model import AccessorFormat, Clip, Track
 from fixtures.broken.pieces import animated, text
 from tests.anim.gltf.writing.documents import check_same, rewritten, viewed
 from tests.clips import STEP, track
@@ -95,7 +95,7 @@ def test_nothing_to_replace_is_nothing_to_do() -> None:
 def test_normalized_integers_stay_integers_until_a_value_is_none(component: int, stored: list[int]) -> None:
     scale = {INT8: 127, UINT8: 255, INT16: 32767}[component]
     values = np.maximum(np.array(stored) / scale, -1.0)[None]
-    storage = Storage(component, normalized=True, element="VEC4")
+    storage = AccessorFormat(component, normalized=True, element="VEC4")
     document = opened(text(animated() | {"nodes": [{}]}))
     new = track("rotation", [0.0], values, storage=storage)
     after = writer.replace_clips(document, {0: Clip("walk", (new,))})

@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.measure.error.metric import NOISE, Ruler, dense_times
-from anim.model import Clip, Instance, Mesh, Scene, Skeleton
+from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened_fixture
 
@@ -186,7 +186,7 @@ def _slower(before: Clip) -> Clip:
     return Clip(before.name, tuple(replace(each, times=1.05 * each.times) for each in before.tracks))
 
 
-def _quantized(instance: Instance) -> Instance:
+def _quantized(instance: MeshInstance) -> MeshInstance:
     assert instance.skin is not None
     back = np.column_stack((np.eye(3) / FACTOR, -SHIFT / FACTOR))
     bind = matrix.multiply(instance.skin.inverse_bind, back)
@@ -197,16 +197,16 @@ def _in_space(mesh: Mesh) -> Mesh:
     return replace(mesh, positions=FACTOR * mesh.positions + SHIFT, targets=FACTOR * mesh.targets)
 
 
-def _fewer(instance: Instance) -> Instance:
+def _fewer(instance: MeshInstance) -> MeshInstance:
     """Every vertex but the first, backward; without faces."""
     return _chosen(instance, np.arange(len(instance.mesh.positions), dtype=np.int64)[:0:-1])
 
 
-def _backward(instance: Instance) -> Instance:
+def _backward(instance: MeshInstance) -> MeshInstance:
     return _chosen(instance, np.arange(len(instance.mesh.positions), dtype=np.int64)[::-1])
 
 
-def _chosen(instance: Instance, kept: Ints) -> Instance:
+def _chosen(instance: MeshInstance, kept: Ints) -> MeshInstance:
     mesh = instance.mesh
     chosen = replace(
         mesh,
@@ -239,7 +239,7 @@ def _renamed(nodes: Skeleton, number: int) -> tuple[str, ...]:
 
 def _box(nodes: Skeleton, node: int) -> Scene:
     sides = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 2) for z in (0.0, 1)])
-    return Scene(nodes, (Instance(node, _mesh(sides), None, NOTHING),))
+    return Scene(nodes, (MeshInstance(node, _mesh(sides), None, NOTHING),))
 
 
 def _mesh(points: Floats) -> Mesh:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from anim.measure.compare.name_matching import by_name, by_name_then_order, nodes
-from anim.model import Instance, Mesh, Scene, Skeleton, Skin
+from anim.model import Mesh, MeshInstance, Scene, Skeleton, Skin
 from tests.clips import skeleton
 
 NOTHING = np.empty(0)
@@ -65,4 +65,4 @@ def _skinned(nodes: Skeleton, joints: list[int]) -> Scene:
     none = np.empty((1, 0))
     points = np.zeros((1, 3))
     mesh = Mesh("", points, np.empty((0, 3), np.int64), none.astype(np.int64), none, np.empty((0, 1, 3)), NOTHING)
-    return Scene(nodes, (Instance(0, mesh, skin, NOTHING),))
+    return Scene(nodes, (MeshInstance(0, mesh, skin, NOTHING),))

@@ -11,12 +11,12 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
-from anim.curves.tangents.table import TANGENTS, rotation_keys, spline_keys
+from anim.curves.tangents.table import TANGENTS, apply_rotation_tangents, apply_tangents
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.continuity import knots
 from anim.measure.continuity.continuity import Grade, Seam, TrackContinuity, at_keys, continuity, seam
-from anim.model import Storage, Track
+from anim.model import AccessorFormat, Track
 from anim.sampling import derivatives
 from tests import clips
 from tests.clips import CUBICSPLINE, STEP, about
@@ -40,7 +40,7 @@ def along_x(values: list[float]) -> Floats:
 
 def splined(rule: str, values: Floats, path: str = "translation", times: Floats | None = None) -> Track:
     t = np.arange(len(values), dtype=float) if times is None else stored(times)
-    make = rotation_keys if path == "rotation" else spline_keys
+    make = apply_rotation_tangents if path == "rotation" else apply_tangents
     keys = make(t, values, TANGENTS[rule])
     tangents = stored(keys.in_tangents), stored(keys.out_tangents)
     return clips.track(path, t, stored(keys.values), CUBICSPLINE, tangents=tangents)
@@ -204,10 +204,10 @@ def test_even_motion_at_a_frame_rate_is_smooth_in_float32(offset: float) -> None
 def test_even_turns_in_normalized_shorts_are_smooth() -> None:
     t = stored(np.arange(100) / 30)
     q = np.rint(about("z", np.linspace(0, 170, 100)) * 32767) / 32767
-    track = clips.track("rotation", t, q, storage=Storage(5122, normalized=True))
+    track = clips.track("rotation", t, q, storage=AccessorFormat(5122, normalized=True))
     assert set(grades(track)) == {"C2"}
     bend = np.concatenate((np.linspace(0, 60, 50), np.linspace(60, 0, 51)[1:]))
-    bent = clips.track("rotation", t, about("z", bend), storage=Storage(5122, normalized=True))
+    bent = clips.track("rotation", t, about("z", bend), storage=AccessorFormat(5122, normalized=True))
     assert grades(bent).count("C0") == 1
 
 
@@ -224,10 +224,10 @@ def test_seams() -> None:
     ring = np.stack((np.cos(np.pi / 2 * t), np.sin(np.pi / 2 * t), np.zeros(5)), axis=1)
     ring[-1] = ring[0]
     for rule, grade in (("natural", Grade.C0), ("periodic", Grade.C2)):
-        keys = spline_keys(t, ring, TANGENTS[rule])
+        keys = apply_tangents(t, ring, TANGENTS[rule])
         track = clips.track("translation", t, keys.values, CUBICSPLINE, tangents=(keys.in_tangents, keys.out_tangents))
         assert seam(track, start=0, end=4).grade is grade, rule
-    closed = spline_keys(t, ring, TANGENTS["time-aware"], cyclic=True)
+    closed = apply_tangents(t, ring, TANGENTS["time-aware"], cyclic=True)
     track = clips.track(
         "translation", t, closed.values, CUBICSPLINE, tangents=(closed.in_tangents, closed.out_tangents)
     )

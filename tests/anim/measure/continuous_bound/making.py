@@ -13,7 +13,7 @@ from anim.measure.error.metric import Ruler, dense_times
 from anim.measure.error.surface import placed, surfaces
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import world_matrices
-from anim.sampling.players import played
+from anim.sampling.players import sampler_for
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, track
 
@@ -58,7 +58,7 @@ def proven(scene: Scene, before: Clip, after: Clip, *, players: Sequence[str] = 
 
 def apart(scene: Scene, before: Clip, after: Clip, times: Floats, player: str) -> float:
     """The largest distance of any vertex at some times, vertex by vertex, without any bound."""
-    poses = [played(scene.skeleton, each, player=player).at(times) for each in (before, after)]
+    poses = [sampler_for(scene.skeleton, each, player=player).at(times) for each in (before, after)]
     worlds = [world_matrices(scene.skeleton, each) for each in poses]
     worst = 0.0
     for surface in surfaces(scene):

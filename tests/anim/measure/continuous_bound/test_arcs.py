@@ -12,7 +12,7 @@ from anim.measure.continuous_bound.rotation_endpoints import turns
 from anim.measure.error.metric import dense_times
 from anim.model import Interpolation, Track
 from anim.sampling.batch import batches
-from anim.sampling.players import PLAYERS, played
+from anim.sampling.players import PLAYERS, sampler_for
 from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, skeleton, track
 
 TIMES = np.array([0.1, 0.2, 0.5, 0.9, 1.0])
@@ -45,7 +45,7 @@ def test_laws_play_as_players_do(mode: Interpolation, seed: int) -> None:
     length = np.linalg.norm(found.value, axis=1)  # (2, P, G, U)
     shown = found.value / np.where(found.unit, length, 1.0)[:, None]
     for p, player in enumerate(players):
-        poses = played(skeleton([-1]), moving, player=player)
+        poses = sampler_for(skeleton([-1]), moving, player=player)
         for end, at in enumerate((where.starts, np.nextafter(where.ends, 0))):
             expected = poses.at(at).rotation[:, 0]
             assert np.abs(_same_side(shown[end, :, p, :, 0].T, expected) - expected).max() < 1e-9
@@ -65,7 +65,7 @@ def test_within_gaps_the_law_goes_on(seed: int) -> None:
     middle = (found.value[0] + found.value[1]) / (2 * np.cos(found.turn / 2))
     middle /= np.where(found.unit, np.linalg.norm(middle, axis=0), 1.0)
     for p, player in enumerate(players):
-        expected = played(skeleton([-1]), moving, player=player).at((where.starts + where.ends) / 2).rotation[:, 0]
+        expected = sampler_for(skeleton([-1]), moving, player=player).at((where.starts + where.ends) / 2).rotation[:, 0]
         assert np.abs(_same_side(middle[:, p, :, 0].T, expected) - expected).max() < 1e-9
 
 

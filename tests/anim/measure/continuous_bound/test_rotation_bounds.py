@@ -15,7 +15,7 @@ from anim.measure.continuous_bound.track_partition import sides
 from anim.measure.error.metric import dense_times
 from anim.model import Clip, Scene
 from anim.sampling import world_matrices
-from anim.sampling.players import played
+from anim.sampling.players import sampler_for
 from tests.anim.measure.continuous_bound.making import pair
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, skeleton, track
 
@@ -24,7 +24,7 @@ STEPS = 2e-3  # of a gap, for differences
 
 def _derivatives(of: Scene, moving: Clip, where: Gaps, player: str, share: float) -> Floats:
     """World matrices (3, N, G, 3, 4) with two derivatives, a share of the way through gaps, by differences."""
-    poses = played(of.skeleton, moving, player=player)
+    poses = sampler_for(of.skeleton, moving, player=player)
     at, step = where.starts + share * where.lengths, STEPS * where.lengths
     left, here, right = (world_matrices(of.skeleton, poses.at(at + k * step)).swapaxes(0, 1) for k in (-1, 0, 1))
     step = step[:, None, None]
@@ -70,7 +70,7 @@ def test_a_jump_is_bounded_exactly() -> None:
     moving = clip(track("rotation", [0, 0.01, 0.02], keys))
     where = Gaps(np.array([0.0, 0.01, 0.02]))
     jumps = in_world(*sides((of, of), (moving, moving)), where, players=["three"]).jumps
-    poses = played(of.skeleton, moving, player="three").at(np.array([np.nextafter(0.01, 0), 0.01]))
+    poses = sampler_for(of.skeleton, moving, player="three").at(np.array([np.nextafter(0.01, 0), 0.01]))
     before, after = world_matrices(of.skeleton, poses)
     assert jumps[0, 0, 0] == pytest.approx(2 * 2 * (1.001**2 - 1))  # of both versions
     assert np.linalg.norm((after - before)[1, :, 3]) <= jumps[1, 1, 0] / 2 <= 3.01 * 2 * (1.001**2 - 1)

@@ -10,8 +10,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.model import Clip, Instance, Mesh, Pose, Scene, Track
-from anim.sampling import pose, world_matrices
+from anim.model import Clip, Mesh, MeshInstance, Pose, Scene, Track
+from anim.sampling import sample_pose, world_matrices
 from tests.clips import skeleton
 
 Find = Callable[[str], Path]
@@ -34,12 +34,12 @@ def points_on_a_node(points: list[list[float]], *, targets: list[list[list[float
     moved = np.array(targets, float) if targets else np.empty((0, count, 3))
     faces, joints = np.empty((0, 3), np.int64), np.empty((count, 0), np.int64)
     mesh = Mesh("points", np.array(points, float), faces, joints, np.empty((count, 0)), moved, np.zeros(len(moved)))
-    return Scene(skeleton([-1]), (Instance(0, mesh, None, np.zeros(len(moved))),))
+    return Scene(skeleton([-1]), (MeshInstance(0, mesh, None, np.zeros(len(moved))),))
 
 
 def brute(scene: Scene, before: Clip, after: Clip, times: Floats) -> float:
     """Return the largest distance of any vertex, or node where there are none, between two clips at these times."""
-    old, new = pose(scene.skeleton, before, times), pose(scene.skeleton, after, times)
+    old, new = sample_pose(scene.skeleton, before, times), sample_pose(scene.skeleton, after, times)
     worlds = [_fourth_row(world_matrices(scene.skeleton, each)) for each in (old, new)]
     worst = 0.0
     for instance in scene.instances:
@@ -50,7 +50,7 @@ def brute(scene: Scene, before: Clip, after: Clip, times: Floats) -> float:
     return worst
 
 
-def _vertices(instance: Instance, world: Floats, weights: Floats) -> Floats:
+def _vertices(instance: MeshInstance, world: Floats, weights: Floats) -> Floats:
     """Vertices (V, 3) in the world: morphed, then by Σ w (world · inverse bind) of the joints, or by the node."""
     mesh = instance.mesh
     points = mesh.positions + sum(w * target for w, target in zip(weights, mesh.targets, strict=True))
@@ -69,6 +69,6 @@ def _fourth_row(matrices: Floats) -> Floats:
     return np.concatenate((matrices, row), axis=-2)
 
 
-def _weights(at: Pose, instance: Instance, frame: int) -> Floats:
+def _weights(at: Pose, instance: MeshInstance, frame: int) -> Floats:
     found = at.weights.get(instance.node)
     return instance.weights if found is None else found[frame]

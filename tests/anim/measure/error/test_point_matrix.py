@@ -12,7 +12,7 @@ from anim.measure.error import point_matrix as points_
 from anim.measure.error.point_matrix import CARRIED, Points, of_scene, stacked
 from anim.measure.error.surface import surfaces
 from anim.model import Scene
-from anim.sampling import rest, world_matrices
+from anim.sampling import rest_pose, world_matrices
 from tests.anim.optimize.making import JOINTS, every_point, scene
 from tests.anim.skinning.scenes import looped, mesh
 from tests.anim.skinning.scenes import scene as made
@@ -67,7 +67,7 @@ def test_a_joint_twice_on_one_vertex_counts_twice() -> None:
 def test_shells_are_six_points_around_a_node() -> None:
     of = Scene(skeleton([-1, 0], translation=[[1, 0, 0], [0, 2, 0]], scale=[[2, 2, 2], [1, 1, 1]]), ())
     points = of_scene(of, {1}, 0.25)
-    world = world_matrices(of.skeleton, rest(of.skeleton)).swapaxes(0, 1)
+    world = world_matrices(of.skeleton, rest_pose(of.skeleton)).swapaxes(0, 1)
     places = points.places(world)[:, 0]
     assert places.mean(axis=0) == pytest.approx([1, 4, 0])
     assert np.linalg.norm(places - [1, 4, 0], axis=1) == pytest.approx(

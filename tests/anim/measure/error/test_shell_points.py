@@ -8,7 +8,7 @@ import pytest
 from anim.measure.error.metric import Ruler
 from anim.measure.error.shell_points import hidden
 from anim.measure.error.surface import surfaces
-from anim.model import Instance, Mesh, Scene, Skeleton
+from anim.model import Mesh, MeshInstance, Scene, Skeleton
 from tests.clips import about, clip, skeleton, track
 
 NOTHING = np.empty(0)
@@ -47,12 +47,12 @@ def test_the_farthest_of_six_points_counts() -> None:
 def test_who_is_hidden() -> None:
     """0 carries a mesh; 1 hangs below it; 2 is above 3, which carries the other; 4 hangs alone."""
     nodes = skeleton([-1, 0, -1, 2, -1])
-    scene = Scene(nodes, tuple(Instance(i, _points(10.0), None, NOTHING) for i in (0, 3)))
+    scene = Scene(nodes, tuple(MeshInstance(i, _points(10.0), None, NOTHING) for i in (0, 3)))
     assert np.flatnonzero(hidden(nodes, surfaces(scene))).tolist() == [1, 4]
 
 
 def _bar(nodes: Skeleton) -> Scene:
-    return Scene(nodes, (Instance(0, _points(10.0), None, NOTHING),))
+    return Scene(nodes, (MeshInstance(0, _points(10.0), None, NOTHING),))
 
 
 def _points(length: float) -> Mesh:

@@ -16,9 +16,9 @@ from anim.measure.error import metric
 from anim.measure.error.displacement import Morphed
 from anim.measure.error.metric import Ruler, check_times, dense_times
 from anim.measure.error.statistics import FRAMES, SLACK, Peak, speed_error, statistics
-from anim.model import Clip, Instance, Mesh, Scene, Skeleton, Track
+from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Track
 from anim.ops.resample import resample
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
 from tests.files import opened_fixture, opened_path
 
@@ -56,7 +56,7 @@ def test_a_plain_loop_finds_the_same(versions: tuple[Scene, Clip, Clip]) -> None
 
 def test_speeds_are_differences_on_the_grid(versions: tuple[Scene, Clip, Clip]) -> None:
     scene, before, after = versions
-    times = grid(0.0, max(before.end, after.end), fps=6)
+    times = frame_times(0.0, max(before.end, after.end), fps=6)
     apart = np.array([_apart(scene, before, after, time) for time in times])
     speeds = np.linalg.norm(np.diff(apart, axis=0), axis=2) / np.diff(times)[:, None]
     found = speed_error(Ruler(scene), before, after, fps=6)
@@ -155,7 +155,7 @@ def test_bounds_hold_where_skin_is_morphed_too(asset: Find) -> None:
     before = reader.clips(document)[0]
     slower = Clip("", tuple(replace(each, times=1.07 * each.times) for each in before.tracks))
     ruler = Ruler(reader.scene(document))
-    times = grid(0.0, slower.end, fps=60)
+    times = frame_times(0.0, slower.end, fps=60)
     found = ruler.error_at(before, slower, times), speed_error(ruler, before, slower, fps=60)
     (block,) = ruler.blocks(before, slower, times)
     (part,) = ruler.parts
@@ -231,7 +231,7 @@ def _points(points: list[list[float]], *, targets: list[list[list[float]]] | Non
     faces = np.empty((0, 3), np.int64)
     rest = np.zeros(len(moved))
     mesh = Mesh("points", np.array(points, float), faces, none.astype(np.int64), none, moved, rest)
-    return Scene(skeleton([-1]), (Instance(0, mesh, None, rest),))
+    return Scene(skeleton([-1]), (MeshInstance(0, mesh, None, rest),))
 
 
 def _apart(scene: Scene, before: Clip, after: Clip, time: float) -> Floats:

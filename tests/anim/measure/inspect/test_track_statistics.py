@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from anim.measure.inspect.track_statistics import TrackStats, stats
-from anim.model import Skeleton, Storage, Track
+from anim.model import AccessorFormat, Skeleton, Track
 from anim.sampling import joined as module
-from anim.sampling.joined import joined
+from anim.sampling.joined import concatenate
 from tests import clips
 from tests.clips import CUBICSPLINE, STEP
 
@@ -20,7 +20,7 @@ NODE = clips.skeleton([-1], translation=[[1, 2, 3]])
 
 
 def of(*tracks: Track, skeleton: Skeleton = NODE) -> TrackStats:
-    return stats(joined(tracks), skeleton)
+    return stats(concatenate(tracks), skeleton)
 
 
 def test_still_tracks_and_those_that_only_rest() -> None:
@@ -95,7 +95,9 @@ def test_a_key_that_leads_the_way_through_a_half_turn_is_needed() -> None:
 def test_a_quaternion_of_another_length_is_needed() -> None:
     """Players that don't normalize show it; rounding to integers is no such length."""
     turns = clips.about("x", [0, 30, 60])
-    rounded = replace(clips.track("rotation", [0, 1, 2], turns * [[1], [1 + 1e-5], [1]]), storage=Storage(5122, True))
+    rounded = replace(
+        clips.track("rotation", [0, 1, 2], turns * [[1], [1 + 1e-5], [1]]), storage=AccessorFormat(5122, True)
+    )
     found = of(
         clips.track("rotation", [0, 1, 2], turns * [[1], [1 + 1e-5], [1]]),
         clips.track("rotation", [0, 1, 2], turns * 1.01),

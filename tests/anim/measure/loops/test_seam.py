@@ -15,8 +15,8 @@ from anim.measure.loops import seam
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.loop_analysis import LoopKind, Steps, loop
 from anim.measure.loops.seam import SkinMotion
-from anim.model import Clip, Instance, Mesh, Scene
-from anim.sampling import pose, world_matrices
+from anim.model import Clip, Mesh, MeshInstance, Scene
+from anim.sampling import sample_pose, world_matrices
 from anim.skinning.bake import bake
 from tests.anim.skinning.scenes import looped, random_scene
 from tests.clips import STEP, about, clip, skeleton, track
@@ -38,7 +38,7 @@ def _mesh(point: ArrayLike, target: ArrayLike | None = None) -> Mesh:
 def _chain(targets: ArrayLike | None = None) -> Scene:
     """Three joints in a row, 1 m apart, each with a vertex half a metre on; node 3 is a control without any."""
     nodes = skeleton([-1, 0, 1, 0], translation=[[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 5, 0]])
-    rows = [Instance(n, _mesh([0.5, 0, 0], targets), None, np.zeros(int(targets is not None))) for n in range(3)]
+    rows = [MeshInstance(n, _mesh([0.5, 0, 0], targets), None, np.zeros(int(targets is not None))) for n in range(3)]
     return Scene(nodes, tuple(rows))
 
 
@@ -132,7 +132,9 @@ def test_the_seam_is_that_of_a_plain_loop_over_vertices() -> None:
     turn = clip(*(track("rotation", [0, 1], about("x", [0, 10.0 * n]), node=n) for n in range(1, 4)))
     (instance,) = scene.instances
     assert instance.skin is not None
-    world = world_matrices(scene.skeleton, pose(scene.skeleton, turn, np.array([0.0, 1.0])))[:, instance.skin.joints]
+    world = world_matrices(scene.skeleton, sample_pose(scene.skeleton, turn, np.array([0.0, 1.0])))[
+        :, instance.skin.joints
+    ]
     bind = np.concatenate((instance.skin.inverse_bind, np.tile([[[0.0, 0, 0, 1]]], (5, 1, 1))), axis=1)
     bound = world @ bind
     mesh = instance.mesh

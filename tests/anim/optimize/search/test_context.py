@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anim.model import Clip, Instance, Scene
+from anim.model import Clip, MeshInstance, Scene
 from anim.optimize.options import Policy
 from anim.optimize.search.context import Setting
 from tests.anim.optimize.making import setting_of
@@ -17,7 +17,7 @@ from tests.clips import about, clip, skeleton, track
 # 0 ─ 1 (a cube) ─ 2 (a socket);  3 ─ 4 (a lamp)
 NODES = skeleton([-1, 0, 1, -1, 3], scale=[[2, 2, 2], [1, 1, 1], [1, 1, 1], [1, 1, 1], [1, 1, 1]])
 CUBE = replace(mesh([[1.0, 0, 0], [0, 1, 0]], np.zeros((2, 0)), np.zeros((2, 0)), targets=np.ones((1, 2, 3))))
-SCENE = Scene(NODES, (Instance(1, CUBE, None, np.zeros(1)),))
+SCENE = Scene(NODES, (MeshInstance(1, CUBE, None, np.zeros(1)),))
 MOVING = clip(track("rotation", [0, 1], about("x", [0, 9]), node=1))
 
 

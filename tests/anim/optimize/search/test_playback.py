@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.optimize.search import playback
-from anim.sampling.track import locate
+from anim.sampling.track import find_interval
 from tests.clips import about
 
 RNG = np.random.default_rng(11)
@@ -32,7 +32,7 @@ def _as_three(a: Floats, b: Floats, u: float) -> Floats:
 
 def test_arcs_are_scipys_slerp() -> None:
     keys = _turns(7)
-    shown = playback.along_arcs(keys, locate(KEYS, AT))
+    shown = playback.along_arcs(keys, find_interval(KEYS, AT))
     for g in range(7):
         expected = Slerp(KEYS, Rotation.from_quat(keys[:, g]))(np.clip(AT, KEYS[0], KEYS[-1]))
         assert (Rotation.from_quat(shown[:, g]) * expected.inv()).magnitude().max() < 1e-7
@@ -42,21 +42,21 @@ def test_arcs_are_scipys_slerp() -> None:
 def test_arcs_of_keys_that_are_not_of_unit_length() -> None:
     """int16 leaves keys too long or too short by some 1e-5; nothing normalizes them on the way."""
     keys = np.rint(_turns(40) * 32767) / 32767
-    place = locate(KEYS, AT)
+    place = find_interval(KEYS, AT)
     shown = playback.along_arcs(keys, place)
     for f, (left, right, u) in enumerate(zip(place.left, place.right, place.u, strict=True)):
         for g in range(40):
             expected = _as_three(keys[left, g], keys[right, g], u) if u else keys[left, g]
             off = shown[f, g] - math.copysign(1, expected @ shown[f, g]) * expected
             assert np.linalg.norm(off) < 1e-5  # where lengths are off by up to 3e-5
-    at_keys = playback.along_arcs(keys, locate(KEYS, KEYS))
+    at_keys = playback.along_arcs(keys, find_interval(KEYS, KEYS))
     assert np.minimum(np.abs(at_keys - keys).max(axis=2), np.abs(at_keys + keys).max(axis=2)).max() < 1e-15
 
 
 @pytest.mark.parametrize("degrees", [1e-6, 1, 90, 179, 179.999, 180])
 def test_steps_of_any_size_turn_evenly(degrees: float) -> None:
     keys = about("y", [10, 10 + degrees])[:, None]
-    shown = playback.along_arcs(keys, locate(np.array([0.0, 1.0]), np.linspace(0, 1, 9)))[:, 0]
+    shown = playback.along_arcs(keys, find_interval(np.array([0.0, 1.0]), np.linspace(0, 1, 9)))[:, 0]
     assert np.isfinite(shown).all()
     turned = np.degrees(np.unwrap(2 * np.arctan2(shown[:, 1], shown[:, 3]))) - 10
     way = -1 if degrees == 180 and turned[1] < 0 else 1  # half a turn has two shortest ways
@@ -65,13 +65,13 @@ def test_steps_of_any_size_turn_evenly(degrees: float) -> None:
 
 def test_equal_keys_stay_as_they_are_stored() -> None:
     keys = np.tile([0.1, 0.2, 0.3, 0.9], (3, 1, 1)).reshape(3, 1, 4)
-    shown = playback.along_arcs(keys, locate(np.arange(3.0), np.linspace(0, 2, 11)))
+    shown = playback.along_arcs(keys, find_interval(np.arange(3.0), np.linspace(0, 2, 11)))
     assert shown == pytest.approx(np.broadcast_to(keys[0], shown.shape), abs=1e-15)
 
 
 def test_chords_are_mixed_by_components_then_normalized() -> None:
     keys = _turns(5) * RNG.uniform(0.98, 1.02, (len(KEYS), 5, 1))
-    place = locate(KEYS, AT)
+    place = find_interval(KEYS, AT)
     shown = playback.along_chords(keys, place)
     for f, (left, right, u) in enumerate(zip(place.left, place.right, place.u, strict=True)):
         for g in range(5):
@@ -82,7 +82,7 @@ def test_chords_are_mixed_by_components_then_normalized() -> None:
 
 def test_lines_are_numpys() -> None:
     keys = RNG.normal(size=(len(KEYS), 3, 3))
-    shown = playback.on_lines(keys, locate(KEYS, AT))
+    shown = playback.on_lines(keys, find_interval(KEYS, AT))
     for g in range(3):
         for c in range(3):
             assert shown[:, g, c] == pytest.approx(np.interp(AT, KEYS, keys[:, g, c]), abs=1e-12)
@@ -91,7 +91,7 @@ def test_lines_are_numpys() -> None:
 @pytest.mark.parametrize("degrees", [20, 60, 90])
 def test_how_far_chord_and_arc_are_apart(degrees: float) -> None:
     keys = about("x", [0, degrees])[:, None]
-    place = locate(np.array([0.0, 1.0]), np.linspace(0, 1, 2001))
+    place = find_interval(np.array([0.0, 1.0]), np.linspace(0, 1, 2001))
     arcs, chords = playback.along_arcs(keys, place), playback.along_chords(keys, place)
     apart = (Rotation.from_quat(arcs[:, 0]) * Rotation.from_quat(chords[:, 0]).inv()).magnitude().max()
     assert float(playback.apart(np.radians(degrees))) == pytest.approx(apart, rel=0.04)

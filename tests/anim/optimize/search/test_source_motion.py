@@ -13,7 +13,7 @@ from anim.model import Scene
 from anim.optimize.options import Reference
 from anim.optimize.search.source_motion import PATHS, key_grid, moments
 from anim.optimize.search.world_matrices import needed_levels, worlds
-from anim.sampling import pose, world_matrices
+from anim.sampling import sample_pose, world_matrices
 from tests.anim.optimize.making import every_point, scene, truth_of, turning, waving
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
 
@@ -72,7 +72,7 @@ def test_columns_are_the_sampled_pose() -> None:
     points = every_point(of)
     truth = truth_of(of, what, points)
     assert (truth.at[truth.on_grid] == truth.grid).all()
-    expected = world_matrices(of.skeleton, pose(of.skeleton, what, truth.at)).swapaxes(0, 1)
+    expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, truth.at)).swapaxes(0, 1)
     assert truth.columns == pytest.approx(stacked(expected, points.nodes), abs=1e-12)
 
 

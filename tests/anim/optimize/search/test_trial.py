@@ -20,7 +20,7 @@ from anim.optimize.search.bound_usage import Strains
 from anim.optimize.search.plan import Fate, Outcome, Plan
 from anim.optimize.search.source_motion import Truth
 from anim.optimize.search.trial import Bench
-from anim.sampling import pose
+from anim.sampling import sample_pose
 from tests.anim.optimize.making import CORE, every_point, scene, truth_of, turning, waving
 from tests.clips import clip, track
 
@@ -123,7 +123,7 @@ def test_a_bound_on_angles() -> None:
     bench = _bench(what, bounds=Bounds(BOUND, 0.0, max_angle=math.radians(0.2)))
     outcome = bench.run(_plan(bench, budget=0.2))
     written = _clip(what, bench, outcome)
-    a, b = (pose(OF.skeleton, each, bench.truth.at).rotation for each in (what, written))
+    a, b = (sample_pose(OF.skeleton, each, bench.truth.at).rotation for each in (what, written))
     turned = np.degrees(quaternion.angle_between(a, b)[:, 1].max())
     assert float(outcome.own[0]) * 0.2 == pytest.approx(turned, rel=0.01)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.model import Storage
+from anim.model import AccessorFormat
 from anim.optimize.tracks.pointer_tracks import thinned
 from anim.sampling.track import sample
 from tests.clips import STEP, about, track
@@ -35,7 +35,7 @@ def test_jumps_keep_every_key_that_changes_something(bound: float) -> None:
     steps = track("/materials/0/alphaCutoff", [0, 1, 2, 3], [[0.1], [0.1], [0.100001], [0.2]], STEP)
     after = thinned(steps, bound)
     assert (after.times.tolist(), after.interpolation) == ([0, 2, 3], STEP)
-    whole = Storage(5121)
+    whole = AccessorFormat(5121)
     flags = thinned(track("/nodes/0/visible", [0, 1, 2], [[1], [1], [0]], STEP, storage=whole), bound)
     assert (flags.times.tolist(), flags.storage) == ([0, 2], whole)
 

@@ -16,7 +16,7 @@ from anim.optimize.request import Request
 from anim.optimize.search.solution import Solution
 from anim.optimize.tracks.quantization import Stored
 from anim.optimize.tracks.redundant_keys import drop_redundant_keys
-from anim.sampling.joined import joined
+from anim.sampling.joined import concatenate
 from tests.anim.optimize.making import scene
 from tests.clips import clip, track
 from tests.files import glb_of, opened, opened_fixture
@@ -67,7 +67,7 @@ def test_exact_tracks_and_clips_without_such_keys_stay() -> None:
 def _redundant(document: Document) -> int:
     """Redundant keys of tracks that move, in all clips, as `inspect` counts them."""
     found = stats(
-        joined([track for clip in reader.clips(document) for track in clip.tracks]), reader.skeleton(document)
+        concatenate([track for clip in reader.clips(document) for track in clip.tracks]), reader.skeleton(document)
     )
     return int(found.redundant[~found.constant].sum())
 

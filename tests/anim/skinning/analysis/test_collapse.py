@@ -11,7 +11,7 @@ import trimesh
 from anim.errors import NotFoundError, RangeError
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene
-from anim.sampling.times import grid
+from anim.sampling.times import frame_times
 from anim.skinning.analysis.collapse import MeshCollapse, collapse
 from anim.skinning.analysis.collapse_index import Narrow
 from anim.skinning.analysis.collapsed_clips import KEPT, pinches
@@ -319,6 +319,6 @@ def test_the_biped_in_all_its_clips() -> None:
     document = opened_fixture("biped")
     of = reader.scene(document)
     for played in reader.clips(document):
-        for found in collapse(of, played, times=grid(played.start, played.end, fps=15)):
+        for found in collapse(of, played, times=frame_times(played.start, played.end, fps=15)):
             assert 0 <= found.worst.index <= 1 + 1e-6
             assert found.indices.min() == pytest.approx(found.worst.index, abs=1e-6)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.model import Clip, Instance, Mesh, Scene
-from anim.sampling.times import grid
+from anim.model import Clip, Mesh, MeshInstance, Scene
+from anim.sampling.times import frame_times
 from anim.skinning.analysis.inbetween_error import MOST, between
 from anim.skinning.bake import Baker, baker
 from tests.anim.skinning.methods.test_linear_blend import moving
@@ -20,7 +20,7 @@ def _rigid() -> Baker:
     """Three points on a node."""
     faces, joints, weights = np.array([[0, 1, 2]]), np.empty((3, 0), np.int64), np.empty((3, 0))
     mesh = Mesh("mesh", POINTS, faces, joints, weights, np.empty((0, 3, 3)), np.empty(0))
-    return baker(Scene(skeleton([-1]), (Instance(0, mesh, None, np.empty(0)),)), rigid=True)
+    return baker(Scene(skeleton([-1]), (MeshInstance(0, mesh, None, np.empty(0)),)), rigid=True)
 
 
 def _turning(times: list[float], degrees: list[float]) -> Clip:
@@ -47,7 +47,7 @@ def test_a_step_misses_half_its_jump() -> None:
 
 def test_frames_that_are_close_miss_nothing() -> None:
     made = _rigid()
-    assert between(made, _turning([0, 1], [0, 90]), grid(0, 1, fps=30)).distance == 0
+    assert between(made, _turning([0, 1], [0, 90]), frame_times(0, 1, fps=30)).distance == 0
     assert between(made, Clip("", ()), np.zeros(1)).distance == 0
 
 
