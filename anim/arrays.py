@@ -15,6 +15,7 @@ Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
+Bytes: TypeAlias = NDArray[np.uint8]
 
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
 _CHECKED_AXES: WeakValueDictionary[int, AnyArray] = WeakValueDictionary()

@@ -5,7 +5,8 @@ AnimError
 ├─ UnsupportedError  valid, but not handled: a required extension, a missing extra
 ├─ NotFoundError     no such clip, node, skin or mesh
 ├─ RangeError        a parameter outside the values it can take
-└─ ShapeError        an array of the wrong shape or type: the caller's mistake
+├─ ShapeError        an array of the wrong shape or type: the caller's mistake
+└─ OutputError       the output can't be written: a full or read-only disk, no permission
 """
 
 from __future__ import annotations
@@ -62,3 +63,7 @@ class RangeError(AnimError):
 
 class ShapeError(AnimError):
     """An array has the wrong shape or type."""
+
+
+class OutputError(AnimError):
+    """What was asked for is right, but can't be written: a full or read-only disk, no permission."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 import traceback
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 from typer import TyperException
 
-from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
+from anim.errors import AnimError, FormatError, NotFoundError, OutputError, RangeError, UnsupportedError
 from cli.tables import one_line
 from cli.text import Voice
 
@@ -22,6 +21,7 @@ CODES: dict[type[AnimError], int] = {
     UnsupportedError: UNSUPPORTED,
     NotFoundError: NOT_FOUND,
     RangeError: USAGE,
+    OutputError: FORMAT,
 }
 
 
@@ -29,22 +29,12 @@ class UsageError(AnimError):
     """The command line asks for something that can't be done: exit 2."""
 
 
-class OutputError(AnimError):
-    """What was asked for is right, but can't be written: a full or read-only disk, no permission. Exit 3."""
-
-
 class CheckError(AnimError):
     """A check that the user asked for said no: exit 6."""
 
 
 CODES[UsageError] = USAGE
-CODES[OutputError] = FORMAT
 CODES[CheckError] = CHECK
-
-
-def not_written(name: str | Path, error: OSError) -> OutputError:
-    """Return the error for an output, `name`, that the system does not let us write."""
-    return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")
 
 
 def guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:

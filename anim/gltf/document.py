@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from anim.arrays import Bytes as Bytes
 from anim.errors import FormatError
 
 Json: TypeAlias = dict[str, Any]
-Bytes: TypeAlias = NDArray[np.uint8]
 
 
 class Buffer:

@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from anim.gltf.io.gltf_files import GLTF_SUFFIXES
 from anim.measure.error.surface import measured_at
 from anim.optimize.optimize import Optimized
 from anim.optimize.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
@@ -20,7 +21,6 @@ from anim.optimize.request import Request
 from anim.optimize.verification import PLAYERS
 from cli.errors import UsageError
 from cli.io import documents
-from cli.io.gltf_files import GLTF_SUFFIXES
 from cli.options import common
 from cli.reports import optimize_json, optimize_report
 from cli.text import Voice

@@ -13,10 +13,11 @@ from anim.caches.options import Reading, Writing, Written
 from anim.caches.registry import CACHE_FORMATS, Files
 from anim.caches.sniffing import ending_of
 from anim.caches.storage import suffix
-from anim.errors import AnimError, FormatError
+from anim.errors import AnimError, FormatError, OutputError
+from anim.files.atomic import not_written
 from anim.model import VertexCache
 from cli import loading
-from cli.errors import OutputError, UsageError, not_written
+from cli.errors import UsageError
 from cli.io import cache_folders, documents
 from cli.reports import cache_notes
 

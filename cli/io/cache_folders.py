@@ -16,9 +16,10 @@ import numpy as np
 from anim.caches.sniffing import HEAD
 from anim.caches.storage import PIECE
 from anim.errors import FormatError
+from anim.files import links
+from anim.files.atomic import AtomicOutputs
 from cli.errors import UsageError
-from cli.io import documents, links
-from cli.io.atomic import AtomicOutputs
+from cli.io import documents
 
 
 def inputs(path: str, stack: ExitStack) -> Folder:

@@ -1,5 +1,5 @@
 """Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path, but
-`cli.io.cache_folders` for what is streamed, `cli.io.atomic` and `cli.io.gltf_files` to write."""
+`cli.io.cache_folders` for what is streamed, and of the library `anim.files` and `anim.gltf.io.gltf_files`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from anim.errors import AnimError, FormatError
+from anim.errors import AnimError, FormatError, OutputError
+from anim.files import atomic, links, resolver
 from anim.gltf.document import Buffer, Bytes, Document, items, node_label
-from anim.gltf.io import container, uri
-from cli.errors import OutputError, UsageError, not_written
-from cli.io import atomic, companion_files, gltf_files, images, links, output_names
+from anim.gltf.io import container, gltf_files, uri
+from cli.errors import UsageError
+from cli.io import images, output_names
 from cli.text import Voice
 
 PIPE = "-"
@@ -79,7 +80,7 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
     """
     name = called(path)
     try:
-        yield _stdin() if path == PIPE else companion_files.mapped(Path(path), ending), name
+        yield _stdin() if path == PIPE else resolver.mapped(Path(path), ending), name
     except (UsageError, OutputError):
         raise
     except AnimError as error:
@@ -230,7 +231,7 @@ def _to_stdout(pieces: Iterable[Bytes]) -> None:
         out.flush()
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or what is left fails once more at exit
-        raise not_written("stdout", error) from None
+        raise atomic.not_written("stdout", error) from None
 
 
 def _stdin() -> Bytes:
@@ -243,14 +244,14 @@ def _stdin() -> Bytes:
 
 def _received(opener: Opener) -> tuple[Bytes, Document]:
     data = _stdin()
-    return data, opener(data, companion_files.missing)
+    return data, opener(data, resolver.missing)
 
 
 def _opened(path: Path, opener: Opener) -> tuple[Bytes, Document]:
     """Bytes and document of a file, and its buffers opened while it was there: if it is replaced meanwhile, again."""
     for _ in range(MAX_TRIES):
         before = _stamp(path)
-        data, buffers = companion_files.mapped(path), companion_files.Beside(path.parent)
+        data, buffers = resolver.mapped(path), resolver.Beside(path.parent)
         document = opener(data, buffers.open)
         outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
         for address in outside:
@@ -296,6 +297,6 @@ def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]
         if folder is None or address is None or uri.is_data(address):
             continue
         try:
-            companion_files.place(folder, uri.relative_path(address))
+            resolver.place(folder, uri.relative_path(address))
         except FormatError as error:
             yield f"image {i}", error.problem

@@ -8,12 +8,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from anim.errors import FormatError
+from anim.errors import FormatError, OutputError
+from anim.files import atomic, resolver
 from anim.gltf.document import Bytes, Document, Json, items
 from anim.gltf.io import uri
 from cli import text
-from cli.errors import OutputError
-from cli.io import atomic, companion_files
 
 LISTED = 3  # names in a note
 
@@ -85,7 +84,7 @@ def _content(folder: Path | None, image: Json) -> Bytes | None:
     if not address or folder is None:
         return None
     try:
-        return companion_files.opened(folder, uri.relative_path(address))
+        return resolver.opened(folder, uri.relative_path(address))
     except FormatError:
         return None
 

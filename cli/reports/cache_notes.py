@@ -9,9 +9,9 @@ from pathlib import Path
 
 from anim.caches.formats import mesh_sequence
 from anim.caches.registry import CACHE_FORMATS, Files
+from anim.files import links
 from anim.model import VertexCache
 from cli import text
-from cli.io import links
 
 
 def not_held(cache: VertexCache, ending: str) -> tuple[str, ...]:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cli.errors import OutputError, UsageError
-from cli.io import documents, links
+from anim.errors import OutputError
+from anim.files import links
+from cli.errors import UsageError
+from cli.io import documents
 
 
 def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:

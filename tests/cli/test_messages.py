@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fixtures
-from anim.errors import AnimError, FormatError, NotFoundError, RangeError, ShapeError, UnsupportedError
+from anim.errors import AnimError, FormatError, NotFoundError, OutputError, RangeError, ShapeError, UnsupportedError
 from cli import errors
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, help_line, refusal
@@ -21,7 +21,7 @@ from tests.cli.running import built, help_line, refusal
         (RangeError("x"), 2),
         (errors.UsageError("x"), 2),
         (FormatError("x"), 3),
-        (errors.OutputError("x"), 3),
+        (OutputError("x"), 3),
         (UnsupportedError("x"), 4),
         (NotFoundError("x"), 5),
         (errors.CheckError("x"), 6),

@@ -68,7 +68,7 @@ def test_all_names_are_settled_before_the_first_file_is_written(call: Call, walk
 def test_what_was_written_before_a_failure_is_said(
     call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cli.errors import OutputError
+    from anim.errors import OutputError
     from cli.io import cache_files
 
     real = cache_files.save

@@ -17,13 +17,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from anim.caches.storage import PIECE
-from anim.gltf.document import Bytes
-from cli import loading
-from cli.errors import OutputError, not_written
-from cli.io import links
+from anim.arrays import Bytes
+from anim.errors import OutputError
+from anim.files import links, signals
 
 MAX_PREFIX_LENGTH = 40  # letters of a name that its temporary neighbor begins with: longer names have no room for more
+BLOCK_BYTES = 1 << 24  # that are copied or compared at a time
 MAX_LOCK_WAIT_S = 5.0  # `flock FOLDER gltf-anim …` in a script would make us wait for ever
 LOCK_POLL_S = 0.005
 
@@ -102,7 +101,7 @@ class AtomicOutputs:
                 check_writable(path)
                 if path.exists() and not path.is_file():  # /dev/null, a named pipe
                     with temporary.open("rb") as source, path.open("wb") as target:
-                        shutil.copyfileobj(source, target, PIECE)
+                        shutil.copyfileobj(source, target, BLOCK_BYTES)
                 elif not path.exists() or not filecmp.cmp(temporary, path, shallow=False):
                     os.chmod(temporary, mode_of(path))
                     new[path] = temporary
@@ -152,6 +151,11 @@ def named_errors(path: Path) -> Iterator[None]:
         raise not_written(path, error) from None
 
 
+def not_written(name: str | Path, error: OSError) -> OutputError:
+    """Return the error for an output, `name`, that the system does not let us write."""
+    return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")
+
+
 @contextmanager
 def temporaries() -> Iterator[list[Path]]:
     """Give a list of files of which those that are still there at the end are removed."""
@@ -159,7 +163,7 @@ def temporaries() -> Iterator[list[Path]]:
     try:
         yield made
     finally:
-        with loading.signals_held():  # what stops us may not stop this
+        with signals.hold_signals():  # what stops us may not stop this
             for path in made:
                 with suppress(OSError):
                     path.unlink()
@@ -220,9 +224,9 @@ def has_bytes(path: Path, pieces: Sequence[Bytes]) -> bool:
         return False
     with path.open("rb") as file:
         return all(
-            file.read(min(PIECE, len(piece) - at)) == piece[at : at + PIECE].tobytes()
+            file.read(min(BLOCK_BYTES, len(piece) - at)) == piece[at : at + BLOCK_BYTES].tobytes()
             for piece in pieces
-            for at in range(0, len(piece), PIECE)
+            for at in range(0, len(piece), BLOCK_BYTES)
         )
 
 
@@ -231,7 +235,7 @@ def _replace_set(new: Mapping[Path, Path], main: Path) -> None:
 
     Whatever fails, or is interrupted but by SIGKILL, leaves the old set as it was.
     """
-    with loading.signals_held():
+    with signals.hold_signals():
         if len(new) > 1:
             _replace_several(new, main)
         else:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from anim.arrays import Bytes
 from anim.errors import FormatError
-from anim.gltf.document import Bytes
 
 
 class Beside:

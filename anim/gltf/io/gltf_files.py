@@ -19,12 +19,10 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from anim.errors import AnimError
+from anim.errors import AnimError, OutputError
+from anim.files import atomic, links, signals
 from anim.gltf.document import Bytes, Document, items
 from anim.gltf.io import container, uri
-from cli import loading
-from cli.errors import OutputError
-from cli.io import atomic, links
 
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name, for as long as others have the shorter ones
 GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
@@ -104,7 +102,7 @@ def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> N
         waiting = {place: atomic.write_temporary(place, pieces, made) for place, pieces in new.items()}
         is_there = atomic.has_bytes(path, text)
         main = None if is_there else atomic.write_temporary(path, text, made)
-        with loading.signals_held(), atomic.temporaries() as placed:
+        with signals.hold_signals(), atomic.temporaries() as placed:
             for place, temporary in waiting.items():
                 atomic.move_to_free(temporary, place)
                 placed.append(place)
