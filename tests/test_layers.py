@@ -37,6 +37,8 @@ OPENING = {  # modules of the library that may open a path
     "anim/files/links.py",
     "anim/files/resolver.py",
     "anim/gltf/io/gltf_files.py",
+    "anim/gltf/io/images.py",
+    "anim/gltf/io/source.py",
     "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
+from anim.gltf.io import images
 from cli import text
-from cli.io import documents, images
+from cli.io import documents
 from cli.options import common
+from cli.reports import image_notes
 
 
 def convert(
@@ -37,9 +39,9 @@ def convert(
         if embed:
             document = images.embed(document, source.folder)
         size = documents.write(document, output, source, dry_run=dry_run)
-    if not dry_run and (embed or not source.is_beside(output)):
+    if not dry_run and (embed or output == documents.PIPE or not source.is_beside(output)):
         copied = output != documents.PIPE
-        for note in images.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
+        for note in image_notes.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
             voice.say(note)
     name = source.name if output == documents.PIPE else output
     voice.say(f"{name}  {text.change(source.size, size)}, {text.took(time.perf_counter() - began)}")

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from anim.errors import AnimError
+from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import traveling_root
 from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge
@@ -179,7 +180,7 @@ def _why_none(clip: Clip, parts: list[Loop]) -> str:
     return "no part loops better than the whole clip" if is_whole else ""
 
 
-def _skin(source: documents.Source, voice: Voice) -> SkinMotion:
+def _skin(source: Source, voice: Voice) -> SkinMotion:
     """Where seams are measured: at nodes where vertices can't be read."""
     try:
         return SkinMotion(scenes.scene(source.document, source.name, voice))

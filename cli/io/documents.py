@@ -1,57 +1,28 @@
 """Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path, but
-`cli.io.cache_folders` for what is streamed, and of the library `anim.files` and `anim.gltf.io.gltf_files`."""
+`cli.io.cache_folders` for what is streamed, and of the library `anim.files` and `anim.gltf.io`."""
 
 from __future__ import annotations
 
 import difflib
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePath
-from typing import TypeAlias
 
 import numpy as np
 
 from anim.errors import AnimError, FormatError, OutputError
 from anim.files import atomic, links, resolver
-from anim.gltf.document import Buffer, Bytes, Document, items, node_label
+from anim.gltf.document import Bytes, Document, items, node_label
 from anim.gltf.io import container, gltf_files, uri
+from anim.gltf.io.source import Opener, Source, glb_pieces, open_bytes, open_file, write_file
 from cli.errors import UsageError
-from cli.io import images, output_names
+from cli.io import output_names
 from cli.text import Voice
 
 PIPE = "-"
-MAX_TRIES = 20  # of opening a .gltf with its buffers, while others replace it
-
 AUDIBLE = Voice()
-Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """An input: its document, what messages call it, its size with its .bin files, its real folder, its own bytes."""
-
-    document: Document
-    name: str
-    size: int
-    folder: Path | None
-    data: Bytes
-
-    def is_beside(self, output: str) -> bool:
-        """Return whether `output` lies in the same folder, so that relative URIs stay right."""
-        if self.folder is None or output == PIPE:
-            return False
-        return links.followed(Path(output)).parent.resolve() == self.folder.resolve()
-
-    def bytes_of(self, document: Document) -> Bytes | None:
-        """Return the bytes of the input where they are still those of a document: nothing of it was changed."""
-        return self.data if document is self.document and not document.expanded else None
-
-    def is_at(self, path: str) -> bool:
-        """Return whether this is the file at `path`."""
-        return self.folder is not None and os.path.realpath(self.name) == os.path.realpath(path)
 
 
 @contextmanager
@@ -62,10 +33,9 @@ def source(path: str, voice: Voice = AUDIBLE, opener: Opener = container.read) -
     """
     name = called(path)
     try:
-        data, document = _received(opener) if path == PIPE else _opened(links.followed(Path(path)), opener)
-        folder = None if path == PIPE else links.followed(Path(path)).parent
-        note_mended(document, name, voice)
-        yield Source(document, name, len(data) + _external_size(document), folder, data)
+        found = open_bytes(_stdin(), name, opener) if path == PIPE else open_file(path, opener)
+        note_mended(found.document, name, voice)
+        yield found
     except (UsageError, OutputError):
         raise
     except AnimError as error:
@@ -100,31 +70,14 @@ def note_mended(document: Document, name: str, voice: Voice) -> None:
 def write(
     document: Document, path: str, source: Source | None, *, unchanged: Bytes | None = None, dry_run: bool = False
 ) -> int:
-    """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
+    """Write a document to a file or, for "-", as a GLB to stdout; return its size in bytes.
 
-    The size is that of all these files, also of those that stay as they are. source: the input that the document comes
-    from: external buffers and images that are still right from the output's folder keep their URI, and none of its
-    files is ever removed. In another folder images are copied beside the output, and no file is overwritten. Files
-    appear whole or not at all, and only if their bytes differ from what is there; else the time of the file at `path`
-    is updated. unchanged: bytes that say the same already (`Source.bytes_of`), written where they do as they are.
+    Files as `anim.gltf.io.source.write_file` does. source: the input that the document comes from. unchanged: bytes
+    that say the same already (`Source.bytes_of`), written where they do as they are.
     """
-    copies: dict[Path, Bytes] = {}
-    if source is not None and source.folder is not None and path != PIPE and not source.is_beside(path):
-        document, copies = images.along(document, source.folder, links.followed(Path(path)).parent)
-        unchanged = None if copies else unchanged  # some may have got other names
-    if not dry_run:
-        images.write_copies(copies)
-    if path.lower().endswith(".gltf"):
-        same_folder = source is not None and source.is_beside(path)
-        spared = [] if source is None or source.is_at(path) else list(_files_beside(source))
-        text = None if unchanged is None or unchanged[:4].tobytes() == container.MAGIC else unchanged
-        size = gltf_files.write(
-            document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run
-        )
-        return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
-    content = container.glb(document)
-    if unchanged is not None and container.is_glb(unchanged) and not _external_size(document):
-        content = [unchanged]
+    if path != PIPE:
+        return write_file(document, path, source, unchanged=unchanged, dry_run=dry_run)
+    content = glb_pieces(document, unchanged)
     if not dry_run:
         write_bytes(content, path)
     return sum(len(piece) for piece in content)
@@ -240,54 +193,6 @@ def _stdin() -> Bytes:
     if sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a GLB into stdin")
     return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
-
-
-def _received(opener: Opener) -> tuple[Bytes, Document]:
-    data = _stdin()
-    return data, opener(data, resolver.missing)
-
-
-def _opened(path: Path, opener: Opener) -> tuple[Bytes, Document]:
-    """Bytes and document of a file, and its buffers opened while it was there: if it is replaced meanwhile, again."""
-    for _ in range(MAX_TRIES):
-        before = _stamp(path)
-        data, buffers = resolver.mapped(path), resolver.Beside(path.parent)
-        document = opener(data, buffers.open)
-        outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
-        for address in outside:
-            with suppress(FormatError):  # raised again where its bytes are asked for
-                buffers.open(uri.relative_path(address))
-        if not outside or _stamp(path) == before:
-            break
-    return data, document
-
-
-def _stamp(path: Path) -> tuple[int, ...]:
-    """What changes when a file is replaced."""
-    try:
-        found = path.stat()
-    except (OSError, ValueError):
-        return ()
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
-
-
-def _files_beside(source: Source) -> Iterator[Path]:
-    """Yield where the buffers and images of an input lie."""
-    for about in (*items(source.document.json, "buffers"), *items(source.document.json, "images")):
-        address = about.get("uri")
-        if source.folder is not None and address is not None and not uri.is_data(address):
-            with suppress(FormatError):
-                yield source.folder / uri.relative_path(address)
-
-
-def _external_size(document: Document) -> int:
-    return sum(map(_size_outside, document.buffers))
-
-
-def _size_outside(buffer: Buffer) -> int:
-    """Bytes of a buffer that is a file of its own, 0 of others."""
-    is_file = buffer.uri is not None and not uri.is_data(buffer.uri) and not buffer.replaced
-    return buffer.byte_length if is_file else 0
 
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:

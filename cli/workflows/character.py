@@ -13,6 +13,7 @@ from anim.exchange.retarget.retarget import Floor
 from anim.exchange.retarget.vrm_humanoid import stated_roles
 from anim.gltf import authoring
 from anim.gltf.document import Document
+from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Scene
@@ -39,7 +40,7 @@ class Casting:
     replaced: int | None = None
 
 
-def cast(made: Conversion, character: documents.Source, casting: Casting, voice: Voice) -> tuple[Conversion, Document]:
+def cast(made: Conversion, character: Source, casting: Casting, voice: Voice) -> tuple[Conversion, Document]:
     """Return the conversion with what became of it on the character, and its document with the clip.
 
     Raises CheckError where more joints are without a partner than may be.

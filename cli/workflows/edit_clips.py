@@ -10,6 +10,7 @@ from functools import cache
 
 from anim.errors import AnimError
 from anim.gltf.document import Document
+from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
@@ -19,7 +20,8 @@ from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
 from anim.ops.selection import Selection
 from cli import text
-from cli.io import documents, images, scenes
+from cli.io import documents, scenes
+from cli.reports import image_notes
 from cli.reports.clip_lengths import lengths
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
@@ -113,9 +115,7 @@ def _is_same(new: Clip, old: Clip) -> bool:
     return new is old or (len(new.tracks) == len(old.tracks) and all(map(operator.is_, new.tracks, old.tracks)))
 
 
-def _measured(
-    edited: Edited, source: documents.Source, accessors: Accessors, skeleton: Skeleton, voice: text.Voice
-) -> Edited:
+def _measured(edited: Edited, source: Source, accessors: Accessors, skeleton: Skeleton, voice: text.Voice) -> Edited:
     at_nodes = False
     try:
         scene = scenes.scene(source.document, source.name, voice, accessors=accessors)
@@ -174,8 +174,8 @@ def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 
 
-def note_images(document: Document, source: documents.Source, output: str, voice: text.Voice) -> None:
+def note_images(document: Document, source: Source, output: str, voice: text.Voice) -> None:
     """Say which images went along to an output in another folder than its input, and which are missing there."""
     if output != documents.PIPE and not source.is_beside(output):
-        for note in images.notes(document, source.folder, copied=True):
+        for note in image_notes.notes(document, source.folder, copied=True):
             voice.say(note)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from anim.gltf.document import Document
+from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.error.surface import diagonal
@@ -32,7 +33,7 @@ class Job:
     chosen: numbers of clips. scale: m, the diagonal. detailed: whether verdicts are to have statistics.
     """
 
-    source: documents.Source
+    source: Source
     clips: tuple[Clip, ...]
     scene: Scene
     chosen: Sequence[int]
@@ -122,7 +123,7 @@ def _bounded(request: Request, max_error: float) -> Request:
     return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
 
 
-def job(source: documents.Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:
+def job(source: Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:
     """Return the job for a source. clip: globs. jobs: processes, 0 for one per core.
 
     Raises NotFoundError; FormatError or UnsupportedError where vertices can't be read: no bound holds on those.

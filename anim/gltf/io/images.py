@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -12,9 +12,6 @@ from anim.errors import FormatError, OutputError
 from anim.files import atomic, resolver
 from anim.gltf.document import Bytes, Document, Json, items
 from anim.gltf.io import uri
-from cli import text
-
-LISTED = 3  # names in a note
 
 
 def along(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Bytes]]:
@@ -26,7 +23,7 @@ def along(document: Document, folder: Path, target: Path) -> tuple[Document, dic
     copies: dict[Path, Bytes] = {}
     images: list[Json] = []
     for image in items(document.json, "images"):
-        address, data = _outside(image), _content(folder, image)
+        address, data = external_uri(image), read_image(folder, image)
         if data is not None and address:
             name = _free(target, uri.relative_path(address), data, copies)
             copies[target / name] = data
@@ -49,38 +46,21 @@ def write_copies(copies: Mapping[Path, Bytes]) -> None:
 def embed(document: Document, folder: Path | None) -> Document:
     """Return the document with those of its external images that can be read as data URIs."""
     images = [
-        image if (data := _content(folder, image)) is None else {**image, "uri": _data_uri(data)}
+        image if (data := read_image(folder, image)) is None else {**image, "uri": _data_uri(data)}
         for image in items(document.json, "images")
     ]
     return replace(document, json={**document.json, "images": images}) if images else document
 
 
-def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: str = "") -> Iterator[str]:
-    """Yield what there is to say of images outside a document that left its folder.
-
-    copied: whether those that can be read were copied; else they stay behind. embed_hint: what would take them in.
-    """
-    outside = [image for image in items(document.json, "images") if _outside(image)]
-    lost = [image["uri"] for image in outside if _content(folder, image) is None]
-    found = [image["uri"] for image in outside if image["uri"] not in lost]
-    if found and copied:
-        yield f"note: {text.plural(len(found), 'image')} copied beside the output ({_listed(found)})"
-    elif found:
-        verb = "stays" if len(found) == 1 else "stay"
-        yield f"note: {text.plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
-    if lost:
-        yield f"note: {text.plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
-
-
-def _outside(image: Json) -> str:
-    """The URI of an image that is a file of its own, else nothing."""
+def external_uri(image: Json) -> str:
+    """Return the URI of an image that is a file of its own, else nothing."""
     address = str(image.get("uri", ""))
     return "" if uri.is_data(address) else address
 
 
-def _content(folder: Path | None, image: Json) -> Bytes | None:
-    """The bytes of an image that is a file beside the input; None for others, and where it can't be read."""
-    address = _outside(image)
+def read_image(folder: Path | None, image: Json) -> Bytes | None:
+    """Return the bytes of an image that is a file beside the input; None for others, and where it can't be read."""
+    address = external_uri(image)
     if not address or folder is None:
         return None
     try:
@@ -97,10 +77,6 @@ def _free(target: Path, name: str, data: Bytes, copies: Mapping[Path, Bytes]) ->
         if target / each in copies or not os.path.lexists(target / each) or atomic.has_bytes(target / each, [data]):
             return each
     raise OutputError(f"{target / name}: is there already, with other content")
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:LISTED]) + (", …" if len(names) > LISTED else "")
 
 
 def _data_uri(data: Bytes) -> str:

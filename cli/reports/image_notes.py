@@ -1,0 +1,33 @@
+"""What there is to say of images that are files of their own, when a document leaves its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from anim.gltf.document import Document, items
+from anim.gltf.io.images import external_uri, read_image
+from cli import text
+
+LISTED = 3  # names in a note
+
+
+def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: str = "") -> Iterator[str]:
+    """Yield what there is to say of images outside a document that left its folder.
+
+    copied: whether those that can be read were copied; else they stay behind. embed_hint: what would take them in.
+    """
+    outside = [image for image in items(document.json, "images") if external_uri(image)]
+    lost = [image["uri"] for image in outside if read_image(folder, image) is None]
+    found = [image["uri"] for image in outside if image["uri"] not in lost]
+    if found and copied:
+        yield f"note: {text.plural(len(found), 'image')} copied beside the output ({_listed(found)})"
+    elif found:
+        verb = "stays" if len(found) == 1 else "stay"
+        yield f"note: {text.plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
+    if lost:
+        yield f"note: {text.plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:LISTED]) + (", …" if len(names) > LISTED else "")
