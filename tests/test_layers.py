@@ -42,7 +42,8 @@ OPENING = {  # modules of the library that may open a path
     "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }
-LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplotlib", "PIL", "mujoco", "pxr", "dask"}
+LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplotlib", "PIL", "png"}
+LAZY |= {"mujoco", "pxr", "dask"}
 
 
 def test_there_is_something_to_look_at() -> None:

@@ -100,7 +100,7 @@ def render(
     Meshes are skinned and flat-shaded under one camera framed on the whole motion, on a ground under the feet; a
     skeleton without a mesh is drawn as sticks. Where a figure travels, the camera goes along, and the distance stands
     beside the time. Several clips come one under the other, several methods in rows of each; side by side in a film.
-    Without --clip it is the first one. .gif, .webp and .apng need the extra plot; a .png needs nothing.
+    Without --clip it is the first one.
     """
     voice = text.Voice(quiet)
     began = time.perf_counter()

@@ -29,6 +29,7 @@ NEVER = {
     "numba",
     "matplotlib",
     "PIL",
+    "png",
     "mujoco",
     "pxr",
     "dask",

@@ -1,40 +1,57 @@
-"""Words on pictures made of pixels: titles, names of rows, times, and the legend of colors."""
+"""Text on pictures: titles, names of rows, times, and the legend of colors."""
 
 from __future__ import annotations
+
+import math
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.show.filmstrip import glyphs, heat_map
+from anim.show.filmstrip import heat_map
 from anim.show.filmstrip.renderer import encoded
 
+if TYPE_CHECKING:
+    from PIL.ImageFont import FreeTypeFont
+
 INK, FAINT = (56, 58, 62), (120, 123, 128)  # sRGB
-LETTER = 2  # pixels of a dot of the font
+FONT_SIZE = 14  # pixels of an em
+LINE = 19  # pixels from one line of text to the next
 BAR = 120, 8  # pixels of the heat's legend
 SPACE = 40  # pixels between title and legend
-LINE = glyphs.HEIGHT * LETTER + 3  # pixels from one line of words to the next
 
 Image = NDArray[np.uint8]
 
 
 def write(image: Image, text: str, x: int, y: int, *, color: tuple[int, int, int] = INK) -> None:
-    """Write a text with its top left at x, y pixels."""
-    glyphs.write(image, text, x, y, size=LETTER, color=color)
+    """Write a text with the top left of its line at x, y pixels; what lies outside the image is cut off."""
+    from PIL import Image as Pillow
+    from PIL import ImageDraw
+
+    stencil = Pillow.new("L", (max(width(text), 1), LINE))
+    ImageDraw.Draw(stencil).text((0, 0), _printable(text), fill=255, font=_font())
+    coverage = np.asarray(stencil)
+    top, left = max(y, 0), max(x, 0)
+    inside = image[top : max(y + LINE, 0), left : max(x + stencil.width, 0)]
+    shares = coverage[top - y :, left - x :][: inside.shape[0], : inside.shape[1], None] / 255
+    inside[:] = np.rint(inside * (1 - shares) + np.array(color) * shares)
 
 
 def width(text: str) -> int:
     """Return how many pixels a text takes across."""
-    return glyphs.width(text, size=LETTER)
+    length: float = _font().getlength(_printable(text))
+    return math.ceil(length)
 
 
 def wrapped(text: str, pixels: int) -> list[str]:
     """Return a text in lines of at most `pixels` across, broken behind spaces and marks where there are any near.
 
-    wrapped("Dualwield_Melee_Attack_Chop", 200) → ["Dualwield_Melee_", "Attack_Chop"]
+    wrapped("Dualwield_Melee_Attack_Chop", 120) → ["Dualwield_Melee_", "Attack_Chop"]
     """
-    most = max((pixels + LETTER) // (glyphs.STEP * LETTER), 1)
     lines = []
-    while len(text) > most:
+    while width(text) > pixels and len(text) > 1:
+        most = next(n for n in range(len(text) - 1, 0, -1) if n == 1 or width(text[:n]) <= pixels)
         cut = max((text[:most].rfind(mark) for mark in " _-./|:"), default=-1) + 1
         cut = cut if cut > most // 3 else most
         lines.append(text[:cut].rstrip())
@@ -56,7 +73,7 @@ def write_header(image: Image, title: str, legend: str, *, left: int, top: int) 
     write(image, legend, right, top, color=FAINT)
     across, height = BAR
     right -= across + 8
-    image[top + 3 : top + 3 + height, right : right + across] = encoded(heat_map.colors(np.linspace(0, 1, across)))
+    image[top + 6 : top + 6 + height, right : right + across] = encoded(heat_map.colors(np.linspace(0, 1, across)))
     write(image, "0", right - 8 - width("0"), top, color=FAINT)
 
 
@@ -66,3 +83,18 @@ def length(meters: float) -> str:
         if meters * factor >= 1 or unit == "mm":
             return f"{meters * factor:.3g} {unit}"
     raise AssertionError
+
+
+@cache
+def _font() -> FreeTypeFont:
+    """The font that Pillow brings along: the same on every machine. Letters it lacks are boxes."""
+    from PIL import ImageFont
+
+    found = ImageFont.load_default(FONT_SIZE)
+    assert isinstance(found, ImageFont.FreeTypeFont)
+    return found
+
+
+def _printable(text: str) -> str:
+    """The text in one line: what is no letter (line breaks, halves of surrogate pairs) becomes "?"."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)

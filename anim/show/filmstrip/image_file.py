@@ -1,20 +1,17 @@
-"""Pictures → bytes of a file: PNG by ourselves, moving ones through Pillow (extra `plot`)."""
+"""Pictures → bytes of a file, by Pillow: PNG, and animated WebP, GIF and APNG."""
 
 from __future__ import annotations
 
 import io
-import struct
-import zlib
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from anim.errors import RangeError, UnsupportedError
+from anim.errors import RangeError
 from anim.show.filmstrip.filmstrip import Image
 
-LEVEL = 9
-BAND = 1 << 24  # bytes of a picture that are filtered at a time
+COMPRESSION_LEVEL = 9
 WEBP_QUALITY = 88
 MOVING = {".webp": "WEBP", ".gif": "GIF", ".apng": "PNG"}
 TICK = {".gif": 10}  # ms in which times are kept, else 1
@@ -22,41 +19,26 @@ MOST_FPS = {".gif": 50}  # quicker ones are shown at a tenth of the speed by mos
 
 
 def png(image: Image) -> bytes:
-    """Return a PNG of 8 bits a channel. image: (H, W, 3). Each row takes the filter whose numbers are smallest."""
-    height, width = image.shape[:2]
-    rows = image.reshape(height, -1)
-    packer = zlib.compressobj(LEVEL)
-    step = max(BAND // max(rows.shape[1], 1), 1)
-    body = [packer.compress(_filtered(rows, low, min(low + step, height))) for low in range(0, height, step)]
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    parts = ((b"IHDR", head), (b"sRGB", b"\0"), (b"IDAT", b"".join((*body, packer.flush()))), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in parts)
+    """Return a PNG of 8 bits a channel that says its colors are sRGB. image: (H, W, 3)."""
+    from PIL import Image as Pillow
+    from PIL.PngImagePlugin import PngInfo
 
-
-def _filtered(rows: Image, low: int, high: int) -> bytes:
-    """Rows low … high of (H, 3W) as PNG has them: each after the number of its filter."""
-    own = rows[low:high]
-    left, above = np.zeros_like(own), np.zeros_like(own)
-    left[:, 3:] = own[:, :-3]
-    above[max(1 - low, 0) :] = rows[max(low - 1, 0) : high - 1]
-    tried = np.stack((own, own - left, own - above))
-    best = np.abs(tried.view(np.int8).astype(np.int16)).sum(axis=2).argmin(axis=0)
-    lines = np.empty((len(own), 1 + own.shape[1]), np.uint8)
-    lines[:, 0], lines[:, 1:] = best, tried[best, np.arange(len(own))]
-    return lines.tobytes()
+    color_space = PngInfo()
+    color_space.add(b"sRGB", b"\0")
+    out = io.BytesIO()
+    Pillow.fromarray(image).save(out, "PNG", compress_level=COMPRESSION_LEVEL, pnginfo=color_space)
+    return out.getvalue()
 
 
 def moving(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
     """Return the bytes of an endless film. ending: one of MOVING.
 
-    Raises RangeError for more frames per second than the format has, UnsupportedError without Pillow.
+    Raises RangeError for more frames per second than the format has.
     """
+    from PIL import Image as Pillow
+
     if fps > MOST_FPS.get(ending, 1000):
         raise RangeError(f"{fps:g} frames per second are too many for {ending} (limit {MOST_FPS.get(ending, 1000)})")
-    try:
-        from PIL import Image as Pillow
-    except ImportError:
-        raise UnsupportedError(f"{ending} needs the package Pillow", help="pip install 'gltf-anim[plot]'") from None
     first, *others = [Pillow.fromarray(image) for image in images]
     out = io.BytesIO()
     about: dict[str, Any] = {
@@ -76,7 +58,3 @@ def durations(frames: int, ending: str, *, fps: float) -> list[int]:
     tick = TICK.get(ending, 1)
     ends = np.rint(np.arange(frames + 1) * 1000 / fps / tick) * tick
     return [round(each) for each in np.diff(ends).tolist()]
-
-
-def _chunk(kind: bytes, body: bytes) -> bytes:
-    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))

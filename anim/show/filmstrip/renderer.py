@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.show.filmstrip.camera import Camera
 from anim.show.filmstrip.rasterizer import visible
 from anim.show.filmstrip.surface_pattern import Marks
@@ -183,17 +183,12 @@ def _shadow(stage: Stage, positions: Floats, faces: Ints) -> Floats:
     fallen = positions - (above / light[1])[:, None] * light
     fallen[:, 1] = stage.ground
     mask = visible(camera.project(fallen)[faces], width=camera.width, height=camera.height) >= 0
-    return SHADOW_DEPTH * _blurred(mask.astype(np.float64), max(round(SHADOW_BLUR * camera.height), 1))
+    return SHADOW_DEPTH * _blur(mask, max(round(SHADOW_BLUR * camera.height), 1))
 
 
-def _blurred(image: Floats, radius: int) -> Floats:
-    for axis in (0, 1):
-        for _ in range(2):
-            pad = [(0, 0), (0, 0)]
-            pad[axis] = (radius + 1, radius)
-            total = np.cumsum(np.pad(image, pad, mode="edge"), axis=axis)
-            size = 2 * radius + 1
-            ahead = np.take(total, range(size, total.shape[axis]), axis)
-            behind = np.take(total, range(total.shape[axis] - size), axis)
-            image = (ahead - behind) / size
-    return image
+def _blur(mask: Bools, radius: int) -> Floats:
+    from PIL import Image, ImageFilter
+
+    box = ImageFilter.BoxBlur(radius)
+    blurred = Image.fromarray(mask.astype(np.uint8) * 255).filter(box).filter(box)
+    return np.asarray(blurred, np.float64) / 255

@@ -67,18 +67,28 @@ def test_a_png_by_hand() -> None:
     assert (
         data[:33] == b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sIIBBBBB", 13, b"IHDR", 2, 2, 16, 2, 0, 0, 0) + data[29:33]
     )
-    packed, at = b"", 8
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at : at + 8])
-        body = data[at + 8 : at + 8 + size]
-        assert data[at + 8 + size : at + 12 + size] == struct.pack(">I", zlib.crc32(kind + body))
-        packed += body if kind == b"IDAT" else b""
-        at += 12 + size
-    # Every byte is less the one above it: 0001 under 0000, 0001 under 0001, … modulo 256.
-    assert zlib.decompress(packed) == bytes.fromhex(
-        "02 0000 0001 0002 ffff 0100 0003  02 0001 0000 00ff 0101 ff00 00fd"
-    )
     assert (png.read(data) == pixels).all()
+
+
+@pytest.mark.parametrize("row_filter", range(5))
+def test_pngs_of_other_programs(row_filter: int) -> None:
+    """Each row 0001 0002 0003, 0001 0002 0003, … of bytes less what its filter predicts (PNG specification, 9.2)."""
+    row = bytes.fromhex("0001 0002 0003" * 2)
+    predicted = {
+        0: (bytes(12), bytes(12)),
+        1: (bytes(6) + row[:6],) * 2,
+        2: (bytes(12), row),
+        3: (bytes(6) + bytes(each // 2 for each in row[:6]), bytes(each // 2 for each in row[:6]) + row[:6]),
+        4: (bytes(6) + row[:6], row),
+    }[row_filter]
+    lines = b"".join(
+        bytes([row_filter]) + bytes((a - b) % 256 for a, b in zip(row, each, strict=True)) for each in predicted
+    )
+    parts = ((b"IHDR", struct.pack(">IIBBBBB", 2, 2, 16, 2, 0, 0, 0)), (b"IDAT", zlib.compress(lines)), (b"IEND", b""))
+    chunks = [
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in parts
+    ]
+    assert png.read(b"\x89PNG\r\n\x1a\n" + b"".join(chunks)).tolist() == [[[1, 2, 3]] * 2] * 2
 
 
 def test_pillow_sees_the_high_bytes() -> None:

@@ -43,15 +43,39 @@ def row(heading: str, count: int, label: str = "") -> Row:
     ("text", "pixels", "lines"),
     [
         (LONG, 400, [LONG]),
-        (LONG, 200, ["Dualwield_Melee_", "Attack_Chop"]),
-        ("x" * 20, 118, ["x" * 10, "x" * 10]),
-        ("Walk lbs", 60, ["Walk", "lbs"]),
+        (LONG, 150, ["Dualwield_Melee_", "Attack_Chop"]),
+        ("Walk lbs", 45, ["Walk", "lbs"]),
         ("", 60, [""]),
     ],
 )
 def test_long_names_are_broken_behind_their_marks(text: str, pixels: int, lines: list[str]) -> None:
     assert captions.wrapped(text, pixels) == lines
     assert all(captions.width(line) <= pixels for line in lines)
+
+
+def test_a_name_without_marks_is_broken_anywhere() -> None:
+    lines = captions.wrapped("x" * 50, 118)
+    assert "".join(lines) == "x" * 50
+    assert len(lines) > 2
+    assert all(captions.width(line) <= 118 for line in lines)
+    assert captions.wrapped("xxx", 1) == ["x", "x", "x"], "a letter that is too wide stands alone"
+
+
+@pytest.mark.parametrize("text", ["Gehen für später", "Прыжок", "歩く", "a\nb", "\ud83d", "\0", "👋🏽", ""])
+def test_names_in_any_script_are_written(text: str) -> None:
+    """Letters that the font lacks are boxes; nothing is an error, and the same text gives the same pixels."""
+    images = [np.full((40, 200, 3), 255, np.uint8) for _ in range(2)]
+    for image in images:
+        captions.write(image, text, 5, 5)
+    assert (images[0] == images[1]).all()
+    assert (images[0] < 255).any() == bool(text)
+
+
+@pytest.mark.parametrize(("x", "y"), [(-3, -5), (25, 10), (-500, 5), (5, -500), (99, 99)])
+def test_what_lies_outside_is_cut_off(x: int, y: int) -> None:
+    image = np.full((20, 30, 3), 255, np.uint8)
+    captions.write(image, "MMMMM", x, y)
+    assert (image < 255).any() == (min(abs(x), abs(y)) < 20 and max(abs(x), abs(y)) < 50)
 
 
 def test_clips_come_one_after_the_other(written: list[tuple[str, int, int]]) -> None:
