@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
+from anim.gltf.writing.references import extensions_naming_keys
 from anim.measure.inspect.storage_cost import footprints
 from anim.measure.inspect.stored_bytes import stored
 from anim.model import Clip
@@ -24,6 +25,7 @@ from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import change, length, plural, share, size, took
 
+LISTED = 3  # places in the file that a note names
 LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
 
 
@@ -56,7 +58,10 @@ class About:
         """Why the output is the input, None where it is not."""
         if not self.unchanged:
             return None
-        return "optimized like this before" if self.found.unchanged else "no smaller file within the bound"
+        if self.found.unchanged:
+            return "optimized like this before"
+        kept = kept_keys(self.before, self.found.solutions)
+        return f"no smaller file within the bound{'; ' if kept else ''}{kept}"
 
     @property
     def optimized_before(self) -> bool:
@@ -89,6 +94,15 @@ def smaller(found: Optimized, document: Document, size_of: Callable[[Document], 
     return found.document
 
 
+def kept_keys(document: Document, clips: Iterable[int]) -> str:
+    """Return which extensions keep old keys of `clips` in the file, empty where none does."""
+    places = extensions_naming_keys(document.json, clips)
+    if not places:
+        return ""
+    named = ", ".join(places[:LISTED]) + (f" and {len(places) - LISTED} more" if len(places) > LISTED else "")
+    return f"some old keys stay in the file, since unknown extensions may refer to them ({named})"
+
+
 def worst(found: Optimized) -> float:
     """Return the largest error of any clip, in metres."""
     return max((each.error.max_error for each in found.verdicts.values()), default=0.0)
@@ -108,7 +122,8 @@ def lines(about: About, *, dry_run: bool) -> list[str]:
         _worst_words(about),
         took(about.seconds),
     ]
-    return [", ".join(summary) + dry, *_policy(about)]
+    kept = kept_keys(about.before, about.found.solutions)
+    return [", ".join(summary) + dry, *_policy(about), *([f"note: {kept}"] if kept else [])]
 
 
 def warnings(about: About) -> list[str]:

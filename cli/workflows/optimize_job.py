@@ -96,9 +96,11 @@ class Job:
     def _check_fit(self, sized: Sized, max_bytes: int) -> None:
         if sized.size > max_bytes:
             percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
+            kept = optimize_report.kept_keys(self.source.document, self.chosen)
             raise CheckError(
                 f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {length(sized.max_error)}{percent} "
                 f"it still takes {plural(sized.size, 'byte')}, {sized.animation} of them animation; "
+                f"{kept}{'; ' if kept else ''}"
                 "nothing was written",
                 help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {sized.size}",
             )

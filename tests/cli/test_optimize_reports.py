@@ -7,6 +7,7 @@ import json
 import math
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from anim.gltf.reading import reader
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import refusal, shell, table
-from tests.files import opened_fixture, opened_path
+from tests.files import glb_of, opened_fixture, opened_path
 
 FAST = ("--effort", "fast")
 
@@ -166,3 +167,31 @@ def test_gzip_as_objective(fixture: Fixture, tmp_path: Path, call: Call) -> None
         assert call("optimize", fixture("noop"), path, "--objective", objective, "--max-error", "1%", *FAST).code == 0
         sizes[objective] = (path.stat().st_size, len(gzip.compress(path.read_bytes(), 9)))
     assert sizes["file"][0] <= sizes["gzip"][0]
+
+
+def _with_numbers(fixture: Fixture, folder: Path, place: str) -> Path:
+    """A file that holds all small numbers at one place of a node, so that each of its accessors might be meant."""
+    document = opened_fixture("noop")
+    node = {**document.json["nodes"][0], place: {"ACME_ids": list(range(80))}}
+    json = {**document.json, "nodes": [node, *document.json["nodes"][1:]]}
+    path = folder / "numbered.glb"
+    path.write_bytes(glb_of(replace(document, json=json)))
+    return path
+
+
+def test_numbers_in_extras_refer_to_nothing(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    source, output = _with_numbers(fixture, tmp_path, "extras"), tmp_path / "out.glb"
+    assert call("optimize", source, output, *FAST).code == 0
+    assert call("optimize", fixture("noop"), tmp_path / "plain.glb", *FAST).code == 0
+    saved = source.stat().st_size - fixture("noop").stat().st_size
+    assert output.stat().st_size == pytest.approx((tmp_path / "plain.glb").stat().st_size + saved, abs=4)
+
+
+def test_keys_that_stay_for_an_unknown_extension_are_said(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    source, output = _with_numbers(fixture, tmp_path, "extensions"), tmp_path / "out.glb"
+    kept = "some old keys stay in the file, since unknown extensions may refer to them (/nodes/0/extensions/ACME_ids)"
+    run = call("optimize", source, output, *FAST, "--report", "-")
+    assert run.json["unchanged_because"] == f"no smaller file within the bound; {kept}"
+    assert f"unchanged: no smaller file within the bound; {kept}" in run.err
+    limit = source.stat().st_size - 100
+    assert kept in refusal(call("optimize", source, output, "--max-bytes", str(limit), *FAST), 6)

@@ -9,7 +9,8 @@ from typing import Any
 from anim.gltf.document import Json, items
 
 # Extensions known to hold no number of an accessor or view, other than those collected below. Numbers inside any
-# other extension, and inside extras, are taken for both: whatever they might name stays where it is.
+# other extension are taken for both: whatever they might name stays where it is. Extras are the application's own:
+# by the specification no number in them is a reference.
 HARMLESS = frozenset(
     """
     EXT_mesh_gpu_instancing EXT_meshopt_compression EXT_texture_avif EXT_texture_webp
@@ -49,13 +50,31 @@ def outside(json: Json, replaced: Iterable[int]) -> References:
 
 
 def unknown_numbers(json: Json) -> set[int]:
-    """Return all whole numbers in extras and in unknown extensions: any of them might name an accessor or a view."""
-    return set(_whole_numbers(list(_unknown_parts(json))))
+    """Return all whole numbers in unknown extensions: any of them might name an accessor or a view."""
+    return {number for _, part in unknown_extensions(json) for number in _whole_numbers(part)}
 
 
 def frozen_buffers(json: Json) -> set[int]:
-    """Return the buffers that unknown extensions or extras point into by themselves: nothing in them may move."""
-    return {part["buffer"] for part in _objects(list(_unknown_parts(json))) if type(part.get("buffer")) is int}
+    """Return the buffers that unknown extensions point into by themselves: nothing in them may move."""
+    parts = [part for _, part in unknown_extensions(json)]
+    return {part["buffer"] for part in _objects(parts) if type(part.get("buffer")) is int}
+
+
+def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
+    """Return where unknown extensions hold numbers that might name key data of `animations`: those bytes stay.
+
+    As JSON pointers: ["/nodes/3/extensions/ACME_path"].
+    """
+    accessors, samplers = items(json, "accessors"), items(json, "animations")
+    keys = {s[k] for i in animations for s in samplers[i]["samplers"] for k in ("input", "output")}
+    named = keys | {view for number in keys for view in views_of(accessors[number])}
+    buffers = {items(json, "bufferViews")[view]["buffer"] for number in keys for view in views_of(accessors[number])}
+    return [
+        place
+        for place, part in unknown_extensions(json)
+        if not named.isdisjoint(_whole_numbers(part))
+        or any(type(each.get("buffer")) is int and each["buffer"] in buffers for each in _objects(part))
+    ]
 
 
 def views_of(accessor: Json) -> list[int]:
@@ -97,42 +116,42 @@ def _of_draco(json: Json) -> Iterator[int]:
             yield from _whole_numbers(draco.get("bufferView"))
 
 
-def _unknown_parts(value: Any) -> Iterator[Any]:
-    """Extras, and extensions that are not known to be harmless, wherever they stand."""
+def unknown_extensions(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (JSON pointer, content) of the extensions that are not known to be harmless, wherever they stand."""
     if isinstance(value, list):
-        for item in value:
+        for i, item in enumerate(value):
             if isinstance(item, dict | list):
-                yield from _unknown_parts(item)
+                yield from unknown_extensions(item, f"{place}/{i}")
         return
     for key, item in value.items():
-        if key == "extras":
-            yield item
-        elif key == "extensions" and isinstance(item, dict):
+        if key == "extras" or not isinstance(item, dict | list):
+            continue
+        if key == "extensions" and isinstance(item, dict):
             for name, extension in item.items():
                 if name not in HARMLESS:
-                    yield extension
+                    yield f"{place}/extensions/{name}", extension
                 elif isinstance(extension, dict | list):
-                    yield from _unknown_parts(extension)
-        elif isinstance(item, dict | list):
-            yield from _unknown_parts(item)
+                    yield from unknown_extensions(extension, f"{place}/extensions/{name}")
+        else:
+            yield from unknown_extensions(item, f"{place}/{key}")
 
 
 def _objects(value: Any) -> Iterator[Json]:
     if isinstance(value, dict):
         yield value
     if isinstance(value, dict | list):
-        for item in value.values() if isinstance(value, dict) else value:
+        for item in _inside(value):
             yield from _objects(item)
 
 
 def _whole_numbers(value: Any) -> Iterator[int]:
-    if isinstance(value, bool):
-        return
-    if isinstance(value, int):
+    if type(value) is int:
         yield value
-    elif isinstance(value, dict):
-        for item in value.values():
+    elif isinstance(value, dict | list):
+        for item in _inside(value):
             yield from _whole_numbers(item)
-    elif isinstance(value, list):
-        for item in value:
-            yield from _whole_numbers(item)
+
+
+def _inside(value: Json | list[Any]) -> Iterator[Any]:
+    """What an object or a list holds, without extras."""
+    yield from (item for key, item in value.items() if key != "extras") if isinstance(value, dict) else value

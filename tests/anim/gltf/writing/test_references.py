@@ -30,13 +30,16 @@ PRIMITIVE: Json = {"attributes": {}}
         ),
         ({"nodes": [{"mesh": 5, "skin": 6, "children": [7], "camera": 8, "weights": [1, 0]}]}, set(), set()),
         ({"materials": [{"alphaCutoff": 1, "pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}]}, set(), set()),
-        ({"extras": {"a": [1, {"b": 2}], "c": True, "d": 3.0, "e": "4", "f": None}}, {1, 2}, {1, 2}),
+        ({"extras": {"a": [1, {"b": 2}]}, "nodes": [{"extras": 3}]}, set(), set()),
+        ({"extensions": {"ACME": {"a": [1, {"b": 2}], "c": True, "d": 3.0, "e": "4", "f": None}}}, {1, 2}, {1, 2}),
+        ({"extensions": {"ACME": {"a": 1, "extras": [2]}}}, {1}, {1}),
         ({"extensions": {"ACME": 5}}, {5}, {5}),
         ({"scenes": [{"extensions": {"ACME": [[6]]}}]}, {6}, {6}),
         ({"extensions": {"KHR_lights_punctual": {"lights": [{"range": 5}]}}}, set(), set()),
         ({"extensions": {"VRMC_vrm": {"humanoid": {"humanBones": {"hips": {"node": 1}}}}}}, set(), set()),
         ({"textures": [{"source": 1, "extensions": {"KHR_texture_basisu": {"source": 2}}}]}, set(), set()),
-        ({"asset": {"version": "2.0", "extras": 7}}, {7}, {7}),
+        ({"asset": {"version": "2.0", "extras": 7}}, set(), set()),
+        ({"nodes": [{"extensions": {"EXT_mesh_gpu_instancing": {"attributes": {}, "extras": 1}}}]}, set(), set()),
     ],
 )
 def test_each_place(content: Json, accessors: set[int], views: set[int]) -> None:
@@ -71,3 +74,23 @@ def test_ids_inside_draco_data_name_no_views() -> None:
     draco = {"KHR_draco_mesh_compression": {"bufferView": 3, "attributes": {"POSITION": 0, "JOINTS_0": 1}}}
     json = {"meshes": [{"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1}, "extensions": draco}]}]}
     assert references.outside(json, ()).views == {3}
+
+
+@pytest.mark.parametrize(
+    ("extension", "places"),
+    [
+        ({"data": 1}, ["/scenes/0/extensions/ACME"]),  # an accessor
+        ({"data": 5}, ["/scenes/0/extensions/ACME"]),  # its view
+        ({"buffer": 2, "from": 99}, ["/scenes/0/extensions/ACME"]),
+        ({"data": 3, "buffer": 0, "extras": 1}, []),
+    ],
+)
+def test_extensions_naming_keys(extension: Json, places: list[str]) -> None:
+    json = {
+        "scenes": [{"extensions": {"ACME": extension}}],
+        "bufferViews": [{"buffer": 0}] * 5 + [{"buffer": 2}],
+        "accessors": [{"bufferView": 4}, {"bufferView": 5}, {"bufferView": 5}, {"bufferView": 4}],
+        "animations": [{"samplers": [{"input": 1, "output": 2}]}, {"samplers": [{"input": 3, "output": 3}]}],
+        "extras": 1,
+    }
+    assert references.extensions_naming_keys(json, [0]) == places

@@ -221,13 +221,10 @@ def test_accessors_that_clips_share_with_others_stay() -> None:
     "pin",
     [
         {"extensions": {"ACME_paths": {"curves": [{"data": 1}]}}},
-        {"extras": {"accessor": 1}},
         {"nodes": [{"extensions": {"ACME_paths": [1]}}]},
-        {"nodes": [{"extras": 1}]},
         {"scenes": [{"extensions": {"ACME": {"deep": {"deeper": [[1]]}}}}]},
         {"materials": [{"pbrMetallicRoughness": {"extensions": {"ACME": {"lut": 1}}}}]},
         {"extensions": {"KHR_lights_punctual": {"lights": [{"extensions": {"ACME": 1}}]}}},
-        {"extensions": {"KHR_lights_punctual": {"lights": [{"extras": [1]}]}}},
         {"meshes": [{"primitives": [{"attributes": {}, "extensions": {"ACME": {"attributes": {"X": 1}}}}]}]},
     ],
 )
@@ -245,7 +242,8 @@ def test_numbers_in_known_places_pin_nothing() -> None:
     harmless = {
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "spot", "intensity": 1}]}},
         "nodes": [{"extensions": {"KHR_lights_punctual": {"light": 1}}}],
-        "extras": {"flag": True, "share": 1.0, "name": "1"},
+        "extras": {"id": 1, "buffer": 0, "all": [0, {"bufferView": 1}]},
+        "scenes": [{"extensions": {"ACME": {"flag": True, "share": 1.0, "name": "1", "extras": {"id": 1}}}}],
     }
     document = opened(text(animated() | harmless))
     assert len(rewritten(document).json["accessors"]) == 2
