@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from anim.gltf.document import Document
+from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.instancing import EXTENSION, instanced_nodes
 from anim.model import Scene
 from anim.skinning.analysis.weight_sums import bad_sums
 from cli.text import Voice
@@ -22,7 +23,7 @@ def scene(
     tangents: bool = False,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
-    """Return the scene of a document, and warn of skin weights that are not used as they stand in the file.
+    """Return the scene of a document, and warn of skin weights and copies of meshes that don't count as in the file.
 
     name: of the file, as messages call it. normals, tangents: whether to read those too.
     nodes: gives the nodes whose meshes the command is about; None for all.
@@ -32,4 +33,15 @@ def scene(
     for bad in bad_sums(each for each in found.instances if chosen is None or each.node in chosen):
         for words in bad.in_words():
             voice.warn(f"{name}: {words}")
+    _warn_of_copies(document, name, voice, chosen)
     return found
+
+
+def _warn_of_copies(document: Document, name: str, voice: Voice, chosen: Collection[int] | None) -> None:
+    copied = [i for i in instanced_nodes(document.json) if chosen is None or i in chosen]
+    if copied:
+        words = f" and {len(copied) - 1} more have" if len(copied) > 1 else " has"
+        voice.warn(
+            f"{name}: {node_label(document.json, copied[0])}{words} copies of a mesh by {EXTENSION}: "
+            "one copy per node counts here, and others may move farther than is said"
+        )

@@ -16,8 +16,10 @@ from tests.anim.skinning.odd_rigs import with_bad_sums
 from tests.cli.conftest import Call
 from tests.cli.running import ROOT, built
 from tests.cli.test_from_euler import SMALL
+from tests.cli.test_instancing import with_copies
 
 SUMS = "don't add up to 1"
+COPIES = "has copies of a mesh by EXT_mesh_gpu_instancing"
 JSON = ("--format", "json")
 REPORT = ("--report", "-", "--effort", "fast")
 WARNED = (  # command line, words of the warning, options that ask for the report; none where there is no report
@@ -29,6 +31,9 @@ WARNED = (  # command line, words of the warning, options that ask for the repor
     (("loop", "bad.glb"), SUMS, JSON),
     (("diff", "bad.glb", "bad.glb"), SUMS, JSON),
     (("optimize", "bad.glb", "out.glb", "--effort", "fast"), SUMS, REPORT),
+    (("resample", "copies.glb", "out.glb", "--fps", "9"), COPIES, ()),
+    (("diff", "copies.glb", "copies.glb"), COPIES, JSON),
+    (("optimize", "copies.glb", "out.glb", "--effort", "fast"), COPIES, REPORT),
     (("diff", "arm.glb", "biped.glb"), "no clip and no node has the same name", JSON),
     (("optimize", "arm.glb", "out.glb", "--max-error", "0.1", "--effort", "fast"), "0.1 means 0.1 m", REPORT),
     (
@@ -51,6 +56,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> Path:
     for name in ("arm", "biped", "tube"):
         (tmp_path / f"{name}.glb").write_bytes(built(name))
     (tmp_path / "bad.glb").write_bytes(with_bad_sums(built("arm")))
+    (tmp_path / "copies.glb").write_bytes(with_copies("arm"))
     (tmp_path / "small.bvh").write_bytes(SMALL)
     return tmp_path
 

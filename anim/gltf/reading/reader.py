@@ -9,7 +9,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, ShapeError
 from anim.gltf.document import Document, Json, items
-from anim.gltf.reading import animations, node_matrix
+from anim.gltf.reading import animations, instancing, node_matrix
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import Meshes
 from anim.gltf.validation import hierarchy
@@ -85,10 +85,13 @@ def scene(
 ) -> Scene:
     """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
 
-    normals, tangents: read those of vertices and morph targets too.
-    Raises UnsupportedError where vertices can't be had: Draco without the package DracoPy, an unknown compression.
+    normals, tangents: read those of vertices and morph targets too. A mesh that EXT_mesh_gpu_instancing shows in copies
+    is there once, on its node (`instancing.instanced_nodes`).
+    Raises UnsupportedError where vertices can't be had: Draco without the package DracoPy, an unknown compression,
+    EXT_mesh_gpu_instancing where the file requires it.
     """
     _check(document)
+    instancing.check_not_required(document)
     accessors = accessors or Accessors(document)
     meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
