@@ -134,6 +134,6 @@ def test_scenes_are_read_in_one_place() -> None:
         path.name
         for path in (ROOT / "cli").rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.Attribute) and node.attr == "scene" and ast.unparse(node.value) == "read"
+        if isinstance(node, ast.Attribute) and node.attr == "scene" and ast.unparse(node.value) == "reader"
     ]
-    assert sorted(found) == ["edit.py", "scenes.py"]
+    assert sorted(found) == ["edit_clips.py", "scenes.py"]
