@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,7 +59,7 @@ def test_a_required_extension_that_no_mesh_uses_stops_nothing(call: Call, tmp_pa
 def with_copies(name: str, *lists: str) -> bytes:
     """Return a fixture whose meshes are shown in copies. lists: of the file's extensions, that name it."""
     document = opened_fixture(name)
-    copies = {"extensions": {EXTENSION: {"attributes": {}}}}
+    copies: dict[str, Any] = {"extensions": {EXTENSION: {"attributes": {}}}}
     nodes = [node | copies if "mesh" in node else node for node in document.json["nodes"]]
     used = {key: [EXTENSION] for key in ("extensionsUsed", *lists)}
     return glb_of(replace(document, json={**document.json, **used, "nodes": nodes}))
