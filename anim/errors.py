@@ -67,3 +67,8 @@ class ShapeError(AnimError):
 
 class OutputError(AnimError):
     """What was asked for is right, but can't be written: a full or read-only disk, no permission."""
+
+
+def not_written(name: object, error: OSError) -> OutputError:
+    """Return the error for an output, `name`, that the system does not let us write."""
+    return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")

@@ -220,7 +220,9 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        sys.stdout.write(f"{PROGRAM} {__version__}\n")
+        from cli.io import stdout
+
+        stdout.write_text(f"{PROGRAM} {__version__}\n")
         raise typer.Exit
 
 

@@ -16,6 +16,8 @@ from typing import Any
 import typer
 from typer import TyperException
 
+from anim.errors import not_written
+
 
 class Plain:
     """Converts the value of one parameter: what typer asks of its own converters."""
@@ -57,9 +59,24 @@ def quicken(command: Any) -> Any:
     for param in command.params:
         _quickened(param)
     help_option, parse = command.get_help_option, command.parse_args
-    command.get_help_option = lambda ctx: _quickened(help_option(ctx))
+    command.get_help_option = lambda ctx: _with_our_stdout(_quickened(help_option(ctx)))
     command.parse_args = lambda ctx, args: _parsed(parse, ctx, args)
     return command
+
+
+def _with_our_stdout(help_option: Any) -> Any:
+    """The option --help, its page written as every other product is: whole, or one line that says why not."""
+    if help_option is not None:
+        help_option.callback = _show_help
+    return help_option
+
+
+def _show_help(ctx: Any, param: Any, wanted: bool) -> None:
+    if wanted and not ctx.resilient_parsing:
+        from cli.io import stdout
+
+        stdout.write_text(f"{ctx.get_help()}\n")
+        ctx.exit()
 
 
 def _parsed(parse: Any, ctx: Any, args: list[str]) -> Any:
@@ -69,6 +86,8 @@ def _parsed(parse: Any, ctx: Any, args: list[str]) -> Any:
         if getattr(error, "ctx", None) is None:
             error.ctx = ctx  # type: ignore[attr-defined]
         raise
+    except OSError as error:  # of typer's own --show-completion and --install-completion
+        raise not_written(error.filename or "stdout", error) from None
 
 
 def _quickened(param: Any) -> Any:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from anim.arrays import Bytes
-from anim.errors import OutputError
+from anim.errors import OutputError, not_written
 from anim.files import links, signals
 
 MAX_PREFIX_LENGTH = 40  # letters of a name that its temporary neighbor begins with: longer names have no room for more
@@ -149,11 +149,6 @@ def named_errors(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise not_written(path, error) from None
-
-
-def not_written(name: str | Path, error: OSError) -> OutputError:
-    """Return the error for an output, `name`, that the system does not let us write."""
-    return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")
 
 
 @contextmanager

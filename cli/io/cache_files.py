@@ -13,8 +13,7 @@ from anim.caches.options import Reading, Writing, Written
 from anim.caches.registry import CACHE_FORMATS, Files
 from anim.caches.sniffing import ending_of
 from anim.caches.storage import suffix
-from anim.errors import AnimError, FormatError, OutputError
-from anim.files.atomic import not_written
+from anim.errors import AnimError, FormatError, OutputError, not_written
 from anim.model import VertexCache
 from cli import loading
 from cli.errors import UsageError
@@ -123,7 +122,7 @@ def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_ru
             elif not dry_run:
                 staged.commit()
         except OSError as error:
-            raise not_written(path, error) from None
+            raise not_written(away if is_pipe else path, error) from None
         finally:
             staged.clear()
     lost = cache_notes.not_held(cache, ending)

@@ -18,7 +18,7 @@ from anim.gltf.document import Bytes, Document, items, node_label
 from anim.gltf.io import container, gltf_files, uri
 from anim.gltf.io.source import Opener, Source, glb_pieces, open_bytes, open_file, write_file
 from cli.errors import UsageError
-from cli.io import output_names
+from cli.io import output_names, stdout
 from cli.text import Voice
 
 PIPE = "-"
@@ -86,8 +86,8 @@ def write(
 def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
     """Write pieces to a file, whole or not at all, or to stdout for "-"; never binary to a terminal."""
     if path == PIPE:
-        _no_terminal()
-        _to_stdout(pieces)
+        stdout.check_no_terminal()
+        stdout.write(piece.data for piece in pieces)
     else:
         atomic.write_file(Path(path), list(pieces))
 
@@ -104,11 +104,11 @@ def write_text(text: str, path: str = PIPE) -> None:
 @contextmanager
 def commit_text_after(text: str, path: str) -> Iterator[None]:
     """Write a text product like `write_text`, a file so that it takes its place after the block, or not at all."""
-    content = np.frombuffer(text.encode(errors="backslashreplace"), np.uint8)
     if path == PIPE:
-        _to_stdout([content])
+        stdout.write_text(text)
         yield
     else:
+        content = np.frombuffer(text.encode(errors="backslashreplace"), np.uint8)
         with atomic.commit_after(Path(path), [content]):
             yield
 
@@ -135,7 +135,7 @@ def check_output(path: str) -> None:
 def check_binary(path: str) -> None:
     """Raise UsageError or OutputError at once, before any work, where no binary can be written to `path`."""
     if path == PIPE:
-        _no_terminal()
+        stdout.check_no_terminal()
     else:
         check_file(path)
 
@@ -167,24 +167,6 @@ def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
 def called(path: str) -> str:
     """Return what messages call an input."""
     return "stdin" if path == PIPE else path or "''"
-
-
-def _no_terminal() -> None:
-    if sys.stdout is not None and sys.stdout.isatty():
-        raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
-
-
-def _to_stdout(pieces: Iterable[Bytes]) -> None:
-    if sys.stdout is None:
-        raise UsageError("stdout is closed", help="name an output file")
-    out = sys.stdout.buffer
-    try:
-        for piece in pieces:
-            out.write(piece.data)
-        out.flush()
-    except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or what is left fails once more at exit
-        raise atomic.not_written("stdout", error) from None
 
 
 def _stdin() -> Bytes:
