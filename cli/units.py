@@ -1,50 +1,36 @@
-"""Numbers with units, as options take them: lengths, angles, shares."""
+"""Numbers with units, as options take them; what can't be read is the command line's fault, not the input's."""
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
+from anim import units
+from anim.errors import RangeError
 from cli.errors import UsageError
-
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
-LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
-ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
 
 def share(text: str, option: str) -> float:
-    """Return a share of something: "0.1%" or a bare number, above 0. Raises UsageError otherwise.
-
-    share("0.1%", "--tolerance") → 0.001
-    """
-    value, unit = _split(text, option)
-    if unit not in ("", "%") or value <= 0:
-        raise UsageError(f"{option} is '{text}' (expected a share above 0, like 0.1% or 0.001)")
-    return value / 100 if unit else value
+    """Return a share above 0: "0.1%" or a bare number. Raises UsageError otherwise."""
+    with _usage_errors():
+        return units.parse_share(text, option)
 
 
 def meters(text: str, option: str, diagonal: Callable[[], float]) -> float:
-    """Return a length above 0 in metres: "0.5mm", "2cm", bare metres, or "0.1%" of what `diagonal` gives.
-
-    Raises UsageError otherwise.
-    """
-    value, unit = _split(text, option)
-    if (unit not in LENGTHS and unit != "%") or value <= 0:
-        raise UsageError(f"{option} is '{text}' (expected a length above 0, like 0.5mm, 2cm or 0.1%)")
-    return value / 100 * diagonal() if unit == "%" else value * LENGTHS[unit]
+    """Return a length above 0 in metres, also from "0.1%" of what `diagonal` gives. Raises UsageError otherwise."""
+    with _usage_errors():
+        return units.parse_length(text, option, diagonal)
 
 
 def angle(text: str, option: str) -> float:
-    """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises UsageError otherwise, or without unit."""
-    value, unit = _split(text, option)
-    if unit not in ANGLES or value <= 0:
-        raise UsageError(f"{option} is '{text}' (expected an angle above 0 with its unit, like 0.05deg or 0.001rad)")
-    return value * ANGLES[unit]
+    """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises UsageError otherwise."""
+    with _usage_errors():
+        return units.parse_angle(text, option)
 
 
-def _split(text: str, option: str) -> tuple[float, str]:
-    match = _NUMBER.fullmatch(text)
-    if match is None:
-        raise UsageError(f"{option} is '{text}' (expected a number with a unit)")
-    return float(match[1]), match[2]
+@contextmanager
+def _usage_errors() -> Iterator[None]:
+    try:
+        yield
+    except RangeError as error:
+        raise UsageError(error.problem) from None

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Rooms from the bottom up; a room may import from its own level only where NEIGHBORS says so.
 LEVELS = (
     {"errors"},
-    {"arrays"},
+    {"arrays", "units"},
     {"maths", "files"},
     {"model"},
     {"gltf", "sampling"},

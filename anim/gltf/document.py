@@ -74,6 +74,10 @@ class Document:
     indent: int | None = None
     expanded: tuple[int, ...] = ()
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{key}={len(items(self.json, key))}" for key in ("animations", "nodes", "meshes", "skins"))
+        return f"Document({counts}, buffer_bytes={sum(each.byte_length for each in self.buffers)})"
+
 
 def node_label(json: Json, number: int) -> str:
     """Return how messages call a node: "node 7 'hip'"."""

@@ -39,3 +39,6 @@ class Clip:
     def end(self) -> float:
         """Time of the last key, in seconds: glTF's length of the animation, which always starts at 0."""
         return max((float(times[-1]) for times in self.axes), default=0.0)
+
+    def __repr__(self) -> str:
+        return f"Clip({self.name!r}, tracks={len(self.tracks)}, start_s={self.start:.6g}, end_s={self.end:.6g})"

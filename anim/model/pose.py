@@ -21,3 +21,6 @@ class Pose:
     rotation: Floats
     scale: Floats
     weights: Mapping[int, Floats] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"Pose(frames={len(self.times)}, nodes={self.translation.shape[1]})"

@@ -28,6 +28,9 @@ class Skin:
         if len(self.joints) != len(self.inverse_bind):
             raise ShapeError(f"{len(self.inverse_bind)} inverse bind matrices for {len(self.joints)} joints")
 
+    def __repr__(self) -> str:
+        return f"Skin(joints={len(self.joints)})"
+
 
 @dataclass(frozen=True, slots=True)
 class PrimitiveRange:
@@ -77,6 +80,10 @@ class Mesh:
         if self.faces.size and int(self.faces.max()) >= len(self.positions):
             raise FormatError(f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=where)
 
+    def __repr__(self) -> str:
+        counts = f"vertices={len(self.positions)}, faces={len(self.faces)}, targets={len(self.targets)}"
+        return f"Mesh({self.name!r}, {counts})"
+
 
 @dataclass(frozen=True, slots=True)
 class MeshInstance:
@@ -90,6 +97,9 @@ class MeshInstance:
     skin: Skin | None
     weights: Floats
 
+    def __repr__(self) -> str:
+        return f"MeshInstance(node={self.node}, {self.mesh!r}, {self.skin!r})"
+
 
 @dataclass(frozen=True, slots=True)
 class Scene:
@@ -102,3 +112,7 @@ class Scene:
     def vertex_count(self) -> int:
         """Number of vertices of all instances."""
         return int(np.sum([len(i.mesh.positions) for i in self.instances], dtype=np.int64))
+
+    def __repr__(self) -> str:
+        counts = f"nodes={len(self.skeleton)}, instances={len(self.instances)}, vertices={self.vertex_count}"
+        return f"Scene({counts})"

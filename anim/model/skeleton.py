@@ -46,6 +46,10 @@ class Skeleton:
             raise ShapeError(f"sheared_local has {len(self.sheared_local)} matrices for {len(self.sheared)} nodes")
         self.levels()
 
+    def __repr__(self) -> str:
+        roots = np.flatnonzero(self.parents < 0)
+        return f"Skeleton(nodes={len(self)}, roots={len(roots)}, first={self.names[roots[0]] if len(roots) else ''!r})"
+
     def __len__(self) -> int:
         return len(self.names)
 

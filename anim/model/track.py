@@ -120,6 +120,11 @@ class Track:
         """How values may be interpolated: see `kind_of`."""
         return kind_of(self)
 
+    def __repr__(self) -> str:
+        target = f"node={self.node}, {self.path}" if self.pointer is None else repr(self.pointer)
+        span = f"start_s={self.times[0]:.6g}, end_s={self.times[-1]:.6g}"
+        return f"Track({target}, {self.interpolation}, keys={len(self.times)}, {span})"
+
 
 def _same(one: Floats | None, other: Floats | None) -> bool:
     if one is None or other is None:

@@ -28,6 +28,10 @@ class FrameChunk:
         turned = (None if each is None else change(each) for each in (self.normals, self.tangents))
         return FrameChunk(self.first, change(self.positions), *turned)
 
+    def __repr__(self) -> str:
+        frames, vertices = self.positions.shape[:2]
+        return f"FrameChunk(first={self.first}, frames={frames}, vertices={vertices})"
+
 
 @dataclass(frozen=True, slots=True)
 class MeshPart:
@@ -91,6 +95,11 @@ class VertexCache:
         return FrameChunk(
             0, positions, _joined(each.normals for each in chunks), _joined(each.tangents for each in chunks)
         )
+
+    def __repr__(self) -> str:
+        span = f"start_s={self.times[0]:.6g}, end_s={self.times[-1]:.6g}" if len(self.times) else ""
+        counts = f"frames={self.frame_count}, vertices={self.vertex_count}, faces={len(self.faces)}"
+        return f"{type(self).__name__}({', '.join(filter(None, (counts, span)))})"
 
 
 def from_arrays(

@@ -33,6 +33,10 @@ class PoseTable:
     weights: Mapping[int, Floats]
     pointers: Mapping[str, Floats]
 
+    def __repr__(self) -> str:
+        space = "local" if self.world is None else "world"
+        return f"PoseTable(frames={len(self.times)}, nodes={self.translation.shape[1]}, {space})"
+
 
 def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") -> PoseTable:
     """Return where every node of the skeleton is at times `at` (F,) in seconds; before and after the clip it holds.

@@ -1,0 +1,50 @@
+"""Numbers with units, as options and the functions of `anim` take them: lengths, angles, shares."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+from anim.errors import RangeError
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+
+
+def parse_share(text: str, name: str) -> float:
+    """Return a share of something: "0.1%" or a bare number, above 0. Raises RangeError otherwise.
+
+    parse_share("0.1%", "--tolerance") → 0.001
+    """
+    value, unit = _split(text, name)
+    if unit not in ("", "%") or value <= 0:
+        raise RangeError(f"{name} is '{text}' (expected a share above 0, like 0.1% or 0.001)")
+    return value / 100 if unit else value
+
+
+def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
+    """Return a length above 0 in metres: "0.5mm", "2cm", bare metres, or "0.1%" of what `diagonal` gives.
+
+    Raises RangeError otherwise.
+    """
+    value, unit = _split(text, name)
+    if (unit not in LENGTHS and unit != "%") or value <= 0:
+        raise RangeError(f"{name} is '{text}' (expected a length above 0, like 0.5mm, 2cm or 0.1%)")
+    return value / 100 * diagonal() if unit == "%" else value * LENGTHS[unit]
+
+
+def parse_angle(text: str, name: str) -> float:
+    """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises RangeError otherwise, or without unit."""
+    value, unit = _split(text, name)
+    if unit not in ANGLES or value <= 0:
+        raise RangeError(f"{name} is '{text}' (expected an angle above 0 with its unit, like 0.05deg or 0.001rad)")
+    return value * ANGLES[unit]
+
+
+def _split(text: str, name: str) -> tuple[float, str]:
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise RangeError(f"{name} is '{text}' (expected a number with a unit)")
+    return float(match[1]), match[2]
