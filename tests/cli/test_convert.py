@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -114,6 +116,21 @@ def test_the_bin_is_named_after_the_file(out: str, bin_name: str, uri: str, call
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([out, bin_name])
     assert text(tmp_path / out)["buffers"][0]["uri"] == uri
     assert call("convert", tmp_path / out).product() == call("convert", stdin=built("arm")).product()
+
+
+@pytest.mark.skipif(sys.platform in ("darwin", "win32"), reason="names there are Unicode")
+@pytest.mark.parametrize(
+    ("name", "uri"), [(b"n\nl", "n%0Al.bin"), (b"t\t\x1b[1m", "t%09%1B%5B1m.bin"), (b"bad\xff", "bad%FF.bin")]
+)
+def test_what_has_a_strange_name_can_be_read_again(name: bytes, uri: str, call: Call, tmp_path: Path) -> None:
+    paths = [os.fsdecode(os.fsencode(tmp_path) + b"/" + name + ending) for ending in (b".glb", b".gltf")]
+    Path(paths[0]).write_bytes(built("biped"))
+    call("convert", *paths, "-q").product()
+    assert json.loads(Path(paths[1]).read_bytes())["buffers"][0]["uri"] == uri
+    assert call("convert", paths[1], "-", "-q").product() == built("biped")
+    call("resample", paths[1], paths[1], "--fps", "9", "-q").product()
+    assert {os.fsencode(path.name)[: len(name)] for path in tmp_path.iterdir()} == {name}
+    assert len(list(tmp_path.iterdir())) == 3  # with one buffer
 
 
 def test_a_file_that_is_already_what_it_shall_be_keeps_its_buffer(call: Call, fixture: Fixture, tmp_path: Path) -> None:

@@ -51,13 +51,14 @@ def encode_data(data: bytes, media: str = BUFFER_TYPES[0]) -> str:
 def relative_path(uri: str) -> str:
     """Return the path that a relative URI names, percent-decoded, with forward slashes.
 
+    Bytes that are no UTF-8 become what `os.fsdecode` makes of them, so that they name the file with these bytes.
     Raises FormatError unless it stays in the file's own folder: no scheme, no absolute path, no "..".
     relative_path("walk%20data.bin") → "walk data.bin"
     """
     if _SCHEME.match(uri):
         raise FormatError(f"URI '{_short(uri)}' has a scheme (only files beside this one are read)")
-    path = unquote(uri)
-    if not path or "\0" in path or not path.isprintable():
+    path = unquote(uri, errors="surrogateescape")
+    if not path or "\0" in path or not _is_encodable(path):
         raise FormatError(f"URI '{_short(uri)}' names no file")
     if path[0] in "/\\" or _SCHEME.match(path):
         raise FormatError(f"URI '{_short(uri)}' is absolute (only files beside this one are read)")
@@ -67,8 +68,17 @@ def relative_path(uri: str) -> str:
 
 
 def from_path(path: str) -> str:
-    """Return the relative URI of a file name, percent-encoded."""
-    return quote(path)
+    """Return the relative URI of a file name, percent-encoded, also of one that is no UTF-8 (`os.fsdecode`)."""
+    return quote(path, errors="surrogateescape")
+
+
+def _is_encodable(path: str) -> bool:
+    """Whether a path has bytes: half of a surrogate pair, which JSON can hold, has none."""
+    try:
+        path.encode(errors="surrogateescape")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _short(uri: str) -> str:

@@ -25,6 +25,9 @@ from tests.files import joined, opened
         ("data/walk+1.bin", "data/walk+1.bin"),
         ("a..b.bin", "a..b.bin"),
         ("datawalk.bin", "datawalk.bin"),
+        ("n%0Al%09%1B.bin", "n\nl\t\x1b.bin"),
+        ("no%C2%A0break.bin", "no\u00a0break.bin"),
+        ("bad%FF.bin", "bad\udcff.bin"),  # as os.fsdecode has it
     ],
 )
 def test_relative_paths_are_percent_decoded(uri: str, path: str) -> None:
@@ -56,6 +59,7 @@ def test_relative_paths_are_percent_decoded(uri: str, path: str) -> None:
         "http://example.com/walk.bin",
         "a%00b.bin",
         "a\0b.bin",
+        "\ud83d.bin",
     ],
 )
 def test_nothing_outside_the_folder_is_asked_for(uri: str) -> None:
