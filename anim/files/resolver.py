@@ -44,7 +44,10 @@ def mapped(path: Path, ending: str = ".glb") -> Bytes:
 def _in_folder(folder: Path, ending: str) -> str:
     """What to name instead of a folder: a file that is there, since most commands take one."""
     found = min(folder.glob(f"*{ending}"), default=None)
-    return f"name a file in it, such as {found}" if found else f"name a file (there is no {ending} in it)"
+    if found is None:
+        return f"name a file (there is no {ending} in it)"
+    name = str(found)
+    return f"name a file in it, such as {name if name[0] != '-' else f'./{name}'}"  # or it would be an option
 
 
 def opened(folder: Path, address: str) -> Bytes:

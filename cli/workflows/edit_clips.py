@@ -96,9 +96,10 @@ def edit(
     if not dry_run:
         note_images(result, source, output, voice)
     name = source.name if output == documents.PIPE else output
-    if chosen and not new:
+    if not new:
+        why = "no track was changed" if clips else "it has no clips"
         before = text.size(size) if size == source.size else text.change(source.size, size)
-        voice.say(f"{name}  {before}, unchanged: no track was changed{DRY if dry_run else ''}")
+        voice.say(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 

@@ -6,6 +6,8 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 import fixtures
 from anim.gltf.io.json_text import dump
 from tests.cli.conftest import Call, Fixture
@@ -85,6 +87,16 @@ def test_a_folder_is_refused_with_a_way_out(call: Call, tmp_path: Path) -> None:
     advised = call("convert", tmp_path, "-").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
     assert advised == str(tmp_path / "a.glb")
     assert call("convert", advised, "-").code == 0
+
+
+def test_a_name_that_looks_like_an_option_is_advised_as_a_path(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "-o.glb").write_bytes(built("noop"))
+    advised = call("inspect", ".").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
+    assert advised == "./-o.glb"
+    assert call("inspect", advised).code == 0
 
 
 def test_of_a_broken_file_what_can_be_read_is_shown(call: Call, tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from anim.errors import AnimError, FormatError, NotFoundError, OutputError, Rang
 from cli import errors
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, help_line, refusal
+from tests.files import glb_of, opened_fixture
 
 # Exit codes.
 
@@ -123,6 +126,26 @@ def test_a_name_that_is_not_there_is_5(
     assert message.startswith(f"gltf-anim: {path}: ")
     assert words in message
     assert hint in help_line(run)
+
+
+@pytest.mark.parametrize(
+    "line", [["resample", "--fps", "30"], ["ease", "--ease", "smoothstep"], ["retime", "--speed", "2"]]
+)
+@pytest.mark.parametrize("ending", [".glb", ".gltf"])
+def test_a_file_without_clips_goes_through_as_it_is(line: list[str], ending: str, call: Call, tmp_path: Path) -> None:
+    """With its spaces and line breaks."""
+    document = opened_fixture("biped")
+    content = {key: value for key, value in document.json.items() if key != "animations"}
+    (tmp_path / "still.glb").write_bytes(glb_of(replace(document, json=content)))
+    call("convert", tmp_path / "still.glb", tmp_path / "still.gltf").product()
+    path, out = tmp_path / f"still{ending}", tmp_path / f"out{ending}"
+    if ending == ".gltf":
+        path.write_bytes(path.read_bytes().replace(b":", b" :   "))
+    before = path.read_bytes()
+    for place in (path, out):
+        run = call(line[0], path, place, *line[1:])
+        assert re.fullmatch(rf"{re.escape(str(place))}  [\d.]+ kB, unchanged: it has no clips\n", run.err)
+        assert place.read_bytes() == before
 
 
 def test_names_that_nothing_has(call: Call) -> None:
