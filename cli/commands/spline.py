@@ -10,6 +10,7 @@ import typer
 
 from anim.curves.tangents.table import DEFAULT, TANGENT_FACTORIES, TANGENTS, parse
 from anim.gltf.reading import reader
+from anim.measure.inspect.root_motion import traveling_root
 from anim.measure.loops.recommendations import closing_command
 from anim.model import Clip, Scene
 from anim.ops.loop import open_tracks
@@ -31,7 +32,8 @@ def spline(
     ] = DEFAULT,
     list_rules: Annotated[bool, typer.Option("--list", help="Show all tangent rules.")] = False,
     cyclic: Annotated[
-        bool, typer.Option("--cyclic", help="A loop: first and last key are neighbors, no seam in value or speed.")
+        bool,
+        typer.Option("--cyclic", help="A loop: no seam in speed; tracks must end as they start, but a root's path."),
     ] = False,
     clip: common.Clips = None,
     node: common.Nodes = None,
@@ -55,7 +57,8 @@ def spline(
         def label(node: int) -> str:
             return scene().skeleton.label(node)
 
-        return splined(each, tangents=rule, cyclic=cyclic, tracks=tracks, label=label)
+        root = traveling_root(scene().skeleton, each) if cyclic or rule.loop else -1
+        return splined(each, tangents=rule, cyclic=cyclic, root=root, tracks=tracks, label=label)
 
     def advise(each: Clip, number: int) -> str:
         is_open = (cyclic or rule.loop) and open_tracks(each)

@@ -41,9 +41,10 @@ def test_unknown_rule_is_refused(call: Call, fixture: Fixture) -> None:
 def test_a_loop_that_is_open_is_named_and_closed_by_the_help(call: Call, walk: Path, tmp_path: Path) -> None:
     half, closed = tmp_path / "half.glb", tmp_path / "closed.glb"
     assert call("trim", walk, half, "--clip", "walk", "--to", "0.4").code == 0
-    for options in (("--cyclic", "--tangents", "natural"), ("--tangents", "periodic")):
+    rules = [("--cyclic", "--tangents", name) for name in ("natural", "catmull-rom", "flat", "clamped")]
+    for options in (*rules, ("--cyclic", "--path", "rotation"), ("--tangents", "periodic")):
         run = call("spline", half, "-", "--clip", "walk", *options)
-        assert re.search(r"clip 'walk', track of node \d+ '\w+', rotation: the loop is open", refusal(run, 2))
+        assert re.search(r"clip 'walk', track of node \d+ '\w+', \w+: the loop is open", refusal(run, 2))
         advice, command = help_line(run).split(": ")
         assert (advice, command) == ("close it first", "gltf-anim loop IN OUT --blend 0.1 --clip '#0'")
         assert shell(command.replace("IN", half.name).replace("OUT", closed.name), tmp_path).code == 0

@@ -14,7 +14,7 @@ from anim.curves.tangents.rule import SplineKeys, TangentRule, local_rule
 from anim.errors import RangeError, ShapeError
 from anim.maths import quaternion as quat
 
-CLOSED = 1e-3  # radians: how near the ends of a loop of rotations must be for a C2 rule
+CLOSED = 1e-3  # radians: how near the ends of a loop of rotations must be
 
 TANGENTS: dict[str, TangentRule] = {
     rule.name: rule
@@ -86,6 +86,15 @@ def apply_rotation_tangents(
     )
 
 
+def check_closed(rotations: Floats) -> None:
+    """Raise RangeError where unit quaternions (K, 4) of a loop end in another rotation than they start with."""
+    turn = float(quat.angle_between(rotations[0], rotations[-1]))
+    if turn > CLOSED:
+        raise RangeError(
+            f"the loop is open: its last key is {np.degrees(turn):.3g}° from its first (expected the same rotation)"
+        )
+
+
 def _checked(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
     t = arrays.as_key_times(times)
     if len(t) != len(values):
@@ -101,11 +110,8 @@ def _keys(times: Floats, values: Floats, rule: TangentRule, cyclic: bool) -> Spl
 
 def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
     """Return the rule's keys of quaternion components, at unit length. A loop that ends at −q runs twice to close."""
-    if cyclic and quat.angle_between(q[0], q[-1]) > CLOSED:
-        degrees = float(np.degrees(quat.angle_between(q[0], q[-1])))
-        raise RangeError(
-            f"the loop is open: its last key is {degrees:.3g}° from its first (expected the same rotation)"
-        )
+    if cyclic:
+        check_closed(q)
     count = len(q)
     if cyclic and quat.dot(q[0], q[-1]) < 0:
         times, q = np.concatenate((times, times[1:] + times[-1] - times[0])), np.concatenate((q, -q[1:]))

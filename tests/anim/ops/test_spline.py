@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from anim.curves.tangents.table import TANGENTS, parse
+from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Track
 from anim.ops.spline import max_key_change, spline
@@ -53,6 +54,29 @@ def test_a_cyclic_loop_has_no_seam_in_speed(name: str, key: str) -> None:
     new = splined(Track(0, track.path, track.interpolation, track.times, values), name, cyclic=True)
     end, start = rates(new, KEYS[-1:], before=True), rates(new, KEYS[:1], before=False)
     np.testing.assert_allclose(end, start, atol=1e-9 * max(1.0, np.abs(end).max()))
+
+
+@pytest.mark.parametrize("name", ["time-aware", "catmull-rom", "flat", "clamped", "natural", "periodic"])
+@pytest.mark.parametrize("key", ["linear", "slerp"])
+def test_a_loop_that_is_open_is_refused_by_every_rule(name: str, key: str) -> None:
+    with pytest.raises(RangeError, match=r"node 0, (translation|rotation): the loop is open"):
+        splined(TRACKS[key], name, cyclic=True)
+
+
+def test_the_way_of_a_root_goes_on() -> None:
+    line = clips.track("translation", [0, 1, 2, 4], [[v, 0, 0] for v in (0, 1, 3, 4)])
+    new = spline(Clip("", (line,)), tangents=parse("catmull-rom"), cyclic=True, root=0).tracks[0]
+    end, start = rates(new, line.times[-1:], before=True), rates(new, line.times[:1], before=False)
+    np.testing.assert_allclose(end, start, atol=1e-12)
+
+
+def test_a_track_within_the_clip_has_no_neighbors_over_the_seam() -> None:
+    """It rests before its first key and after its last one."""
+    late = clips.track("translation", [1, 2, 2.5], [[v, 0, 0] for v in (0, 3, 0)])
+    whole = clips.track("scale", [0, 3], np.ones((2, 3)), node=1)
+    new = spline(Clip("", (late, whole)), tangents=parse("time-aware"), cyclic=True).tracks[0]
+    plain = splined(late, "time-aware")
+    np.testing.assert_array_equal(np.asarray(new.out_tangents), np.asarray(plain.out_tangents))
 
 
 def test_holds_and_single_keys_stay() -> None:
