@@ -13,7 +13,9 @@ from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
-SPARSE = 6  # keys that a blend needs at least; sparser LINEAR tracks get more
+SPARSE = 6  # keys that a blend needs at least; sparser tracks get more
+FPS = 30.0  # of those
+SHORTEST = 1e-5  # s, between two keys
 
 
 def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
@@ -40,8 +42,8 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> C
     """Return the clip with its last `blend` seconds bent so that it ends as it starts, in value and speed.
 
     To the motion a correction is added that grows from nothing: a cubic with the gap in value and in speed at its end;
-    for rotations a turn. STEP tracks end on their first value. Tracks not in `tracks` keep their end: a root that
-    travels.
+    for rotations a turn. The last piece of a LINEAR track gets the speed of the first one. STEP tracks end on their
+    first value. Tracks not in `tracks` keep their end: a root that travels.
     Raises RangeError unless 0 < blend ≤ the clip's duration.
     """
     if not 0 < blend <= clip.end - clip.start:
@@ -72,18 +74,55 @@ def _closed(track: Track, clip: Clip, blend: float) -> Track:
     first, last = sample(track, ends)
     if track.interpolation is Interpolation.STEP:
         return replace(track, values=np.concatenate((track.values[:-1], first[None])))
+    if len(track.times) > 2 and track.times[-2] > clip.end - SHORTEST:
+        track = _without_last_jump(track)
+        last = track.values[-1]
     gap = _gap(track, first, last)
-    speed = (rates(track, ends[:1], before=False) - rates(track, ends[1:], before=True))[0]
-    if not gap.any() and not speed.any():
+    speed = rates(track, ends[:1], before=False)[0]
+    change = speed - rates(track, ends[1:], before=True)[0]
+    if not gap.any() and not change.any():
         return track
-    correction = _Correction(clip.end - blend, clip.end, gap, speed)
-    return _bent_spline(track, correction) if track.in_tangents is not None else _bent_lines(track, correction)
+    times = _times(track, clip.end - blend, clip.end)
+    if track.in_tangents is not None:
+        return _bent_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
+    last_piece = float(times[-1] - times[-2])
+    before_last = _gap(track, _stepped_back(track, first, speed, last_piece), sample(track, times[-2:-1])[0])
+    slope = _end_slope(gap, before_last, blend, last_piece)
+    return _bent_lines(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
+
+
+def _without_last_jump(track: Track) -> Track:
+    """Return a track whose last two keys stand for a jump without it: the bend replaces that."""
+    before, after = track.in_tangents, track.out_tangents
+    return replace(
+        track,
+        times=np.append(track.times[:-2], track.times[-1]),
+        values=track.values[:-1],
+        in_tangents=None if before is None else before[:-1],
+        out_tangents=None if after is None else after[:-1],
+    )
 
 
 def _gap(track: Track, first: Floats, last: Floats) -> Floats:
     if track.kind is ValueKind.ROTATION:
         return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(last), first))
     return first - last
+
+
+def _stepped_back(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
+    """Return what a track was some seconds before a value that it reaches at a steady speed."""
+    if track.kind is ValueKind.ROTATION:
+        return quaternion.multiply(value, quaternion.from_rotation_vector(-seconds * speed))
+    return value - seconds * speed
+
+
+def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -> Floats:
+    """Return the slope at its end of the cubic that is 0 and at rest at first, `gap` after `duration` seconds, and
+    `before_last` the `last` seconds earlier.
+    """
+    share = 1 - last / duration
+    # c(s) = (3 g − m) s² + (m − 2 g) s³ with m the slope per duration, so that c(1) = g and c'(1) = m
+    return (gap * (3 * share**2 - 2 * share**3) - before_last) / (share**2 * (1 - share)) / duration
 
 
 class _Correction:
@@ -108,20 +147,20 @@ class _Correction:
         return (times > self.start)[:, None]
 
 
-def _bent_lines(track: Track, correction: _Correction) -> Track:
-    times = _times(track, correction)
+def _bent_lines(track: Track, times: Floats, correction: _Correction) -> Track:
     values = _bent(track, sample(track, times), correction.value(times))
     return replace(track, times=times, values=values)
 
 
-def _times(track: Track, correction: _Correction) -> Floats:
-    """The track's keys, with the ends of the blend and, where keys are sparse in it, some between."""
-    inside = (track.times > correction.start) & (track.times < correction.end)
-    more = [correction.start, correction.end]
-    if int(inside.sum()) < SPARSE:
-        more += np.linspace(correction.start, correction.end, 2 * SPARSE).tolist()
-    times = np.unique(np.concatenate((track.times, more)))
-    return times[np.concatenate(([True], np.diff(times) > 1e-5))]
+def _times(track: Track, start: float, end: float) -> Floats:
+    """Return the track's keys, with the ends of the blend and, where keys are sparse in it, some between."""
+    keys = track.times
+    inside = keys[(keys > start) & (keys < end)]
+    more = np.array([start, end])
+    if len(inside) < SPARSE or end - inside[-1] > (end - start) / SPARSE:
+        more = np.linspace(start, end, max(2 * SPARSE, round((end - start) * FPS) + 1))
+    more = more[np.abs(more[:, None] - keys).min(axis=1) > SHORTEST]
+    return np.sort(np.concatenate((keys, more)))
 
 
 def _bent(track: Track, values: Floats, added: Floats) -> Floats:
@@ -130,8 +169,7 @@ def _bent(track: Track, values: Floats, added: Floats) -> Floats:
     return quaternion.align_signs(quaternion.multiply(values, quaternion.from_rotation_vector(added)))
 
 
-def _bent_spline(track: Track, correction: _Correction) -> Track:
-    times = _times(track, correction)
+def _bent_spline(track: Track, times: Floats, correction: _Correction) -> Track:
     before = rates(track, times, before=True) + correction.slope(times)
     after = rates(track, times, before=False) + correction.slope(times)
     values = _bent(track, sample(track, times), correction.value(times))

@@ -21,6 +21,7 @@ from anim.ops.trim import trim
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 from tests.anim.ops.tracks import TRACKS
+from tests.clips import LINEAR, about, track
 from tests.files import opened
 
 
@@ -66,9 +67,41 @@ def test_ends_meet_in_value_and_splines_in_speed(key: str) -> None:
     new = loop(Clip("", (TRACKS[key],)), blend=1.0).tracks[0]
     first, last = sample(new, np.array([0.0, 3.0]))
     assert min(np.abs(first - last).max(), np.abs(first + last).max()) < 1e-9
-    if key in ("cubic", "turning"):
+    if key != "step":
         start, end = rates(new, np.array([0.0]), before=False), rates(new, np.array([3.0]), before=True)
         np.testing.assert_allclose(end, start, atol=0.05 * np.abs(start).max() if key == "turning" else 1e-9)
+
+
+@pytest.mark.parametrize("count", [2, 9, 40])
+@pytest.mark.parametrize("blend", [0.3, 1.0])
+def test_linear_tracks_end_at_the_speed_that_they_start_with(count: int, blend: float) -> None:
+    """However few keys, or however many: the last piece goes on as the first one does."""
+    times = np.linspace(0, 2, count)
+    rise = track("translation", times, np.stack((times**2, np.sin(times), 0 * times), axis=1), LINEAR)
+    turn = track("rotation", times, about("z", 80 * times**2), LINEAR)
+    for new in loop(Clip("", (rise, turn)), blend=blend).tracks:
+        start, end = rates(new, np.array([0.0]), before=False), rates(new, np.array([2.0]), before=True)
+        np.testing.assert_allclose(end, start, atol=1e-6)
+
+
+def test_a_track_that_starts_late_rests_at_the_seam() -> None:
+    late = track("translation", [0.5, 1.5], np.array([[3.0, 0, 0], [5, 0, 0]]), LINEAR, node=0)
+    other = track("translation", [0, 2], np.zeros((2, 3)), LINEAR, node=1)
+    new = loop(Clip("", (late, other)), blend=0.3).tracks[0]
+    np.testing.assert_allclose(rates(new, np.array([2.0]), before=True), 0, atol=1e-9)
+    assert np.diff(sample(new, np.linspace(1.7, 2, 100))[:, 0]).max() <= 0
+
+
+def test_keys_that_jump_before_the_blend_stay() -> None:
+    jump = track("translation", [0, 0.5, 0.5 + 2.0**-22, 2], np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0]]))
+    new = loop(Clip("", (jump,)), blend=0.5).tracks[0]
+    np.testing.assert_array_equal(new.times[:3], jump.times[:3])
+
+
+def test_a_jump_in_the_last_moment_goes() -> None:
+    jump = track("translation", [0, 2 - 2.0**-22, 2], np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0]]), LINEAR)
+    new = loop(Clip("", (jump,)), blend=0.5).tracks[0]
+    np.testing.assert_allclose(new.values, 0, atol=1e-9)
 
 
 def test_blend_longer_than_the_clip_is_refused() -> None:
