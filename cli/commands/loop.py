@@ -58,8 +58,8 @@ def loop(
     Without OUT and --blend: a report per clip: closed; closed except some joints, which are named; open by one frame
     (its last frame is missing); not a loop; or a single pose. The seam in pose and in speed is measured on the skin,
     with the way of a traveling root taken off; nodes that move no vertex, like IK controls, don't count, and where no
-    mesh has a vertex all nodes do. "per frame" and "inside" are the largest motion and the largest change of speed from
-    one frame to the next inside the clip, on the same vertices: a seam that is much smaller is hardly seen. With OUT:
+    mesh has a vertex all nodes do. "per frame" is the largest motion from one frame to the next, "inside" the largest
+    change of speed at a key inside, on the same vertices: a seam that is much smaller is hardly seen. With OUT:
     an open loop gets its missing frame; --blend closes any seam in value and speed over the last seconds; where only
     some joints stay open, it bends these and leaves all others as they are. --find looks for the best part: trim it; a
     line says where no part loops better than the whole clip.

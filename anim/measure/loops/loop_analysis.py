@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import unique_sorted
+from anim.arrays import Floats, unique_sorted
 from anim.measure.inspect import frame_rate
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import JointGap, Seam, SkinMotion
@@ -18,7 +18,8 @@ CLOSED = (1e-5, 1e-3)  # of the model's size: a seam below the first is rounding
 UNSEEN = 0.1  # of the usual motion per frame; between these two, a smaller seam is not seen
 ONE_FRAME = 1.6  # an open loop's seam against the motion per frame next to it: about one frame's worth
 MAX_FRAMES = 600  # looked at by `best_ranges`
-MAX_STEPS = 300  # pairs of frames looked at inside a clip
+MAX_STEPS = 300  # pairs of frames, and keys, looked at inside a clip
+INTERIOR_S = 2e-4  # s, from an end to a key inside
 DEFAULT_FPS = 30.0
 
 
@@ -36,7 +37,7 @@ class LoopKind(StrEnum):
 class Steps:
     """What any vertex does at most from one frame to the next: largest, typical: m, over all frames, and their median.
 
-    speed: m/s, the largest change of velocity.
+    speed: m/s, the largest change of velocity at a key, measured as the speed at the seam is.
     """
 
     largest: float = 0.0
@@ -144,11 +145,19 @@ def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind
 
 
 def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, root: int) -> Steps:
-    count = max(round((end - start) / step) - 1, 1)
-    frames = np.unique(np.linspace(1, count, min(count, MAX_STEPS)).round())
-    times = start + step * np.concatenate((frames - 1, frames, frames + 1))
-    *moved, changed = skin.steps(clip, np.minimum(times, end).reshape(3, -1), root)
-    return Steps(float(np.max(moved)), float(np.median(moved)), float(changed.max()) / step)
+    count = max(round((end - start) / step), 2)
+    frames = start + step * _some(np.arange(count, dtype=np.float64))
+    moved = skin.steps(clip, np.minimum(np.stack((frames, frames + step)), end), root)
+    keys = unique_sorted(np.concatenate(clip.axes))
+    keys = _some(keys[(keys > start + INTERIOR_S) & (keys < end - INTERIOR_S)])
+    changes = skin.velocity_changes(clip, keys, root) if len(keys) else np.zeros(1)
+    return Steps(float(moved.max()), float(np.median(moved)), float(changes.max()))
+
+
+def _some(numbers: Floats) -> Floats:
+    """At most MAX_STEPS of some numbers, evenly chosen."""
+    count = min(len(numbers), MAX_STEPS)
+    return np.asarray(numbers[np.linspace(0, len(numbers) - 1, count).round().astype(int)])
 
 
 def _fps(clip: Clip) -> float:

@@ -20,7 +20,8 @@ from anim.sampling.joined import ConcatenatedTracks
 from anim.sampling.pose import rest_pose, sample_pose, world_by_node
 
 PARTS = ("translation", "rotation", "scale")
-STEPS = np.array([[-1.0, 1, 0], [0, -1, 1], [1, -2, 1]])  # of three frames: two moves, and how much they differ
+STEPS = np.array([-1.0, 1])  # of two frames: the move
+VELOCITIES = np.array([1.0, -1, -1, 1])  # of two times before and two after a key: how much the moves differ
 AT_ONCE = 4_000_000  # numbers; moves of points that are looked at together
 
 
@@ -103,33 +104,54 @@ class SkinMotion:
         return self.points.places(world)
 
     def steps(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
-        """Return (3, F) how far any vertex moves from the first of times (3, F) to the second and from there to the
-        third, and how much these two moves differ: the largest of each, the way of node `root` taken off.
+        """Return how far (F,) any vertex moves from the first of times (2, F) to the second.
+
+        The way of node `root` is taken off.
         """
-        frames = times.shape[1]
-        poses = sample_pose(self.skeleton, clip, times.reshape(-1))
+        return self._combined(clip, times, STEPS, root)
+
+    def velocity_changes(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
+        """Return how much (K,) the velocity of any vertex changes at times (K,), in m/s; a jump there is no speed.
+
+        Measured as `Seam.speed`, the way of node `root` taken off.
+        """
+        whole = LoopRange(clip, clip.start, clip.end, root=root)
+        around = np.array([-whole.probe, -whole.shortest, whole.shortest, whole.probe])[:, None]
+        held = np.array([-whole.shortest] * 2 + [whole.shortest] * 2)[:, None]
+        moves = self._combined(clip, times + around, VELOCITIES, root, held=times + held)
+        return np.asarray(moves / (whole.probe - whole.shortest))
+
+    def _combined(self, clip: Clip, times: Floats, weights: Floats, root: int, *, held: Floats | None = None) -> Floats:
+        """Return the longest (F,) of sums of places at times (S, F), by weights (S,). held: times of STEP tracks."""
+        stops, frames = times.shape
+        poses, (morphs,) = clip_ends.poses_of_clips(
+            self.skeleton, [clip], times.reshape(1, -1), held=None if held is None else held.reshape(1, -1)
+        )
         world = world_by_node(self.skeleton, poses)
         clip_ends.take_off(self.skeleton, world, root)
-        world = world.reshape(len(world), 3, frames, 3, 4)
-        weights = {node: each.reshape(3, frames, -1) for node, each in poses.weights.items()}
-        count = max(AT_ONCE // (9 * len(self._every)), 1)
-        cuts = [slice(first, first + count) for first in range(0, frames, count)]
-        parts = [self._steps(world[:, :, cut], {node: each[:, cut] for node, each in weights.items()}) for cut in cuts]
-        return np.concatenate(parts, axis=1)
+        world = world.reshape(len(world), stops, frames, 3, 4)
+        morphs = {node: each.reshape(stops, frames, -1) for node, each in morphs.items()}
+        count = max(AT_ONCE // (3 * stops * len(self._every)), 1)
+        parts = []
+        for first in range(0, frames, count):
+            cut = slice(first, first + count)
+            parts.append(
+                self._longest(world[:, :, cut], {node: each[:, cut] for node, each in morphs.items()}, weights)
+            )
+        return np.concatenate(parts)
 
-    def _steps(self, world: Floats, weights: Mapping[int, Floats]) -> Floats:
-        """world: (N, 3, F, 3, 4). weights: (3, F, M) by node."""
-        size, frames = world.shape[0], world.shape[2]
-        differences = np.moveaxis(np.tensordot(STEPS, world, (1, 1)), 0, 1)
-        squares = self._squares(differences.reshape(size, -1, 3, 4))
-        morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in weights]
+    def _longest(self, world: Floats, morphs: Mapping[int, Floats], weights: Floats) -> Floats:
+        """world: (N, S, F, 3, 4). morphs: (S, F, M) by node. weights: (S,)."""
+        size, stops, frames = world.shape[:3]
+        squares = self._squares(np.tensordot(weights, world, (0, 1)))
+        morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in morphs]
         if morphing:
             squares[np.isin(self._owners, [mesh.owner for mesh in morphing])] = 0
-        most = np.sqrt(squares.max(axis=0)).reshape(3, frames).astype(np.float64)
+        most = np.sqrt(squares.max(axis=0)).astype(np.float64)
         for mesh in morphing:
-            seen = AtEnds(world.reshape(size, -1, 3, 4), {mesh.owner: weights[mesh.owner].reshape(3 * frames, -1)})
-            moved = np.tensordot(STEPS, _morphing(mesh, seen).reshape(3, frames, -1, 3), (1, 0))
-            most = np.maximum(most, np.sqrt((moved * moved).sum(axis=-1).max(axis=-1)))
+            seen = AtEnds(world.reshape(size, -1, 3, 4), {mesh.owner: morphs[mesh.owner].reshape(stops * frames, -1)})
+            moved = np.tensordot(weights, _morphing(mesh, seen).reshape(stops, frames, -1, 3), (0, 0))
+            most = np.maximum(most, _longest_each(moved))
         return np.asarray(most)
 
     def seams(self, parts: Sequence[LoopRange], groups: Sequence[ConcatenatedTracks] | None = None) -> list[Seam]:
