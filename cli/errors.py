@@ -10,8 +10,8 @@ from typing import Any
 from typer import TyperException
 
 from anim.errors import AnimError, FormatError, NotFoundError, OutputError, RangeError, UnsupportedError
-from cli.tables import one_line
-from cli.text import Voice
+from cli.tables import escape_control
+from cli.text import Reporter
 
 PROGRAM = "gltf-anim"
 DONE, BUG, USAGE, FORMAT, UNSUPPORTED, NOT_FOUND, CHECK = range(7)
@@ -37,7 +37,7 @@ CODES[UsageError] = USAGE
 CODES[CheckError] = CHECK
 
 
-def guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
+def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
     """Run a job and return the exit code; one line on stderr for what went wrong, a traceback only for our own bugs.
 
     args: of the command line, for the hint where one of them is a file that looks like an option.
@@ -46,7 +46,7 @@ def guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
         code = job()
         return code if isinstance(code, int) and not isinstance(code, bool) else DONE
     except AnimError as error:
-        return reported(error)
+        return report_error(error)
     except TyperException as error:
         problem, hint = _usage(error)
         _say(problem, _file_hint(error, args) or hint)
@@ -65,7 +65,7 @@ def guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
         return BUG
 
 
-def reported(error: AnimError) -> int:
+def report_error(error: AnimError) -> int:
     """Say what was refused, in one line and maybe a hint, and return its exit code."""
     code = CODES.get(type(error), BUG)
     if code == BUG:
@@ -105,11 +105,11 @@ def _has_output(context: Any) -> bool:
 
 
 def _say(problem: str, hint: str) -> None:
-    voice = Voice()  # the exit code is the same where nobody listens
-    voice.say(f"{PROGRAM}: {one_line(problem)}")
+    voice = Reporter()  # the exit code is the same where nobody listens
+    voice.say(f"{PROGRAM}: {escape_control(problem)}")
     if hint:
-        voice.say(f"help: {one_line(hint)}")
+        voice.say(f"help: {escape_control(hint)}")
 
 
 def _say_trace() -> None:
-    Voice().say(traceback.format_exc().rstrip("\n"))
+    Reporter().say(traceback.format_exc().rstrip("\n"))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 
-from cli.text import Voice
+from cli.text import Reporter
 
 
-def announce_compiling(voice: Voice) -> None:
+def announce_compiling(voice: Reporter) -> None:
     """Write to a terminal that kernels are compiled, where none is in the user's cache folder yet."""
     if voice.quiet or sys.stderr is None or not sys.stderr.isatty():
         return

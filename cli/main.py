@@ -20,7 +20,7 @@ from cli.typer_options import quicken
 PROGRAM = "gltf-anim"
 
 
-class Row(NamedTuple):
+class CommandInfo(NamedTuple):
     """One command: what `--help` says of it, and examples that its own help ends with."""
 
     about: str
@@ -28,7 +28,7 @@ class Row(NamedTuple):
 
 
 COMMANDS = {
-    "inspect": Row(
+    "inspect": CommandInfo(
         "Show what is in a file and whether it is healthy.",
         (
             "gltf-anim inspect walk.glb",
@@ -37,7 +37,7 @@ COMMANDS = {
             "gltf-anim inspect *.glb --fail-on error > health.txt",
         ),
     ),
-    "sample": Row(
+    "sample": CommandInfo(
         "Give the pose of every node at chosen times.",
         (
             "gltf-anim sample walk.glb --at 0.5",
@@ -45,7 +45,7 @@ COMMANDS = {
             "gltf-anim sample walk.glb --fps 30 --node '*Foot*' --format csv",
         ),
     ),
-    "resample": Row(
+    "resample": CommandInfo(
         "Put the keys of clips on a regular grid of frames.",
         (
             "gltf-anim resample walk.glb walk30.glb --fps 30",
@@ -53,7 +53,7 @@ COMMANDS = {
             "cat walk.glb | gltf-anim resample --fps 30 | gltf-anim inspect",
         ),
     ),
-    "from-euler": Row(
+    "from-euler": CommandInfo(
         "Turn Euler tracks (BVH, CSV, JSON curves) into glTF.",
         (
             "gltf-anim from-euler walk.bvh walk.glb --mesh sticks",
@@ -61,7 +61,7 @@ COMMANDS = {
             "gltf-anim from-euler curves.csv door.glb --order XYZ --frame extrinsic --unit deg",
         ),
     ),
-    "to-euler": Row(
+    "to-euler": CommandInfo(
         "Write a clip as Euler curves: BVH, CSV or JSON.",
         (
             "gltf-anim to-euler hero.glb walk.bvh --clip walk --fps 30",
@@ -69,7 +69,7 @@ COMMANDS = {
             "gltf-anim to-euler door.glb door.json --tolerance 0.1deg",
         ),
     ),
-    "ease": Row(
+    "ease": CommandInfo(
         "Give motion another tempo between the same keys.",
         (
             "gltf-anim ease --list",
@@ -77,7 +77,7 @@ COMMANDS = {
             "gltf-anim ease walk.glb slow-in.glb --per range --ease 'cubic-bezier(.2, 0, 0, 1)' --clip walk",
         ),
     ),
-    "spline": Row(
+    "spline": CommandInfo(
         "Join keys by a smooth curve, by a choice of tangent rules.",
         (
             "gltf-anim spline poses.glb smooth.glb",
@@ -85,7 +85,7 @@ COMMANDS = {
             "gltf-anim spline face.glb face2.glb --tangents monotone --path weights",
         ),
     ),
-    "retime": Row(
+    "retime": CommandInfo(
         "Stretch, reverse or warp the seconds of clips.",
         (
             "gltf-anim retime walk.glb slow.glb --speed 0.25",
@@ -93,11 +93,11 @@ COMMANDS = {
             "gltf-anim retime walk.glb pendulum.glb --warp sine-in-out --ping-pong",
         ),
     ),
-    "trim": Row(
+    "trim": CommandInfo(
         "Keep a part of a clip, with exact ends.",
         ("gltf-anim trim walk.glb step.glb --from 0.25 --to 0.75 --rebase",),
     ),
-    "loop": Row(
+    "loop": CommandInfo(
         "Say whether a clip loops, and close it.",
         (
             "gltf-anim loop walk.glb",
@@ -105,7 +105,7 @@ COMMANDS = {
             "gltf-anim loop walk.glb closed.glb --blend 0.2",
         ),
     ),
-    "bake": Row(
+    "bake": CommandInfo(
         "Bake skinning by LBS, dual quaternions or centers of rotation to vertex caches.",
         (
             "gltf-anim bake walk.glb walk.npz --method dqs --fps 30",
@@ -113,7 +113,7 @@ COMMANDS = {
             "gltf-anim bake face.glb face.npz --clip talk --mesh Head --space mesh",
         ),
     ),
-    "plot": Row(
+    "plot": CommandInfo(
         "See the curves of tracks, of eases, and of tangent rules.",
         (
             "gltf-anim plot walk.glb walk.png --clip walk --node 'Hip*'",
@@ -122,7 +122,7 @@ COMMANDS = {
             "gltf-anim plot --through 0,0.9,0.2,1 --tangents catmull-rom --tangents natural curve.svg",
         ),
     ),
-    "collapse": Row(
+    "collapse": CommandInfo(
         "Say where skin collapses when joints turn, and what other methods make of it.",
         (
             "gltf-anim collapse hero.glb",
@@ -130,7 +130,7 @@ COMMANDS = {
             "gltf-anim collapse arm.glb --plot arm.png",
         ),
     ),
-    "convert-cache": Row(
+    "convert-cache": CommandInfo(
         "Change a vertex cache into another format, frame by frame.",
         (
             "gltf-anim convert-cache walk.npz walk.pc2 --up z --order blender",
@@ -138,7 +138,7 @@ COMMANDS = {
             "gltf-anim convert-cache walk.mdd walk.exr --preset godot --depth half",
         ),
     ),
-    "render": Row(
+    "render": CommandInfo(
         "Draw a clip as a filmstrip.",
         (
             "gltf-anim render walk.glb walk.png",
@@ -146,7 +146,7 @@ COMMANDS = {
             "gltf-anim render walk.npz walk.webp --frames 24",
         ),
     ),
-    "optimize": Row(
+    "optimize": CommandInfo(
         "Make animations smaller, within an error that no vertex exceeds.",
         (
             "gltf-anim optimize hero.glb small.glb --max-error 0.1%",
@@ -155,7 +155,7 @@ COMMANDS = {
             "gltf-anim optimize hero.glb --curve size-against-error.csv --effort fast",
         ),
     ),
-    "diff": Row(
+    "diff": CommandInfo(
         "Say how far apart the motion of two files is.",
         (
             "gltf-anim diff walk.glb walk30.glb",
@@ -163,7 +163,7 @@ COMMANDS = {
             "gltf-anim diff walk.glb walk30.glb --fail-above 20% --format json > diff.json",
         ),
     ),
-    "convert": Row(
+    "convert": CommandInfo(
         "Change between .glb and .gltf, and nothing else.",
         ("gltf-anim convert walk.glb walk.gltf", "gltf-anim convert scene/walk.gltf - | gltf-anim inspect"),
     ),
@@ -183,7 +183,7 @@ class LazyGroup(TyperGroup):
         if row is None or cmd_name in self.commands:
             return self.commands.get(cmd_name)
         name = cmd_name.replace("-", "_")
-        function = getattr(importlib.import_module(f"cli.commands.{name}"), name)
+        function = importlib.import_module(f"cli.commands.{name}").command
         single = typer.Typer(add_completion=False, rich_markup_mode=None)
         examples = "\n".join(f"  {example}" for example in row.examples)
         single.command(cmd_name, epilog=f"\b\nExamples:\n{examples}", no_args_is_help=False)(function)
@@ -256,7 +256,7 @@ def run(args: list[str]) -> int:
     from cli import errors
 
     command = quicken(typer.main.get_command(app))
-    return errors.guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False), args)
+    return errors.run_guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False), args)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> st
     return out.getvalue()
 
 
-def one_line(words: str) -> str:
+def escape_control(words: str) -> str:
     """Return words as they can be shown to a person: line breaks and terminal codes of a name become \\n, \\x1b."""
     if words.isprintable():
         return words
@@ -47,4 +47,4 @@ def _shown(cell: Cell) -> str:
         return ""
     if cell is True:
         return "yes"
-    return f"{cell:g}" if isinstance(cell, float) else one_line(str(cell))
+    return f"{cell:g}" if isinstance(cell, float) else escape_control(str(cell))

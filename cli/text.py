@@ -11,7 +11,7 @@ NEARLY_NOTHING = 1e-11  # m; what rounding leaves of nothing
 
 
 @dataclass(frozen=True, slots=True)
-class Voice:
+class Reporter:
     """How much is said: nothing but errors and warnings, one line, or every detail.
 
     warnings: what was warned of so far, for the list of this name in a JSON report.
@@ -31,7 +31,7 @@ class Voice:
         """Write "warning: words" to stderr, even when quiet, and once: for what changes the meaning of a number."""
         if words not in self.warnings:
             self.warnings.append(words)
-            Voice().say(f"warning: {words}")
+            Reporter().say(f"warning: {words}")
 
     def detail(self, line: str) -> None:
         """Write a line to stderr only where details are wanted."""
@@ -39,7 +39,7 @@ class Voice:
             self.say(line)
 
 
-def size(count: int) -> str:
+def format_bytes(count: int) -> str:
     """Return bytes as people say them: "812 B", "42.3 kB", "3.66 MB"."""
     if count < 1000:
         return f"{count} B"
@@ -50,56 +50,56 @@ def size(count: int) -> str:
     raise AssertionError
 
 
-def change(before: int, after: int) -> str:
+def format_change(before: int, after: int) -> str:
     """Return "42.3 kB → 9.1 kB (-78 %)", without the percentage where it rounds to 0."""
     percent = round(100 * (after - before) / before) if before else 0
-    return f"{size(before)} → {size(after)}" + (f" ({percent:+d} %)" if percent else "")
+    return f"{format_bytes(before)} → {format_bytes(after)}" + (f" ({percent:+d} %)" if percent else "")
 
 
-def length(meters: float) -> str:
+def format_length(meters: float) -> str:
     """Return a length in the unit in which it is easy to read: "0.41 mm", "12 µm", "1.5 cm", "2.9 m"."""
     if meters == 0:
         return "0 mm"
     if meters < NEARLY_NOTHING:
-        return f"<{digits(1e9 * NEARLY_NOTHING, 2)} nm"
+        return f"<{format_number(1e9 * NEARLY_NOTHING, 2)} nm"
     for unit, factor, limit in (("nm", 1e9, 1e-6), ("µm", 1e6, 1e-4), ("mm", 1e3, 1e-2), ("cm", 1e2, 1.0)):
         if float(f"{meters:.2g}") < limit:
-            return f"{digits(meters * factor, 2)} {unit}"
-    return f"{digits(meters, 3)} m"
+            return f"{format_number(meters * factor, 2)} {unit}"
+    return f"{format_number(meters, 3)} m"
 
 
-def share(part: float, whole: float) -> str:
+def format_share(part: float, whole: float) -> str:
     """Return " (0.41 %)", or nothing where there is no whole or what is left is far below what anybody sees."""
     percent = 100 * part / whole if whole else 0.0
-    return f" ({digits(percent, 2)} %)" if percent >= LEAST_PERCENT else ""
+    return f" ({format_number(percent, 2)} %)" if percent >= LEAST_PERCENT else ""
 
 
-def speed(meters_per_second: float) -> str:
+def format_speed(meters_per_second: float) -> str:
     """Return a speed with two digits: "0.46 m/s", "280 m/s"."""
-    return f"{digits(meters_per_second, 2)} m/s"
+    return f"{format_number(meters_per_second, 2)} m/s"
 
 
-def moment(seconds: float) -> str:
+def format_time(seconds: float) -> str:
     """Return a time or a length of time to a tenth of a millisecond: "0.0417 s", "12 s"."""
-    return f"{_rounded(seconds)} s"
+    return f"{_round_significant(seconds)} s"
 
 
-def span(start: float, end: float) -> str:
+def format_span(start: float, end: float) -> str:
     """Return the seconds of a clip: "1.5 s", or "0.0417–2 s" where it starts late."""
-    begins = _rounded(start)
-    return moment(end) if begins == "0" else f"{begins}–{moment(end)}"
+    begins = _round_significant(start)
+    return format_time(end) if begins == "0" else f"{begins}–{format_time(end)}"
 
 
-def _rounded(seconds: float) -> str:
+def _round_significant(seconds: float) -> str:
     return f"{seconds:.4f}".rstrip("0").rstrip(".")
 
 
-def took(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Return how long the command worked, so that nobody takes it for the length of a clip: "took 0.8 s"."""
-    return f"took {digits(seconds, 2 if seconds < 10 else 3)} s"
+    return f"took {format_number(seconds, 2 if seconds < 10 else 3)} s"
 
 
-def digits(value: float, count: int) -> str:
+def format_number(value: float, count: int) -> str:
     """Return the value rounded to so many digits, never in the form 2.8e+02."""
     return f"{float(f'{value:.{count}g}'):.10f}".rstrip("0").rstrip(".")
 

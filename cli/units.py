@@ -10,19 +10,19 @@ from anim.errors import RangeError
 from cli.errors import UsageError
 
 
-def share(text: str, option: str) -> float:
+def parse_share(text: str, option: str) -> float:
     """Return a share above 0: "0.1%" or a bare number. Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_share(text, option)
 
 
-def meters(text: str, option: str, diagonal: Callable[[], float]) -> float:
+def parse_length(text: str, option: str, diagonal: Callable[[], float]) -> float:
     """Return a length above 0 in metres, also from "0.1%" of what `diagonal` gives. Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_length(text, option, diagonal)
 
 
-def angle(text: str, option: str) -> float:
+def parse_angle(text: str, option: str) -> float:
     """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_angle(text, option)

@@ -13,8 +13,8 @@ from anim.arrays import Floats
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.measure.error.metric import SLACK, Ruler, check_times
-from anim.measure.error.surface import placed, surfaces
+from anim.measure.error.metric import SLACK, ErrorMetric, key_and_mid_times
+from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, Scene
 from anim.ops.resample import resample
 from anim.sampling import sample_pose
@@ -163,14 +163,14 @@ def test_our_ruler_and_three_agree_on_real_files(asset: Find, name: str, tmp_pat
     before = reader.clips(document)
     changed = writer.replace_clips(document, {i: resample(each, fps=9) for i, each in enumerate(before)})
     found = judge(asset(name), _written(tmp_path, "other", changed))
-    ruler = Ruler(reader.scene(document))
+    ruler = ErrorMetric(reader.scene(document))
     assert found.by_vertex
     assert len(found.clips) == len(before)
     assert found.diagonal == pytest.approx(ruler.diagonal, rel=1e-6)
     for each, old, new in zip(found.clips, before, reader.clips(changed), strict=True):
         assert each.max_error > 1e-3 * found.diagonal  # else nothing is compared
         assert _at_node(ruler.scene, each, old, new) == pytest.approx(each.max_error, abs=1e-6 * found.diagonal)
-        times = np.union1d(np.arange(0, each.duration, 1 / RATE), check_times(old, new)[::2])
+        times = np.union1d(np.arange(0, each.duration, 1 / RATE), key_and_mid_times(old, new)[::2])
         ours = ruler.error_at(old, new, times).max_error
         assert -1e-6 * found.diagonal <= ours - each.max_error <= (SLACK - 1) * ours + 1e-6 * found.diagonal
 
@@ -186,7 +186,7 @@ def _placed(scene: Scene, found: ClipVerdict, clip: Clip) -> list[Floats]:
     skeleton = scene.skeleton
     world = world_by_node(skeleton, sample_pose(skeleton, clip, np.array([found.time])))
     theirs = (each for each in surfaces(scene) if skeleton.names[each.owner] == found.node)
-    return [placed(each, world[each.nodes, 0], each.rest_weights) for each in theirs]
+    return [place_points(each, world[each.nodes, 0], each.rest_weights) for each in theirs]
 
 
 # Helpers

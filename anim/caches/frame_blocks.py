@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from anim.caches.storage import PIECE, Inputs, read_exactly, size_of
+from anim.caches.storage import COPY_BYTES, Inputs, read_exactly, size_of
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
 
@@ -49,7 +49,7 @@ def write(cache: VertexCache, file: BinaryIO, dtype: str) -> str:
     return mark
 
 
-def mark(inputs: Inputs, header: int, frames: int, vertices: int) -> str:
+def fingerprint(inputs: Inputs, header: int, frames: int, vertices: int) -> str:
     """Return the mark of the first of so many frames behind the header, by which a rest mesh knows its cache."""
     with inputs.open(inputs.main) as file:
         file.seek(header)
@@ -62,4 +62,4 @@ def _mark(frame: bytes, frames: int) -> str:
 
 def per_chunk(vertices: int) -> int:
     """Return how many frames make a chunk."""
-    return max(1, PIECE // max(12 * vertices, 1))
+    return max(1, COPY_BYTES // max(12 * vertices, 1))

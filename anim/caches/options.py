@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ReadOptions:
     """fps: frames per second where a format keeps none (PC2, frame sequences, USD without a rate).
 
     note: called with what the user should know about what was read, a line each.
@@ -18,7 +18,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
-class Writing:
+class WriteOptions:
     """Settings of all formats.
 
     max_error: m, how far a vertex may lie from where it was, for morph targets and textures' own report.
@@ -38,7 +38,7 @@ class Writing:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WriteResult:
     """What came of writing. max_error: m, farthest that a vertex is from where it was; None where nothing is lost.
 
     notes: what the user should know, a line each.

@@ -9,14 +9,14 @@ from functools import partial
 from typing import TypeAlias
 
 from anim.caches.formats import gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
-from anim.caches.options import Reading, Writing, Written
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs
 from anim.caches.vat import reader, writer
 from anim.errors import UnsupportedError
 from anim.model import VertexCache
 
-Read: TypeAlias = Callable[[Inputs, Reading], VertexCache]
-Write: TypeAlias = Callable[[VertexCache, Outputs, Writing], Written]
+Read: TypeAlias = Callable[[Inputs, ReadOptions], VertexCache]
+Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
 
 
 class Files(Enum):

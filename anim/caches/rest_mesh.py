@@ -15,8 +15,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks
 from anim.caches.formats import mesh_frame
-from anim.caches.formats.mesh_frame import Still
-from anim.caches.storage import Inputs, Outputs, beside, suffix, whole
+from anim.caches.formats.mesh_frame import MeshFrame
+from anim.caches.storage import Inputs, Outputs, companion_name, read_all, suffix
 from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
@@ -26,7 +26,7 @@ OTHERS = ("-rest.ply", "-rest.obj", ".ply", ".obj")  # behind its name without t
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class RestMesh:
     """What lies beside a cache: faces (T, 3), none if nothing does; positions (V, 3); fps and up as it says."""
 
     faces: Ints
@@ -45,12 +45,12 @@ def write(cache: VertexCache, outputs: Outputs, ending: str, mark: str, *, fps: 
     if not ending:
         return
     remark = {"up": cache.up, "of": mark} | ({} if fps is None else {"fps": f"{fps:.9g}"})
-    mesh = Still(positions(cache).astype(np.float32), cache.faces, None, remark)
-    with outputs.create(beside(outputs.main, f"-rest{ending}")) as file:
+    mesh = MeshFrame(positions(cache).astype(np.float32), cache.faces, None, remark)
+    with outputs.create(companion_name(outputs.main, f"-rest{ending}")) as file:
         file.write(mesh_frame.write(mesh, ending))
 
 
-def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable[[str], None]) -> Rest:
+def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable[[str], None]) -> RestMesh:
     """Return the first rest mesh beside the main file that belongs to it.
 
     header: bytes before the cache's first frame. note: is told of meshes that are left out since they
@@ -59,11 +59,11 @@ def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable
     there = set(inputs.names())
     mark = ""
     stem = PurePath(inputs.main).stem
-    for name in (*(beside(inputs.main, place) for place in OURS), *(stem + place for place in OTHERS)):
+    for name in (*(companion_name(inputs.main, place) for place in OURS), *(stem + place for place in OTHERS)):
         if name not in there or name == inputs.main:
             continue
         mesh = _opened(inputs, name)
-        mark = mark or frame_blocks.mark(inputs, header, frames, vertices)
+        mark = mark or frame_blocks.fingerprint(inputs, header, frames, vertices)
         if len(mesh.positions) != vertices:
             note(f"'{name}' has {len(mesh.positions)} vertices, the cache {vertices}: left out")
         elif mesh.remark.get("of", mark) != mark:
@@ -72,7 +72,7 @@ def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable
             if "of" not in mesh.remark:
                 note(f"faces and axes are those of '{name}', by its name and number of vertices")
             return _rest(mesh)
-    return Rest(np.empty((0, 3), np.int64))
+    return RestMesh(np.empty((0, 3), np.int64))
 
 
 def positions(cache: VertexCache) -> Floats:
@@ -80,15 +80,15 @@ def positions(cache: VertexCache) -> Floats:
     return cache.rest if cache.rest is not None else next(cache.chunks()).positions[0].astype(np.float64)
 
 
-def _opened(inputs: Inputs, name: str) -> Still:
+def _opened(inputs: Inputs, name: str) -> MeshFrame:
     try:
-        with whole(inputs, name) as data:
+        with read_all(inputs, name) as data:
             return mesh_frame.read(data, suffix(name))
     except FormatError as error:
         raise error.at(f"'{name}'", " ") from None
 
 
-def _rest(mesh: Still) -> Rest:
+def _rest(mesh: MeshFrame) -> RestMesh:
     fps = mesh.remark.get("fps", "")
     rate = float(fps) if fps.replace(".", "", 1).isdigit() and float(fps) > 0 else None
-    return Rest(mesh.faces, mesh.positions.astype(np.float64), rate, mesh.remark.get("up", "y"))
+    return RestMesh(mesh.faces, mesh.positions.astype(np.float64), rate, mesh.remark.get("up", "y"))

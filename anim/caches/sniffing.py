@@ -11,12 +11,12 @@ HEAD = 1024  # bytes that are enough to tell any format
 OBJ_WORDS = frozenset((b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"mtllib", b"usemtl"))
 
 
-def ending_of(head: bytes, size: int) -> str:
+def sniff_format(head: bytes, size: int) -> str:
     """Return the ending of the format of a file, by its first bytes, best `HEAD` of them, and its size in bytes.
 
     Raises FormatError for bytes with which no cache begins.
     """
-    for ending, begins in BEGINNINGS:
+    for ending, begins in SIGNATURES:
         if begins(head, size):
             return ending
     raise FormatError(f"starts with {head[:12]!r}, as no cache format does" if head else "is empty")
@@ -45,7 +45,7 @@ def _is_obj(head: bytes, size: int) -> bool:
 
 
 # Asked in this order. MDD and binary STL have no magic, but their sizes give them away.
-BEGINNINGS: tuple[tuple[str, Callable[[bytes, int], bool]], ...] = (
+SIGNATURES: tuple[tuple[str, Callable[[bytes, int], bool]], ...] = (
     (".npz", lambda head, _: head.startswith(b"PK")),
     (".pc2", lambda head, _: head.startswith(b"POINTCACHE2")),
     (".usdc", lambda head, _: head.startswith(b"PXR-USDC")),

@@ -15,7 +15,7 @@ from typing import BinaryIO, Protocol
 
 from anim.errors import FormatError
 
-PIECE = 1 << 24  # bytes that streaming readers and writers handle at a time, about
+COPY_BYTES = 1 << 24  # bytes that streaming readers and writers handle at a time, about
 
 
 class Inputs(Protocol):
@@ -61,7 +61,7 @@ class Memory:
         return _Kept(self.files, name)
 
 
-def beside(name: str, ending: str) -> str:
+def companion_name(name: str, ending: str) -> str:
     """Return the name of a companion: beside("walk.pc2", "-rest.ply") → "walk.pc2-rest.ply"; no other cache has it."""
     return PurePath(name).name + ending
 
@@ -88,7 +88,7 @@ def size_of(file: BinaryIO) -> int:
 
 
 @contextmanager
-def whole(inputs: Inputs, name: str) -> Iterator[bytes]:
+def read_all(inputs: Inputs, name: str) -> Iterator[bytes]:
     """Give all bytes of a file."""
     with inputs.open(name) as file:
         yield file.read()

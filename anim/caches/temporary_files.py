@@ -10,31 +10,31 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
-from anim.caches.storage import PIECE, Inputs, Outputs
+from anim.caches.storage import COPY_BYTES, Inputs, Outputs
 
 
 @contextmanager
-def written(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
+def temp_output(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
     """Give a path of this ending to write to; what lies there at the end becomes the output `name`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"output{ending}"
         yield str(path)
         with path.open("rb") as source, outputs.create(name) as target:
-            shutil.copyfileobj(source, target, PIECE)
+            shutil.copyfileobj(source, target, COPY_BYTES)
 
 
 @contextmanager
-def readable(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
+def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
     """Give a path at which the bytes of an input can be read."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"input{ending}"
         with inputs.open(name) as source, path.open("wb") as target:
-            shutil.copyfileobj(source, target, PIECE)
+            shutil.copyfileobj(source, target, COPY_BYTES)
         yield str(path)
 
 
 @contextmanager
-def hushed() -> Iterator[None]:
+def silence_native() -> Iterator[None]:
     """Keep a package written in C++ from printing: what it finds wrong is said by us, in one line."""
     try:
         kept = os.dup(2)

@@ -10,7 +10,7 @@ from anim.arrays import Ints
 from anim.model import Mesh, Skeleton, Skin
 
 
-def trees(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh, Skin]]:
+def split_by_root(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh, Skin]]:
     """Return a mesh and its skin for each root that has joints, numbered by name where there are several.
 
     mesh: each triangle hangs on joints of one tree, and has its vertices for itself.

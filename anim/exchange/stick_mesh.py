@@ -17,7 +17,7 @@ MAX_RADIUS, MIN_RADIUS = 0.02, 0.004  # shares of the skeleton's size
 KNOB = 0.02  # share of the size: length of the stick of a joint without children
 
 
-def sticks(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[Mesh, Skin]:
+def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[Mesh, Skin]:
     """Return a mesh and the skin that hangs it on the skeleton; each stick follows the joint it starts from.
 
     ends: nodes that are no joints and only mark where their parent ends. Normals are those of flat faces.

@@ -43,7 +43,7 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     So what may fail of this file (no permission, a full disk) fails before the block. What is no plain file is written
     into before it.
     """
-    target, temporary = links.followed(path), None
+    target, temporary = links.resolve_links(path), None
     with temporaries() as made:
         with named_errors(path):
             check_writable(path)

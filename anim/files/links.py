@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 
-def followed(path: Path) -> Path:
+def resolve_links(path: Path) -> Path:
     """Return where the file lies that a link leads to, also one that is not there yet; any other path as it is.
 
     A link to what has no place in a folder (/dev/stdin, which may be a pipe) stays as it is, too.

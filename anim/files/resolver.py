@@ -13,7 +13,7 @@ from anim.arrays import Bytes
 from anim.errors import FormatError
 
 
-class Beside:
+class CompanionFiles:
     """Files in or below a folder, opened once."""
 
     def __init__(self, folder: Path) -> None:

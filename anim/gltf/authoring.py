@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import anim
 from anim.arrays import Floats
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.io import container
 from anim.gltf.writing import writer
 from anim.model import Clip, Mesh, Skeleton, Skin
@@ -26,7 +26,7 @@ TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 COLOR = (0.8, 0.55, 0.25, 1.0)  # of bodies, linear RGBA
 
 
-def author(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[tuple[Mesh, Skin]] = ()) -> Document:
+def build_document(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[tuple[Mesh, Skin]] = ()) -> Document:
     """Return a new document with the nodes of the skeleton, then a node for each body, and the clips.
 
     Node numbers are those of the skeleton, which the clips and skins use. Parts of nodes that are the identity are
@@ -36,7 +36,7 @@ def author(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[tuple[Mes
 
     gltf = GLTF2(asset=Asset(generator=GENERATOR, version="2.0"), scene=0, scenes=[Scene(nodes=[])])
     for number, name in enumerate(skeleton.names):
-        gltf.nodes.append(Node(name=name or None, **_placed(skeleton, number)))
+        gltf.nodes.append(Node(name=name or None, **_place_clips(skeleton, number)))
     for number, parent in enumerate(skeleton.parents.tolist()):
         (gltf.scenes[0].nodes if parent < 0 else gltf.nodes[parent].children).append(number)
     blob = bytearray()
@@ -50,7 +50,7 @@ def add_clips(document: Document, clips: Sequence[Clip]) -> Document:
     clips = [clip for clip in clips if clip.tracks]
     if not clips:
         return document
-    there = items(document.json, "animations")
+    there = json_array(document.json, "animations")
     blank: list[Json] = [
         {**({"name": clip.name} if clip.name else {}), "channels": [], "samplers": []} for clip in clips
     ]
@@ -58,7 +58,7 @@ def add_clips(document: Document, clips: Sequence[Clip]) -> Document:
     return writer.replace_clips(longer, {len(there) + i: clip for i, clip in enumerate(clips)})
 
 
-def _placed(skeleton: Skeleton, number: int) -> dict[str, list[float]]:
+def _place_clips(skeleton: Skeleton, number: int) -> dict[str, list[float]]:
     parts = {
         "translation": (skeleton.translation[number], (0.0, 0.0, 0.0)),
         "rotation": (skeleton.rotation[number], (0.0, 0.0, 0.0, 1.0)),

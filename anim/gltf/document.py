@@ -75,17 +75,19 @@ class Document:
     expanded: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{key}={len(items(self.json, key))}" for key in ("animations", "nodes", "meshes", "skins"))
+        counts = ", ".join(
+            f"{key}={len(json_array(self.json, key))}" for key in ("animations", "nodes", "meshes", "skins")
+        )
         return f"Document({counts}, buffer_bytes={sum(each.byte_length for each in self.buffers)})"
 
 
 def node_label(json: Json, number: int) -> str:
     """Return how messages call a node: "node 7 'hip'"."""
-    name = items(json, "nodes")[number].get("name")
+    name = json_array(json, "nodes")[number].get("name")
     return f"node {number} '{name}'" if name else f"node {number}"
 
 
-def items(json: Json, key: str) -> list[Json]:
+def json_array(json: Json, key: str) -> list[Json]:
     """Return the objects of a top-level array, empty where the file has none."""
     found: list[Json] = json.get(key, [])
     return found

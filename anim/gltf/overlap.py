@@ -6,10 +6,10 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 from anim.gltf.writing.byte_ranges import ALIGNMENT
-from anim.gltf.writing.encoding import Numbers
+from anim.gltf.writing.encoding import AccessorData
 
 
-def inside(contents: Sequence[Numbers]) -> dict[int, tuple[int, int]]:
+def inside(contents: Sequence[AccessorData]) -> dict[int, tuple[int, int]]:
     """Return, for each time axis that occurs in another, (number of that one, byte offset in it).
 
     The longest come first; what lies in another is no place for a third one to lie in. Only axes are looked at: they

@@ -10,15 +10,15 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import FLOAT32, Clip, Interpolation, Track
 from anim.optimize.options import Drop
-from anim.optimize.search.bound_usage import Strains
-from anim.optimize.search.context import Setting
-from anim.optimize.search.plan import Fate, Outcome
+from anim.optimize.search.bound_usage import BoundUsage
+from anim.optimize.search.context import Context
+from anim.optimize.search.plan import TrackAction, TrialResult
 from anim.optimize.search.search import search
 from anim.optimize.search.solution import Solution, value_bytes
-from anim.optimize.search.source_motion import PATHS, Truth, key_grid, truth
-from anim.optimize.search.trial import CHORDS_NOTICED, Bench
+from anim.optimize.search.source_motion import PATHS, SourceMotion, analyze_source, key_grid
+from anim.optimize.search.trial import CHORDS_NOTICED, TrialRunner
 from anim.optimize.tracks import clip_ends, lossless, morph_weights, pointer_tracks
-from anim.optimize.tracks.quantization import Stored
+from anim.optimize.tracks.quantization import EncodedKeys
 from anim.sampling import times
 
 MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
@@ -39,19 +39,19 @@ class Task:
     bound: float
 
 
-def solve(setting: Setting, task: Task) -> Solution | None:
+def solve(setting: Context, task: Task) -> Solution | None:
     """Return the clip in as few bytes as the effort finds; None where no way keeps the bounds."""
-    return _Sorted(setting, task).solution()
+    return _SortedTracks(setting, task).solution()
 
 
-class _Sorted:
+class _SortedTracks:
     """The tracks of one clip, by what can be done with them."""
 
-    def __init__(self, setting: Setting, task: Task) -> None:
+    def __init__(self, setting: Context, task: Task) -> None:
         self._setting = setting
         self._task = task
         self._clip = task.clip
-        self._done: dict[int, tuple[Track, Stored]] = {}
+        self._done: dict[int, tuple[Track, EncodedKeys]] = {}
         self._dropped: list[int] = []
         self._free: list[int] = []
         self._spent = 0.0
@@ -78,7 +78,7 @@ class _Sorted:
     def _sort(self, i: int, track: Track) -> None:
         policy, exact = self._setting.policy, self._setting.bounds.max_error == 0
         if track.node is None or track.path == "pointer":
-            self._put(i, pointer_tracks.thinned(track, self._setting.bounds.max_pointer_error))
+            self._put(i, pointer_tracks.reduce_pointer_keys(track, self._setting.bounds.max_pointer_error))
         elif self._is_unseen(i):
             self._dropped.append(i)
         elif track.path == "weights":
@@ -102,7 +102,7 @@ class _Sorted:
 
     def _keep_exactly(self, i: int) -> None:
         track = self._clip.tracks[i]
-        slim = lossless.lossless(track)
+        slim = lossless.reduce_lossless(track)
         if len(slim.times) == 1 and self._droppable(i) and track.node is not None and track.path in PATHS:
             is_exact = self._setting.bounds.max_error == 0  # a rest pose in decimals differs from float32 keys
             precision = np.float64 if is_exact else np.float32
@@ -114,7 +114,7 @@ class _Sorted:
         self._put(i, slim)
 
     def _put(self, i: int, track: Track) -> None:
-        self._done[i] = _as_it_is(track)
+        self._done[i] = _unchanged(track)
 
     def _droppable(self, i: int) -> bool:
         policy = self._setting.policy
@@ -134,21 +134,23 @@ class _Sorted:
             reach = setting.morph_reach(track.node)
             exact = setting.bounds.max_error == 0 or track.node in setting.policy.keep
             if exact or not reach.size or track.interpolation is Interpolation.STEP:
-                self._put(i, lossless.lossless(track))
+                self._put(i, lossless.reduce_lossless(track))
                 continue
-            from_rest = morph_weights.off(track, setting.weights_at_rest(track.node), reach)
+            from_rest = morph_weights.weight_error(track, setting.weights_at_rest(track.node), reach)
             if self._droppable(i) and from_rest <= bound:
                 self._dropped.append(i)
                 self._spent += from_rest
                 continue
-            new, stored, off = morph_weights.thinned(track, reach, bound, key_grid([track]), setting.coding.packing)
+            new, stored, off = morph_weights.reduce_weights(
+                track, reach, bound, key_grid([track]), setting.coding.packing
+            )
             if track.interpolation is Interpolation.CUBICSPLINE and self._spline_is_smaller(i, new, {i: (new, stored)}):
-                self._put(i, lossless.lossless(track))
+                self._put(i, lossless.reduce_lossless(track))
                 continue
             self._done[i] = new, stored
             self._spent += off
 
-    def _spline_is_smaller(self, i: int, lines: Track, found: Mapping[int, tuple[Track, Stored]]) -> bool:
+    def _spline_is_smaller(self, i: int, lines: Track, found: Mapping[int, tuple[Track, EncodedKeys]]) -> bool:
         """Whether the source's own spline takes fewer bytes than lines do, each with its part of a time axis."""
         if len(lines.times) == 1:
             return False
@@ -160,13 +162,13 @@ class _Sorted:
         axis = self._setting.coding.prices.axis + 4 * len(track.times)
         return value_bytes(track) + axis / sharing
 
-    def _searched(self, free: Sequence[int]) -> dict[int, tuple[Track, Stored]] | None:
+    def _searched(self, free: Sequence[int]) -> dict[int, tuple[Track, EncodedKeys]] | None:
         """The free tracks as the search left them, without those that it dropped; None where it found no way."""
         setting = self._setting
         if not free:
             return {}
         bound = self._task.bound
-        found = truth(
+        found = analyze_source(
             setting.skeleton,
             self._clip,
             free,
@@ -176,10 +178,10 @@ class _Sorted:
             noticed=CHORDS_NOTICED * bound,
         )
         allowed = np.full(len(setting.points), bound - self._spent)
-        bench = Bench(
+        bench = TrialRunner(
             setting.skeleton,
             found,
-            Strains(setting.skeleton, found, setting.points, allowed, replace(setting.bounds, max_error=bound)),
+            BoundUsage(setting.skeleton, found, setting.points, allowed, replace(setting.bounds, max_error=bound)),
             setting.coding,
             np.array([self._droppable(i) for i in free], np.bool_),
             [self._task.shared[i] for i in free],
@@ -188,11 +190,11 @@ class _Sorted:
         return None if outcome is None else _tracks(self._clip, found, outcome)
 
 
-def _tracks(clip: Clip, found: Truth, outcome: Outcome) -> dict[int, tuple[Track, Stored]]:
+def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, tuple[Track, EncodedKeys]]:
     axes: dict[bytes, Floats] = {}
     result = {}
     for k, moving in enumerate(found.moving):
-        if outcome.fates[k] == Fate.DROPPED:
+        if outcome.fates[k] == TrackAction.DROPPED:
             continue
         stored = outcome.keys[k]
         if k in outcome.on:
@@ -204,7 +206,7 @@ def _tracks(clip: Clip, found: Truth, outcome: Outcome) -> dict[int, tuple[Track
     return result
 
 
-def _new_track(track: Track, at: Floats, stored: Stored) -> Track:
+def _new_track(track: Track, at: Floats, stored: EncodedKeys) -> Track:
     return replace(
         track,
         interpolation=Interpolation.LINEAR,
@@ -216,19 +218,19 @@ def _new_track(track: Track, at: Floats, stored: Stored) -> Track:
     )
 
 
-def _with_ends(clip: Clip, every: dict[int, tuple[Track, Stored]], dropped: list[int]) -> Solution:
+def _with_ends(clip: Clip, every: dict[int, tuple[Track, EncodedKeys]], dropped: list[int]) -> Solution:
     """The solution, with at least one track, and with keys at the clip's start and end."""
     if not every and clip.tracks:
-        every = {0: _as_it_is(clip_ends.held(clip.tracks[0]))}
+        every = {0: _unchanged(clip_ends.single_key(clip.tracks[0]))}
         dropped = [i for i in dropped if i != 0]
     made = Clip(clip.name, tuple(track for track, _ in every.values()))
     if every and (made.end < clip.end or made.start > clip.start):
         number = min(every, key=lambda i: (len(every[i][0].times), every[i][0].values.shape[1], i))
-        every[number] = _as_it_is(clip_ends.stretched(every[number][0], clip.start, clip.end))
+        every[number] = _unchanged(clip_ends.extend(every[number][0], clip.start, clip.end))
     ordered = [every[i] for i in sorted(every)]
     tracks, stored = tuple(track for track, _ in ordered), tuple(each for _, each in ordered)
     return Solution(Clip(clip.name, tracks), stored, tuple(dropped))
 
 
-def _as_it_is(track: Track) -> tuple[Track, Stored]:
-    return track, Stored(track.values, "as it is")
+def _unchanged(track: Track) -> tuple[Track, EncodedKeys]:
+    return track, EncodedKeys(track.values, "as it is")

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.optimize.clip import Task, solve
 from anim.optimize.options import EFFORTS, Effort
 from anim.optimize.request import Request
-from anim.optimize.search.context import Setting, setting
+from anim.optimize.search.context import Context, build_context
 from anim.optimize.search.solution import Solution
-from anim.optimize.tracks.quantization import PRICES, Coding
-from anim.optimize.verification import Verdict, verdict
+from anim.optimize.tracks.quantization import BYTE_COSTS, Encoding
+from anim.optimize.verification import Verification, verify
 
 TIGHTER = 0.97  # of the share that a clip was beyond its bound, for the next search
 HARDLY = 0.995  # less for the next search where the vertex that was off most had not been measured
@@ -24,18 +24,18 @@ ROUNDS = 6  # of searching and verifying; after them a clip that still fails is 
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class ClipResult:
     """A clip that needs no more work: what became of it, and how far it is from its source.
 
     without_loss: whether no lossy way was found that holds all bounds.
     """
 
     solution: Solution
-    verdict: Verdict
+    verdict: Verification
     without_loss: bool = False
 
 
-class Site:
+class ClipOptimizer:
     """What every process works with; each part is made where it is first needed.
 
     before, after: the scene as it was, and in its new rest pose. clips: all of the file. detailed: whether verdicts are
@@ -51,15 +51,15 @@ class Site:
         self.clips = clips
         self.detailed = detailed
 
-    def setting(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Setting:
+    def setting(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Context:
         """Return the setting, with some more vertices measured, (number of the surface, number of the vertex)."""
         if not extra:
             return self._usual_setting
         return self._setting(extra)
 
-    def judged(self, number: int, after: Clip) -> Verdict:
+    def judged(self, number: int, after: Clip) -> Verification:
         """Return how far a new version of clip `number` is from its source."""
-        return verdict(
+        return verify(
             self._ruler,
             self.clips[number],
             after,
@@ -70,39 +70,39 @@ class Site:
             prover=self._prover,
         )
 
-    def worst_vertex(self, found: Verdict) -> frozenset[tuple[int, int]]:
+    def worst_vertex(self, found: Verification) -> frozenset[tuple[int, int]]:
         """Return the vertex that was off most, (number of the surface, number of the vertex); none of a shell."""
         error = found.error
         names = [surface.name for surface, _ in self._ruler.pairs.surfaces]
         return frozenset((i, error.vertex) for i, name in enumerate(names) if name == error.place and error.vertex >= 0)
 
-    def _setting(self, extra: frozenset[tuple[int, int]]) -> Setting:
+    def _setting(self, extra: frozenset[tuple[int, int]]) -> Context:
         request = self.request
-        return setting(
+        return build_context(
             self.after,
             self.clips,
             bounds=request.bounds,
             policy=request.policy,
-            coding=Coding(request.packing, PRICES[request.objective]),
+            coding=Encoding(request.packing, BYTE_COSTS[request.objective]),
             effort=EFFORTS[request.effort],
             extra=extra,
         )
 
     @cached_property
-    def _usual_setting(self) -> Setting:
+    def _usual_setting(self) -> Context:
         return self._setting(frozenset())
 
     @cached_property
-    def _ruler(self) -> Ruler:
+    def _ruler(self) -> ErrorMetric:
         share = self.request.bounds.shell / (diagonal(self.before) or 1.0)
-        return Ruler(self.before, self.after, shell=None if self.request.policy.drop_invisible else share)
+        return ErrorMetric(self.before, self.after, shell=None if self.request.policy.drop_invisible else share)
 
     @cached_property
     def _prover(self) -> Prover:
         return Prover(self._ruler)
 
 
-def finished(site: Site, item: tuple[int, Task]) -> Finished:
+def optimize_clip(site: ClipOptimizer, item: tuple[int, Task]) -> ClipResult:
     """Return clip `item[0]` in the fewest bytes found within all bounds, judged as it will be stored.
 
     Splines and steps as they are compete too: lines in place of a few of them can take more.
@@ -118,10 +118,10 @@ def finished(site: Site, item: tuple[int, Task]) -> Finished:
     if best is not None and best.solution.size(setting.coding) <= exact.size(setting.coding):
         return best
     is_last_resort = best is None and site.request.bounds.max_error > 0
-    return Finished(exact, site.judged(number, exact.clip), without_loss=is_last_resort)
+    return ClipResult(exact, site.judged(number, exact.clip), without_loss=is_last_resort)
 
 
-def judged(site: Site, item: tuple[int, Clip]) -> Verdict:
+def verify_solution(site: ClipOptimizer, item: tuple[int, Clip]) -> Verification:
     """Return how far a new version of clip `item[0]` is from its source."""
     return site.judged(*item)
 
@@ -130,7 +130,7 @@ def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 
 
-def _within(site: Site, number: int, task: Task, effort: Effort) -> Finished | None:
+def _within(site: ClipOptimizer, number: int, task: Task, effort: Effort) -> ClipResult | None:
     """What a search finds that holds, None if nothing does.
 
     After each search that fails, the vertex that was off most is measured too, and the search gets less to spend.
@@ -142,7 +142,7 @@ def _within(site: Site, number: int, task: Task, effort: Effort) -> Finished | N
             return None
         found = site.judged(number, solution.clip)
         if found.holds:
-            return Finished(solution, found)
+            return ClipResult(solution, found)
         worst = site.worst_vertex(found)
         factor = HARDLY if worst - extra else min(TIGHTER / found.strain, TIGHTER)
         extra |= worst

@@ -15,7 +15,7 @@ from anim.model import Clip
 KEY = "gltf-anim"
 
 
-def sealed(document: Document, clips: Iterable[Clip], options: str) -> Document:
+def add_mark(document: Document, clips: Iterable[Clip], options: str) -> Document:
     """Return the document with a mark of its clips and the options in `asset.extras`; as it is where that is taken."""
     asset = document.json["asset"]
     extras = asset.get("extras", {})
@@ -25,7 +25,7 @@ def sealed(document: Document, clips: Iterable[Clip], options: str) -> Document:
     return replace(document, json={**document.json, "asset": marked})
 
 
-def is_sealed(document: Document, clips: Iterable[Clip], options: str) -> bool:
+def has_mark(document: Document, clips: Iterable[Clip], options: str) -> bool:
     """Return whether the document carries the mark of exactly these clips and options."""
     extras = document.json["asset"].get("extras", {})
     mark = extras.get(KEY) if isinstance(extras, dict) else None

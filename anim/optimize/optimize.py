@@ -11,15 +11,15 @@ from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimize import fingerprint
 from anim.optimize.clip import Task
-from anim.optimize.clip_optimizer import Site, finished, judged
-from anim.optimize.process_pool import crew
+from anim.optimize.clip_optimizer import ClipOptimizer, optimize_clip, verify_solution
+from anim.optimize.process_pool import process_pool
 from anim.optimize.request import Request
 from anim.optimize.rest_pose import rebase
 from anim.optimize.search.solution import Solution
-from anim.optimize.shared_constants import known
+from anim.optimize.shared_constants import find_constants
 from anim.optimize.tracks.redundant_keys import drop_redundant_keys
-from anim.optimize.verification import Verdict
-from anim.optimize.writing import differing, written
+from anim.optimize.verification import Verification
+from anim.optimize.writing import changed_clips, write_solutions
 
 MARGIN = 0.985  # of the bound, that a search may use
 
@@ -34,7 +34,7 @@ class Optimized:
 
     document: Document
     solutions: Mapping[int, Solution]
-    verdicts: Mapping[int, Verdict]
+    verdicts: Mapping[int, Verification]
     moved: tuple[tuple[int, str], ...] = ()
     without_loss: tuple[int, ...] = ()
     unchanged: bool = False
@@ -61,21 +61,21 @@ def optimize(
     """
     chosen = range(len(clips)) if chosen is None else chosen
     options = f"{request.name} {tuple(chosen)}"
-    if fingerprint.is_sealed(document, clips, options):
+    if fingerprint.has_mark(document, clips, options):
         return Optimized(document, {}, {}, unchanged=True)
-    request = _in_sight(request, scene)
+    request = _visible_clips(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
-    site = Site(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
+    site = ClipOptimizer(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
     tasks = _tasks(site, chosen)
     solutions: dict[int, Solution] = {}
-    verdicts: dict[int, Verdict] = {}
+    verdicts: dict[int, Verification] = {}
     without_loss: list[int] = []
 
     def name(item: tuple[int, object]) -> str:
-        return reader.label(clips[item[0]].name, item[0])
+        return reader.clip_label(clips[item[0]].name, item[0])
 
-    with crew(min(workers, len(tasks)), site, start=start) as workforce:
-        results = workforce.each(finished, tasks, label=name)
+    with process_pool(min(workers, len(tasks)), site, start=start) as workforce:
+        results = workforce.each(optimize_clip, tasks, label=name)
         for (number, _), each in zip(tasks, results, strict=True):
             solutions[number], verdicts[number] = each.solution, each.verdict
             without_loss += [number] if each.without_loss else []
@@ -83,26 +83,26 @@ def optimize(
         lossy = {i: each for i, each in solutions.items() if i not in without_loss}
         slimmer = drop_redundant_keys(lossy, site.after.skeleton, request)
         items = [(i, each.clip) for i, each in slimmer.items()]
-        for (number, _), found in zip(items, workforce.each(judged, items, label=name), strict=True):
+        for (number, _), found in zip(items, workforce.each(verify_solution, items, label=name), strict=True):
             if found.holds:
                 solutions[number], verdicts[number] = slimmer[number], found
-    new = written(base.document if base else document, solutions, request.packing)
+    new = write_solutions(base.document if base else document, solutions, request.packing)
     read_back = reader.clips(new)
-    for number in differing(read_back, solutions):
+    for number in changed_clips(read_back, solutions):
         verdicts[number] = site.judged(number, read_back[number])
-    done = fingerprint.sealed(new, read_back, options)
+    done = fingerprint.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 
-def _in_sight(request: Request, scene: Scene) -> Request:
+def _visible_clips(request: Request, scene: Scene) -> Request:
     """The request, for a scene without a vertex as if nothing were invisible: nodes are all that it shows."""
     if has_vertices(scene):
         return request
     return replace(request, policy=replace(request.policy, drop_invisible=False))
 
 
-def _tasks(site: Site, chosen: Sequence[int]) -> list[tuple[int, Task]]:
-    shared = known(site.setting(), site.clips)
+def _tasks(site: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:
+    shared = find_constants(site.setting(), site.clips)
     tasks = []
     for i in chosen:
         clip = site.clips[i]

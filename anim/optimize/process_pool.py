@@ -22,7 +22,7 @@ from anim.errors import UnsupportedError
 Result = TypeVar("Result")
 
 
-class Crew:
+class ProcessPool:
     """Runs one function on many arguments. `shared` is handed to every process once."""
 
     def __init__(self, pool: ProcessPoolExecutor | None, shared: Any) -> None:
@@ -52,7 +52,7 @@ class Crew:
 
 
 @contextmanager
-def crew(workers: int, shared: Any, *, start: str = "spawn") -> Iterator[Crew]:
+def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator[ProcessPool]:
     """Give a crew of so many processes; of none, in this process, where one is enough.
 
     start: "spawn" for fresh processes, for which callers guard their main module as `multiprocessing` asks; "fork" for
@@ -60,14 +60,14 @@ def crew(workers: int, shared: Any, *, start: str = "spawn") -> Iterator[Crew]:
     OPENBLAS_NUM_THREADS to 1 in it, so that each has a core of its own.
     """
     if workers <= 1:
-        yield Crew(None, shared)
+        yield ProcessPool(None, shared)
         return
     context = multiprocessing.get_context(start)
     lifeline, held = context.Pipe(duplex=False)
     inherited = held if start == "fork" else None  # copies of this process hold the other end too, and close it
     pool = ProcessPoolExecutor(workers, context, _set_up, (shared, lifeline, inherited))
     try:
-        yield Crew(pool, shared)
+        yield ProcessPool(pool, shared)
         pool.shutdown()
     finally:
         held.close()  # whoever still works ends now, and nobody waits for it
@@ -75,7 +75,7 @@ def crew(workers: int, shared: Any, *, start: str = "spawn") -> Iterator[Crew]:
         lifeline.close()
 
 
-_of_this_process: list[Any] = []  # what every task of a worker process works with; set once, before the first
+_run_in_worker: list[Any] = []  # what every task of a worker process works with; set once, before the first
 
 
 def _set_up(shared: Any, lifeline: Connection, inherited: Connection | None) -> None:
@@ -85,7 +85,7 @@ def _set_up(shared: Any, lifeline: Connection, inherited: Connection | None) -> 
     if inherited is not None:
         inherited.close()
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
-    _of_this_process[:] = [shared]
+    _run_in_worker[:] = [shared]
 
 
 def _end_with(lifeline: Connection) -> None:
@@ -95,4 +95,4 @@ def _end_with(lifeline: Connection) -> None:
 
 
 def _run(function: Callable[[Any, Any], Result], task: Any) -> Result:
-    return function(_of_this_process[0], task)
+    return function(_run_in_worker[0], task)

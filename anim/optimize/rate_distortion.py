@@ -12,7 +12,7 @@ STEPS = 9  # of halving the logarithm: within 2 % of the smallest such bound
 
 
 @dataclass(frozen=True, slots=True)
-class Sized:
+class RatePoint:
     """A bound, m, with the bytes of the file it leads to and the error, m, that is left.
 
     animation: bytes of keys and of their JSON, without meshes and images.
@@ -24,13 +24,15 @@ class Sized:
     animation: int = 0
 
 
-def curve(diagonal: float, tried: Callable[[float], Sized], shares: Sequence[float] = SHARES) -> Iterator[Sized]:
+def curve(
+    diagonal: float, tried: Callable[[float], RatePoint], shares: Sequence[float] = SHARES
+) -> Iterator[RatePoint]:
     """Yield sizes at bounds from small to large. tried: makes one, for a bound in metres."""
     for share in sorted(shares):
         yield tried(share * diagonal)
 
 
-def fitting(max_bytes: int, diagonal: float, tried: Callable[[float], Sized]) -> Sized | None:
+def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], RatePoint]) -> RatePoint | None:
     """Return the smallest bound found that takes at most `max_bytes`; None where even a tenth of the diagonal doesn't.
 
     Halves the logarithm of the bound; sizes fall with it but for the noise of the search, some percent.

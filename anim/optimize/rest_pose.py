@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.model import Clip, Scene, Skeleton
 from anim.optimize.search.source_motion import PATHS
 
@@ -19,7 +19,7 @@ WORTH = 1e-5  # a rest value nearer than this to the constant stays
 
 
 @dataclass(frozen=True, slots=True)
-class Rebased:
+class RebasedDocument:
     """A scene and its document in a new rest pose. moved: (node, path) of every rest value that changed."""
 
     document: Document
@@ -27,30 +27,30 @@ class Rebased:
     moved: tuple[tuple[int, str], ...]
 
 
-def rebase(document: Document, scene: Scene, clips: Sequence[Clip], *, exact: bool = False) -> Rebased:
+def rebase(document: Document, scene: Scene, clips: Sequence[Clip], *, exact: bool = False) -> RebasedDocument:
     """Return the scene with the commonest constant as rest value of every property that all clips drive.
 
     What no clip drives, in any clip, keeps its rest value: it is seen. Values are the shortest
     decimals that are the same in float32; exact: in float64 too.
     """
     skeleton = scene.skeleton
-    values = _commonest(skeleton, clips)
-    nodes = items(document.json, "nodes")
+    values = _most_common_value(skeleton, clips)
+    nodes = json_array(document.json, "nodes")
     values = {
         target: value.astype(np.float32).astype(np.float64) if exact else _short(value)
         for target, value in values.items()
         if "matrix" not in nodes[target[0]]
     }
     if not values:
-        return Rebased(document, scene, ())
+        return RebasedDocument(document, scene, ())
     parts = {path: getattr(skeleton, path).copy() for path in PATHS}
     for (node, path), value in values.items():
         parts[path][node] = value
     new = replace(scene, skeleton=replace(skeleton, **parts))
-    return Rebased(_with_rest(document, values), new, tuple(values))
+    return RebasedDocument(_with_rest(document, values), new, tuple(values))
 
 
-def _commonest(skeleton: Skeleton, clips: Sequence[Clip]) -> dict[tuple[int, str], Floats]:
+def _most_common_value(skeleton: Skeleton, clips: Sequence[Clip]) -> dict[tuple[int, str], Floats]:
     driven = Counter(track.target for clip in clips for track in clip.tracks if track.path in PATHS)
     constants: dict[tuple[int, str], list[Floats]] = {}
     for clip in clips:
@@ -82,7 +82,7 @@ def _short(value: Floats) -> Floats:
 
 
 def _with_rest(document: Document, values: Mapping[tuple[int, str], Floats]) -> Document:
-    nodes: list[Json] = list(items(document.json, "nodes"))
+    nodes: list[Json] = list(json_array(document.json, "nodes"))
     for (node, path), value in values.items():
         nodes[node] = {**nodes[node], path: value.tolist()}
     return replace(document, json={**document.json, "nodes": nodes})

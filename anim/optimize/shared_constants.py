@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track
-from anim.optimize.search.context import Setting
+from anim.optimize.search.context import Context
 from anim.optimize.search.source_motion import PATHS
 from anim.optimize.tracks import morph_weights
 
@@ -20,14 +20,14 @@ Target = tuple[int, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class Constants:
     """unused: properties that no clip moves away from rest. values: by property, where clips hold it, most first."""
 
     unused: frozenset[Target]
     values: dict[Target, tuple[Floats, ...]]
 
 
-def known(setting: Setting, clips: Sequence[Clip]) -> Known:
+def find_constants(setting: Context, clips: Sequence[Clip]) -> Constants:
     """Return what all clips have in common, judged with levers of the rest pose."""
     meters = _meters(setting)
     moved: set[Target] = set()
@@ -53,16 +53,16 @@ def known(setting: Setting, clips: Sequence[Clip]) -> Known:
         target: tuple(each.value for each in sorted(found, key=lambda each: -each.clips))
         for target, found in values.items()
     }
-    return Known(frozenset(seen - moved), chosen)
+    return Constants(frozenset(seen - moved), chosen)
 
 
-def _weights_rest(setting: Setting, track: Track, bound: float) -> bool:
+def _weights_rest(setting: Context, track: Track, bound: float) -> bool:
     """Whether morph weights leave every vertex within `bound` of the rest pose; splines that move never do."""
     assert track.node is not None
     reach = setting.morph_reach(track.node)
     if not reach.size or track.interpolation is Interpolation.CUBICSPLINE:
         return False
-    return morph_weights.off(track, setting.weights_at_rest(track.node), reach) <= bound
+    return morph_weights.weight_error(track, setting.weights_at_rest(track.node), reach) <= bound
 
 
 class _Value:
@@ -99,7 +99,7 @@ def _off(track: Track, value: Floats) -> float:
     return float(apart.max())
 
 
-def _meters(setting: Setting) -> tuple[Floats, Floats, Floats]:
+def _meters(setting: Context) -> tuple[Floats, Floats, Floats]:
     """How far a point moves per unit of each node's translation, rotation and scale (N,), in the rest pose."""
     world, skeleton = setting.rest_world, setting.skeleton
     places = setting.points.places(world[:, None])[:, 0]

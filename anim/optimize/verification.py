@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import MotionError, Ruler, check_times, dense_times
+from anim.measure.error.metric import ErrorMetric, MotionError, dense_times, key_and_mid_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip
 from anim.optimize.options import Bounds, Reference
 from anim.optimize.tracks.loop_closure import opened_tracks
 
-NOTHING = 1e-9  # of the diagonal: what rounding in float64 may show of motion that is the same
+FLOAT_NOISE = 1e-9  # of the diagonal: what rounding in float64 may show of motion that is the same
 PLAYERS = ("spec", "three", "raw", "nlerp")  # "three" mixes joints of two kinds: 3 % beyond both others on Fox
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Verification:
     """One clip against its source.
 
     error: the largest distance, and where. player: who showed it. statistics: the rest, as the first player shows it;
@@ -38,8 +38,8 @@ class Verdict:
         return self.strain <= 1
 
 
-def verdict(
-    ruler: Ruler,
+def verify(
+    ruler: ErrorMetric,
     before: Clip,
     after: Clip,
     *,
@@ -48,7 +48,7 @@ def verdict(
     players: Sequence[str] = PLAYERS,
     detailed: bool = True,
     prover: Prover | None = None,
-) -> Verdict:
+) -> Verification:
     """Return how far `after`, as read from the written file, is from `before`.
 
     Looked at: all keys of both, the middles between them, and 120 frames per second; with Reference.KEYS the source's
@@ -57,29 +57,29 @@ def verdict(
     times, unless the bound is exceeded anyway.
     """
     if reference is Reference.KEYS:
-        times, prover = check_times(before)[::2], None
+        times, prover = key_and_mid_times(before)[::2], None
     else:
         times = dense_times(before, after)
     looks = {player: ruler.look(before, after, times, player=player) for player in players}
     player = max(looks, key=lambda each: looks[each].error.max_error)
     error, certified = looks[player].error, None
-    if prover is not None and error.max_error <= max(bounds.max_error, NOTHING * (ruler.diagonal or 1.0)):
+    if prover is not None and error.max_error <= max(bounds.max_error, FLOAT_NOISE * (ruler.diagonal or 1.0)):
         proof = prover.certified(before, after, times, looks, enough=bounds.max_error)
         error, player, certified = proof.error, proof.player, proof.bound
     wanted = detailed or bounds.max_angle is not None or bounds.max_speed_error is not None
     about = statistics(ruler, before, after, times=times, player=players[0]) if wanted else None
-    least = NOTHING * (ruler.diagonal or 1.0)
+    least = FLOAT_NOISE * (ruler.diagonal or 1.0)
     shares = [
         _share(error.max_error, bounds.max_error, least),
-        _share(error.max_pointer_error, bounds.max_pointer_error, NOTHING),
+        _share(error.max_pointer_error, bounds.max_pointer_error, FLOAT_NOISE),
     ]
     if bounds.max_angle is not None and about is not None:
-        shares.append(_share(about.angle.size, bounds.max_angle, NOTHING))
+        shares.append(_share(about.angle.size, bounds.max_angle, FLOAT_NOISE))
     if bounds.max_speed_error is not None and about is not None:
         shares.append(_share(about.speed.size, bounds.max_speed_error, least))
     if (before.start, before.end) != (after.start, after.end) or opened_tracks(before, after):
         shares.append(float("inf"))
-    return Verdict(error, player, about, max(shares), certified)
+    return Verification(error, player, about, max(shares), certified)
 
 
 def _share(size: float, bound: float, least: float) -> float:

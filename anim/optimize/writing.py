@@ -16,22 +16,22 @@ from anim.optimize.search.solution import Solution
 FILTERS = {"quaternion": "QUATERNION", "exponent": "EXPONENTIAL"}  # what meshopt calls the forms of `coding`
 
 
-def written(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
+def write_solutions(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
     """Return the document with the clips numbered in `solutions` in place of its own, and no number left over."""
     clips = {i: each.clip for i, each in sorted(solutions.items())}
     if not packing.extension:
-        return reindex.compacted(writer.replace_clips(document, clips))
+        return reindex.drop_placeholders(writer.replace_clips(document, clips))
     filtered = {
-        id(track): storage.Filtered(FILTERS[stored.form], stored.codes)
+        id(track): storage.FilteredValues(FILTERS[stored.form], stored.codes)
         for each in solutions.values()
         for track, stored in zip(each.clip.tracks, each.stored, strict=True)
         if stored.form in FILTERS
     }
-    how = storage.compressed(packing.extension, filtered)
-    return reindex.compacted(writer.replace_clips(document, clips, packing=how))
+    how = storage.compress_document(packing.extension, filtered)
+    return reindex.drop_placeholders(writer.replace_clips(document, clips, packing=how))
 
 
-def differing(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) -> list[int]:
+def changed_clips(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) -> list[int]:
     """Return the numbers of the clips that, read from the new document, are unlike their solution: none."""
     return [i for i, each in solutions.items() if not _is_same(read_back[i], each.clip)]
 

@@ -12,15 +12,15 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError, UnsupportedError
 from anim.model import Clip, MeshInstance, MeshPart, PrimitiveRange, Scene, VertexCache
-from anim.skinning.binding import Rig
-from anim.skinning.bound_mesh import Layer, Make, layer
-from anim.skinning.chunk_pipeline import Stream
-from anim.skinning.methods.blended import Mixed
-from anim.skinning.methods.bulge_clamp import Clamped
+from anim.skinning.binding import SkinBinding
+from anim.skinning.bound_mesh import BoundMesh, Make, bind_mesh
+from anim.skinning.chunk_pipeline import ChunkPipeline
+from anim.skinning.methods.blended import BlendedMethod
+from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
 from anim.skinning.methods.registry import SKINNING_METHODS
 from anim.skinning.methods.skinner import Skinner
-from anim.skinning.pose_blocks import Playback
+from anim.skinning.pose_blocks import PosePlayback
 
 SPACES = ("world", "mesh")
 
@@ -46,7 +46,7 @@ def bake(
     Parameters as for `baker`, which is the thing to use for many clips; progress: called with the frames done.
     bake(scene, clip, times=grid(0, 1, fps=30), method="dqs") → VertexCache of 31 frames
     """
-    made = baker(
+    made = prepare_bake(
         scene,
         method=method,
         blend=blend,
@@ -61,7 +61,7 @@ def bake(
     return made.bake(clip, times=times, progress=progress)
 
 
-def baker(
+def prepare_bake(
     scene: Scene,
     *,
     method: str = "lbs",
@@ -87,16 +87,16 @@ def baker(
     for tangents of a mesh without any.
     """
     _check(method, blend, space, bulge_clamp=bulge_clamp)
-    chosen = baked(scene, rigid=rigid, nodes=nodes)
+    chosen = bakeable_instances(scene, rigid=rigid, nodes=nodes)
     if not chosen:
         raise NotFoundError("there is no mesh with a skin or morph targets to bake", help=_hint(scene, rigid=rigid))
     starts = np.cumsum([0, *(len(instance.mesh.positions) for instance in chosen)])
     make = _maker(method, blend, bulge_clamp=bulge_clamp)
     layers = tuple(
-        layer(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
+        bind_mesh(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
-    still = Playback(scene.skeleton, Clip("", ())).at(np.zeros(1))
+    still = PosePlayback(scene.skeleton, Clip("", ())).at(np.zeros(1))
     return Baker(
         scene,
         layers,
@@ -106,7 +106,7 @@ def baker(
         np.concatenate([each.at_rest(still) for each in layers]),
         normals,
         _handedness(chosen) if tangents else None,
-        threads or _cores(),
+        threads or _cpu_count(),
     )
 
 
@@ -120,7 +120,7 @@ class Baker:
     """
 
     scene: Scene
-    layers: tuple[Layer, ...]
+    layers: tuple[BoundMesh, ...]
     vertices: int
     faces: Ints
     parts: tuple[MeshPart, ...]
@@ -138,7 +138,7 @@ class Baker:
         """
         seconds = arrays.as_key_times(times)
         wanted = (self.normals, self.handedness is not None)
-        stream = Stream(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads)
+        stream = ChunkPipeline(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads)
         return VertexCache(
             seconds,
             self.vertices,
@@ -151,7 +151,7 @@ class Baker:
         )
 
 
-def baked(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[MeshInstance]:
+def bakeable_instances(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[MeshInstance]:
     """Return the mesh instances that have vertices and are baked: skinned or morphed ones, with `rigid` all."""
     return [
         instance
@@ -179,13 +179,13 @@ def _handedness(chosen: Sequence[MeshInstance]) -> Floats:
 def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:
     """What makes the skinner of a rig. A mesh on one joint alone needs no method: all give the same."""
 
-    def make(rig: Rig, plain: bool) -> Skinner:
+    def make(rig: SkinBinding, plain: bool) -> Skinner:
         if len(rig.nodes) == 1:
             return LinearBlend(rig, plain)
         skinner = SKINNING_METHODS[method].skinner(rig, plain)
         if bulge_clamp:
-            skinner = Clamped(skinner, rig)
-        return skinner if blend is None else Mixed(LinearBlend(rig, plain), skinner, blend)
+            skinner = BulgeClamp(skinner, rig)
+        return skinner if blend is None else BlendedMethod(LinearBlend(rig, plain), skinner, blend)
 
     return make
 
@@ -208,7 +208,7 @@ def _hint(scene: Scene, *, rigid: bool) -> str:
     return "" if rigid else "meshes that only nodes move are baked with --rigid"
 
 
-def _parts(scene: Scene, layers: Sequence[Layer]) -> Iterator[MeshPart]:
+def _parts(scene: Scene, layers: Sequence[BoundMesh]) -> Iterator[MeshPart]:
     face = 0
     for each in layers:
         mesh, vertex = each.instance.mesh, each.at
@@ -221,5 +221,5 @@ def _parts(scene: Scene, layers: Sequence[Layer]) -> Iterator[MeshPart]:
             vertex, face = ends
 
 
-def _cores() -> int:
+def _cpu_count() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 from anim.model import MeshInstance
-from anim.skinning.kernels.layout import Held, Singles
+from anim.skinning.kernels.layout import FloatArray, Influences
 
 
 @dataclass(frozen=True, slots=True)
-class Rig:
+class SkinBinding:
     """V vertices, and the joints that each of them hangs on, strongest first, joints without weight left out.
 
     nodes: (J,) node numbers. bind: (J, 3, 4) joint_from_mesh at bind time. above: (J,) the nearest joint above, or −1.
@@ -31,17 +31,17 @@ class Rig:
     tangents: Floats
     start: Ints
     joint: NDArray[np.int32]
-    weight: Singles
+    weight: FloatArray
     most: int
     faces: Ints
 
     @property
-    def held(self) -> Held:
+    def held(self) -> Influences:
         """What the vertices hang on, as kernels read it."""
-        return Held(self.weight, self.joint, self.start, self.most)
+        return Influences(self.weight, self.joint, self.start, self.most)
 
 
-def rig(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> Rig:
+def bind_skin(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> SkinBinding:
     """Return the rig of a mesh instance; one without a skin hangs on its own node, whole.
 
     parents: (N,) of the skeleton. normals, tangents: keep the mesh's, if it has them.
@@ -59,7 +59,7 @@ def rig(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangent
     turned = mesh.normals if normals and mesh.normals is not None else none
     along = mesh.tangents[:, :3] if tangents and mesh.tangents is not None else none
     above = joints_above(nodes, parents)
-    return Rig(
+    return SkinBinding(
         nodes,
         bind,
         above,
@@ -74,7 +74,7 @@ def rig(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangent
     )
 
 
-def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], Singles]:
+def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], FloatArray]:
     """Return start (V + 1,), joint (E,) and weight (E,) of joints and weights (V, I), strongest first, zeros left out.
 
     influences([[4, 7]], [[0.25, 0.75]]) → [0, 2], [7, 4], [0.75, 0.25]

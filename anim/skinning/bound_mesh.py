@@ -12,17 +12,17 @@ from anim.arrays import Floats
 from anim.errors import AnimError, RangeError
 from anim.maths import matrix
 from anim.model import MeshInstance, Skeleton
-from anim.skinning.binding import Rig, rig
-from anim.skinning.kernels.layout import NOTHING, Shape, Singles, Target
-from anim.skinning.methods.skinner import Skinner, filled
-from anim.skinning.pose_blocks import Frames
+from anim.skinning.binding import SkinBinding, bind_skin
+from anim.skinning.kernels.layout import NOTHING, FloatArray, OutputSlice, VertexBlock
+from anim.skinning.methods.skinner import Skinner, fill_lanes
+from anim.skinning.pose_blocks import PoseBlock
 from anim.skinning.vertex_normals import SmoothNormals
 
-Make: TypeAlias = Callable[[Rig, bool], Skinner]
+Make: TypeAlias = Callable[[SkinBinding, bool], Skinner]
 
 
 @dataclass(frozen=True, slots=True)
-class Layer:
+class BoundMesh:
     """An instance, its rig and skinner, and its first column.
 
     in_mesh_space: positions are wanted in the space of the instance's node. smooth: what makes normals of the faces
@@ -30,12 +30,12 @@ class Layer:
     """
 
     instance: MeshInstance
-    rig: Rig
+    rig: SkinBinding
     skinner: Skinner
     at: int
     in_mesh_space: bool
     smooth: SmoothNormals | None
-    still: Shape
+    still: VertexBlock
 
     @property
     def packed_size(self) -> int:
@@ -43,18 +43,18 @@ class Layer:
         morphed = len(self.rig.points) if len(self.instance.mesh.targets) else 0
         return 96 * len(self.rig.nodes) + 36 * morphed
 
-    def pack(self, frames: Frames, block: slice) -> tuple[Any, Shape]:
+    def pack(self, frames: PoseBlock, block: slice) -> tuple[Any, VertexBlock]:
         """Return what `place` needs for some of the frames."""
         return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
 
-    def place(self, packed: tuple[Any, Shape], block: slice, whole: Target, first: int, last: int) -> None:
+    def place(self, packed: tuple[Any, VertexBlock], block: slice, whole: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last, for a block of frames, into the whole."""
         parts, shape = packed
         normals = whole.normals[block] if len(shape.normals) else NOTHING
         tangents = whole.tangents[block] if len(shape.tangents) else NOTHING
-        self.skinner.place(parts, shape, Target(self.at, whole.positions[block], normals, tangents), first, last)
+        self.skinner.place(parts, shape, OutputSlice(self.at, whole.positions[block], normals, tangents), first, last)
 
-    def finish(self, frames: Frames, whole: Target) -> None:
+    def finish(self, frames: PoseBlock, whole: OutputSlice) -> None:
         """Bring what was placed in world space into the mesh's own, and make normals of the faces if need be."""
         span = slice(self.at, self.at + len(self.rig.points))
         if self.in_mesh_space and self.instance.skin is not None:
@@ -68,10 +68,10 @@ class Layer:
         if self.smooth is not None:
             self.smooth.of(whole.positions[:, span], whole.normals[:, span])
 
-    def at_rest(self, frames: Frames) -> Floats:
+    def at_rest(self, frames: PoseBlock) -> Floats:
         """Return the vertices (V, 3) in the first of the frames, blended linearly in float64."""
         bound = self.matrices(frames, slice(0, 1))[0]
-        points = _morphed(self.rig.points, self.instance.mesh.targets, self._weights(frames, slice(0, 1)))[..., 0]
+        points = _morph(self.rig.points, self.instance.mesh.targets, self._weights(frames, slice(0, 1)))[..., 0]
         owner = np.repeat(np.arange(len(points)), np.diff(self.rig.start))
         chosen = bound[self.rig.joint]
         moved = np.einsum("eij,ej->ei", chosen[..., :3], points[owner]) + chosen[..., 3]
@@ -82,7 +82,7 @@ class Layer:
             placed = matrix.apply(_inverse(frames.world[self.instance.node, :1])[0], placed)
         return placed
 
-    def matrices(self, frames: Frames, block: slice) -> Floats:
+    def matrices(self, frames: PoseBlock, block: slice) -> Floats:
         """Return world_from_mesh (n, J, 3, 4) of the joints; where there is no skin, of the node."""
         if self.in_mesh_space and self.instance.skin is None:
             count = len(frames.times[block])
@@ -94,37 +94,37 @@ class Layer:
         product = world.reshape(joints, 3 * count, 4) @ whole  # one per joint, not per frame: ten times faster
         return product.reshape(joints, count, 3, 4).transpose(1, 0, 2, 3)
 
-    def _shape(self, frames: Frames, block: slice) -> Shape:
+    def _shape(self, frames: PoseBlock, block: slice) -> VertexBlock:
         mesh, weights = self.instance.mesh, self._weights(frames, block)
         if not weights.any():
             return self.still
-        points = _morphed(self.rig.points, mesh.targets, weights)
-        normals = _morphed(self.rig.normals, mesh.normal_targets, weights)
-        tangents = _morphed(self.rig.tangents, mesh.tangent_targets, weights)
-        return Shape(_rows(points), _rows(normals), _rows(tangents))
+        points = _morph(self.rig.points, mesh.targets, weights)
+        normals = _morph(self.rig.normals, mesh.normal_targets, weights)
+        tangents = _morph(self.rig.tangents, mesh.tangent_targets, weights)
+        return VertexBlock(_rows(points), _rows(normals), _rows(tangents))
 
-    def _weights(self, frames: Frames, block: slice) -> Floats:
+    def _weights(self, frames: PoseBlock, block: slice) -> Floats:
         """Morph weights (n, M), or (1, M) where no frame has its own."""
         animated = frames.weights.get(self.instance.node)
         return self.instance.weights[None] if animated is None else animated[block]
 
 
-def layer(
+def bind_mesh(
     skeleton: Skeleton, instance: MeshInstance, make: Make, *, at: int, space: str, normals: bool, tangents: bool
-) -> Layer:
+) -> BoundMesh:
     """Return the layer of an instance. make: gets its rig, and whether its points never change and are all it needs."""
     name = instance.mesh.name or skeleton.names[instance.node] or f"node {instance.node}"
     try:
-        bound = rig(instance, skeleton.parents, normals=normals, tangents=tangents)
+        bound = bind_skin(instance, skeleton.parents, normals=normals, tangents=tangents)
     except AnimError as error:
         raise error.at(f"mesh '{name}'") from None
     smooth = SmoothNormals(bound.faces, len(bound.points)) if normals and instance.mesh.normals is None else None
     plain = not len(instance.mesh.targets) and not len(bound.normals) and not len(bound.tangents)
-    still = Shape(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))
-    return Layer(instance, bound, make(bound, plain), at, space == "mesh", smooth, still)
+    still = VertexBlock(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))
+    return BoundMesh(instance, bound, make(bound, plain), at, space == "mesh", smooth, still)
 
 
-def _morphed(base: Floats, targets: Floats | None, weights: Floats) -> Floats:
+def _morph(base: Floats, targets: Floats | None, weights: Floats) -> Floats:
     """base (V, 3) and targets (M, V, 3) by weights (n, M) → (V, 3, n); targets that never count are not read."""
     if targets is None or not len(targets) or not len(base):
         return base[:, :, None]
@@ -135,8 +135,8 @@ def _morphed(base: Floats, targets: Floats | None, weights: Floats) -> Floats:
     return np.asarray(base[:, :, None] + moved.reshape(*base.shape, -1))
 
 
-def _rows(values: Floats) -> Singles:
-    return np.ascontiguousarray(values, np.float32) if values.shape[2] == 1 else filled(values)
+def _rows(values: Floats) -> FloatArray:
+    return np.ascontiguousarray(values, np.float32) if values.shape[2] == 1 else fill_lanes(values)
 
 
 def _unit(vectors: Floats) -> Floats:

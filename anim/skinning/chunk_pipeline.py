@@ -12,11 +12,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import Clip, FrameChunk, Skeleton
-from anim.skinning.bound_mesh import Layer
-from anim.skinning.kernels.layout import LANES, NOTHING, Target
-from anim.skinning.pose_blocks import Frames, Playback
+from anim.skinning.bound_mesh import BoundMesh
+from anim.skinning.kernels.layout import LANES, NOTHING, OutputSlice
+from anim.skinning.pose_blocks import PoseBlock, PosePlayback
 
-Job: TypeAlias = tuple[Layer, Any, slice, int, int]  # a layer, what it packed, its block, first and last vertex
+Job: TypeAlias = tuple[BoundMesh, Any, slice, int, int]  # a layer, what it packed, its block, first and last vertex
 
 CHUNK_BYTES = 1 << 23  # of positions in a chunk, about; never less than LANES frames
 PACKED_BYTES = 1 << 22  # of matrices and morphed vertices that a chunk needs, about
@@ -25,11 +25,11 @@ MIN_VERTICES = 4096  # for which it is worth to wake a thread
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class ChunkPipeline:
     """What is made: `vertices` columns by these layers. threads: how many work on it, without any change of a bit."""
 
     skeleton: Skeleton
-    layers: Sequence[Layer]
+    layers: Sequence[BoundMesh]
     vertices: int
     normals: bool
     tangents: bool
@@ -40,7 +40,7 @@ class Stream:
 
         While the caller uses one chunk the next is skinned, and the poses of the one after it are sampled.
         """
-        playback, step = Playback(self.skeleton, clip), self._frames_per_chunk()
+        playback, step = PosePlayback(self.skeleton, clip), self._frames_per_chunk()
         with ThreadPoolExecutor(self.threads, thread_name_prefix="skinning") as pool:
             spans = (times[low : low + step] for low in range(0, len(times), step))
             started = (self._start(playback.at(span), pool) for span in spans)
@@ -57,13 +57,13 @@ class Stream:
         blocks = min(CHUNK_BYTES // (12 * self.vertices * LANES), PACKED_BYTES // (packed * LANES), MAX_BLOCKS)
         return LANES * max(blocks, 1)
 
-    def _start(self, frames: Frames, pool: ThreadPoolExecutor) -> _Started:
+    def _start(self, frames: PoseBlock, pool: ThreadPoolExecutor) -> _PendingChunk:
         shape = (len(frames.times), self.vertices, 3)
         wanted = (True, self.normals, self.tangents)
-        whole = Target(0, *(np.empty(shape, np.float32) if each else NOTHING for each in wanted))
-        return _Started(frames, whole, [pool.submit(_place, share, whole) for share in self._shares(frames)])
+        whole = OutputSlice(0, *(np.empty(shape, np.float32) if each else NOTHING for each in wanted))
+        return _PendingChunk(frames, whole, [pool.submit(_submit, share, whole) for share in self._shares(frames)])
 
-    def _shares(self, frames: Frames) -> list[list[Job]]:
+    def _shares(self, frames: PoseBlock) -> list[list[Job]]:
         """Return what each thread has to do: vertices of large layers are divided, in blocks of frames."""
         shares: list[list[Job]] = [[] for _ in range(self.threads)]
         next_share = cycle(shares)
@@ -77,7 +77,7 @@ class Stream:
                     next(next_share).append((layer, parts, block, first, last))
         return [share for share in shares if share]
 
-    def _finish(self, first: int, started: _Started) -> FrameChunk:
+    def _finish(self, first: int, started: _PendingChunk) -> FrameChunk:
         for future in started.futures:
             future.result()
         for layer in self.layers:
@@ -87,14 +87,14 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True)
-class _Started:
+class _PendingChunk:
     """A chunk that is being written."""
 
-    frames: Frames
-    whole: Target
+    frames: PoseBlock
+    whole: OutputSlice
     futures: list[Future[None]]
 
 
-def _place(share: list[Job], whole: Target) -> None:
+def _submit(share: list[Job], whole: OutputSlice) -> None:
     for layer, parts, block, first, last in share:
         layer.place(parts, block, whole, first, last)

@@ -9,13 +9,13 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
-from anim.skinning.binding import Rig
+from anim.skinning.binding import SkinBinding
 
-RIGID = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what float32 bind matrices leave behind
+RIGID_TOLERANCE = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what float32 bind matrices leave behind
 
 
 @dataclass(frozen=True, slots=True)
-class Split:
+class PolarDecomposition:
     """Joints' matrices as rotation (n, J, 4) xyzw and translation (n, J, 3), after a stretch and a scale.
 
     stretch: (n, J, 3, 4), scale: (n, J); None where all are rigid and there is nothing to stretch.
@@ -27,7 +27,7 @@ class Split:
     scale: Floats | None = None
 
 
-def split(matrices: Floats, pivots: Floats) -> Split:
+def decompose(matrices: Floats, pivots: Floats) -> PolarDecomposition:
     """Return affine matrices (n, J, 3, 4) as A p + t = R (S p + c o) + t′ − c R o, whatever c is.
 
     R is a rotation, o the joint's own place in bind space, `pivots` (J, 3), and t′ the place to which it goes. S is a
@@ -40,23 +40,23 @@ def split(matrices: Floats, pivots: Floats) -> Split:
     """
     linear = matrices[..., :3]
     if _is_rotation(linear).all():
-        return Split(quaternion.from_matrix(linear), matrices[..., 3])
-    return _stretched(matrices, pivots)
+        return PolarDecomposition(quaternion.from_matrix(linear), matrices[..., 3])
+    return _has_stretch(matrices, pivots)
 
 
-def split_after(matrices: Floats, pivots: Floats, shape: Floats) -> Split:
+def decompose_after(matrices: Floats, pivots: Floats, shape: Floats) -> PolarDecomposition:
     """Return matrices (n, J, 3, 4) in the same parts where all joints' stretches begin with one, `shape` (3, 3).
 
     pivots: (J, 3) m, stretched by it.
     """
     bound = np.concatenate((matrices[..., :3] @ np.linalg.inv(shape), matrices[..., 3:]), axis=-1)
-    parts = _stretched(bound, pivots)
+    parts = _has_stretch(bound, pivots)
     assert parts.stretch is not None
     whole = np.concatenate((parts.stretch[..., :3] @ shape, parts.stretch[..., 3:]), axis=-1)
     return replace(parts, stretch=whole)
 
 
-def pivots(rig: Rig) -> Floats:
+def joint_origins(rig: SkinBinding) -> Floats:
     """Return where each joint (J, 3) stands in mesh space at bind time; the origin for one that has no such place."""
     linear = rig.bind[..., :3]
     solvable = np.abs(np.linalg.det(linear)) > 0
@@ -71,26 +71,26 @@ def _is_rotation(linear: Floats) -> Bools:
     unit = [_dot(each, each) - 1 for each in (x, y, z)]
     square = np.stack([*unit, _dot(x, y), _dot(y, z), _dot(z, x)])
     normal = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    return np.asarray((np.abs(square).max(axis=0) < RIGID) & (_dot(normal, z) > 0))
+    return np.asarray((np.abs(square).max(axis=0) < RIGID_TOLERANCE) & (_dot(normal, z) > 0))
 
 
 def _dot(a: Sequence[Floats], b: Sequence[Floats]) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _stretched(matrices: Floats, pivots: Floats) -> Split:
+def _has_stretch(matrices: Floats, pivots: Floats) -> PolarDecomposition:
     linear, moved = matrices[..., :3], matrices[..., 3]
     turn, stretch = _polar(linear, np.swapaxes(linear, -1, -2) @ linear)
     whole = np.concatenate((stretch, -_times(stretch, pivots)[..., None]), axis=-1)
     scale = np.cbrt(np.linalg.det(linear))
-    return Split(quaternion.from_matrix(turn), _times(linear, pivots) + moved, whole, scale)
+    return PolarDecomposition(quaternion.from_matrix(turn), _times(linear, pivots) + moved, whole, scale)
 
 
 def _polar(linear: Floats, square: Floats) -> tuple[Floats, Floats]:
     """Rotation and stretch (..., 3, 3); the slow way only for matrices that are no rotation times a number."""
     size = np.sqrt(np.trace(square, axis1=-2, axis2=-1) / 3)[..., None, None]
     sign = np.where(np.linalg.det(linear) < 0, -1.0, 1.0)[..., None, None]
-    even = (np.abs(square - size**2 * np.eye(3)).max(axis=(-1, -2)) <= RIGID * size[..., 0, 0] ** 2) & (
+    even = (np.abs(square - size**2 * np.eye(3)).max(axis=(-1, -2)) <= RIGID_TOLERANCE * size[..., 0, 0] ** 2) & (
         size[..., 0, 0] > 0
     )
     turn = sign * linear / np.where(size > 0, size, 1)

@@ -13,31 +13,31 @@ from anim.sampling.pose import PoseSampler, world_by_node
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
+class PoseBlock:
     """F frames at `times` (F,) s: world_from_node (N, F, 3, 4), and animated morph weights (F, M) by node number."""
 
     times: Floats
     world: Floats
     weights: Mapping[int, Floats]
 
-    def part(self, span: slice) -> Frames:
+    def part(self, span: slice) -> PoseBlock:
         """Return some of the frames, in the same memory."""
         weights = {node: values[span] for node, values in self.weights.items()}
-        return Frames(self.times[span], self.world[:, span], weights)
+        return PoseBlock(self.times[span], self.world[:, span], weights)
 
 
-class Playback:
+class PosePlayback:
     """A clip on a skeleton, to be asked for many stretches of time: its keys are put in order once."""
 
     def __init__(self, skeleton: Skeleton, clip: Clip) -> None:
         self._skeleton, self._poses = skeleton, PoseSampler(skeleton, clip)
 
-    def at(self, times: Floats) -> Frames:
+    def at(self, times: Floats) -> PoseBlock:
         """Return the frames at `times` (F,) in seconds."""
         pose = self._poses.at(times)
-        return Frames(pose.times, world_by_node(self._skeleton, pose), pose.weights)
+        return PoseBlock(pose.times, world_by_node(self._skeleton, pose), pose.weights)
 
 
-def at_rest(skeleton: Skeleton) -> Frames:
+def rest_block(skeleton: Skeleton) -> PoseBlock:
     """Return one frame, of the nodes at rest."""
-    return Playback(skeleton, Clip("", ())).at(np.zeros(1))
+    return PosePlayback(skeleton, Clip("", ())).at(np.zeros(1))

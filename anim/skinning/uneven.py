@@ -7,11 +7,11 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
-from anim.skinning.bound_mesh import Layer
-from anim.skinning.pose_blocks import Playback
+from anim.skinning.bound_mesh import BoundMesh
+from anim.skinning.pose_blocks import PosePlayback
 from anim.skinning.weighted_joints import bind_shape
 
-UNEVEN = 1e-3  # by how much factors may differ, as a share; rounding in files leaves less
+UNEVEN_SCALE = 1e-3  # by how much factors may differ, as a share; rounding in files leaves less
 AT_ONCE = 256  # frames
 
 
@@ -20,7 +20,7 @@ def uneven_joints(made: Baker, clip: Clip, times: Floats) -> tuple[int, ...]:
 
     A stretch that all bind matrices of a mesh have alike doesn't count: it is undone before joints move the mesh.
     """
-    playback = Playback(made.scene.skeleton, clip)
+    playback = PosePlayback(made.scene.skeleton, clip)
     found: set[int] = set()
     for first in range(0, len(times), AT_ONCE):
         frames = playback.at(times[first : first + AT_ONCE])
@@ -29,7 +29,7 @@ def uneven_joints(made: Baker, clip: Clip, times: Floats) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def _uneven(layer: Layer, matrices: Floats) -> set[int]:
+def _uneven(layer: BoundMesh, matrices: Floats) -> set[int]:
     """matrices: (n, J, 3, 4) of a mesh's joints."""
     used = np.unique(layer.rig.joint)
     linear, shape = matrices[:, used, :, :3], bind_shape(layer.rig)
@@ -37,5 +37,5 @@ def _uneven(layer: Layer, matrices: Floats) -> set[int]:
         linear = linear @ np.linalg.inv(shape)
     square = np.swapaxes(linear, -1, -2) @ linear
     even = np.trace(square, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
-    off = np.abs(square - even).max(axis=(0, 2, 3)) > 2 * UNEVEN * even[..., 0, 0].max(axis=0)
+    off = np.abs(square - even).max(axis=(0, 2, 3)) > 2 * UNEVEN_SCALE * even[..., 0, 0].max(axis=0)
     return {int(layer.rig.nodes[joint]) for joint in used[off]}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Ints
-from anim.skinning.kernels.layout import Singles
+from anim.skinning.kernels.layout import FloatArray
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class SmoothNormals:
     faces: Ints
     vertices: int
 
-    def of(self, positions: Singles, normals: Singles) -> None:
+    def of(self, positions: FloatArray, normals: FloatArray) -> None:
         """Write the normals of positions (n, V, 3) into `normals`."""
         from anim.skinning.kernels.vertex_normals import vertex_normals
 

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.skinning.binding import Rig
-from anim.skinning.kernels.layout import Held, Singles, Stretches, group_influences
+from anim.skinning.binding import SkinBinding
+from anim.skinning.kernels.layout import FloatArray, Influences, ScaleShear, group_influences
 from anim.skinning.methods.skinner import lanes
-from anim.skinning.polar_decomposition import Split, pivots, split, split_after
+from anim.skinning.polar_decomposition import PolarDecomposition, decompose, decompose_after, joint_origins
 
-EVEN = 1e-4  # how far a bind matrix's stretch may be from a uniform one without being one
+SCALE_TOLERANCE = 1e-4  # how far a bind matrix's stretch may be from a uniform one without being one
 
 
 @dataclass(frozen=True)
-class Carriers:
+class WeightedJoints:
     """Joints with weight: another one may have any bind scale, and moves nothing.
 
     used: (U,) their numbers in the rig, increasing. shape: (3, 3) bind_from_mesh, symmetric, None where it is 1: a mesh
@@ -25,41 +25,41 @@ class Carriers:
     the shares by which their scales make up that of the vertex.
     """
 
-    rig: Rig
+    rig: SkinBinding
     used: Ints = field(init=False, repr=False)
     shape: Floats | None = field(init=False, repr=False)
     pivots: Floats = field(init=False, repr=False)
-    held: Held = field(init=False, repr=False)
-    ruling: Held = field(init=False, repr=False)
+    held: Influences = field(init=False, repr=False)
+    ruling: Influences = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         used = np.unique(self.rig.joint).astype(np.int64)
         held = self.rig.held._replace(joint=np.searchsorted(used, self.rig.joint).astype(np.int32))
-        shape, places = bind_shape(self.rig), pivots(self.rig)[used]
+        shape, places = bind_shape(self.rig), joint_origins(self.rig)[used]
         for name, value in (
             ("used", used),
             ("shape", shape),
             ("pivots", places if shape is None else places @ shape),
             ("held", group_influences(held)),
-            ("ruling", group_influences(held._replace(weight=scale_shares(self.rig)))),
+            ("ruling", group_influences(held._replace(weight=scale_fractions(self.rig)))),
         ):
             object.__setattr__(self, name, value)
 
-    def split(self, matrices: Floats) -> Split:
+    def split(self, matrices: Floats) -> PolarDecomposition:
         """Return the parts of matrices (n, J, 3, 4) of all of the rig's joints, for those with weight."""
         mine = matrices if len(self.used) == matrices.shape[1] else matrices[:, self.used]
-        return split(mine, self.pivots) if self.shape is None else split_after(mine, self.pivots, self.shape)
+        return decompose(mine, self.pivots) if self.shape is None else decompose_after(mine, self.pivots, self.shape)
 
-    def stretches(self, parts: Split) -> Stretches | None:
+    def stretches(self, parts: PolarDecomposition) -> ScaleShear | None:
         """Return stretches as kernels read them, None of rigid parts."""
         if parts.stretch is None or parts.scale is None:
             return None
         rows = parts.stretch.reshape(*parts.scale.shape, 12)
         places = np.broadcast_to(self.pivots, (*parts.scale.shape, 3))
-        return Stretches(lanes(np.concatenate((rows, places), axis=-1)), lanes(parts.scale), self.ruling)
+        return ScaleShear(lanes(np.concatenate((rows, places), axis=-1)), lanes(parts.scale), self.ruling)
 
 
-def bind_shape(rig: Rig) -> Floats | None:
+def bind_shape(rig: SkinBinding) -> Floats | None:
     """Return the symmetric matrix (3, 3) of determinant 1 by which bind matrices stretch the mesh, None for no stretch.
 
     A bind matrix is a rotation after a stretch; this is the stretch without its scale, the mean over the joints by
@@ -73,10 +73,10 @@ def bind_shape(rig: Rig) -> Floats | None:
         return None
     even = factors / np.cbrt(np.where(sizes > 0, sizes, 1))[:, None]
     shape = np.average(np.swapaxes(axes, -1, -2) @ (even[..., None] * axes), axis=0, weights=weight)
-    return None if np.abs(shape - np.eye(3)).max() < EVEN else shape
+    return None if np.abs(shape - np.eye(3)).max() < SCALE_TOLERANCE else shape
 
 
-def scale_shares(rig: Rig) -> Singles:
+def scale_fractions(rig: SkinBinding) -> FloatArray:
     """Return the shares (E,) by which the scales of a vertex's joints make up the one scale of the vertex.
 
     Two joints that blend are as far apart as the scale of the upper one makes them, so each pair takes that one's;

@@ -19,20 +19,20 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Scene, VertexCache
 from anim.ops.selection import Selection
 from anim.sampling.times import frame_times
-from anim.skinning.analysis.inbetween_error import Missed, between
+from anim.skinning.analysis.inbetween_error import InbetweenError, inbetween_error
 from anim.skinning.analysis.method_deviation import Deviation, deviation, linear_baker
-from anim.skinning.bake import SPACES, Baker, baked, baker
+from anim.skinning.bake import SPACES, Baker, bakeable_instances, prepare_bake
 from anim.skinning.uneven import uneven_joints
 from cli import text, units
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
 from cli.io import cache_files, documents, output_names, scenes
-from cli.io.cache_files import Saved
+from cli.io.cache_files import SavedCache
 from cli.options import caches, common, mesh_selection
 from cli.options.skinning_methods import ABOUT, Method
 from cli.progress import Progress
 from cli.reports import bake_notes
-from cli.text import Voice, plural
+from cli.text import Reporter, plural
 
 PLACEHOLDERS = ("mesh", "clip")
 LISTED = 8  # files in a note
@@ -42,7 +42,7 @@ Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc
 WORLD = Space("world")
 
 
-def bake(
+def command(
     input: common.Input = "-",
     output: caches.Product = "-",
     *,
@@ -62,11 +62,11 @@ def bake(
     mesh: mesh_selection.Meshes = None,
     space: Annotated[Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")] = WORLD,
     normals: Annotated[
-        bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(caches.holding('normals'))}).")
+        bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(caches.formats_with('normals'))}).")
     ] = False,
     tangents: Annotated[
         bool,
-        typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(caches.holding('tangents'))})."),
+        typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(caches.formats_with('tangents'))})."),
     ] = False,
     rigid: Annotated[bool, typer.Option("--rigid", help="Bake meshes that only nodes move, too.")] = False,
     format: caches.FormatOption = None,
@@ -91,19 +91,19 @@ def bake(
     define all methods but lbs differently: here each joint stretches the mesh about its own place, then turns it. A
     method that loses the model in any frame is warned of.
     """
-    voice = Voice(quiet, verbose)
+    voice = Reporter(quiet, verbose)
     began = time.perf_counter()
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     ending = cache_files.check(output, None if format is None else f".{format}", PLACEHOLDERS)
     given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    caches.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
-    caches.check_held(ending, normals=normals, tangents=tangents)
+    caches.write_options(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    caches.check_supported(ending, normals=normals, tangents=tangents)
     done: list[_Done] = []
     with documents.source(input, voice) as source:
         document = source.document
         clips = reader.clips(document)
-        scene = scenes.scene(
+        scene = scenes.read_scene(
             document,
             source.name,
             voice,
@@ -116,9 +116,9 @@ def bake(
         groups = _groups(scene, nodes, output, rigid=rigid)
         jobs = _jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
         announce_compiling(voice)
-        if not rigid and baked(scene, nodes=nodes):
-            bake_notes.left_out(scene, nodes, voice)
-        missed: list[tuple[str, Missed]] = []
+        if not rigid and bakeable_instances(scene, nodes=nodes):
+            bake_notes.left_out_note(scene, nodes, voice)
+        missed: list[tuple[str, InbetweenError]] = []
         made: dict[int, Baker] = {}
         linear: Baker | None = None
         deviations: list[tuple[str, Deviation]] = []
@@ -126,7 +126,7 @@ def bake(
         for job in jobs:
             if job.group not in made:
                 made = {
-                    job.group: baker(
+                    job.group: prepare_bake(
                         scene,
                         method=method.value,
                         blend=blend,
@@ -140,16 +140,16 @@ def bake(
                 }
                 linear = None if method is LBS else linear_baker(made[job.group], space=space.value)
             each = Clip("", ()) if job.clip is None else clips[job.clip]
-            times, label = _times(each, fps), reader.label(each.name, job.clip or 0)
+            times, label = _times(each, fps), reader.clip_label(each.name, job.clip or 0)
             if linear is not None:
                 deviations.append((label, deviation(made[job.group], linear, each, times)))
                 uneven.update(uneven_joints(made[job.group], each, times))
             if fps is None:
-                missed.append((label, between(made[job.group], each, times)))
+                missed.append((label, inbetween_error(made[job.group], each, times)))
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
             cache = _turned(made[job.group].bake(each, times=times, progress=progress), up, order)
             try:
-                writing = caches.writing(ending, given | {"max_error": _meters(max_error, cache)})
+                writing = caches.write_options(ending, given | {"max_error": _meters(max_error, cache)})
                 saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)
             except BaseException:
                 _say_written(done, voice, dry_run=dry_run)
@@ -161,10 +161,10 @@ def bake(
             if len(jobs) > 1:
                 voice.detail(f"  {_summary(done[-1:], method.value)}")
         at_rest = made[jobs[-1].group].rest
-    bake_notes.gaps(missed, at_rest, voice)
-    bake_notes.lost(deviations, method.value, voice)
-    bake_notes.uneven(sorted(uneven), scene, method.value, voice)
-    took = text.took(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
+    bake_notes.frame_gap_note(missed, at_rest, voice)
+    bake_notes.lost_data_notes(deviations, method.value, voice)
+    bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)
+    took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
     voice.say(f"{_summary(done, method.value)}, {took}")
 
 
@@ -185,7 +185,7 @@ class _Done:
     clip: str
     frames: int
     vertices: int
-    saved: Saved
+    saved: SavedCache
 
 
 Group = tuple[str, Sequence[int] | None]  # what {mesh} becomes, and the nodes of the meshes; None for all
@@ -195,7 +195,7 @@ def _groups(scene: Scene, nodes: Sequence[int] | None, output: str, *, rigid: bo
     """Meshes that go into a file together: each by itself where OUT says {mesh}."""
     if "{mesh}" not in output:
         return [("", nodes)]
-    chosen = {each.node: each.mesh.name for each in baked(scene, rigid=rigid, nodes=nodes)}
+    chosen = {each.node: each.mesh.name for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)}
     return [(name or scene.skeleton.names[node], [node]) for node, name in chosen.items()] or [("", nodes)]
 
 
@@ -216,7 +216,7 @@ def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tup
     return [_Job(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
 
 
-def _say_written(done: Sequence[_Done], voice: Voice, *, dry_run: bool) -> None:
+def _say_written(done: Sequence[_Done], voice: Reporter, *, dry_run: bool) -> None:
     """Say which files are there already where a later one fails."""
     if done and not dry_run:
         names = ", ".join(each.file for each in done[:LISTED])
@@ -226,15 +226,15 @@ def _say_written(done: Sequence[_Done], voice: Voice, *, dry_run: bool) -> None:
 
 def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
     if order is not None:
-        cache = orders.ordered(cache, str(order))
-    return cache if up is None else up_axis.turned(cache, str(up))
+        cache = orders.reorder(cache, str(order))
+    return cache if up is None else up_axis.to_up_axis(cache, str(up))
 
 
 def _meters(max_error: str | None, cache: VertexCache) -> float | None:
-    return None if max_error is None else units.meters(max_error, "--max-error", lambda: bounds.diagonal(cache))
+    return None if max_error is None else units.parse_length(max_error, "--max-error", lambda: bounds.diagonal(cache))
 
 
-def _say_notes(done: list[_Done], voice: Voice) -> None:
+def _say_notes(done: list[_Done], voice: Reporter) -> None:
     """Notes of the last file that none before it had."""
     told = {note for each in done[:-1] for note in each.saved.written.notes}
     for note in done[-1].saved.written.notes:
@@ -247,11 +247,11 @@ def _summary(done: list[_Done], method: str) -> str:
     name = file if len(done) == 1 else f"{plural(len(done), 'clip')}, {file} …"
     frames = plural(sum(each.frames for each in done), "frame")
     of = f" of '{done[0].clip}'" if len(done) == 1 and done[0].clip else ""
-    parts = [f"{name}  {text.size(sum(each.saved.size for each in done))}", f"{method}{of}"]
+    parts = [f"{name}  {text.format_bytes(sum(each.saved.size for each in done))}", f"{method}{of}"]
     vertices = sorted({each.vertices for each in done})
     parts.append(f"{frames} of {' to '.join(map(str, dict.fromkeys((vertices[0], vertices[-1]))))} vertices")
     errors = [each.saved.written.max_error for each in done if each.saved.written.max_error is not None]
-    parts += [f"max {text.length(max(errors))} at frames"] if errors else []
+    parts += [f"max {text.format_length(max(errors))} at frames"] if errors else []
     count = sum(len(each.saved.files) for each in done)
     return ", ".join([*parts, *([plural(count, "file")] if count > len(done) else [])])
 

@@ -12,7 +12,7 @@ from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.ops.selection import Selection
 from anim.sampling.times import frame_times
-from anim.show.plots.collapse_plot import collapse as picture_of
+from anim.show.plots.collapse_plot import collapse_plot as picture_of
 from anim.skinning.analysis.collapse import Comparison
 from anim.skinning.analysis.recommendations import Found
 from cli.errors import UsageError
@@ -23,13 +23,13 @@ from cli.options.common import Format
 from cli.options.skinning_methods import Method
 from cli.progress import Progress
 from cli.reports import collapse_report
-from cli.reports.collapse_report import Seen
-from cli.text import Voice, size
+from cli.reports.collapse_report import CollapseReport
+from cli.text import Reporter, format_bytes
 
 USUAL = ("lbs", "dqs")
 
 
-def collapse(
+def command(
     input: common.Input = "-",
     *,
     method: Annotated[
@@ -57,17 +57,17 @@ def collapse(
     distance of a vertex from the links between its joints, against that in bind pose. Below: what to do.
     """
     _check(fps, plot)
-    voice = Voice(quiet)
+    voice = Reporter(quiet)
     methods = tuple(dict.fromkeys(str(each) for each in method)) if method else USUAL
     found: list[Found] = []
     with documents.source(input, voice) as source:
         document = source.document
         clips = reader.clips(document)
-        scene = scenes.scene(document, source.name, voice, nodes=lambda scene: mesh_selection.nodes(scene, mesh))
+        scene = scenes.read_scene(document, source.name, voice, nodes=lambda scene: mesh_selection.nodes(scene, mesh))
         numbers = Selection(clip or ()).chosen_clips(reader.names(document))
         if plot is not None and not numbers:
             raise NotFoundError("there is no clip to draw")
-        announce_compiling(Voice(quiet))
+        announce_compiling(Reporter(quiet))
         comparison = Comparison(
             scene, methods=methods, bulge_clamp=bulge_clamp, nodes=mesh_selection.nodes(scene, mesh)
         )
@@ -79,7 +79,7 @@ def collapse(
             ]
             progress(done + 1)
         progress.close()
-    seen = Seen(source.name, comparison.meshes, methods, bulge_clamp, fps, found, voice.warnings)
+    seen = CollapseReport(source.name, comparison.meshes, methods, bulge_clamp, fps, found, voice.warnings)
     if plot is not None:
         _draw(seen, plot, voice)
     if format is Format.JSON:
@@ -97,10 +97,10 @@ def _check(fps: float, plot: str | None) -> None:
             raise UsageError(f"{plot}: is no .png or .svg file")
 
 
-def _draw(seen: Seen, plot: str, voice: Voice) -> None:
+def _draw(seen: CollapseReport, plot: str, voice: Reporter) -> None:
     title = PurePath(seen.name).stem + (", bulge clamp" if seen.clamped else "")
     picture = picture_of(
         collapse_report.worst_of_clips(seen.found), title=title, kind=PurePath(plot).suffix.lower()[1:]
     )
     documents.write_bytes([np.frombuffer(picture, np.uint8)], plot)
-    voice.say(f"{plot}  {size(len(picture))}")
+    voice.say(f"{plot}  {format_bytes(len(picture))}")

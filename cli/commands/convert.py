@@ -14,7 +14,7 @@ from cli.options import common
 from cli.reports import image_notes
 
 
-def convert(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -30,7 +30,7 @@ def convert(
     of the JSON stays as it is: numbers, order, extras, unknown extensions. In another folder external images are copied
     beside the output.
     """
-    voice = text.Voice(quiet)
+    voice = text.Reporter(quiet)
     began = time.perf_counter()
     if not dry_run:
         documents.check_output(output)
@@ -44,4 +44,4 @@ def convert(
         for note in image_notes.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
             voice.say(note)
     name = source.name if output == documents.PIPE else output
-    voice.say(f"{name}  {text.change(source.size, size)}, {text.took(time.perf_counter() - began)}")
+    voice.say(f"{name}  {text.format_change(source.size, size)}, {text.format_duration(time.perf_counter() - began)}")

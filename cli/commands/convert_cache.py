@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from anim.caches.options import Reading
+from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS
 from anim.caches.transforms import bounds, resample, up_axis
 from anim.caches.transforms import vertex_order as orders
@@ -27,7 +27,7 @@ Cache = Annotated[
 ]
 
 
-def convert_cache(
+def command(
     input: Cache = "-",
     output: caches.Product = "-",
     *,
@@ -60,7 +60,7 @@ def convert_cache(
     --order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply. Textures (.exr, .png) get a JSON
     and a mesh beside them. A pipe takes one file: textures don't go through it, of sequences a single frame does.
     """
-    voice = text.Voice(quiet)
+    voice = text.Reporter(quiet)
     began = time.perf_counter()
     for name, rate in (("--fps", fps), ("--read-fps", read_fps)):
         if rate is not None and rate <= 0:
@@ -69,16 +69,16 @@ def convert_cache(
         raise UsageError("--at and --fps exclude each other")
     ending = cache_files.check(output, None if format is None else f".{format}")
     given: dict[str, Any] = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    caches.writing(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
-    with cache_files.load(input, Reading(read_fps)) as loaded:
+    caches.write_options(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    with cache_files.load(input, ReadOptions(read_fps)) as loaded:
         if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
         if loaded.ending == ".glb":
             announce_compiling(voice)
         cache = _changed(loaded.cache, at, fps, up, order)
         if max_error is not None:
-            given["max_error"] = units.meters(max_error, "--max-error", lambda: bounds.diagonal(cache))
-        writing = caches.writing(ending, given)
+            given["max_error"] = units.parse_length(max_error, "--max-error", lambda: bounds.diagonal(cache))
+        writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:
             saved = cache_files.save(_counted(cache, progress), output, writing, ending=ending, dry_run=dry_run)
@@ -93,14 +93,14 @@ def convert_cache(
         voice.say(f"note: {note}")
     name = loaded.name if output == documents.PIPE else output
     parts = [
-        f"{name}  {text.change(size, saved.size)}",
+        f"{name}  {text.format_change(size, saved.size)}",
         f"{text.plural(cache.frame_count, 'frame')} of {cache.vertex_count} vertices",
     ]
     if saved.written.max_error is not None:
-        parts.append(f"max {text.length(saved.written.max_error)}")
+        parts.append(f"max {text.format_length(saved.written.max_error)}")
     if len(saved.files) > 1:
         parts.append(f"{len(saved.files)} files")
-    parts.append(text.took(time.perf_counter() - began))
+    parts.append(text.format_duration(time.perf_counter() - began))
     voice.say(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
 
 
@@ -112,8 +112,8 @@ def _changed(
     if fps is not None:
         cache = resample.at_rate(cache, fps)
     if chosen is not None:
-        cache = orders.ordered(cache, str(chosen))
-    return cache if up is None else up_axis.turned(cache, str(up))
+        cache = orders.reorder(cache, str(chosen))
+    return cache if up is None else up_axis.to_up_axis(cache, str(up))
 
 
 def _counted(cache: VertexCache, progress: Progress) -> VertexCache:

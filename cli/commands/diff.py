@@ -13,12 +13,12 @@ import typer
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
-from anim.measure.compare.name_matching import by_name
-from anim.measure.error.error_curve import profile
-from anim.measure.error.metric import FPS, Ruler
-from anim.measure.error.surface import diagonal, measured_at
-from anim.measure.inspect.storage_cost import Footprint, footprints
-from anim.measure.inspect.stored_bytes import stored
+from anim.measure.compare.name_matching import match_by_name
+from anim.measure.error.error_curve import error_curve
+from anim.measure.error.metric import FPS, ErrorMetric
+from anim.measure.error.surface import diagonal, is_measured_at
+from anim.measure.inspect.storage_cost import StorageCost, storage_costs
+from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip, Scene
 from anim.ops.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
@@ -30,8 +30,8 @@ from cli.io import documents, scenes
 from cli.options import common
 from cli.options.common import Format
 from cli.reports import diff_report
-from cli.reports.diff_report import File, Found
-from cli.text import Voice, length, plural, size
+from cli.reports.diff_report import DiffReport, File
+from cli.text import Reporter, format_bytes, format_length, plural
 
 OFF = ("0", "0%", "0m")
 
@@ -40,7 +40,7 @@ Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[m
 SPEC = Player("spec")
 
 
-def diff(
+def command(
     old: Annotated[str, typer.Argument(metavar="A", help="A .glb or .gltf file, '-' for stdin.", show_default=False)],
     new: Annotated[
         str | None,
@@ -83,7 +83,7 @@ def diff(
     are not of unit length show there. --players spec,nlerp holds one file against itself as two players show it: slerp
     against nlerp.
     """
-    voice, selection = Voice(quiet), Selection(clip or ())
+    voice, selection = Reporter(quiet), Selection(clip or ())
     who = _players(new, str(player), players)
     if old == new == documents.PIPE:
         raise UsageError("A and B can't both be stdin")
@@ -93,12 +93,12 @@ def diff(
     one = _opened(old, voice)
     other = one if new is None else _opened(new, voice)
     scale = diagonal(one.scene)
-    limit = None if fail_above is None else units.meters(fail_above, "--fail-above", lambda: scale)
-    radius = 0.0 if shell.strip() in OFF else units.meters(shell, "--shell", lambda: scale)
-    ruler = Ruler(one.scene, other.scene, shell=radius / scale if radius and scale else None)
+    limit = None if fail_above is None else units.parse_length(fail_above, "--fail-above", lambda: scale)
+    radius = 0.0 if shell.strip() in OFF else units.parse_length(shell, "--shell", lambda: scale)
+    ruler = ErrorMetric(one.scene, other.scene, shell=radius / scale if radius and scale else None)
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
-    report = Found(one.file, other.file, found, *_names(one, other), who, fps, radius, measured_at(one.scene))
+    report = DiffReport(one.file, other.file, found, *_names(one, other), who, fps, radius, is_measured_at(one.scene))
     if report.are_strangers:
         voice.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
     if format is Format.JSON:
@@ -108,7 +108,7 @@ def diff(
     if plot is not None:
         drawn = _drawn(report, ruler, one, other, kind, limit)
         documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
-        voice.say(f"{plot}  {size(len(drawn))}")
+        voice.say(f"{plot}  {format_bytes(len(drawn))}")
     if limit is not None:
         _check(report, limit)
 
@@ -136,13 +136,13 @@ class _Side:
     scene: Scene
 
 
-def _opened(path: str, voice: Voice) -> _Side:
+def _opened(path: str, voice: Reporter) -> _Side:
     with documents.source(path, voice) as source:
         document = source.document
         accessors = Accessors(document)
         clips = reader.clips(document, accessors)
-        scene = scenes.scene(document, source.name, voice, accessors=accessors)
-        cost = Footprint(stored(document), footprints(document)[1].json)
+        scene = scenes.read_scene(document, source.name, voice, accessors=accessors)
+        cost = StorageCost(stored_bytes(document), storage_costs(document)[1].json)
         return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
 
 
@@ -150,7 +150,7 @@ def _names(one: _Side, other: _Side) -> tuple[int, bool]:
     """How many nodes of one have a namesake in the other, and whether both have any names at all."""
     nodes = one.scene.skeleton.names, other.scene.skeleton.names
     are_named = all(any((*side.file.clips, *names)) for side, names in zip((one, other), nodes, strict=True))
-    return int((by_name(*nodes) >= 0).sum()), are_named
+    return int((match_by_name(*nodes) >= 0).sum()), are_named
 
 
 def _kind(path: str) -> str:
@@ -161,11 +161,11 @@ def _kind(path: str) -> str:
     return ending
 
 
-def _drawn(found: Found, ruler: Ruler, one: _Side, other: _Side, kind: str, limit: float | None) -> bytes:
+def _drawn(found: DiffReport, ruler: ErrorMetric, one: _Side, other: _Side, kind: str, limit: float | None) -> bytes:
     apart = [each for each in found.diff.clips if each.error.max_error > 0]
     profiles = [
         replace(
-            profile(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps),
+            error_curve(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps),
             name=reader.clip_name(each.name, each.old),
         )
         for each in apart[: picture.LIMIT]
@@ -174,7 +174,7 @@ def _drawn(found: Found, ruler: Ruler, one: _Side, other: _Side, kind: str, limi
     title = f"{PurePath(found.old.name).name} → {PurePath(found.new.name).name}"
     if "," in found.player:
         title = f"{PurePath(found.old.name).name}: {found.player.replace(',', ' → ')}"
-    return picture.diff(profiles, title=title, kind=kind, limit=limit, note=note)
+    return picture.error_plot(profiles, title=title, kind=kind, limit=limit, note=note)
 
 
 def _left_out(drawn: int, apart: int, count: int) -> str:
@@ -186,14 +186,14 @@ def _left_out(drawn: int, apart: int, count: int) -> str:
     return f"{shown}, {count - apart} without difference" if count > apart else shown
 
 
-def _check(found: Found, limit: float) -> None:
+def _check(found: DiffReport, limit: float) -> None:
     """Raise CheckError where a clip is farther away than `limit`, in m, or missing, or nothing was compared."""
     if found.diff.missing_clips:
         number = found.diff.missing_clips[0]
-        raise CheckError(f"{found.new.name}: {reader.label(found.old.clips[number], number)} is missing")
+        raise CheckError(f"{found.new.name}: {reader.clip_label(found.old.clips[number], number)} is missing")
     if not found.diff.clips:
         raise CheckError(f"{found.old.name}, {found.new.name}: no clips to compare")
     above = [each for each in found.diff.clips if each.error.max_error > limit]
     if above:
         more = f" and {len(above) - 1} more" if len(above) > 1 else ""
-        raise CheckError(f"{found.new.name}: {diff_report.worst(found)}{more} (limit {length(limit)})")
+        raise CheckError(f"{found.new.name}: {diff_report.worst(found)}{more} (limit {format_length(limit)})")

@@ -21,8 +21,8 @@ from cli import units
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
-from cli.text import Voice
-from cli.workflows.edit_clips import Clips, edit
+from cli.text import Reporter
+from cli.workflows.edit_clips import Clips, edit_clips
 
 
 class Per(StrEnum):
@@ -36,7 +36,7 @@ Interpolation = StrEnum("Interpolation", [(name, name) for name in by_segment.OU
 CUBIC = Interpolation("cubicspline")
 
 
-def ease(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -76,7 +76,7 @@ def ease(
         documents.write_text(_table())
         return
     easing = parse(ease)
-    share, angle = units.share(tolerance, "--tolerance"), units.angle(angle_tolerance, "--angle-tolerance")
+    share, angle = units.parse_share(tolerance, "--tolerance"), units.parse_angle(angle_tolerance, "--angle-tolerance")
     if per is Per.RANGE and easing.stepped:
         raise UsageError(f"'{easing.name}' jumps, and time can't", help="--per segment makes STEP keys of it")
     tolerances = by_segment.Tolerances(share, angle)
@@ -106,12 +106,12 @@ def ease(
         return eased
 
     selection = Selection(clip or (), node or (), path or ())
-    edit(
+    edit_clips(
         input,
         output,
         selection,
         change,
-        Voice(quiet, verbose),
+        Reporter(quiet, verbose),
         dry_run=dry_run,
         measure=False,
         notes=lambda before, after: _notes(before, after, easing, per),
@@ -153,7 +153,7 @@ def _usual_step(tracks: Iterable[Track]) -> float | None:
 
 
 def _labels(clips: Clips, numbers: Iterable[int]) -> str:
-    return reader.labels([(clips[i].name, i) for i in numbers])
+    return reader.clip_labels([(clips[i].name, i) for i in numbers])
 
 
 def _table() -> str:

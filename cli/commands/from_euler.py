@@ -11,19 +11,19 @@ from typing import Annotated
 import typer
 
 from anim.errors import FormatError, RangeError
-from anim.exchange.euler.baked_keys import Keys
-from anim.exchange.euler.convention import Stated
-from anim.exchange.euler.evaluate import extent, skeleton
+from anim.exchange.euler.baked_keys import KeyPlacement
+from anim.exchange.euler.convention import PartialConvention
+from anim.exchange.euler.evaluate import bounding_size, skeleton
 from anim.exchange.euler.from_euler import from_euler as converted_from
-from anim.exchange.euler.gimbal import gimbal
-from anim.exchange.euler.motion import EulerMotion, Unit, scaled, turned_up
+from anim.exchange.euler.gimbal import gimbal_stats
+from anim.exchange.euler.motion import EulerMotion, Unit, scale_motion, z_up_to_y_up
 from anim.exchange.euler.unit_guess import guess_unit
 from anim.exchange.formats import registry
 from anim.exchange.formats.bvh_reader import BvhPosition
-from anim.exchange.formats.registry import TRACK_FORMATS, Reading
-from anim.exchange.retarget.retarget import Floor
-from anim.exchange.split_skins import trees
-from anim.exchange.stick_mesh import sticks
+from anim.exchange.formats.registry import TRACK_FORMATS, TrackReadOptions
+from anim.exchange.retarget.retarget import GroundMode
+from anim.exchange.split_skins import split_by_root
+from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf import authoring
 from anim.maths.euler import AxesConvention, check_order
 from cli import text, units
@@ -32,8 +32,8 @@ from cli.io import documents
 from cli.options import common
 from cli.options.common import Format
 from cli.reports import from_euler_report
-from cli.reports.from_euler_report import Conversion
-from cli.workflows.character import Casting, cast, check_name, index_of, named, pairs
+from cli.reports.from_euler_report import ConversionReport
+from cli.workflows.character import CharacterOptions, check_name, index_of, named, pairs, put_on_character
 
 TALL = 10.0  # m; a skeleton that is taller is hardly in meters
 
@@ -52,7 +52,7 @@ class Mesh(StrEnum):
     STICKS = "sticks"
 
 
-def from_euler(
+def command(
     source: Annotated[
         str, typer.Argument(metavar="SOURCE", help="A .bvh, .csv or .json file, '-' for stdin.", show_default=False)
     ] = "-",
@@ -66,7 +66,9 @@ def from_euler(
         AxesConvention | None, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = None,
     unit: Annotated[Unit | None, typer.Option("--unit", help="Unit of the angles (CSV, JSON).")] = None,
-    keys: Annotated[Keys, typer.Option("--keys", help="Where keys stand; auto keeps recordings' grid.")] = Keys.AUTO,
+    keys: Annotated[
+        KeyPlacement, typer.Option("--keys", help="Where keys stand; auto keeps recordings' grid.")
+    ] = KeyPlacement.AUTO,
     tolerance: Annotated[
         str, typer.Option("--tolerance", metavar="ANGLE", help="The most that slerp may leave the Euler motion.")
     ] = "0.05deg",
@@ -89,8 +91,8 @@ def from_euler(
         int | None, typer.Option("--fail-unmatched", metavar="N", help="Exit 6 if over N joints are unmatched.", min=0)
     ] = None,
     floor: Annotated[
-        Floor, typer.Option("--floor", help="--onto: soles on the floor, or heights scaled and no more.")
-    ] = Floor.CONTACT,
+        GroundMode, typer.Option("--floor", help="--onto: soles on the floor, or heights scaled and no more.")
+    ] = GroundMode.CONTACT,
     rest_at: Annotated[
         float | None, typer.Option("--rest-at", metavar="S", help="--onto: when the source stands in its rest pose.")
     ] = None,
@@ -113,28 +115,28 @@ def from_euler(
     names where none match. README shows what CSV and JSON look like.
     """
     began = time.perf_counter()
-    voice = text.Voice(quiet, verbose)
-    limit = units.angle(tolerance, "--tolerance")
+    voice = text.Reporter(quiet, verbose)
+    limit = units.parse_angle(tolerance, "--tolerance")
     _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
-    if onto is None and (alias, fail_unmatched, rest_at, replace, floor) != (*[None] * 4, Floor.CONTACT):
+    if onto is None and (alias, fail_unmatched, rest_at, replace, floor) != (*[None] * 4, GroundMode.CONTACT):
         words = "--alias, --fail-unmatched, --floor, --replace and --rest-at"
         raise UsageError(f"{words} are about a character (--onto names it)")
-    stated = Stated(_order(order), frame, unit)
+    stated = PartialConvention(_order(order), frame, unit)
     with documents.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = registry.of_path(source) or registry.of_content(data.tobytes())
-        motion = kind.read(data.tobytes(), Reading(stated, bvh_position))
-        motion = turned_up(motion) if up is Up.Z else motion
+        motion = kind.read(data.tobytes(), TrackReadOptions(stated, bvh_position))
+        motion = z_up_to_y_up(motion) if up is Up.Z else motion
         meters, words, is_guess = _meters_per_unit(motion, scale, known=kind.has_units)
         clip = name or (Path(source).stem if source != documents.PIPE else "motion")
-        converted = converted_from(scaled(motion, meters), tolerance=limit, keys=keys, name=clip)
+        converted = converted_from(scale_motion(motion, meters), tolerance=limit, keys=keys, name=clip)
         if not converted.clip.tracks:
             raise FormatError("no curve has a key: there is no motion in it")
-    rows = () if quiet and format is Format.TEXT else gimbal(motion, converted.clip)
-    made = Conversion(kind.suffix[1:], motion, converted, meters, words, rows, is_guess=is_guess)
+    rows = () if quiet and format is Format.TEXT else gimbal_stats(motion, converted.clip)
+    made = ConversionReport(kind.suffix[1:], motion, converted, meters, words, rows, is_guess=is_guess)
     if onto is None:
         bones = converted.skeleton
-        bodies = trees(bones, *sticks(bones, converted.ends)) if mesh is Mesh.STICKS else []
-        document = authoring.author(bones, [converted.clip], bodies)
+        bodies = split_by_root(bones, *stick_mesh(bones, converted.ends)) if mesh is Mesh.STICKS else []
+        document = authoring.build_document(bones, [converted.clip], bodies)
         before, size = len(data), documents.write(document, output, None, dry_run=dry_run)
     else:
         names = pairs(alias)
@@ -142,8 +144,8 @@ def from_euler(
             taken = index_of(replace, character.document)
             check_name(name, taken, character.document)
             made = named(made, character.document, name=name, replaced=taken)
-            casting = Casting(names, floor, rest_at, fail_unmatched, taken)
-            made, document = cast(made, character, casting, voice)
+            casting = CharacterOptions(names, floor, rest_at, fail_unmatched, taken)
+            made, document = put_on_character(made, character, casting, voice)
             before, size = character.size, documents.write(document, output, character, dry_run=dry_run)
     for each in from_euler_report.warnings(made):
         voice.warn(each)
@@ -152,11 +154,11 @@ def from_euler(
     for line in from_euler_report.lines(made, verbose=verbose):
         voice.say(line)
     parts = [
-        f"{called if output == documents.PIPE else output}  {text.change(before, size)}",
+        f"{called if output == documents.PIPE else output}  {text.format_change(before, size)}",
         from_euler_report.counts(made),
     ]
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.say(f"{', '.join(parts)}, {text.took(time.perf_counter() - began)}{ending}")
+    voice.say(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
 
 
 def _order(order: str | None) -> str | None:
@@ -184,14 +186,22 @@ def _check(
 
 def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str, bool]:
     """Meters per unit of the motion, the words that say where that comes from, and whether it is uncertain."""
-    height = extent(skeleton(motion))
+    height = bounding_size(skeleton(motion))
     if scale is not None:
-        return scale, f"{scale:g} m per unit (--scale): the skeleton measures {text.length(height * scale)}", False
+        return (
+            scale,
+            f"{scale:g} m per unit (--scale): the skeleton measures {text.format_length(height * scale)}",
+            False,
+        )
     if known and height < TALL:
         return 1.0, "", False
     if known:
-        return 1.0, f"the skeleton measures {text.length(height)} (--scale 0.01 if its unit is centimeters)", True
+        return (
+            1.0,
+            f"the skeleton measures {text.format_length(height)} (--scale 0.01 if its unit is centimeters)",
+            True,
+        )
     guess = guess_unit(height)
-    measures = f"the skeleton then measures {text.length(guess.height)}"
+    measures = f"the skeleton then measures {text.format_length(guess.height)}"
     words = f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
     return guess.scale, words, True

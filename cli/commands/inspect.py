@@ -13,7 +13,7 @@ import typer
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container
-from anim.gltf.io.lenient import Broken, read_broken, unread_buffers
+from anim.gltf.io.lenient import BrokenFile, read_broken, unread_buffers
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.inspect import file_findings
@@ -27,7 +27,7 @@ from cli.io import documents
 from cli.options import common
 from cli.reports import inspect_report
 from cli.reports.inspect_data import Inspected, Smoothness
-from cli.text import Voice
+from cli.text import Reporter
 
 SCHEMA = 1
 LOST = "put it there, or mend the URI"
@@ -41,7 +41,7 @@ class Format(StrEnum):
     CSV = "csv"
 
 
-def inspect(
+def command(
     inputs: Annotated[
         list[str] | None, typer.Argument(metavar="FILE", help="Files, '-' for stdin.", show_default=False)
     ] = None,
@@ -93,7 +93,7 @@ def inspect(
         for i, (name, size, facts) in enumerate(done):
             page = inspect_report.page(name, size, facts, smooth[i], tracks=tracks)
             documents.write_text(("\n" if i else "") + page)
-    worst = max(map(errors.reported, refused), default=errors.DONE)
+    worst = max(map(errors.report_error, refused), default=errors.DONE)
     if fail_on is not None:
         _check(done, fail_on)
     return worst
@@ -129,7 +129,7 @@ def _unreadable(path: str, error: AnimError) -> Inspected:
         animation_json_bytes=0,
         clips=(),
         skins=(),
-        findings=tuple(file_findings.of_faults([fault])),
+        findings=tuple(file_findings.fault_findings([fault])),
         faults=(fault,),
     )
     return name, 0, facts
@@ -156,7 +156,7 @@ def _check(done: list[Inspected], limit: Severity) -> None:
 
 def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:
     opener = _Opener()
-    with documents.source(path, Voice(quiet=True), opener.open) as source:
+    with documents.source(path, Reporter(quiet=True), opener.open) as source:
         document = source.document
         chosen = selection.chosen_clips(reader.names(document)) if selection.clips else None
         facts = facts_of(document, file_bytes=source.size, chosen=chosen, tracks=tracks, broken=opener.broken)
@@ -173,7 +173,7 @@ class _Opener:
     """Opens a document, or what is left of one. broken: what is wrong with it."""
 
     def __init__(self) -> None:
-        self.broken: Broken | None = None
+        self.broken: BrokenFile | None = None
 
     def open(self, data: Bytes, resolve: container.Resolve | None) -> Document:
         """Return the document in `data`, as far as it can be read."""
@@ -185,7 +185,7 @@ class _Opener:
             self.broken = read_broken(data, resolve, refusal)
             return self.broken.document
         if faults := unread_buffers(document):
-            self.broken = Broken(document, faults, frozenset(), frozenset())
+            self.broken = BrokenFile(document, faults, frozenset(), frozenset())
         return document
 
 

@@ -12,9 +12,9 @@ import typer
 from anim.errors import AnimError
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
-from anim.measure.inspect.root_motion import traveling_root
-from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge
-from anim.measure.loops.recommendations import advice
+from anim.measure.inspect.root_motion import root_motion_node
+from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge_range
+from anim.measure.loops.recommendations import recommend
 from anim.measure.loops.seam import SkinMotion
 from anim.model import Clip, Scene
 from anim.ops import loop as closing
@@ -24,15 +24,15 @@ from cli.errors import UsageError
 from cli.io import documents, scenes
 from cli.options import common
 from cli.options.common import Format
-from cli.text import Voice, length, speed
-from cli.workflows.edit_clips import edit
+from cli.text import Reporter, format_length, format_speed
+from cli.workflows.edit_clips import edit_clips
 
 SCHEMA = 1
 HELP = "--blend S closes over the last S seconds; --clip leaves others alone"
 MAX_NAMES = 3  # joints that a table or a message lists
 
 
-def loop(
+def command(
     input: common.Input = "-",
     output: Annotated[
         str | None,
@@ -65,14 +65,14 @@ def loop(
     line says where no part loops better than the whole clip.
     """
     selection = Selection(clip or ())
-    voice = Voice(quiet, verbose)
+    voice = Reporter(quiet, verbose)
     if output is None and blend is None:
         _report(input, selection, voice, find=find, shortest=shortest, format=format)
         return
     if find:
         raise UsageError("--find only reports", help="trim --from … --to … the part that it names")
     closing_of = _Closing(blend, input)
-    edit(input, output or documents.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
+    edit_clips(input, output or documents.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
 
 
 class _Closing:
@@ -109,8 +109,8 @@ class _Closing:
 
 
 def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float | None) -> Clip:
-    root = traveling_root(skin.skeleton, clip)
-    found = judge(skin, clip, root=root)
+    root = root_motion_node(skin.skeleton, clip)
+    found = judge_range(skin, clip, root=root)
     if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
         clip = closing.append_first_frame(clip, fps=found.fps, tracks=tracks)
     elif found.kind is not LoopKind.CLOSED and blend is None:
@@ -125,12 +125,12 @@ def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float |
 
 def _problem(found: Loop) -> str:
     if found.kind is LoopKind.CLOSED_EXCEPT:
-        return f"closes except at {_names(found, quote=True)}: its end is {length(found.seam)} from its start"
-    return f"is not a loop: its end is {length(found.seam)} from its start at '{found.node}'"
+        return f"closes except at {_names(found, quote=True)}: its end is {format_length(found.seam)} from its start"
+    return f"is not a loop: its end is {format_length(found.seam)} from its start at '{found.node}'"
 
 
 def _report(
-    path: str, selection: Selection, voice: Voice, *, find: bool, shortest: float | None, format: Format
+    path: str, selection: Selection, voice: Reporter, *, find: bool, shortest: float | None, format: Format
 ) -> None:
     with documents.source(path, voice) as source:
         clips = reader.clips(source.document)
@@ -140,15 +140,15 @@ def _report(
         judged: list[tuple[int, Loop]] = []
         parts: list[tuple[int, list[Loop]]] = []
         for i in chosen:
-            root = traveling_root(skin.skeleton, clips[i])
+            root = root_motion_node(skin.skeleton, clips[i])
             name = reader.clip_name(clips[i].name, i)
             if find:
                 parts.append((i, best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)))
                 rows += [(name, each) for each in parts[-1][1]]
             else:
-                judged.append((i, judge(skin, clips[i], root=root)))
+                judged.append((i, judge_range(skin, clips[i], root=root)))
                 rows.append((name, judged[-1][1]))
-    advised, notes = list(advice(judged)), list(_no_better(clips, parts))
+    advised, notes = list(recommend(judged)), list(_no_better(clips, parts))
     if format is Format.JSON:
         documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
     elif not voice.quiet:
@@ -164,7 +164,7 @@ def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> It
     for number, parts in found:
         if reason := _why_none(clips[number], parts):
             reasons.setdefault(reason, []).append((clips[number].name, number))
-    yield from (f"{reader.labels(those)}: {reason}" for reason, those in reasons.items())
+    yield from (f"{reader.clip_labels(those)}: {reason}" for reason, those in reasons.items())
 
 
 def _why_none(clip: Clip, parts: list[Loop]) -> str:
@@ -180,10 +180,10 @@ def _why_none(clip: Clip, parts: list[Loop]) -> str:
     return "no part loops better than the whole clip" if is_whole else ""
 
 
-def _skin(source: Source, voice: Voice) -> SkinMotion:
+def _skin(source: Source, voice: Reporter) -> SkinMotion:
     """Where seams are measured: at nodes where vertices can't be read."""
     try:
-        return SkinMotion(scenes.scene(source.document, source.name, voice))
+        return SkinMotion(scenes.read_scene(source.document, source.name, voice))
     except AnimError as error:
         hint = f" ({error.help})" if error.help else ""
         voice.warn(f"measured at nodes, not on the skin: {error}{hint}")
@@ -207,12 +207,12 @@ def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
             name,
             f"{each.start:.4g}–{each.end:.4g}",
             str(each.kind),
-            length(each.seam),
-            length(each.inside.largest),
-            speed(each.speed_seam),
-            speed(each.inside.speed),
+            format_length(each.seam),
+            format_length(each.inside.largest),
+            format_speed(each.speed_seam),
+            format_speed(each.inside.speed),
             _names(each) if each.kind is LoopKind.CLOSED_EXCEPT else each.node,
-            length(each.travel) if each.travel else "",
+            format_length(each.travel) if each.travel else "",
         ]
         for name, each in rows
     ]

@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from anim.gltf.io.gltf_files import GLTF_SUFFIXES
-from anim.measure.error.surface import measured_at
+from anim.measure.error.surface import is_measured_at
 from anim.optimize.optimize import Optimized
 from anim.optimize.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
 from anim.optimize.rate_distortion import MOST, SHARES, curve
@@ -23,10 +23,10 @@ from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
 from cli.reports import optimize_json, optimize_report
-from cli.text import Voice
+from cli.text import Reporter
 from cli.workflows import optimize_request
 from cli.workflows.edit_clips import note_images
-from cli.workflows.optimize_job import Job, job
+from cli.workflows.optimize_job import OptimizeJob, optimize_job
 
 PICTURES = (".png", ".svg")
 
@@ -49,7 +49,7 @@ Effort = StrEnum("Effort", [(name, name) for name in EFFORTS])  # type: ignore[m
 BALANCED = Effort("balanced")
 
 
-def optimize(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -138,13 +138,15 @@ def optimize(
     The same command on its own output changes nothing; another bound counts from there, and errors add up.
     """
     began = time.perf_counter()
-    voice = Voice(quiet, verbose)
+    voice = Reporter(quiet, verbose)
     max_count = None if max_bytes is None else optimize_request.count_of_bytes(max_bytes)
     _check_outputs(input, output, report, curve_file, dry_run=dry_run)
     if curve_file is not None and (max_bytes is not None or report is not None):
         raise UsageError("--curve goes with neither --max-bytes nor --report")
     with documents.source(input, voice) as source:
-        work = job(source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice)
+        work = optimize_job(
+            source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice
+        )
         said = {
             "max_error": optimize_request.MAX_ERROR if max_error is None else max_error,
             "shell": shell,
@@ -157,12 +159,14 @@ def optimize(
             voice.warn(words)
         request = Request(
             bounds,
-            Policy(drop, reference, rebase_rest, drop_invisible, optimize_request.kept(keep_node or (), work.scene)),
+            Policy(
+                drop, reference, rebase_rest, drop_invisible, optimize_request.kept_nodes(keep_node or (), work.scene)
+            ),
             Packing.CORE if meshopt is None else Packing(meshopt.value),
             objective,
             str(effort),
             PLAYERS if player is Player.ANY else ("spec",),
-            optimize_request.given(bounds, said),
+            optimize_request.raw_options(bounds, said),
         )
         if curve_file is not None:
             _draw_curve(work, request, curve_file, voice, dry_run=dry_run)
@@ -181,19 +185,21 @@ def optimize(
         note_images(about.after, source, output, voice)
 
 
-def _about(work: Job, request: Request, found: Optimized, began: float) -> optimize_report.About:
+def _about(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:
     """Return all there is to say of what was found."""
     source, result = work.source, work.smaller(found)
     name = source.name if work.output == documents.PIPE else work.output
-    size, place = work.size(result), measured_at(work.scene)
+    size, place = work.size(result), is_measured_at(work.scene)
     seconds = time.perf_counter() - began
-    return optimize_report.About(
+    return optimize_report.OptimizeReport(
         name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, place
     )
 
 
 @contextmanager
-def _report(about: optimize_report.About, voice: Voice, path: str | None, *, dry_run: bool) -> Iterator[None]:
+def _report(
+    about: optimize_report.OptimizeReport, voice: Reporter, path: str | None, *, dry_run: bool
+) -> Iterator[None]:
     """Write the report around the block that writes the model: where one of them fails, neither file changes.
 
     On stdout it comes first, so that the model stays as it was where nobody can read the report.
@@ -206,7 +212,7 @@ def _report(about: optimize_report.About, voice: Voice, path: str | None, *, dry
         yield
 
 
-def _say(about: optimize_report.About, voice: Voice, *, dry_run: bool) -> None:
+def _say(about: optimize_report.OptimizeReport, voice: Reporter, *, dry_run: bool) -> None:
     for line in optimize_report.lines(about, dry_run=dry_run):
         voice.say(line)
     for words in optimize_report.warnings(about):
@@ -238,7 +244,7 @@ def _check_report(report: str, input: str, output: str) -> None:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
 
-def _draw_curve(work: Job, request: Request, path: str, voice: Voice, *, dry_run: bool) -> None:
+def _draw_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
     sizes = []
     bounds = (0.0, *SHARES, MOST)  # also what is kept without loss, and the least that any bound leaves
     for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
@@ -250,7 +256,7 @@ def _draw_curve(work: Job, request: Request, path: str, voice: Voice, *, dry_run
     if kind == "csv":
         documents.write_text(optimize_report.curve_csv(sizes, work.scale), path)
     else:
-        from anim.show.plots.rate_distortion_plot import tradeoff as picture
+        from anim.show.plots.rate_distortion_plot import rate_distortion_plot as picture
 
         title, source = PurePath(work.source.name).name, optimize_report.cost(work.source.document)
         drawn = picture(sizes, work.scale, title=title, kind=kind, source=source)

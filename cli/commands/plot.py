@@ -14,15 +14,15 @@ from anim.curves.easing.table import parse
 from anim.maths.euler import check_order
 from anim.ops.selection import Selection
 from anim.show.plots import track_plot as tracks
-from anim.show.plots.easing_plot import eases
+from anim.show.plots.easing_plot import easing_plot
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
-from anim.show.plots.tangent_plot import through as curves_through
-from anim.show.plots.track_selection import Chosen, choose
+from anim.show.plots.tangent_plot import tangent_plot as curves_through
+from anim.show.plots.track_selection import TrackSelection, select_tracks
 from anim.show.plots.track_selection import compare as compared
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
-from cli.text import Voice, plural, size
+from cli.text import Reporter, format_bytes, plural
 
 
 class Format(StrEnum):
@@ -32,7 +32,7 @@ class Format(StrEnum):
     SVG = "svg"
 
 
-def plot(
+def command(
     files: Annotated[
         list[str] | None,
         typer.Argument(
@@ -87,7 +87,7 @@ def plot(
     values, one second apart unless given as time:value, with their overshoot, and says how smooth each rule is.
     Same input and options, same bytes. Needs matplotlib: pip install 'gltf-anim[plot]'.
     """
-    voice = Voice(quiet)
+    voice = Reporter(quiet)
     if ease and through is not None:
         raise UsageError("--ease and --through exclude each other")
     if tangents and through is None:
@@ -105,7 +105,7 @@ def plot(
     kind = _format(format, output)
     documents.check_binary(output)
     if ease:
-        picture = eases([parse(name) for name in ease], kind=kind)
+        picture = easing_plot([parse(name) for name in ease], kind=kind)
     elif through is not None:
         times, values = _keys(through)
         picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
@@ -113,7 +113,7 @@ def plot(
         picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
     documents.write_bytes([np.frombuffer(picture, np.uint8)], output)
     if output != documents.PIPE:
-        voice.say(f"{output}  {size(len(picture))}")
+        voice.say(f"{output}  {format_bytes(len(picture))}")
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
@@ -152,7 +152,7 @@ def _keys(text: str) -> tuple[Floats, Floats]:
 
 
 def _tracks(
-    source: str, selection: Selection, view: str, other: str | None, kind: str, limit: int, voice: Voice
+    source: str, selection: Selection, view: str, other: str | None, kind: str, limit: int, voice: Reporter
 ) -> bytes:
     if limit < 1:
         raise UsageError(f"--limit is {limit} (expected 1 or more)")
@@ -160,7 +160,7 @@ def _tracks(
         raise UsageError("IN and --compare can't both be stdin")
     names = None
     with documents.source(source, voice) as opened:
-        chosen, name = choose(opened.document, selection, limit=limit, view=view), opened.name
+        chosen, name = select_tracks(opened.document, selection, limit=limit, view=view), opened.name
     if other is not None:
         with documents.source(other, voice) as opened:
             chosen, alone = compared(chosen, opened.document)
@@ -171,14 +171,14 @@ def _tracks(
     title = PurePath(name).stem
     clips = {each.clip for each in chosen.shown}
     title = f"{title}: {clips.pop()}" if len(clips) == 1 else title
-    return tracks.plot(chosen.shown, title=title, kind=kind, names=names, note=_count(chosen))
+    return tracks.track_plot(chosen.shown, title=title, kind=kind, names=names, note=_count(chosen))
 
 
-def _count(chosen: Chosen) -> str:
+def _count(chosen: TrackSelection) -> str:
     return f"{len(chosen.shown)} of {plural(len(chosen.shown) + chosen.more, 'track')}" if chosen.more else ""
 
 
-def _say_left_out(chosen: Chosen, voice: Voice) -> None:
+def _say_left_out(chosen: TrackSelection, voice: Reporter) -> None:
     if chosen.more:
         voice.say(
             f"note: drew the first {len(chosen.shown)} of {len(chosen.shown) + chosen.more} tracks that move; choose "

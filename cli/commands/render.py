@@ -14,9 +14,9 @@ import typer
 
 from anim.arrays import Floats
 from anim.caches.formats import gltf
-from anim.caches.options import Reading
+from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS, reader_for
-from anim.caches.sniffing import HEAD, ending_of
+from anim.caches.sniffing import HEAD, sniff_format
 from anim.caches.storage import Memory, suffix
 from anim.gltf.document import Document
 from anim.gltf.io import container
@@ -25,8 +25,8 @@ from anim.model import VertexCache
 from anim.ops.selection import Selection
 from anim.show.filmstrip import clips, filmstrip, image_file
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION
-from anim.show.filmstrip.clips import Shot, When
-from anim.show.filmstrip.filmstrip import HEIGHT, Look
+from anim.show.filmstrip.clips import FilmstripClip, FrameSelection
+from anim.show.filmstrip.filmstrip import HEIGHT, ViewOptions
 from cli import text
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
@@ -47,7 +47,7 @@ Picture = Annotated[
 ]
 
 
-def render(
+def command(
     input: Seen = "-",
     output: Picture = "-",
     *,
@@ -102,14 +102,14 @@ def render(
     beside the time. Several clips come one under the other, several methods in rows of each; side by side in a film.
     Without --clip it is the first one.
     """
-    voice = text.Voice(quiet)
+    voice = text.Reporter(quiet)
     began = time.perf_counter()
     ending = _ending(output)
     if at and (count is not None or fps is not None):
         raise UsageError("--at excludes --frames and --fps")
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
-    when = When(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
+    when = FrameSelection(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
     with _opened(input, voice) as (seen, name):
         if isinstance(seen, VertexCache):
             given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide}
@@ -122,22 +122,26 @@ def render(
             if is_moving and count is not None and count > 1 and len(numbers) > 1:
                 when = _one_rate(seen, numbers, when)
             announce_compiling(voice)
-            scene = scenes.scene(seen, name, voice, nodes=lambda scene: mesh_selection.shown(scene, mesh, hide))
-            nodes = mesh_selection.shown(scene, mesh, hide)
+            scene = scenes.read_scene(
+                seen, name, voice, nodes=lambda scene: mesh_selection.visible_meshes(scene, mesh, hide)
+            )
+            nodes = mesh_selection.visible_meshes(scene, mesh, hide)
             found = clips.of_document(seen, numbers, [str(each) for each in method or ()], when, nodes=nodes)
-        rows, extent = clips.rows(found, heated=heat, followed=follow)
+        rows, extent = clips.build_strips(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
-        look = Look(size, azimuth, elevation, checker, wire)
+        look = ViewOptions(size, azimuth, elevation, checker, wire)
         if is_moving:
             times = filmstrip.film_times(rows)
-            pictures = filmstrip.moving(rows, extent, title=title, look=look)
+            pictures = filmstrip.animate_frames(rows, extent, title=title, look=look)
             drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(times))
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, extent, title=title, look=look))
     documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)
     frames = text.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == documents.PIPE else output
-    voice.say(f"{called}  {text.size(len(drawn))}, {frames}, {text.took(time.perf_counter() - began)}")
+    voice.say(
+        f"{called}  {text.format_bytes(len(drawn))}, {frames}, {text.format_duration(time.perf_counter() - began)}"
+    )
 
 
 def _ending(output: str) -> str:
@@ -151,13 +155,13 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, voice: text.Voice) -> Iterator[tuple[Document | VertexCache, str]]:
+def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str]]:
     """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes.
 
     voice: says what readers found.
     """
     if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
-        with cache_files.load(path, Reading()) as loaded:
+        with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
                 voice.warn(words)
             yield loaded.cache, loaded.name
@@ -172,13 +176,13 @@ def _opened(path: str, voice: text.Voice) -> Iterator[tuple[Document | VertexCac
                 documents.note_mended(document, name, voice)
                 yield gltf.pages(document) or document, name
             else:
-                ending = ending_of(head, len(data))
+                ending = sniff_format(head, len(data))
                 cache_files.check_pipe(name, ending)
                 reader = reader_for(ending)
-                yield reader(Memory(name, {name: data.tobytes()}), Reading(note=voice.warn)), name
+                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=voice.warn)), name
 
 
-def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:
+def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) -> FrameSelection:
     """As many frames of the longest clip, and the others at its rate: in a film all play at once."""
     clips = reader.clips(document)
     spans = [when.span(clips[i].start, clips[i].end) for i in numbers]
@@ -186,7 +190,7 @@ def _one_rate(document: Document, numbers: Sequence[int], when: When) -> When:
     return replace(when, count=None, fps=((when.count or 0) - 1) / longest) if longest > 0 else when
 
 
-def _one_clip(found: Sequence[Shot]) -> str:
+def _one_clip(found: Sequence[FilmstripClip]) -> str:
     return found[0].clip if len({shot.clip for shot in found}) == 1 else ""
 
 

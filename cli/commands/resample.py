@@ -12,14 +12,14 @@ from anim.ops.resample import resample as resampled
 from anim.ops.selection import Selection
 from cli.errors import UsageError
 from cli.options import common
-from cli.text import Voice
-from cli.workflows.edit_clips import edit
+from cli.text import Reporter
+from cli.workflows.edit_clips import edit_clips
 
 Interpolation = StrEnum("Interpolation", [(name, name) for name in INTERPOLATIONS])  # type: ignore[misc]
 AS_IT_IS = Interpolation(KEEP)
 
 
-def resample(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -45,11 +45,11 @@ def resample(
     """
     if not fps > 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
-    edit(
+    edit_clips(
         input,
         output,
         Selection(clip or (), node or (), path or ()),
         lambda each, tracks, _: resampled(each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks),
-        Voice(quiet, verbose),
+        Reporter(quiet, verbose),
         dry_run=dry_run,
     )

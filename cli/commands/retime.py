@@ -13,11 +13,11 @@ from anim.ops.selection import Selection
 from anim.ops.time_warp import warp
 from cli.errors import UsageError
 from cli.options import common
-from cli.text import Voice
-from cli.workflows.edit_clips import edit
+from cli.text import Reporter
+from cli.workflows.edit_clips import edit_clips
 
 
-def retime(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -63,4 +63,4 @@ def retime(
         )
 
     selection = Selection(clip or (), node or (), path or ())
-    edit(input, output, selection, change, Voice(quiet, verbose), dry_run=dry_run, measure=False)
+    edit_clips(input, output, selection, change, Reporter(quiet, verbose), dry_run=dry_run, measure=False)

@@ -23,7 +23,7 @@ from cli import tables
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
-from cli.text import Voice
+from cli.text import Reporter
 
 SCHEMA = 1
 
@@ -44,7 +44,7 @@ Product = Annotated[
 ]
 
 
-def sample(
+def command(
     input: common.Input = "-",
     output: Product = "-",
     *,
@@ -77,7 +77,7 @@ def sample(
     chosen_format = format or _format_of(output)
     if output != documents.PIPE:
         documents.check_file(output)
-    with documents.source(input, Voice(quiet)) as source:
+    with documents.source(input, Reporter(quiet)) as source:
         document = source.document
         selection = Selection(clip or (), node or ())
         clips, skeleton = reader.clips(document), reader.skeleton(document)

@@ -10,7 +10,7 @@ import typer
 
 from anim.curves.tangents.table import DEFAULT, TANGENT_FACTORIES, TANGENTS, parse
 from anim.gltf.reading import reader
-from anim.measure.inspect.root_motion import traveling_root
+from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.recommendations import closing_command
 from anim.model import Clip, Scene
 from anim.ops.loop import open_tracks
@@ -19,11 +19,11 @@ from anim.ops.spline import max_key_change
 from anim.ops.spline import spline as splined
 from cli.io import documents
 from cli.options import common
-from cli.text import Voice
-from cli.workflows.edit_clips import Clips, edit
+from cli.text import Reporter
+from cli.workflows.edit_clips import Clips, edit_clips
 
 
-def spline(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -57,7 +57,7 @@ def spline(
         def label(node: int) -> str:
             return scene().skeleton.label(node)
 
-        root = traveling_root(scene().skeleton, each) if cyclic or rule.loop else -1
+        root = root_motion_node(scene().skeleton, each) if cyclic or rule.loop else -1
         return splined(each, tangents=rule, cyclic=cyclic, root=root, tracks=tracks, label=label)
 
     def advise(each: Clip, number: int) -> str:
@@ -65,7 +65,7 @@ def spline(
         return f"close it first: {closing_command(each, number)}" if is_open else ""
 
     selection = Selection(clip or (), node or (), path or ())
-    edit(input, output, selection, change, Voice(quiet, verbose), dry_run=dry_run, notes=_notes, advise=advise)
+    edit_clips(input, output, selection, change, Reporter(quiet, verbose), dry_run=dry_run, notes=_notes, advise=advise)
 
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:
@@ -76,7 +76,7 @@ def _notes(before: Clips, after: Clips) -> Iterator[str]:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))
         far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SEEN else []
         far += [f"other values by up to {moved:.3g}"] if moved else []
-        where = reader.labels([(before[i].name, i) for i in found])
+        where = reader.clip_labels([(before[i].name, i) for i in found])
         yield f"{where}: the curve passes keys by, {', '.join(far)}; --tangents natural goes through them"
 
 

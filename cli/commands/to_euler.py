@@ -11,12 +11,12 @@ import typer
 
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.euler.motion import Convention, EulerMotion, Unit
-from anim.exchange.euler.rotation_order import BEST, USUAL, Orders, parse
+from anim.exchange.euler.rotation_order import BEST, USUAL, OrderRules, parse
 from anim.exchange.euler.to_bvh_motion import to_bvh
 from anim.exchange.euler.to_euler import to_euler as curves_of
 from anim.exchange.formats.registry import TRACK_FORMATS, TrackFormat, of_path
-from anim.exchange.retarget.bind_pose import bind_pose, completed
-from anim.gltf.document import Document, items
+from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
+from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.maths.euler import AxesConvention
 from anim.model import Clip
@@ -32,7 +32,7 @@ NOTABLE = math.radians(0.5)  # that straight curves may leave the motion by befo
 CENTIMETERS = 0.01  # m per unit of a BVH, unless told
 
 
-def to_euler(
+def command(
     input: common.Input = "-",
     output: Annotated[
         str, typer.Argument(metavar="OUT", help="A .bvh, .csv or .json file, '-' for stdout.", show_default=False)
@@ -74,9 +74,9 @@ def to_euler(
     node's own angles, with its rest and its parent, and are what from-euler reads.
     """
     began = time.perf_counter()
-    voice = text.Voice(quiet)
+    voice = text.Reporter(quiet)
     kind = _kind(output, format)
-    limit = None if tolerance is None else units.angle(tolerance, "--tolerance")
+    limit = None if tolerance is None else units.parse_angle(tolerance, "--tolerance")
     orders = _orders(order, kind)
     _check(kind, unit, frame, scale, limit)
     if output != documents.PIPE and not dry_run:
@@ -98,8 +98,8 @@ def to_euler(
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     voice.say(
-        f"{name}  {text.change(source.size, len(data))}, {text.plural(len(motion.nodes), 'node')}, "
-        f"{words}{text.took(time.perf_counter() - began)}{ending}"
+        f"{name}  {text.format_change(source.size, len(data))}, {text.plural(len(motion.nodes), 'node')}, "
+        f"{words}{text.format_duration(time.perf_counter() - began)}{ending}"
     )
 
 
@@ -113,7 +113,7 @@ def _kind(output: str, format: Format | None) -> TrackFormat:
     return found or TRACK_FORMATS["bvh"]
 
 
-def _orders(text: str, kind: TrackFormat) -> Orders:
+def _orders(text: str, kind: TrackFormat) -> OrderRules:
     try:
         orders = parse(text)
     except RangeError as error:
@@ -153,7 +153,7 @@ def _motion(
     document: Document,
     clip: Clip,
     kind: TrackFormat,
-    orders: Orders,
+    orders: OrderRules,
     frame: AxesConvention,
     fps: float | None,
     limit: float | None,
@@ -163,11 +163,11 @@ def _motion(
     nodes = reader.skeleton(document)
     bound = bind_pose(nodes, reader.skins(document))
     skeleton = bound.skeleton
-    clip = completed(clip, nodes, skeleton)
+    clip = fill_from_parents(clip, nodes, skeleton)
     if kind is TRACK_FORMATS["bvh"]:
-        joints = {joint for skin in items(document.json, "skins") for joint in skin["joints"]}
+        joints = {joint for skin in json_array(document.json, "skins") for joint in skin["joints"]}
         return to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale), "", bound.num_joints
-    holders = {i for i, node in enumerate(items(document.json, "nodes")) if "skin" in node}
+    holders = {i for i, node in enumerate(json_array(document.json, "nodes")) if "skin" in node}
     found = curves_of(
         skeleton,
         clip,

@@ -10,11 +10,11 @@ from anim.ops.selection import Selection
 from anim.ops.trim import trim as trimmed
 from cli.errors import UsageError
 from cli.options import common
-from cli.text import Voice
-from cli.workflows.edit_clips import edit
+from cli.text import Reporter
+from cli.workflows.edit_clips import edit_clips
 
 
-def trim(
+def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
@@ -34,12 +34,12 @@ def trim(
     """
     if start is None and end is None and not rebase:
         raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")
-    edit(
+    edit_clips(
         input,
         output,
         Selection(clip or ()),
         lambda each, tracks, _: trimmed(each, start=start, end=end, rebase=rebase, tracks=tracks),
-        Voice(quiet, verbose),
+        Reporter(quiet, verbose),
         dry_run=dry_run,
         measure=False,
     )

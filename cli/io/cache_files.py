@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 from anim.caches import registry
 from anim.caches.formats import mesh_sequence
-from anim.caches.options import Reading, Writing, Written
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.registry import CACHE_FORMATS, Files
-from anim.caches.sniffing import ending_of
+from anim.caches.sniffing import sniff_format
 from anim.caches.storage import suffix
 from anim.errors import AnimError, FormatError, OutputError, not_written
 from anim.model import VertexCache
@@ -22,14 +22,14 @@ from cli.reports import cache_notes
 
 
 @dataclass(frozen=True, slots=True)
-class Loaded:
+class LoadedCache:
     """A cache that was opened: what messages call it, its format's ending, and what its reader said."""
 
     cache: VertexCache
     name: str
     ending: str
     notes: tuple[str, ...]
-    _folder: cache_folders.Folder
+    _folder: cache_folders.CacheFolder
 
     @property
     def size(self) -> int:
@@ -38,16 +38,16 @@ class Loaded:
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class SavedCache:
     """Files that were written, the main one last, their size in bytes together, and what there is to say."""
 
     files: tuple[str, ...]
     size: int
-    written: Written
+    written: WriteResult
 
 
 @contextmanager
-def load(path: str, reading: Reading) -> Iterator[Loaded]:
+def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
     """Give the cache at `path`, "-" for stdin, its format by the name's ending or by its first bytes.
 
     Its frames are read while it is used, so use it inside; errors raised there name the input.
@@ -63,7 +63,7 @@ def load(path: str, reading: Reading) -> Iterator[Loaded]:
             read = registry.reader_for(ending)
             loading.load(CACHE_FORMATS[ending].library)
             cache = read(inputs, replace(reading, note=notes.append))
-            yield Loaded(cache, name, ending, tuple(notes), inputs)
+            yield LoadedCache(cache, name, ending, tuple(notes), inputs)
         except (UsageError, OutputError):
             raise
         except AnimError as error:
@@ -98,7 +98,7 @@ def check_pipe(name: str, ending: str) -> None:
         raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")
 
 
-def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_run: bool = False) -> Saved:
+def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, dry_run: bool = False) -> SavedCache:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
     What lies beside the main file (a rest mesh) is left out on stdout, and a note says so.
@@ -125,20 +125,22 @@ def save(cache: VertexCache, path: str, writing: Writing, *, ending: str, dry_ru
             raise not_written(away if is_pipe else path, error) from None
         finally:
             staged.clear()
-    lost = cache_notes.not_held(cache, ending)
-    left = cache_notes.no_place(staged.names[:-1]) if is_pipe else cache_notes.left_behind(path, names, ending)
-    return Saved(names, size, replace(written, notes=(*written.notes, *lost, *left)))
+    lost = cache_notes.unsupported_notes(cache, ending)
+    left = (
+        cache_notes.no_place_note(staged.names[:-1]) if is_pipe else cache_notes.left_behind_note(path, names, ending)
+    )
+    return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)))
 
 
-def _ending(inputs: cache_folders.Folder) -> str:
+def _ending(inputs: cache_folders.CacheFolder) -> str:
     """The format of what is read: by the name, else by the first bytes of it or of its first frame."""
     own = suffix(inputs.main)
     if own in CACHE_FORMATS:
         return own
-    frames = () if inputs.main in inputs.names() else mesh_sequence.belonging(inputs.main, inputs.names())
+    frames = () if inputs.main in inputs.names() else mesh_sequence.sequence_files(inputs.main, inputs.names())
     head, size = inputs.beginning(frames[0] if frames else inputs.main)
     try:
-        return ending_of(head, size)
+        return sniff_format(head, size)
     except FormatError:
         if own:
             return own  # which is then said to be none

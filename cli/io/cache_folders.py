@@ -14,7 +14,7 @@ from typing import BinaryIO
 import numpy as np
 
 from anim.caches.sniffing import HEAD
-from anim.caches.storage import PIECE
+from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError
 from anim.files import links
 from anim.files.atomic import AtomicOutputs
@@ -22,18 +22,18 @@ from cli.errors import UsageError
 from cli.io import documents
 
 
-def inputs(path: str, stack: ExitStack) -> Folder:
+def inputs(path: str, stack: ExitStack) -> CacheFolder:
     """Return the file at `path` and what is beside it; "-" for stdin, which is kept in a file for as long as `stack`.
 
     Raises UsageError where stdin is a terminal; FormatError when what is asked for can't be opened.
     """
-    return Folder(Path(path)) if path != documents.PIPE else _received(stack)
+    return CacheFolder(Path(path)) if path != documents.PIPE else _received(stack)
 
 
 def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     """Return a place for the file at `path` and what goes beside it; `away`: a folder for what is not to stay."""
     is_pipe = path == documents.PIPE
-    place = links.followed(Path(path))
+    place = links.resolve_links(Path(path))
     folder = Path(away) if dry_run or is_pipe else place.parent
     return AtomicOutputs(folder, "stdout" if is_pipe else place.name)
 
@@ -41,15 +41,15 @@ def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
 def to_stdout(staged: AtomicOutputs) -> None:
     """Write the main file to stdout."""
     with staged.files[staged.main].open("rb") as file:
-        pieces = iter(lambda: file.read(PIECE), b"")
+        pieces = iter(lambda: file.read(COPY_BYTES), b"")
         documents.write_bytes((np.frombuffer(piece, np.uint8) for piece in pieces), documents.PIPE)
 
 
-class Folder:
+class CacheFolder:
     """Inputs in a folder."""
 
     def __init__(self, path: Path) -> None:
-        path = links.followed(path)
+        path = links.resolve_links(path)
         self.main = path.name
         self.sizes: dict[str, int] = {}
         self._folder = path.parent
@@ -80,12 +80,12 @@ class Folder:
             raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 
 
-def _received(stack: ExitStack) -> Folder:
+def _received(stack: ExitStack) -> CacheFolder:
     """Stdin as a file in a folder of its own, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
     folder = stack.enter_context(tempfile.TemporaryDirectory())
     path = Path(folder) / "stdin"
     with path.open("wb") as file:
-        shutil.copyfileobj(sys.stdin.buffer, file, PIECE)
-    return Folder(path)
+        shutil.copyfileobj(sys.stdin.buffer, file, COPY_BYTES)
+    return CacheFolder(path)

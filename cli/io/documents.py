@@ -14,19 +14,19 @@ import numpy as np
 
 from anim.errors import AnimError, FormatError, OutputError
 from anim.files import atomic, links, resolver
-from anim.gltf.document import Bytes, Document, items, node_label
+from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, gltf_files, uri
 from anim.gltf.io.source import Opener, Source, glb_pieces, open_bytes, open_file, write_file
 from cli.errors import UsageError
 from cli.io import output_names, stdout
-from cli.text import Voice
+from cli.text import Reporter
 
 PIPE = "-"
-AUDIBLE = Voice()
+AUDIBLE = Reporter()
 
 
 @contextmanager
-def source(path: str, voice: Voice = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
+def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
     """Give the document at `path`, "-" for stdin; errors raised inside name the input.
 
     voice: says what had to be mended to read it. opener: makes a document of bytes.
@@ -57,7 +57,7 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
         raise error.at(name, ": ") from None
 
 
-def note_mended(document: Document, name: str, voice: Voice) -> None:
+def note_mended(document: Document, name: str, voice: Reporter) -> None:
     """Say what had to be mended to read a document, nothing of most. name: of the input."""
     if not document.expanded:
         return
@@ -121,7 +121,7 @@ def check_output(path: str) -> None:
     check_binary(path)
     if path == PIPE or (ending := Path(path).suffix).lower() in ("", *gltf_files.GLTF_SUFFIXES):
         return
-    target = links.followed(Path(path))
+    target = links.resolve_links(Path(path))
     if target.exists() and not target.is_file():
         return
     near = difflib.get_close_matches(ending.lower(), gltf_files.GLTF_SUFFIXES, n=1)
@@ -149,7 +149,7 @@ def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
         raise UsageError("the output has an empty name")
     output_names.check_placeholders(path, placeholders)
     try:
-        target = links.followed(Path(path))
+        target = links.resolve_links(Path(path))
         if target.is_dir():
             raise UsageError(f"{path}: is a folder (expected a file name)")
         if not target.parent.is_dir():
@@ -179,7 +179,7 @@ def _stdin() -> Bytes:
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:
     """Yield place and problem of every image that can't be found from the input's folder."""
-    for i, about in enumerate(items(document.json, "images")):
+    for i, about in enumerate(json_array(document.json, "images")):
         address = about.get("uri")
         if folder is None or address is None or uri.is_data(address):
             continue

@@ -9,14 +9,14 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.instancing import EXTENSION, instanced_nodes
 from anim.model import Scene
-from anim.skinning.analysis.weight_sums import bad_sums
-from cli.text import Voice
+from anim.skinning.analysis.weight_sums import unnormalized_weights
+from cli.text import Reporter
 
 
-def scene(
+def read_scene(
     document: Document,
     name: str,
-    voice: Voice,
+    voice: Reporter,
     *,
     accessors: Accessors | None = None,
     normals: bool = False,
@@ -30,14 +30,14 @@ def scene(
     """
     found = reader.scene(document, accessors, normals=normals, tangents=tangents)
     chosen = nodes(found)
-    for bad in bad_sums(each for each in found.instances if chosen is None or each.node in chosen):
+    for bad in unnormalized_weights(each for each in found.instances if chosen is None or each.node in chosen):
         for words in bad.in_words():
             voice.warn(f"{name}: {words}")
     _warn_of_copies(document, name, voice, chosen)
     return found
 
 
-def _warn_of_copies(document: Document, name: str, voice: Voice, chosen: Collection[int] | None) -> None:
+def _warn_of_copies(document: Document, name: str, voice: Reporter, chosen: Collection[int] | None) -> None:
     copied = [i for i in instanced_nodes(document.json) if chosen is None or i in chosen]
     if copied:
         words = f" and {len(copied) - 1} more have" if len(copied) > 1 else " has"

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from anim.caches.formats import gltf
-from anim.caches.options import Writing
+from anim.caches.options import WriteOptions
 from anim.caches.registry import CACHE_FORMATS
 from anim.caches.transforms import vertex_order
 from anim.caches.transforms.up_axis import UPS
@@ -83,7 +83,7 @@ RestOption = Annotated[
 ]
 
 
-def writing(ending: str, given: Mapping[str, Any]) -> Writing:
+def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
     """Return the settings for a format from the options that were given (None, False: not given).
 
     Raises UsageError for an option that means nothing to the format.
@@ -98,16 +98,16 @@ def writing(ending: str, given: Mapping[str, Any]) -> Writing:
     if "rest" in said:
         said["rest"] = "" if said["rest"] == "none" else f".{said['rest']}"
     plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}
-    return Writing(**plain)
+    return WriteOptions(**plain)
 
 
-def holding(what: str) -> tuple[str, ...]:
+def formats_with(what: str) -> tuple[str, ...]:
     """Return the endings of formats with a place for "normals" or "tangents"."""
     return tuple(ending for ending, format in CACHE_FORMATS.items() if what in format.holds)
 
 
-def check_held(ending: str, **wanted: bool) -> None:
+def check_supported(ending: str, **wanted: bool) -> None:
     """Raise UsageError for what is wanted beside positions and has no place in the format."""
     for what, is_wanted in wanted.items():
         if is_wanted and what not in CACHE_FORMATS[ending].holds:
-            raise UsageError(f"--{what} means nothing to {ending}", help=f"{', '.join(holding(what))} keep {what}")
+            raise UsageError(f"--{what} means nothing to {ending}", help=f"{', '.join(formats_with(what))} keep {what}")

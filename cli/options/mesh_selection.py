@@ -35,7 +35,7 @@ def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:
     return [scene.instances[i % len(meshes)].node for i in match_names(globs, [*meshes, *nodes], "mesh")]
 
 
-def shown(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> list[int] | None:
+def visible_meshes(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> list[int] | None:
     """Return the nodes of the meshes that are meant and not hidden; None for all.
 
     hidden: globs for names of meshes and of nodes, which hide what descends from them too.

@@ -8,17 +8,17 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import Scene
-from anim.skinning.analysis.inbetween_error import Missed
+from anim.skinning.analysis.inbetween_error import InbetweenError
 from anim.skinning.analysis.method_deviation import Deviation
-from anim.skinning.bake import baked
+from anim.skinning.bake import bakeable_instances
 from cli import text
-from cli.text import Voice
+from cli.text import Reporter
 
 SHOWN_JOINTS = 3  # that a note lists
 SHOWN = 1e-3  # of the diagonal; less is not seen
 
 
-def lost(found: Sequence[tuple[str, Deviation]], method: str, voice: Voice) -> None:
+def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: Reporter) -> None:
     """Warn where a method places vertices farther from linear blending than the model is large.
 
     found: of clips of these names.
@@ -26,13 +26,13 @@ def lost(found: Sequence[tuple[str, Deviation]], method: str, voice: Voice) -> N
     if far := [(each, name) for name, each in found if each.distance > each.size]:
         worst, name = max(far)
         voice.warn(
-            f"{method} can't be used: a vertex is {text.length(worst.distance)} from where linear blending "
-            f"(lbs), and so every player, has it, more than the model's size of {text.length(worst.size)}, at "
+            f"{method} can't be used: a vertex is {text.format_length(worst.distance)} from where linear blending "
+            f"(lbs), and so every player, has it, more than the model's size of {text.format_length(worst.size)}, at "
             f"{worst.time:.3g} s of {name}"
         )
 
 
-def uneven(joints: Sequence[int], scene: Scene, method: str, voice: Voice) -> None:
+def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: Reporter) -> None:
     """Note which joints scale unevenly while a method plays that other tools define differently there."""
     if joints:
         names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
@@ -43,16 +43,16 @@ def uneven(joints: Sequence[int], scene: Scene, method: str, voice: Voice) -> No
         )
 
 
-def left_out(scene: Scene, nodes: Sequence[int] | None, voice: Voice) -> None:
+def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) -> None:
     """Warn of how many vertices are not baked as only nodes move them."""
-    kept = {id(each) for each in baked(scene, nodes=nodes)}
-    lost = [each for each in baked(scene, rigid=True, nodes=nodes) if id(each) not in kept]
+    kept = {id(each) for each in bakeable_instances(scene, nodes=nodes)}
+    lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if id(each) not in kept]
     if lost:
         count = sum(len(each.mesh.positions) for each in lost)
         voice.warn(f"{count} vertices that only nodes move are left out; --rigid takes them in")
 
 
-def gaps(found: Sequence[tuple[str, Missed]], rest: Floats, voice: Voice) -> None:
+def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, voice: Reporter) -> None:
     """Warn of how far vertices are off the straight way between frames, of the clip where that can be seen best.
 
     found: what clips of these names miss. rest: (V, 3) m, for their size.
@@ -63,6 +63,6 @@ def gaps(found: Sequence[tuple[str, Missed]], rest: Floats, voice: Voice) -> Non
         missed, name = max(seen)
         others = f" ({len(seen)} clips have such places)" if len(seen) > 1 else ""
         voice.warn(
-            f"between frames a vertex is up to {text.length(missed.distance)} off the straight way, at "
+            f"between frames a vertex is up to {text.format_length(missed.distance)} off the straight way, at "
             f"{missed.time:.3g} s of {name}{others}; --fps puts more frames there"
         )

@@ -14,27 +14,27 @@ from anim.model import VertexCache
 from cli import text
 
 
-def not_held(cache: VertexCache, ending: str) -> tuple[str, ...]:
+def unsupported_notes(cache: VertexCache, ending: str) -> tuple[str, ...]:
     """Return what of the cache has no place in the format."""
     carried = [name for name, has in (("normals", cache.has_normals), ("tangents", cache.has_tangents)) if has]
     lost = [name for name in carried if name not in CACHE_FORMATS[ending].holds]
     return (f"{' and '.join(lost)} are left out: {ending[1:]} has no place for them",) if lost else ()
 
 
-def no_place(names: Sequence[str]) -> tuple[str, ...]:
+def no_place_note(names: Sequence[str]) -> tuple[str, ...]:
     """Return which files a pipe has no place for."""
     return (f"not written, since the output is a pipe: {', '.join(names)}",) if names else ()
 
 
-def left_behind(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
+def left_behind_note(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
     """Return which frames of an earlier sequence are still beside those that were written to `path`."""
     if CACHE_FORMATS[ending].files is not Files.FRAMES:
         return ()
-    target, there = links.followed(Path(path)), []
+    target, there = links.resolve_links(Path(path)), []
     with suppress(OSError):
         there = os.listdir(target.parent)
     notes = []
-    if old := [name for name in mesh_sequence.belonging(target.name, there) if name not in written]:
+    if old := [name for name in mesh_sequence.sequence_files(target.name, there) if name not in written]:
         notes.append(f"{text.plural(len(old), 'frame')} of before still there, from {old[0]} on")
     if target.name in there and target.name not in (*written, *old):
         notes.append(f"{target.name} of before is still there, and is what that name reads")

@@ -6,19 +6,19 @@ from collections.abc import Mapping
 
 from anim.gltf.reading.reader import clip_name
 from anim.model import Clip
-from cli.text import moment, plural, span
+from cli.text import format_span, format_time, plural
 
 LISTED = 3  # clips whose lengths are given one by one; more as their sum
 
 
-def lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
+def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
     """Return the length of every clip that changed it: "'walk' 1 s → 4 s"; of many clips the sum; else "".
 
     before, after: clips of a file by number. Where a clip starts late, its span stands for its length: "0.5–1.5 s".
     """
-    spans = {i: [span(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
+    spans = {i: [format_span(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
     changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
     if len(changed) <= LISTED:
         return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())
     sums = (sum(clips[i].end for i in changed) for clips in (before, after))
-    return f"{plural(len(changed), 'clip')} {' → '.join(map(moment, sums))} in all"
+    return f"{plural(len(changed), 'clip')} {' → '.join(map(format_time, sums))} in all"

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from anim.skinning.analysis.collapse import LOW, MeshCollapse
-from anim.skinning.analysis.collapsed_clips import KEPT, pinches
-from anim.skinning.analysis.method_scores import BULGE, Fared
-from anim.skinning.analysis.recommendations import Found, advice
+from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
+from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed
+from anim.skinning.analysis.method_scores import BULGE, MethodScore
+from anim.skinning.analysis.recommendations import Found, recommend
 from cli import tables
 from cli.text import plural
 
@@ -19,7 +19,7 @@ SCHEMA = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class CollapseReport:
     """What was looked at, and what was found.
 
     name: of the file. meshes: how many skinned ones. clamped: whether methods other than lbs had the bulge clamp.
@@ -49,17 +49,17 @@ def worst_of_clips(found: Sequence[Found]) -> list[Found]:
     return list(worst.values())
 
 
-def text(seen: Seen, *, every: bool) -> str:
+def text(seen: CollapseReport, *, every: bool) -> str:
     """Return a row for the worst mesh of each clip, or for every mesh, and what to do. Without a clip only words."""
     shown = seen.found if every else worst_of_clips(seen.found)
-    header = ["clip", "mesh", "index", f"< {LOW}", "inverted", "at", "joints", "turn"]
+    header = ["clip", "mesh", "index", f"< {LOW_INDEX}", "inverted", "at", "joints", "turn"]
     header += [f"volume {each}" for each in seen.methods] + [f"bulge {each}" for each in seen.methods]
     table = tables.text(header, [_row(each) for each in shown], left=2) + "\n" if shown else ""
-    lines = "".join(f"  {line}\n" for line in advice(seen.found, clamped=seen.clamped))
+    lines = "".join(f"  {line}\n" for line in recommend(seen.found, clamped=seen.clamped))
     return f"{_head(seen, every=every)}\n\n{table}{lines}"
 
 
-def as_json(seen: Seen) -> str:
+def as_json(seen: CollapseReport) -> str:
     """Return the same as one JSON document, units in the keys."""
     clips: dict[int, dict[str, Any]] = {}
     for each in seen.found:
@@ -70,18 +70,18 @@ def as_json(seen: Seen) -> str:
         "fps": seen.fps,
         "methods": list(seen.methods),
         "bulge_clamp": seen.clamped,
-        "low_index": LOW,
-        "low_volume": KEPT,
+        "low_index": LOW_INDEX,
+        "low_volume": MIN_VOLUME_FRACTION,
         "bulge_ratio": BULGE,
         "skinned_meshes": seen.meshes,
         "clips": list(clips.values()),
-        "advice": list(advice(seen.found, clamped=seen.clamped)),
+        "advice": list(recommend(seen.found, clamped=seen.clamped)),
         "warnings": list(seen.warnings),
     }
     return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
 
-def _head(seen: Seen, *, every: bool) -> str:
+def _head(seen: CollapseReport, *, every: bool) -> str:
     meshes = f"{seen.meshes} skinned {'mesh' if seen.meshes == 1 else 'meshes'}"
     parts = [f"{seen.name}: {plural(seen.clips, 'clip')}, {meshes}"]
     if seen.clamped:
@@ -119,7 +119,7 @@ def _mesh(mesh: MeshCollapse) -> dict[str, Any]:
         "mesh": mesh.mesh,
         "node": mesh.node,
         "vertices": mesh.vertices,
-        "pinches": pinches(mesh),
+        "pinches": is_collapsed(mesh),
         "index": worst.index,
         "vertex": worst.vertex,
         "time_s": worst.time,
@@ -134,7 +134,7 @@ def _mesh(mesh: MeshCollapse) -> dict[str, Any]:
     }
 
 
-def _fared(fared: Fared, mesh: MeshCollapse) -> dict[str, Any]:
+def _fared(fared: MethodScore, mesh: MeshCollapse) -> dict[str, Any]:
     about: dict[str, Any] = {"method": fared.method}
     if fared.volume is not None:
         about |= {

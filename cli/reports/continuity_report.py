@@ -8,17 +8,23 @@ from dataclasses import asdict
 from typing import Any
 
 from anim.gltf.reading.reader import clip_name
-from anim.measure.continuity.continuity import Grade, Largest, Seam, TrackContinuity
-from anim.measure.inspect.report import ClipFacts
+from anim.measure.continuity.continuity import ContinuityClass, LoopGap, MaxJump, TrackContinuity
+from anim.measure.inspect.report import ClipReport
 from cli import tables
 from cli.reports.inspect_data import Inspected, Smoothness
 from cli.tables import Cell
-from cli.text import digits, length, plural
+from cli.text import format_length, format_number, plural
 
 
-def table(clip: ClipFacts, tracks: Sequence[TrackContinuity]) -> str:
+def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
     """Return the table of a clip's tracks that move at all, and a note on the others."""
-    header = [tables.one_line(f"smoothness of {clip_name(clip.name, clip.index)}"), "path", "how", "inner keys", "jump"]
+    header = [
+        tables.escape_control(f"smoothness of {clip_name(clip.name, clip.index)}"),
+        "path",
+        "how",
+        "inner keys",
+        "jump",
+    ]
     header += ["C0", "G1", "C1", "C2", "value jump", "speed jump", "acceleration jump", "loop seam"]
     moving = [track for track in tracks if not track.still]
     rows: list[list[Cell]] = [
@@ -62,7 +68,7 @@ def cells(track: TrackContinuity | None) -> dict[str, Cell]:
     plain = ("target", "path", "interpolation", "unit", "still", "interior_keys", "jumps", "c0", "g1", "c1", "c2")
     found: dict[str, Cell] = {name: getattr(track, name, None) for name in plain}
     for name in ("value", "speed", "acceleration"):
-        largest: Largest | None = getattr(track, f"largest_{name}_jump", None)
+        largest: MaxJump | None = getattr(track, f"largest_{name}_jump", None)
         found[f"largest_{name}_jump"] = largest.size if largest else None
         found[f"largest_{name}_jump_at_s"] = largest.time_s if largest else None
     seam = track.seam if track else None
@@ -75,7 +81,7 @@ def cells(track: TrackContinuity | None) -> dict[str, Cell]:
 def json(track: TrackContinuity) -> dict[str, Any]:
     """Return one track's smoothness as JSON holds it, with every key between its ends."""
     about = {name: getattr(track, name) for name in track.__dataclass_fields__ if name != "keys"}
-    about |= {name: asdict(value) for name, value in about.items() if isinstance(value, Largest | Seam)}
+    about |= {name: asdict(value) for name, value in about.items() if isinstance(value, MaxJump | LoopGap)}
     keys = track.keys
     about["keys"] = {
         "times_s": keys.times.tolist(),
@@ -90,11 +96,11 @@ def json(track: TrackContinuity) -> dict[str, Any]:
 def _seam(track: TrackContinuity) -> str:
     """The loop's seam in words: "C2", "C0, 0.3 m/s", "jump, 2 cm"."""
     seam = track.seam
-    if seam is None or seam.grade is Grade.C2:
+    if seam is None or seam.grade is ContinuityClass.C2:
         return "C2" if seam else ""
-    if seam.grade is Grade.JUMP:
+    if seam.grade is ContinuityClass.JUMP:
         return f"jump, {_amount(seam.value_jump, track.unit, '')}"
-    if seam.grade is Grade.C1:
+    if seam.grade is ContinuityClass.C1:
         return f"C1, {_amount(seam.acceleration_jump, track.unit, '/s²')}"
     return f"{seam.grade}, {_amount(seam.speed_jump, track.unit, '/s')}"
 
@@ -102,8 +108,8 @@ def _seam(track: TrackContinuity) -> str:
 def _amount(size: float, unit: str, per: str) -> str:
     """A jump with its unit, two digits: "0.46 m/s", "12 °/s", "3.1 /s²"."""
     if unit == "m":
-        return f"{digits(size, 2)} m{per}" if per else length(size)
+        return f"{format_number(size, 2)} m{per}" if per else format_length(size)
     if unit == "rad":
-        degrees = digits(math.degrees(size), 2)
+        degrees = format_number(math.degrees(size), 2)
         return f"{degrees} °{per}" if per else f"{degrees}°"
-    return f"{digits(size, 2)} {per}".rstrip()
+    return f"{format_number(size, 2)} {per}".rstrip()

@@ -11,9 +11,9 @@ from typing import Any
 from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.diff import ClipDiff, Diff
 from anim.measure.error.statistics import Peak
-from anim.measure.inspect.storage_cost import Footprint
+from anim.measure.inspect.storage_cost import StorageCost
 from cli import tables
-from cli.text import change, digits, length, plural, speed
+from cli.text import format_change, format_length, format_number, format_speed, plural
 
 SCHEMA = 1
 SAME_END = 1e-6  # s; ends that are nearer than this differ by rounding
@@ -28,12 +28,12 @@ class File:
 
     name: str
     size: int
-    cost: Footprint
+    cost: StorageCost
     clips: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class DiffReport:
     """What was found about two files, and how it was measured.
 
     nodes_by_name: how many nodes of the old file have a namesake in the new one. are_named: whether both files call
@@ -62,7 +62,7 @@ class Found:
         return self.are_named and not self.clips_by_name and not self.nodes_by_name
 
 
-def text(found: Found) -> str:
+def text(found: DiffReport) -> str:
     """Return a row per clip, the worst first, then what only one file has, and one line that says it all.
 
     Files in which nothing has the same name are called that before anything else.
@@ -74,7 +74,7 @@ def text(found: Found) -> str:
     return head + table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
 
 
-def as_json(found: Found, *, warnings: Sequence[str] = ()) -> str:
+def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
     """Return the same as one JSON document, units in the keys. warnings: said of the files."""
     diff = found.diff
     content = {
@@ -100,7 +100,7 @@ def as_json(found: Found, *, warnings: Sequence[str] = ()) -> str:
     return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
 
-def worst(found: Found) -> str:
+def worst(found: DiffReport) -> str:
     """Return where the largest distance is: "4.3 mm (0.21 %) in 'Run' at 'tail3', vertex 134, 0.458 s"."""
     each = found.diff.clips[0]
     error = each.error
@@ -109,7 +109,7 @@ def worst(found: Found) -> str:
     vertex = f", vertex {error.vertex}" if error.vertex >= 0 else ""
     percent = f" ({_share(_percent(error.max_error, found.diff.diagonal))} %)" if found.diff.diagonal else ""
     clip = clip_name(each.name, each.old)
-    return f"{length(error.max_error)}{percent} in '{clip}' at '{error.joint}'{vertex}, {error.time:.3f} s"
+    return f"{format_length(error.max_error)}{percent} in '{clip}' at '{error.joint}'{vertex}, {error.time:.3f} s"
 
 
 def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
@@ -123,12 +123,12 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
         error.joint,
         str(error.vertex) if error.vertex >= 0 else "",
         f"{error.time:.3f}" if moved else "",
-        length(error.max_error),
+        format_length(error.max_error),
         _share(_percent(error.max_error, diagonal)) if moved else "",
-        length(found.p99) if moved else "",
-        length(found.mean) if moved else "",
+        format_length(found.p99) if moved else "",
+        format_length(found.mean) if moved else "",
         f"{_share(math.degrees(found.angle.size))}°" if found.angle.size else "",
-        speed(found.speed.size) if found.speed.size else "",
+        format_speed(found.speed.size) if found.speed.size else "",
         _share(found.weight.size) if found.weight.size else "",
         f"{_share(100 * error.max_pointer_error)} %" if error.max_pointer_error else "",
         ends,
@@ -136,7 +136,7 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
     ]
 
 
-def _alone(found: Found) -> list[str]:
+def _alone(found: DiffReport) -> list[str]:
     """Lines about what only one of the files has."""
     diff, lines = found.diff, []
     for names, which in (
@@ -148,25 +148,28 @@ def _alone(found: Found) -> list[str]:
         if names:
             noun, rest = which.split(" ", 1)
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-            listed = ", ".join(f"'{tables.one_line(name)}'" for name in names[:LISTED])
+            listed = ", ".join(f"'{tables.escape_control(name)}'" for name in names[:LISTED])
             lines.append(f"{plural(len(names), noun)} {rest}: {listed}{more}")
     if not diff.by_vertex:
         lines.append("meshes differ: the first file's vertices, carried by the second one's joints")
     return lines
 
 
-def _summary(found: Found) -> list[str]:
+def _summary(found: DiffReport) -> list[str]:
     old, new = found.old, found.new
     count = plural(len(found.diff.clips), "clip")
     motion = f"{count} compared, max {worst(found)}" if found.diff.clips else "no clips to compare"
     if "," in found.player:
         return [motion, f"{old.name}, as {found.player.replace(',', ' and as ')} show it"]
-    cost = f"animation {change(old.cost.total, new.cost.total)}"
-    return [motion, f"{old.name} → {new.name}: {change(old.size, new.size)}, {cost}, of it JSON {_json_part(found)}"]
+    cost = f"animation {format_change(old.cost.total, new.cost.total)}"
+    return [
+        motion,
+        f"{old.name} → {new.name}: {format_change(old.size, new.size)}, {cost}, of it JSON {_json_part(found)}",
+    ]
 
 
-def _json_part(found: Found) -> str:
-    return change(found.old.cost.json, found.new.cost.json)
+def _json_part(found: DiffReport) -> str:
+    return format_change(found.old.cost.json, found.new.cost.json)
 
 
 def _file(file: File) -> dict[str, Any]:
@@ -224,4 +227,4 @@ def _share(value: float) -> str:
     """A number with two digits, three above 100, never in the form 2.8e-05."""
     if 0 < value < 1e-4:
         return "<0.0001"
-    return digits(value, 3 if value >= 100 else 2)
+    return format_number(value, 3 if value >= 100 else 2)

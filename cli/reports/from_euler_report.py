@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
 
-from anim.exchange.euler.from_euler import Converted
-from anim.exchange.euler.gimbal import NEAR, GimbalRow
+from anim.exchange.euler.from_euler import ImportedMotion
+from anim.exchange.euler.gimbal import NEAR, GimbalStats
 from anim.exchange.euler.motion import EulerMotion
-from anim.exchange.retarget.apply import Onto
+from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.model import Skeleton
 from cli import tables, text
@@ -26,7 +26,7 @@ NEAR_DEG = round(degrees(NEAR))
 
 
 @dataclass(frozen=True, slots=True)
-class Conversion:
+class ConversionReport:
     """A motion, what became of it, and on whom.
 
     scale_words: where meters_per_unit comes from; is_guess: whether that is not certain.
@@ -34,16 +34,16 @@ class Conversion:
 
     format: str
     motion: EulerMotion
-    converted: Converted
+    converted: ImportedMotion
     meters_per_unit: float
     scale_words: str
-    gimbal: tuple[GimbalRow, ...]
-    onto: Onto | None = None
+    gimbal: tuple[GimbalStats, ...]
+    onto: CharacterClip | None = None
     character: Skeleton | None = None
     is_guess: bool = False
 
 
-def warnings(made: Conversion) -> Iterator[str]:
+def warnings(made: ConversionReport) -> Iterator[str]:
     """Yield what was guessed or put right, a line each: it changes the meaning of times, lengths and poses."""
     yield from made.motion.notes
     if made.is_guess:
@@ -55,7 +55,7 @@ def warnings(made: Conversion) -> Iterator[str]:
         yield from _guesses(made.onto)
 
 
-def lines(made: Conversion, *, verbose: bool) -> Iterator[str]:
+def lines(made: ConversionReport, *, verbose: bool) -> Iterator[str]:
     """Yield what a person wants to know, one line each; tables where verbose."""
     if made.scale_words and not made.is_guess:
         yield f"scale: {made.scale_words}"
@@ -69,7 +69,7 @@ def lines(made: Conversion, *, verbose: bool) -> Iterator[str]:
         yield from _onto_lines(made, made.onto, made.character, verbose=verbose)
 
 
-def counts(made: Conversion) -> str:
+def counts(made: ConversionReport) -> str:
     """Return "31 joints, 22.9 s in up to 2752 keys a track"."""
     tracks = made.converted.clip.tracks
     most = max((len(track.times) for track in tracks), default=0)
@@ -77,7 +77,7 @@ def counts(made: Conversion) -> str:
     return f"{text.plural(joints, 'joint')}, {text.plural(most, 'key')} at most, {made.converted.clip.end:.3g} s long"
 
 
-def as_json(made: Conversion, *, warnings: Sequence[str]) -> str:
+def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
     """Return the report as one JSON document: schema, units in the keys. warnings: said so far."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
@@ -116,7 +116,7 @@ def _angles_line(motion: EulerMotion) -> Iterator[str]:
         yield f"angles: {degrees(low):.4g}° to {degrees(high):.4g}°"
 
 
-def _gimbal_line(rows: tuple[GimbalRow, ...]) -> str:
+def _gimbal_line(rows: tuple[GimbalStats, ...]) -> str:
     near = [row for row in rows if row.nearest_deg < NEAR_DEG]
     worst = min(rows, key=lambda row: row.nearest_deg)
     words = f"gimbal: {len(near)} of {text.plural(len(rows), 'joint')} within {NEAR_DEG}° of lock; nearest "
@@ -126,7 +126,7 @@ def _gimbal_line(rows: tuple[GimbalRow, ...]) -> str:
     return words
 
 
-def _gimbal_table(rows: tuple[GimbalRow, ...]) -> str:
+def _gimbal_table(rows: tuple[GimbalStats, ...]) -> str:
     header = ("joint", "order", "nearest", "at", f"time < {NEAR_DEG}°", "condition", "aligns", "best order", "keeps")
     cells: list[tuple[tables.Cell, ...]] = [
         (
@@ -145,14 +145,14 @@ def _gimbal_table(rows: tuple[GimbalRow, ...]) -> str:
     return tables.text(header, cells).rstrip("\n")
 
 
-def _onto_lines(made: Conversion, onto: Onto, character: Skeleton, *, verbose: bool) -> Iterator[str]:
+def _onto_lines(made: ConversionReport, onto: CharacterClip, character: Skeleton, *, verbose: bool) -> Iterator[str]:
     names = made.converted.skeleton.names
     left = [names[node] for node in onto.matching.unmatched]
     total = len(left) + len(onto.matching.pairs)
     rest = f"; not: {listed(left)}" if left else ""
     yield f"onto: {len(onto.matching.pairs)} of {text.plural(total, 'joint')} matched{rest}"
     if made.motion.nested:
-        low, high = (text.length(abs(each)) for each in onto.lowered)
+        low, high = (text.format_length(abs(each)) for each in onto.lowered)
         ways = ["down" if each >= 0 else "up" for each in onto.lowered]
         moved = f", hips {low} {ways[0]} to {high} {ways[1]} for the floor" if any(onto.lowered) else ""
         yield f"onto: path × {onto.scale:.3g}{moved}"
@@ -160,7 +160,7 @@ def _onto_lines(made: Conversion, onto: Onto, character: Skeleton, *, verbose: b
         yield from (f"  {names[a]} → {character.names[b]}" for a, b in onto.matching.pairs.items())
 
 
-def _guesses(onto: Onto) -> Iterator[str]:
+def _guesses(onto: CharacterClip) -> Iterator[str]:
     """What the path and the floor had to do without, where the builds differ."""
     if onto.without and onto.measure not in (None, Measure.BUILD):
         made = [WORDS[onto.measure]] if onto.measure in WORDS else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from anim.gltf.document import Document, items
+from anim.gltf.document import Document, json_array
 from anim.gltf.io.images import external_uri, read_image
 from cli import text
 
@@ -17,7 +17,7 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
 
     copied: whether those that can be read were copied; else they stay behind. embed_hint: what would take them in.
     """
-    outside = [image for image in items(document.json, "images") if external_uri(image)]
+    outside = [image for image in json_array(document.json, "images") if external_uri(image)]
     lost = [image["uri"] for image in outside if read_image(folder, image) is None]
     found = [image["uri"] for image in outside if image["uri"] not in lost]
     if found and copied:

@@ -8,11 +8,11 @@ from dataclasses import asdict
 
 from anim.gltf.reading.reader import clip_name
 from anim.measure.inspect.file_findings import Finding
-from anim.measure.inspect.report import ClipFacts, Facts, SkinFacts, TrackFacts
+from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
 from cli import tables
 from cli.reports.inspect_data import Inspected, Smoothness
 from cli.tables import Cell
-from cli.text import length, plural, size, span, speed
+from cli.text import format_bytes, format_length, format_span, format_speed, plural
 
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 STANDING = 1e-4  # m; a root that ends this near its start goes nowhere
@@ -22,7 +22,7 @@ MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
 def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, tracks: bool) -> str:
     """Return the whole page for one file: headline, clips, skins, findings; smooth: tracks of each clip, or nothing."""
     if facts.faults and not file_bytes:
-        return tables.one_line(f"{name}: nothing can be read") + "\n" + _findings(facts.findings)
+        return tables.escape_control(f"{name}: nothing can be read") + "\n" + _findings(facts.findings)
     parts = [_headline(name, file_bytes, facts)]
     if facts.clips:
         parts.append(_clips(facts.clips))
@@ -40,7 +40,7 @@ def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, t
 
 def clip_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
     """Return header and rows of one table: a row per clip of every file."""
-    plain = [key for key in _fields(ClipFacts) if key not in ("tracks", "interpolations", "track_list")]
+    plain = [key for key in _fields(ClipReport) if key not in ("tracks", "interpolations", "track_list")]
     header = ["file", *plain, *(f"{path}_tracks" for path in PATHS), "interpolations"]
     rows = [
         [
@@ -57,7 +57,7 @@ def clip_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
 
 def track_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
     """Return header and rows of one table: a row per track of every clip of every file."""
-    header = ["file", "clip", *_fields(TrackFacts)]
+    header = ["file", "clip", *_fields(TrackReport)]
     rows: list[list[Cell]] = [
         [name, clip_name(clip.name, clip.index), *asdict(track).values()]
         for name, _, facts in files
@@ -67,7 +67,7 @@ def track_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]
     return header, rows
 
 
-def _fields(kind: type[ClipFacts] | type[TrackFacts]) -> list[str]:
+def _fields(kind: type[ClipReport] | type[TrackReport]) -> list[str]:
     return list(kind.__dataclass_fields__)
 
 
@@ -79,35 +79,36 @@ def _headline(name: str, file_bytes: int, facts: Facts) -> str:
     counts += [plural(len(facts.skins), "skin"), plural(len(facts.clips), "clip")]
     share = f" ({100 * cost / file_bytes:.0f} % of the file)" if file_bytes else ""
     decoded = facts.animation_data_bytes
-    unpacked = f" ({size(decoded)} decoded)" if any("meshopt" in each for each in facts.extensions_used) else ""
-    parts = f"{size(facts.animation_stored_bytes)} of keys{unpacked} + {size(facts.animation_json_bytes)} of JSON"
-    lines = [f"{name}  {size(file_bytes)}: {', '.join(counts)}"]
+    unpacked = f" ({format_bytes(decoded)} decoded)" if any("meshopt" in each for each in facts.extensions_used) else ""
+    keys, described = format_bytes(facts.animation_stored_bytes), format_bytes(facts.animation_json_bytes)
+    parts = f"{keys} of keys{unpacked} + {described} of JSON"
+    lines = [f"{name}  {format_bytes(file_bytes)}: {', '.join(counts)}"]
     if cost:
         lines.append(f"  animation: {parts}{share}")
     if facts.generator:
         lines.append(f"  generator: {facts.generator}")
     if facts.extensions_used:
         lines.append(f"  extensions: {', '.join(facts.extensions_used)}")
-    return "\n".join(map(tables.one_line, lines)) + "\n"
+    return "\n".join(map(tables.escape_control, lines)) + "\n"
 
 
-def _clips(clips: Sequence[ClipFacts]) -> str:
+def _clips(clips: Sequence[ClipReport]) -> str:
     on_skin = all(clip.seam_measured_on == "skin" for clip in clips)
     header = ["clip", "seconds", "fps", "T/R/S/W/P", "keys", "how", "bytes", "share"]
     header += ["still", "at rest", "spare keys", "loop seam" if on_skin else "loop seam (nodes)", "root speed"]
     rows: list[list[Cell]] = []
     for clip in clips:
-        seam = f"{length(clip.seam_m)} {speed(clip.seam_speed_m_per_s)}"
-        root_speed = speed(clip.root_speed_m_per_s) if clip.root_distance_m > STANDING else ""
+        seam = f"{format_length(clip.seam_m)} {format_speed(clip.seam_speed_m_per_s)}"
+        root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > STANDING else ""
         rows.append(
             [
                 clip_name(clip.name, clip.index),
-                span(clip.start_s, clip.end_s).removesuffix(" s"),
+                format_span(clip.start_s, clip.end_s).removesuffix(" s"),
                 _rate(clip),
                 "/".join(str(clip.tracks.get(path, 0)) for path in PATHS),
                 clip.keys,
                 "+".join(name[0] for name in sorted(clip.interpolations)),
-                size(clip.stored_bytes + clip.json_bytes),
+                format_bytes(clip.stored_bytes + clip.json_bytes),
                 f"{100 * clip.share:.1f} %",
                 str(clip.constant_tracks or ""),
                 str(clip.no_effect_tracks or ""),
@@ -119,15 +120,15 @@ def _clips(clips: Sequence[ClipFacts]) -> str:
     return tables.text(header, rows)
 
 
-def _rate(clip: ClipFacts) -> str:
+def _rate(clip: ClipReport) -> str:
     if clip.frame_rate_fps is None or clip.frame_rate_regular is None:
         return ""
     mark = "" if clip.frame_rate_regular >= 0.98 else "~"
     return f"{mark}{clip.frame_rate_fps:.4g}"
 
 
-def _tracks(clip: ClipFacts) -> str:
-    header = [tables.one_line(f"tracks of {clip_name(clip.name, clip.index)}"), "path", "how", "keys", "seconds"]
+def _tracks(clip: ClipReport) -> str:
+    header = [tables.escape_control(f"tracks of {clip_name(clip.name, clip.index)}"), "path", "how", "keys", "seconds"]
     header += ["still", "at rest", "spare keys", "off unit", "sign flips", "widest step"]
     rows: list[list[Cell]] = [
         [
@@ -148,7 +149,7 @@ def _tracks(clip: ClipFacts) -> str:
     return tables.text(header, rows, left=3)
 
 
-def _skins(skins: Sequence[SkinFacts]) -> str:
+def _skins(skins: Sequence[SkinReport]) -> str:
     header = ["skin", "joints", "unused", "vertices", "influences (mean, most)", "sums off 1"]
     rows: list[list[Cell]] = []
     for skin in skins:
@@ -162,4 +163,4 @@ def _findings(findings: Sequence[Finding]) -> str:
     if not findings:
         return "  healthy: nothing found\n"
     lines = [f"  {MARKS[f.severity]}  {f.name}: {f.where}: {f.problem}; {f.advice}" for f in findings]
-    return "\n".join(map(tables.one_line, lines)) + "\n"
+    return "\n".join(map(tables.escape_control, lines)) + "\n"

@@ -7,18 +7,18 @@ from collections.abc import Iterable
 
 from anim.optimize.options import Reference
 from anim.optimize.request import Request
-from anim.optimize.verification import NOTHING, Verdict
-from cli.text import length
+from anim.optimize.verification import FLOAT_NOISE, Verification
+from cli.text import format_length
 
 NOT_PROVEN = "not proven between the times looked at"
 
 
-def summary(verdicts: Iterable[Verdict], request: Request, scale: float) -> str:
+def summary(verdicts: Iterable[Verification], request: Request, scale: float) -> str:
     """Return what is proven for every time of all clips; nothing where no vertex moved or only keys count.
 
     scale: m, the diagonal.
     """
-    moved = [each for each in verdicts if each.error.max_error > NOTHING * scale]
+    moved = [each for each in verdicts if each.error.max_error > FLOAT_NOISE * scale]
     if not moved or request.policy.reference is Reference.KEYS:
         return ""
     proven = [each.certified for each in moved if each.certified is not None]
@@ -26,19 +26,19 @@ def summary(verdicts: Iterable[Verdict], request: Request, scale: float) -> str:
         return f", {NOT_PROVEN}"
     if max(proven) <= request.bounds.max_error:
         return ", proven for every time"
-    return f", proven for every time: at most {length(_rounded_up(max(proven)))}"
+    return f", proven for every time: at most {format_length(_rounded_up(max(proven)))}"
 
 
-def of_clip(verdict: Verdict, request: Request) -> str:
+def of_clip(verdict: Verification, request: Request) -> str:
     """Return the bound of a clip for every time."""
     if request.policy.reference is Reference.KEYS:
         return ""
     if verdict.certified is None:
         return f", {NOT_PROVEN}"
-    return f", at most {length(_rounded_up(verdict.certified))} at any time"
+    return f", at most {format_length(_rounded_up(verdict.certified))} at any time"
 
 
-def why_not(verdict: Verdict, request: Request) -> str | None:
+def why_not(verdict: Verification, request: Request) -> str | None:
     """Return why no bound is proven for a clip, None where one is."""
     if verdict.certified is not None:
         return None

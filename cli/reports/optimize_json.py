@@ -9,16 +9,16 @@ from typing import Any
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.measure.inspect.storage_cost import footprints
-from anim.measure.inspect.stored_bytes import stored
+from anim.measure.inspect.storage_cost import storage_costs
+from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.optimize.search.solution import Solution
 from cli.reports import optimize_bound
-from cli.reports.optimize_report import About, count_keys
+from cli.reports.optimize_report import OptimizeReport, count_keys
 
 SCHEMA = 1
 
 
-def as_json(about: About, *, warnings: Sequence[str] = ()) -> str:
+def as_json(about: OptimizeReport, *, warnings: Sequence[str] = ()) -> str:
     """Return the report as a JSON document, schema 1. warnings: said so far."""
     request = about.request
     content = {
@@ -60,18 +60,18 @@ def as_json(about: About, *, warnings: Sequence[str] = ()) -> str:
 
 
 def _bytes(file: int, document: Document) -> dict[str, int]:
-    whole = footprints(document)[1]
-    return {"file": file, "data": whole.data, "stored": stored(document), "json": whole.json}
+    whole = storage_costs(document)[1]
+    return {"file": file, "data": whole.data, "stored": stored_bytes(document), "json": whole.json}
 
 
-def _target(about: About, node: int | None, path: str, pointer: str | None = None) -> dict[str, Any]:
+def _target(about: OptimizeReport, node: int | None, path: str, pointer: str | None = None) -> dict[str, Any]:
     if node is None:
         return {"pointer": pointer, "path": path}
     names = reader.skeleton(about.before).names
     return {"node": node, "name": names[node] if node < len(names) else "", "path": path}
 
 
-def _clip(about: About, number: int, solution: Solution) -> dict[str, Any]:
+def _clip(about: OptimizeReport, number: int, solution: Solution) -> dict[str, Any]:
     source, verdict = about.clips[number], about.found.verdicts[number]
     error, rest = verdict.error, verdict.statistics
     assert rest is not None  # a report asks for details

@@ -11,26 +11,26 @@ from dataclasses import dataclass
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing.references import extensions_naming_keys
-from anim.measure.inspect.storage_cost import footprints
-from anim.measure.inspect.stored_bytes import stored
+from anim.measure.inspect.storage_cost import storage_costs
+from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip
 from anim.optimize.fingerprint import KEY
 from anim.optimize.optimize import Optimized
 from anim.optimize.options import Drop
-from anim.optimize.rate_distortion import Sized
+from anim.optimize.rate_distortion import RatePoint
 from anim.optimize.request import Request
 from anim.optimize.search.solution import Solution
-from anim.optimize.verification import NOTHING, Verdict
+from anim.optimize.verification import FLOAT_NOISE, Verification
 from cli.errors import CheckError
 from cli.reports import optimize_bound
-from cli.text import change, length, plural, share, size, took
+from cli.text import format_bytes, format_change, format_duration, format_length, format_share, plural
 
 LISTED = 3  # places in the file that a note names
 LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
 
 
 @dataclass(frozen=True, slots=True)
-class About:
+class OptimizeReport:
     """Everything there is to say. size_before, size_after: bytes of the files; scale: m, the diagonal.
 
     measured_at: "surface" or, in a file without vertices, "nodes".
@@ -82,8 +82,8 @@ def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: floa
         worst = max(bad, key=lambda i: bad[i].strain)
         off = bad[worst].error
         raise CheckError(
-            f"{reader.label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
-            f"{off.time:.3f} s (bound {length(request.bounds.max_error)}); nothing was written"
+            f"{reader.clip_label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
+            f"{off.time:.3f} s (bound {format_length(request.bounds.max_error)}); nothing was written"
         )
 
 
@@ -108,55 +108,56 @@ def worst(found: Optimized) -> float:
     return max((each.error.max_error for each in found.verdicts.values()), default=0.0)
 
 
-def lines(about: About, *, dry_run: bool) -> list[str]:
+def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
     """Return what is always said."""
     dry = " (dry run: nothing written)" if dry_run else ""
     if about.unchanged:
-        said = f"{about.name}  {size(about.size_after)}, unchanged: {about.unchanged_because}{dry}"
+        said = f"{about.name}  {format_bytes(about.size_after)}, unchanged: {about.unchanged_because}{dry}"
         return [said]
     keys = f"{_keys(about.clips, about)} → {sum(count_keys(each.clip) for each in about.found.solutions.values())} keys"
     summary = [
-        f"{about.name}  {change(about.size_before, about.size_after)}",
-        f"animation {change(cost(about.before), cost(about.after))}",
+        f"{about.name}  {format_change(about.size_before, about.size_after)}",
+        f"animation {format_change(cost(about.before), cost(about.after))}",
         keys,
         _worst_words(about),
-        took(about.seconds),
+        format_duration(about.seconds),
     ]
     kept = kept_keys(about.before, about.found.solutions)
     return [", ".join(summary) + dry, *_policy(about), *([f"note: {kept}"] if kept else [])]
 
 
-def warnings(about: About) -> list[str]:
+def warnings(about: OptimizeReport) -> list[str]:
     """Return what is said even when quiet, since it changes what the numbers mean."""
     return [] if about.found.unchanged else _earlier(about)
 
 
-def details(about: About) -> list[str]:
+def details(about: OptimizeReport) -> list[str]:
     """Return a line per clip."""
     found = {} if about.unchanged else about.found.solutions
     return [_clip_line(about, i, solution) for i, solution in found.items()]
 
 
-def _clip_line(about: About, number: int, solution: Solution) -> str:
+def _clip_line(about: OptimizeReport, number: int, solution: Solution) -> str:
     source = about.clips[number]
     keys = f"{count_keys(source)} → {count_keys(solution.clip)} keys"
     counts = f"{keys}, {len(source.tracks)} → {len(solution.clip.tracks)} tracks"
     found = about.found.verdicts[number]
     assert found.statistics is not None  # -v asks for them
-    usual = f", p99 {length(found.statistics.p99)}, mean {length(found.statistics.mean)}"
+    usual = f", p99 {format_length(found.statistics.p99)}, mean {format_length(found.statistics.mean)}"
     usual = optimize_bound.of_clip(found, about.request) + usual
-    moved = found.error.max_error > NOTHING * about.scale
-    return f"  {reader.label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
+    moved = found.error.max_error > FLOAT_NOISE * about.scale
+    return f"  {reader.clip_label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
 
 
-def curve_line(sized: Sized, scale: float) -> str:
+def curve_line(sized: RatePoint, scale: float) -> str:
     """Return one point of the curve for a person."""
     percent = 100 * sized.max_error / scale if scale else 0.0
-    bound = f"{length(sized.max_error)} ({percent:.2g} %)" if sized.max_error else "without loss"
-    return f"  {bound}: animation {size(sized.animation)}, file {size(sized.size)}, max {length(sized.error)}"
+    bound = f"{format_length(sized.max_error)} ({percent:.2g} %)" if sized.max_error else "without loss"
+    sizes = f"animation {format_bytes(sized.animation)}, file {format_bytes(sized.size)}"
+    return f"  {bound}: {sizes}, max {format_length(sized.error)}"
 
 
-def curve_csv(sizes: Sequence[Sized], scale: float) -> str:
+def curve_csv(sizes: Sequence[RatePoint], scale: float) -> str:
     """Return the curve as CSV: bound in metres and as a share of the diagonal, bytes of the file, largest error found,
     and bytes of the animation alone."""
     text = io.StringIO()
@@ -170,10 +171,10 @@ def curve_csv(sizes: Sequence[Sized], scale: float) -> str:
 
 def cost(document: Document) -> int:
     """Return the bytes of all animations: keys as stored, and JSON."""
-    return stored(document) + footprints(document)[1].json
+    return stored_bytes(document) + storage_costs(document)[1].json
 
 
-def _keys(clips: Sequence[Clip], about: About) -> int:
+def _keys(clips: Sequence[Clip], about: OptimizeReport) -> int:
     return sum(count_keys(clips[i]) for i in about.found.solutions)
 
 
@@ -183,10 +184,10 @@ def count_keys(clip: Clip) -> int:
 
 
 def _length(meters: float, scale: float) -> str:
-    return f"max {length(meters)}{share(meters, scale)}"
+    return f"max {format_length(meters)}{format_share(meters, scale)}"
 
 
-def _worst_words(about: About) -> str:
+def _worst_words(about: OptimizeReport) -> str:
     verdicts = about.found.verdicts
     if not verdicts:
         return "no clip"
@@ -194,9 +195,9 @@ def _worst_words(about: About) -> str:
     return words + optimize_bound.summary(verdicts.values(), about.request, about.scale)
 
 
-def _error_words(verdict: Verdict, about: About) -> str:
+def _error_words(verdict: Verification, about: OptimizeReport) -> str:
     error = verdict.error
-    if error.max_error <= NOTHING * about.scale:
+    if error.max_error <= FLOAT_NOISE * about.scale:
         words = "no vertex moved"
     else:
         where = f" at '{error.joint}', {error.time:.3f} s" if error.joint else ""
@@ -206,14 +207,14 @@ def _error_words(verdict: Verdict, about: About) -> str:
     return words
 
 
-def _earlier(about: About) -> list[str]:
+def _earlier(about: OptimizeReport) -> list[str]:
     """What to know where the input was lossy before: nothing in a file tells its motion from its own source's."""
     if not about.optimized_before:
         return []
     return ["the input was optimized before; errors are measured from it, not from its source"]
 
 
-def _policy(about: About) -> list[str]:
+def _policy(about: OptimizeReport) -> list[str]:
     """What was removed and moved, and under which rule."""
     policy, words = about.request.policy, []
     dropped = Counter(about.clips[i].tracks[k].path for i, each in about.found.solutions.items() for k in each.dropped)

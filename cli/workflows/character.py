@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from anim.errors import NotFoundError
 from anim.exchange.retarget import aliases
-from anim.exchange.retarget.apply import onto, to_match
-from anim.exchange.retarget.kept_tracks import left_over, with_left_over
-from anim.exchange.retarget.retarget import Floor
-from anim.exchange.retarget.vrm_humanoid import stated_roles
+from anim.exchange.retarget.apply import apply_to_character, to_match
+from anim.exchange.retarget.kept_tracks import add_kept_tracks, kept_tracks
+from anim.exchange.retarget.retarget import GroundMode
+from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
 from anim.gltf import authoring
 from anim.gltf.document import Document
 from anim.gltf.io.source import Source
@@ -22,38 +22,40 @@ from cli import tables, text
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
 from cli.reports import from_euler_report
-from cli.reports.from_euler_report import Conversion
-from cli.text import Voice
+from cli.reports.from_euler_report import ConversionReport
+from cli.text import Reporter
 
 
 @dataclass(frozen=True, slots=True)
-class Casting:
+class CharacterOptions:
     """What --onto is told: pairs of names, what heights the hips get, the time of the rest pose, and the limit.
 
     replaced: index of the clip that gives way to the new one; None where it is added.
     """
 
     names: dict[str, str]
-    floor: Floor
+    floor: GroundMode
     rest_at: float | None
     fail_unmatched: int | None
     replaced: int | None = None
 
 
-def cast(made: Conversion, character: Source, casting: Casting, voice: Voice) -> tuple[Conversion, Document]:
+def put_on_character(
+    made: ConversionReport, character: Source, casting: CharacterOptions, voice: Reporter
+) -> tuple[ConversionReport, Document]:
     """Return the conversion with what became of it on the character, and its document with the clip.
 
     Raises CheckError where more joints are without a partner than may be.
     """
     document = character.document
-    scene = scenes.scene(document, character.name, voice)
+    scene = scenes.read_scene(document, character.name, voice)
     try:
-        done = onto(
+        done = apply_to_character(
             made.converted,
             scene,
             aliases=casting.names,
             nested=made.motion.nested,
-            stated=stated_roles(document.json),
+            stated=read_vrm_roles(document.json),
             floor=casting.floor,
             rest_at=casting.rest_at,
         )
@@ -69,18 +71,18 @@ def cast(made: Conversion, character: Source, casting: Casting, voice: Voice) ->
     made = replace(made, onto=done, character=scene.skeleton)
     if casting.replaced is not None:
         old = reader.clips(document)[casting.replaced]
-        stay, num_gone = left_over(old, done)
+        stay, num_gone = kept_tracks(old, done)
         if stay:
             voice.say(f"note: {text.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
         if num_gone:
             what = f"{text.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
             voice.warn(f"{what} go with it: it is another figure's motion")
-        clip = with_left_over(done, stay, scene.skeleton)
+        clip = add_kept_tracks(done, stay, scene.skeleton)
         return made, writer.replace_clips(document, {casting.replaced: clip})
     return made, authoring.add_clips(document, [done.clip])
 
 
-def _list_joints(made: Conversion, scene: Scene, voice: Voice) -> None:
+def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
     """Say, where details are wanted, which names there are to pair."""
     moving, moved = to_match(made.converted, scene, nested=made.motion.nested)
     for what, skeleton, nodes in (
@@ -88,7 +90,7 @@ def _list_joints(made: Conversion, scene: Scene, voice: Voice) -> None:
         ("character", scene.skeleton, moved),
     ):
         names = ", ".join(f"'{skeleton.names[node]}'" for node in sorted(nodes))
-        voice.detail(f"joints of the {what} ({len(nodes)}): {tables.one_line(names)}")
+        voice.detail(f"joints of the {what} ({len(nodes)}): {tables.escape_control(names)}")
 
 
 def pairs(path: str | None) -> dict[str, str]:
@@ -99,7 +101,7 @@ def pairs(path: str | None) -> dict[str, str]:
         return aliases.read(data.tobytes())
 
 
-def named(made: Conversion, document: Document, *, name: str | None, replaced: int | None) -> Conversion:
+def named(made: ConversionReport, document: Document, *, name: str | None, replaced: int | None) -> ConversionReport:
     """Return the conversion with the name that its clip gets in the character's file, and a note where it is taken.
 
     name: as asked for, which stays; None for the motion's own, which gets a number where a clip has it. replaced:
@@ -139,7 +141,7 @@ def check_name(name: str | None, replaced: int | None, document: Document) -> No
         raise UsageError(words, help="leave --name out")
 
 
-def _called(made: Conversion, name: str, *notes: str) -> Conversion:
+def _called(made: ConversionReport, name: str, *notes: str) -> ConversionReport:
     motion = replace(made.motion, notes=(*made.motion.notes, *notes))
     clip = replace(made.converted.clip, name=name)
     return replace(made, motion=motion, converted=replace(made.converted, clip=clip))

@@ -14,7 +14,7 @@ from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
-from anim.measure.error.metric import MotionError, Ruler
+from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.measure.inspect.file_findings import badly_stored
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
@@ -22,7 +22,7 @@ from anim.ops.selection import Selection
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
-from cli.reports.clip_lengths import lengths
+from cli.reports.clip_lengths import clip_lengths
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by their number in the file
@@ -30,7 +30,7 @@ DRY = " (dry run: nothing written)"
 
 
 @dataclass(frozen=True, slots=True)
-class Edited:
+class EditResult:
     """Clips of a file before and after, by number, and the worst that happened to the surface.
 
     at_nodes: whether the surface could not be read, so that only nodes were measured.
@@ -43,12 +43,12 @@ class Edited:
     at_nodes: bool = False
 
 
-def edit(
+def edit_clips(
     path: str,
     output: str,
     selection: Selection,
     change: Change,
-    voice: text.Voice,
+    voice: text.Reporter,
     *,
     dry_run: bool,
     measure: bool = True,
@@ -77,28 +77,28 @@ def edit(
             try:
                 new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), scene)
             except AnimError as error:
-                raise error.at(reader.label(clips[i].name, i)).advise(advise(clips[i], i)) from None
+                raise error.at(reader.clip_label(clips[i].name, i)).advise(advise(clips[i], i)) from None
         stale = badly_stored(document.json)
         new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
         for note in notes({i: clips[i] for i in new}, new):
             voice.say(f"note: {note}")
         result = writer.replace_clips(document, new)
         written = reader.clips(result)
-        edited = Edited({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
+        edited = EditResult({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
         if not new:
             pass
         elif measure:
             edited = _measured(edited, source, accessors, skeleton, voice)
         else:
             for i, clip in edited.before.items():
-                voice.detail(f"  {reader.label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
+                voice.detail(f"  {reader.clip_label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
         size = documents.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run)
     if not dry_run:
         note_images(result, source, output, voice)
     name = source.name if output == documents.PIPE else output
     if not new:
         why = "no track was changed" if clips else "it has no clips"
-        before = text.size(size) if size == source.size else text.change(source.size, size)
+        before = text.format_bytes(size) if size == source.size else text.format_change(source.size, size)
         voice.say(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
     voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
@@ -116,27 +116,29 @@ def _is_same(new: Clip, old: Clip) -> bool:
     return new is old or (len(new.tracks) == len(old.tracks) and all(map(operator.is_, new.tracks, old.tracks)))
 
 
-def _measured(edited: Edited, source: Source, accessors: Accessors, skeleton: Skeleton, voice: text.Voice) -> Edited:
+def _measured(
+    edited: EditResult, source: Source, accessors: Accessors, skeleton: Skeleton, voice: text.Reporter
+) -> EditResult:
     at_nodes = False
     try:
-        scene = scenes.scene(source.document, source.name, voice, accessors=accessors)
+        scene = scenes.read_scene(source.document, source.name, voice, accessors=accessors)
     except AnimError as error:  # vertices that can't be read don't stop a change of keys
         hint = f" ({error.help})" if error.help else ""
         voice.warn(f"measured at nodes, not on the surface: {error}{hint}")
         scene, at_nodes = Scene(skeleton, ()), True
-    ruler = Ruler(scene)
+    ruler = ErrorMetric(scene)
     worst: MotionError | None = None
     _warn_of_lengths(edited, voice)
     for i, before in edited.before.items():
         found = ruler.error(before, edited.after[i])
         counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
-        voice.detail(f"  {reader.label(before.name, i)}: {counts}, {_error(found, ruler.diagonal)}")
+        voice.detail(f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, ruler.diagonal)}")
         if worst is None or found.max_error > worst.max_error:
             worst = found
-    return Edited(edited.before, edited.after, worst, ruler.diagonal, at_nodes)
+    return EditResult(edited.before, edited.after, worst, ruler.diagonal, at_nodes)
 
 
-def _warn_of_lengths(edited: Edited, voice: text.Voice) -> None:
+def _warn_of_lengths(edited: EditResult, voice: text.Reporter) -> None:
     """Warn of rotations off unit length in tracks that changed: the stated error is for players that normalize them."""
     off: list[tuple[str, int]] = []
     keys = 0
@@ -148,24 +150,24 @@ def _warn_of_lengths(edited: Edited, voice: text.Voice) -> None:
             off.append((before.name, i))
             keys += sum(changed)
     if off:
-        found = f"{text.plural(keys, 'rotation key')} of {reader.labels(off)} {'is' if keys == 1 else 'are'}"
+        found = f"{text.plural(keys, 'rotation key')} of {reader.clip_labels(off)} {'is' if keys == 1 else 'are'}"
         rest = "players that don't normalize rotations may be further off than stated"
         voice.warn(f"{found} off unit length; {rest}")
 
 
-def _summary(name: str, before: int, after: int, edited: Edited, seconds: float, *, dry_run: bool) -> str:
+def _summary(name: str, before: int, after: int, edited: EditResult, seconds: float, *, dry_run: bool) -> str:
     keys = [sum(_keys(clip) for clip in clips.values()) for clips in (edited.before, edited.after)]
-    parts = [f"{name}  {text.change(before, after)}", f"{keys[0]} → {keys[1]} keys"]
-    parts += filter(None, [lengths(edited.before, edited.after)])
+    parts = [f"{name}  {text.format_change(before, after)}", f"{keys[0]} → {keys[1]} keys"]
+    parts += filter(None, [clip_lengths(edited.before, edited.after)])
     if edited.worst is not None:
         parts.append(_error(edited.worst, edited.diagonal) + (" (nodes only)" if edited.at_nodes else ""))
-    parts.append(text.took(seconds))
+    parts.append(text.format_duration(seconds))
     return ", ".join(parts) + (DRY if dry_run else "")
 
 
 def _error(error: MotionError, diagonal: float) -> str:
     where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = f"max {text.length(error.max_error)}{text.share(error.max_error, diagonal)}{where}"
+    words = f"max {text.format_length(error.max_error)}{text.format_share(error.max_error, diagonal)}{where}"
     if error.max_pointer_error > 0:
         words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
     return words
@@ -175,7 +177,7 @@ def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 
 
-def note_images(document: Document, source: Source, output: str, voice: text.Voice) -> None:
+def note_images(document: Document, source: Source, output: str, voice: text.Reporter) -> None:
     """Say which images went along to an output in another folder than its input, and which are missing there."""
     if output != documents.PIPE and not source.is_beside(output):
         for note in image_notes.notes(document, source.folder, copied=True):

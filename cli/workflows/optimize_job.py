@@ -17,17 +17,17 @@ from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.ops.selection import Selection
 from anim.optimize.optimize import Optimized, optimize
-from anim.optimize.rate_distortion import MOST, Sized, fitting
+from anim.optimize.rate_distortion import MOST, RatePoint, smallest_error
 from anim.optimize.request import Request
 from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress
 from cli.reports import optimize_report
-from cli.text import Voice, length, plural
+from cli.text import Reporter, format_length, plural
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class OptimizeJob:
     """A file, what of it is to be optimized, and where it goes.
 
     chosen: numbers of clips. scale: m, the diagonal. detailed: whether verdicts are to have statistics.
@@ -68,11 +68,11 @@ class Job:
         """Return the bytes of a document as it would be written."""
         return documents.write(document, self.output, self.source, dry_run=True)
 
-    def sized(self, request: Request, max_error: float) -> Sized:
+    def sized(self, request: Request, max_error: float) -> RatePoint:
         """Return what a bound, in m, leads to, searched fast."""
         found = self.run(replace(_bounded(request, max_error), effort="fast"))
         smaller = self.smaller(found)
-        return Sized(max_error, self.size(smaller), optimize_report.worst(found), optimize_report.cost(smaller))
+        return RatePoint(max_error, self.size(smaller), optimize_report.worst(found), optimize_report.cost(smaller))
 
     def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
         """Return what fits with the smallest error, and the request that led there.
@@ -83,7 +83,7 @@ class Job:
         most = MOST * self.scale if ceiling is None else ceiling
         if ceiling is not None:
             self._check_fit(self.sized(request, most), max_bytes)
-        best = fitting(max_bytes, self.scale, lambda max_error: self.sized(request, max_error))
+        best = smallest_error(max_bytes, self.scale, lambda max_error: self.sized(request, max_error))
         if best is None:
             self._check_fit(self.sized(request, most), max_bytes)
         bound = most if best is None else min(best.max_error, most)
@@ -93,15 +93,15 @@ class Job:
             found = self.run(replace(request, effort="fast"))
         return request, found
 
-    def _check_fit(self, sized: Sized, max_bytes: int) -> None:
+    def _check_fit(self, sized: RatePoint, max_bytes: int) -> None:
         if sized.size > max_bytes:
             percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
             kept = optimize_report.kept_keys(self.source.document, self.chosen)
             raise CheckError(
-                f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {length(sized.max_error)}{percent} "
-                f"it still takes {plural(sized.size, 'byte')}, {sized.animation} of them animation; "
-                f"{kept}{'; ' if kept else ''}"
-                "nothing was written",
+                f"doesn't fit {plural(max_bytes, 'byte')}: "
+                f"with an error of up to {format_length(sized.max_error)}{percent} it still takes "
+                f"{plural(sized.size, 'byte')}, {sized.animation} of them animation; "
+                f"{kept}{'; ' if kept else ''}nothing was written",
                 help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {sized.size}",
             )
 
@@ -125,7 +125,9 @@ def _bounded(request: Request, max_error: float) -> Request:
     return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
 
 
-def job(source: Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Voice) -> Job:
+def optimize_job(
+    source: Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Reporter
+) -> OptimizeJob:
     """Return the job for a source. clip: globs. jobs: processes, 0 for one per core.
 
     Raises NotFoundError; FormatError or UnsupportedError where vertices can't be read: no bound holds on those.
@@ -133,8 +135,8 @@ def job(source: Source, output: str, *, clip: Sequence[str], jobs: int, detailed
     document = source.document
     accessors = Accessors(document)
     clips = tuple(reader.clips(document, accessors))
-    scene = scenes.scene(document, source.name, voice, accessors=accessors)
-    return Job(
+    scene = scenes.read_scene(document, source.name, voice, accessors=accessors)
+    return OptimizeJob(
         source,
         clips,
         scene,

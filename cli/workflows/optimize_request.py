@@ -28,19 +28,19 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
         text, option = said[name], f"--{name.replace('_', '-')}"
         if text is None:
             return None
-        return 0.0 if ZERO.fullmatch(text) else units.meters(text, option, lambda: scale)
+        return 0.0 if ZERO.fullmatch(text) else units.parse_length(text, option, lambda: scale)
 
     pointer, angle, speed = said["max_pointer_error"] or "0", said["max_angle"], said["max_speed_error"]
     return Bounds(
         length("max_error") or 0.0,
         length("shell") or 0.0,
-        0.0 if ZERO.fullmatch(pointer) else units.share(pointer, "--max-pointer-error"),
-        None if angle is None else units.angle(angle, "--max-angle"),
-        None if speed is None else units.meters(speed, "--max-speed-error", lambda: scale),
+        0.0 if ZERO.fullmatch(pointer) else units.parse_share(pointer, "--max-pointer-error"),
+        None if angle is None else units.parse_angle(angle, "--max-angle"),
+        None if speed is None else units.parse_length(speed, "--max-speed-error", lambda: scale),
     )
 
 
-def given(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
+def raw_options(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
     """Return the same as it was typed where that is a share of the diagonal, and the number of metres elsewhere."""
     return tuple(_share(text) or f"{getattr(bounds, name)}" for name, text in said.items())
 
@@ -58,7 +58,7 @@ def _share(text: str | None) -> str:
     return f"{float(number[:-1])}%" if number.endswith("%") else ""
 
 
-def kept(globs: Sequence[str], scene: Scene) -> frozenset[int]:
+def kept_nodes(globs: Sequence[str], scene: Scene) -> frozenset[int]:
     """Return the numbers of the nodes that match any glob; none without globs. Raises NotFoundError."""
     return frozenset(Selection((), globs).chosen_nodes(scene.skeleton)) if globs else frozenset()
 

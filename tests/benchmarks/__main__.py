@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cli import tables
-from cli.text import length, size
+from cli.text import format_bytes, format_length
 from tests.benchmarks.processes import Measured, environment, interleaved
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str]) -> int:
     peer = _peer()
     with tempfile.TemporaryDirectory() as folder:
         source = _source(given.file, Path(folder))
-        print(f"{source.name}, {size(source.stat().st_size)}, median of {given.runs} runs in turn\n")  # noqa: T201
+        print(f"{source.name}, {format_bytes(source.stat().st_size)}, median of {given.runs} runs in turn\n")  # noqa: T201
         outputs = {name: str(Path(folder) / f"{name}.glb") for name in (OURS, PEER)}
         _report("inspect", ours, peer, [str(source)], [str(source)], given.runs)
         _report(
@@ -90,7 +90,7 @@ def _row(each: Measured, peer: Measured | None) -> list[tables.Cell]:
         f"{min(each.seconds):.3f} s",
         f"{max(each.seconds):.3f} s",
         f"{each.median_s / peer.median_s:.2f} ×" if peer else "",
-        size(round(each.median_peak)),
+        format_bytes(round(each.median_peak)),
         f"{each.median_peak / peer.median_peak:.2f} ×" if peer else "",
     ]
 
@@ -102,7 +102,7 @@ def _outputs(source: Path, outputs: dict[str, str]) -> None:
         if Path(path).is_file():
             found = _json("tests.benchmarks.error", str(source), path)
             share = f"{100 * found['share']:.2g} %"
-            rows.append([name, size(Path(path).stat().st_size), length(found["max_error_m"]), share])
+            rows.append([name, format_bytes(Path(path).stat().st_size), format_length(found["max_error_m"]), share])
     _show(["output of resample", "size", "max error", "of the diagonal"], rows)
 
 
@@ -131,7 +131,12 @@ def _starts(ours: str, peer: str | None, runs: int) -> None:
     found = interleaved(commands, runs=runs)
     bare = found["python -c pass"].median_s
     rows: list[list[tables.Cell]] = [
-        [each.name, f"{1000 * each.median_s:.0f} ms", f"{each.median_s / bare:.1f} ×", size(round(each.median_peak))]
+        [
+            each.name,
+            f"{1000 * each.median_s:.0f} ms",
+            f"{each.median_s / bare:.1f} ×",
+            format_bytes(round(each.median_peak)),
+        ]
         for each in found.values()
     ]
     _show(["start", "median", "of bare Python", "peak memory"], rows)

@@ -12,7 +12,7 @@ import json as jsonlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing import references
 from tests.files import opened_path
@@ -34,10 +34,10 @@ class Cost:
 def animation_cost(path: Path) -> Cost:
     """Return what the animations of a .glb or .gltf cost; 0 and 0 of a file without any."""
     content = opened_path(path).json
-    accessors, views = items(content, "accessors"), items(content, "bufferViews")
+    accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
     gone = _of_animations(content) - _of_others(content)
     kept = {view for i, each in enumerate(accessors) if i not in gone for view in references.views_of(each)}
-    kept |= {image["bufferView"] for image in items(content, "images") if "bufferView" in image}
+    kept |= {image["bufferView"] for image in json_array(content, "images") if "bufferView" in image}
     dropped = {view for i in gone for view in references.views_of(accessors[i])} - kept
     data = sum(_stored(views[view]) for view in dropped)
     data += sum(_size(accessors[i]) for i in gone if not dropped.issuperset(references.views_of(accessors[i])))
@@ -49,17 +49,17 @@ def animation_cost(path: Path) -> Cost:
 
 
 def _of_animations(content: Json) -> set[int]:
-    samplers = [sampler for clip in items(content, "animations") for sampler in clip["samplers"]]
+    samplers = [sampler for clip in json_array(content, "animations") for sampler in clip["samplers"]]
     return {sampler[end] for sampler in samplers for end in ("input", "output")}
 
 
 def _of_others(content: Json) -> set[int]:
     """Accessors of meshes, skins and instances: all that the format has, besides animations."""
-    found = {skin["inverseBindMatrices"] for skin in items(content, "skins") if "inverseBindMatrices" in skin}
-    for primitive in (each for mesh in items(content, "meshes") for each in mesh["primitives"]):
+    found = {skin["inverseBindMatrices"] for skin in json_array(content, "skins") if "inverseBindMatrices" in skin}
+    for primitive in (each for mesh in json_array(content, "meshes") for each in mesh["primitives"]):
         found |= {each for target in primitive.get("targets", ()) for each in target.values()}
         found |= {*primitive["attributes"].values(), primitive.get("indices", -1)}
-    for node in items(content, "nodes"):
+    for node in json_array(content, "nodes"):
         found |= set(node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {}).values())
     return found
 
@@ -76,7 +76,7 @@ def _declarations(content: Json, views: list[Json]) -> int:
     """What the extensions that these views use need besides: their names, and the buffers that stand in for them."""
     used = {name for view in views for name in view.get("extensions", {})}
     names = [name for key in ("extensionsUsed", "extensionsRequired") for name in content.get(key, ()) if name in used]
-    buffers = items(content, "buffers")
+    buffers = json_array(content, "buffers")
     stand_ins = {view["buffer"] for view in views if buffer_layout.compression(view)}
     fallback = [buffers[i] for i in stand_ins if used & set(buffers[i].get("extensions", {}))]
     return sum(_length(each) + 1 for each in [*names, *fallback])

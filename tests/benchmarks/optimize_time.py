@@ -15,10 +15,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from anim.gltf.document import Document, items
-from anim.gltf.writing.insertion import assemble
+from anim.gltf.document import Document, json_array
+from anim.gltf.writing.insertion import insert_accessors
 from cli import tables
-from cli.text import size
+from cli.text import format_bytes
 from tests.benchmarks import peers
 from tests.benchmarks.processes import environment
 from tests.files import glb_of, opened_path
@@ -50,8 +50,8 @@ def show(path: Path, runs: int) -> None:
 
 def _with_clips(document: Document, count: int) -> Document:
     """The document with its first `count` clips and what they need."""
-    animations = items(document.json, "animations")
-    return assemble(document, animations[:count], set(range(count, len(animations))), [])
+    animations = json_array(document.json, "animations")
+    return insert_accessors(document, animations[:count], set(range(count, len(animations))), [])
 
 
 def _table(source: Path, output: Path, title: str, runs: int) -> None:
@@ -80,7 +80,7 @@ def _row(name: str, each: Watched, peer: Watched) -> list[tables.Cell]:
         f"{seconds:.2f} s",
         f"{min(each.seconds):.2f} s",
         f"{seconds / statistics.median(peer.seconds):.2f} ×",
-        size(round(peak)),
+        format_bytes(round(peak)),
         f"{peak / statistics.median(peer.peak):.2f} ×",
     ]
 

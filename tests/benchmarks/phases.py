@@ -64,10 +64,10 @@ def main(source: str, target: str, fps: str) -> dict[str, float]:
     for module, name, phase in WATCHED:
         owner = importlib.import_module(module)
         setattr(owner, name, clock.watched(getattr(owner, name), phase))
-    from anim.measure.error.metric import Ruler
+    from anim.measure.error.metric import ErrorMetric
 
     for method in ("__init__", "error"):
-        setattr(Ruler, method, clock.watched(getattr(Ruler, method), "measure how far vertices move"))
+        setattr(ErrorMetric, method, clock.watched(getattr(ErrorMetric, method), "measure how far vertices move"))
     importlib.import_module("cli.commands.resample")
     imported = time.perf_counter()
     code = command_line.run(["resample", source, target, "--fps", fps, "--quiet"])

@@ -106,9 +106,9 @@ def long(method: str) -> dict[str, float]:
 
 
 def _streamed(scene: Scene, clip: Clip, times: Floats, method: str) -> Callable[[], None]:
-    from anim.skinning.bake import baker
+    from anim.skinning.bake import prepare_bake
 
-    made = baker(scene, method=method)
+    made = prepare_bake(scene, method=method)
 
     def job() -> None:
         for _ in made.bake(clip, times=times).chunks():
@@ -118,9 +118,9 @@ def _streamed(scene: Scene, clip: Clip, times: Floats, method: str) -> Callable[
 
 
 def _into_one(scene: Scene, clip: Clip, times: Floats, method: str) -> Callable[[], None]:
-    from anim.skinning.bake import baker
+    from anim.skinning.bake import prepare_bake
 
-    made = baker(scene, method=method)
+    made = prepare_bake(scene, method=method)
 
     def job() -> None:
         cache = made.bake(clip, times=times)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.caches.registry import CACHE_FORMATS
-from anim.caches.sniffing import ending_of
+from anim.caches.sniffing import sniff_format
 from anim.caches.transforms.resample import at_time
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Fixture
@@ -27,7 +27,7 @@ def walk(tmp_path: Path) -> Path:
 
 
 def told(data: bytes) -> str:
-    return ending_of(data[:1024], len(data))
+    return sniff_format(data[:1024], len(data))
 
 
 def times(path: Path) -> list[float]:

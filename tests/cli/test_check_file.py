@@ -16,7 +16,7 @@ def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypat
     def refused(path: Path) -> Path:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(links, "followed", refused)
+    monkeypatch.setattr(links, "resolve_links", refused)
     with pytest.raises(OutputError, match="permission denied"):
         documents.check_file("closed/out.glb")
 

@@ -9,7 +9,7 @@ import pytest
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from tests.cli.conftest import Call, Find
 from tests.cli.running import help_line, refusal
 from tests.draco import compressed
@@ -33,7 +33,7 @@ def without_package(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def error_on(surface: Document, before: Document, after: Document) -> float:
     """The largest error, in m, of the vertices of a third file."""
-    ruler = Ruler(reader.scene(surface))
+    ruler = ErrorMetric(reader.scene(surface))
     pairs = zip(reader.clips(before), reader.clips(after), strict=True)
     return max(ruler.error(*each).max_error for each in pairs)
 

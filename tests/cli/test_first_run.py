@@ -9,7 +9,7 @@ import pytest
 
 from anim.skinning.kernels import jit
 from cli.first_run import announce_compiling
-from cli.text import Voice
+from cli.text import Reporter
 
 
 class Terminal(io.StringIO):
@@ -33,5 +33,5 @@ def test_a_first_run_is_announced_on_a_terminal(
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(jit, "is_compiled", lambda: compiled)
-    announce_compiling(Voice(quiet))
+    announce_compiling(Reporter(quiet))
     assert stream.getvalue() == line

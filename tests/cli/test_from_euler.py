@@ -11,7 +11,7 @@ import pytest
 
 from anim.exchange.formats import bvh_reader
 from anim.gltf.reading import reader
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import Run, help_line, refusal, shell
@@ -198,7 +198,7 @@ def test_what_a_bvh_does_not_hold_stays_when_the_clip_gives_way(call: Call, asse
     now = {(track.node, track.path) for track in after.tracks}
     moved = {(t.node, t.path) for t in before.tracks if np.ptp(t.values, axis=0).max() > 1e-4 and t.path != "scale"}
     assert moved <= now
-    assert Ruler(reader.scene(opened(run.product()))).error(before, after).max_error < 1e-4
+    assert ErrorMetric(reader.scene(opened(run.product()))).error(before, after).max_error < 1e-4
     assert "tracks of 'lbr_run_normal_anm_default' that the motion has no node for stay" in run.err
     other = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", character, "--replace", "#0")
     assert "that the motion has no node for go with it" in other.err

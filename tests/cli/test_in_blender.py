@@ -10,7 +10,7 @@ import pytest
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats import gltf
 from anim.caches.transforms import bounds, document_playback
-from anim.caches.transforms.vertex_order import ordered
+from anim.caches.transforms.vertex_order import reorder
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
@@ -43,7 +43,7 @@ def test_morph_targets_are_the_bake(
     (chosen,) = (each for each in reader.clips(document) if each.name == clip)
     times = frame_times(chosen.start, chosen.end, fps=48)
     truth = bake(reader.scene(document), chosen, times=times, rigid=bool(options))
-    assert _error(out, ordered(truth, "blender")) < BOUND
+    assert _error(out, reorder(truth, "blender")) < BOUND
 
 
 @pytest.mark.parametrize(("name", "clip", "options"), BAKES)
@@ -53,7 +53,7 @@ def test_morph_targets_play_as_we_play_them(
 ) -> None:
     out = tmp_path / "out.glb"
     assert call("bake", asset(name), out, "--clip", clip, "--fps", 24, *options, *more).code == 0
-    assert _error(out, ordered(document_playback.play(opened_path(out)), "blender")) < BOUND
+    assert _error(out, reorder(document_playback.evaluate_document(opened_path(out)), "blender")) < BOUND
 
 
 def test_a_flip_book(call: Call, asset: Find, tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ def test_a_flip_book(call: Call, asset: Find, tmp_path: Path) -> None:
     assert call("bake", asset("Fox.glb"), out, "--clip", "Walk", "--fps", 24, "--layout", "flip-scale").code == 0
     frames = gltf.pages(opened_path(out))
     assert frames is not None
-    ours = ordered(frames, "blender")
+    ours = reorder(frames, "blender")
     pages = vertices(out, (ours.times + 1e-3).tolist())  # not at the very instant of turning over
     assert len(pages) == ours.frame_count
     assert _apart(sum(pages.values(), np.zeros(())), ours.whole().positions) < BOUND * bounds.diagonal(ours)
@@ -91,7 +91,7 @@ def test_skinned_files(call: Call, asset: Find, tmp_path: Path, name: str, comma
 
 def _at_keys(document: Document, clip: Clip) -> VertexCache:
     times = np.unique(np.concatenate(clip.axes))
-    return ordered(bake(reader.scene(document), clip, times=times, rigid=True), "blender")
+    return reorder(bake(reader.scene(document), clip, times=times, rigid=True), "blender")
 
 
 def _error(path: Path, ours: VertexCache, clip: str | None = None) -> float:

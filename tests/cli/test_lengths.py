@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from cli.reports.clip_lengths import lengths
-from cli.text import moment, span, took
+from cli.reports.clip_lengths import clip_lengths
+from cli.text import format_duration, format_span, format_time
 from tests.cli.conftest import Call, Fixture
 from tests.clips import clip, track
 
@@ -52,13 +52,17 @@ def test_every_command_says_took_and_only_new_lengths(options: tuple[str, ...], 
 def test_many_clips_are_summed_up() -> None:
     before = {i: clip(track("translation", [0, 1 + i], [[0, 0, 0], [1, 0, 0]])) for i in range(4)}
     after = {i: clip(track("translation", [0, 0.5], [[0, 0, 0], [1, 0, 0]])) for i in range(4)}
-    assert lengths(before, after) == "4 clips 10 s → 2 s in all"
-    assert lengths(before, before) == ""
+    assert clip_lengths(before, after) == "4 clips 10 s → 2 s in all"
+    assert clip_lengths(before, before) == ""
 
 
 def test_times_as_words() -> None:
-    assert moment(1 / 24) == "0.0417 s"
-    assert moment(12) == "12 s"
-    assert span(1 / 24, 2) == "0.0417–2 s"
-    assert span(0, 1.5) == "1.5 s"
-    assert (took(0.0312), took(0.84), took(75.31)) == ("took 0.031 s", "took 0.84 s", "took 75.3 s")
+    assert format_time(1 / 24) == "0.0417 s"
+    assert format_time(12) == "12 s"
+    assert format_span(1 / 24, 2) == "0.0417–2 s"
+    assert format_span(0, 1.5) == "1.5 s"
+    assert (format_duration(0.0312), format_duration(0.84), format_duration(75.31)) == (
+        "took 0.031 s",
+        "took 0.84 s",
+        "took 75.3 s",
+    )

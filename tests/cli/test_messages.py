@@ -38,7 +38,7 @@ def test_every_refusal_has_its_exit_code(
     def fails() -> None:
         raise error
 
-    assert errors.guarded(fails) == code
+    assert errors.run_guarded(fails) == code
     out, err = capsysbinary.readouterr()
     assert out == b""
     expected = {130: "", 4: "gltf-anim: out of memory\n"} if not isinstance(error, AnimError) else {}
@@ -50,21 +50,21 @@ def test_a_bug_of_ours_is_1_with_a_traceback(error: Exception, capsys: pytest.Ca
     def fails() -> None:
         raise error
 
-    assert errors.guarded(fails) == 1
+    assert errors.run_guarded(fails) == 1
     err = capsys.readouterr().err
     assert "Traceback" in err
     assert "odd" in err
 
 
 def test_done_is_0_and_a_number_is_passed_on() -> None:
-    assert errors.guarded(lambda: None) == 0
-    assert errors.guarded(lambda: True) == 0
-    assert errors.guarded(lambda: 5) == 5
+    assert errors.run_guarded(lambda: None) == 0
+    assert errors.run_guarded(lambda: True) == 0
+    assert errors.run_guarded(lambda: 5) == 5
 
 
 def test_where_and_help_are_shown_on_one_line_each(capsys: pytest.CaptureFixture[str]) -> None:
     error = FormatError("broke\nat \x1b[1m", where="clip 'a\u2028b'", help="do\nthis")
-    assert errors.reported(error) == 3
+    assert errors.report_error(error) == 3
     assert capsys.readouterr().err == "gltf-anim: clip 'a\\u2028b': broke\\nat \\x1b[1m\nhelp: do\\nthis\n"
 
 

@@ -7,7 +7,7 @@ import pytest
 from anim.measure.error.metric import MotionError
 from anim.optimize.options import Bounds, Policy, Reference
 from anim.optimize.request import Request
-from anim.optimize.verification import Verdict
+from anim.optimize.verification import Verification
 from cli.reports import optimize_bound
 
 REQUEST = Request(Bounds(1e-3, 0.01))
@@ -15,8 +15,8 @@ KEYS = Request(Bounds(1e-3, 0.01), Policy(reference=Reference.KEYS))
 SCALE = 2.0  # m
 
 
-def _verdict(certified: float | None, error: float = 9e-4) -> Verdict:
-    return Verdict(MotionError(error, 0.5, "body", "arm", 100), "spec", None, 0.9, certified)
+def _verdict(certified: float | None, error: float = 9e-4) -> Verification:
+    return Verification(MotionError(error, 0.5, "body", "arm", 100), "spec", None, 0.9, certified)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.options import Writing
-from anim.gltf.document import Document, Json, items
+from anim.caches.options import WriteOptions
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.validation import buffer_layout
 from anim.model.vertex_cache import from_arrays
@@ -52,7 +52,7 @@ def test_more_targets_than_a_row_holds(count: int, mode: str, pointer: bool, tmp
 
 
 def _streams(document: Document) -> list[Json]:
-    return [each for view in items(document.json, "bufferViews") if (each := buffer_layout.compression(view))]
+    return [each for view in json_array(document.json, "bufferViews") if (each := buffer_layout.compression(view))]
 
 
 def _face(count: int, *, pointer: bool) -> bytes:
@@ -60,7 +60,7 @@ def _face(count: int, *, pointer: bool) -> bytes:
     random = np.random.default_rng(count)
     frames = np.cumsum(random.normal(size=(count + 1, 60, 3)), axis=0)
     cache = from_arrays(np.arange(count + 1) / 30, frames, np.arange(60).reshape(-1, 3))
-    data = written(cache, "a.glb", Writing(max_error=1e-4))[0].files["a.glb"]
+    data = written(cache, "a.glb", WriteOptions(max_error=1e-4))[0].files["a.glb"]
     document = opened(data)
     assert len(document.json["meshes"][0]["weights"]) == count
     if pointer:

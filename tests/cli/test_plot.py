@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.gltf.authoring import author
+from anim.gltf.authoring import build_document
 from anim.model import Clip
 from tests import clips
 from tests.anim.show.reading import png_size, words
@@ -25,7 +25,7 @@ def book() -> bytes:
     """The curve of the book, 0, 0.9, 0.2, 1, as lines and as steps."""
     line = clips.track("translation", range(4), VALUES)
     steps = clips.track("translation", range(4), VALUES, STEP, node=1)
-    return glb_of(author(clips.skeleton([-1, 0]), [Clip("book", (line, steps))]))
+    return glb_of(build_document(clips.skeleton([-1, 0]), [Clip("book", (line, steps))]))
 
 
 def counted(call: Call, data: bytes) -> list[dict[str, int]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.text import change, digits, length, size, speed
+from cli.text import format_bytes, format_change, format_length, format_number, format_speed
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ from cli.text import change, digits, length, size, speed
     ],
 )
 def test_a_length_has_the_unit_in_which_it_is_short(meters: float, words: str) -> None:
-    assert length(meters) == words
+    assert format_length(meters) == words
 
 
 @pytest.mark.parametrize(
@@ -35,16 +35,16 @@ def test_a_length_has_the_unit_in_which_it_is_short(meters: float, words: str) -
     [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (42_345, "42.3 kB"), (999_499, "999 kB"), (999_500, "1 MB")],
 )
 def test_a_size_has_three_digits(count: int, words: str) -> None:
-    assert size(count) == words
+    assert format_bytes(count) == words
 
 
 def test_digits_are_never_an_exponent() -> None:
-    assert digits(283_456, 2) == "280000"
-    assert digits(0.000_012_34, 2) == "0.000012"
-    assert speed(0.4567) == "0.46 m/s"
+    assert format_number(283_456, 2) == "280000"
+    assert format_number(0.000_012_34, 2) == "0.000012"
+    assert format_speed(0.4567) == "0.46 m/s"
 
 
 def test_a_change_in_percent_where_there_is_any() -> None:
-    assert change(42_300, 9_100) == "42.3 kB → 9.1 kB (-78 %)"
-    assert change(1000, 1001) == "1 kB → 1 kB"
-    assert change(0, 10) == "0 B → 10 B"
+    assert format_change(42_300, 9_100) == "42.3 kB → 9.1 kB (-78 %)"
+    assert format_change(1000, 1001) == "1 kB → 1 kB"
+    assert format_change(0, 10) == "0 B → 10 B"

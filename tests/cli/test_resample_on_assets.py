@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from tests import khronos
 from tests.cli.conftest import Call, Find
 from tests.cli.untouched import check_only_animations_changed
@@ -72,7 +72,7 @@ def test_real_files_play_the_same_at_twice_their_rate(name: str, call: Call, ass
     globs = [f"--clip={clip['name'] or clip['index']}" for clip in chosen]
     call("resample", source, out, "--fps", str(2 * rate), *globs).product()
     before, after = opened_path(source), opened(out.read_bytes())
-    ruler = Ruler(reader.scene(before))
+    ruler = ErrorMetric(reader.scene(before))
     old, new = reader.clips(before), reader.clips(after)
     for clip in chosen:
         number = clip["index"]

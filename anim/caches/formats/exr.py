@@ -18,14 +18,14 @@ def write(pixels: AnyArray, outputs: Outputs, name: str) -> None:
     """Write pixels (height, width, 3), float32 or float16, as R, G, B; losslessly packed (ZIP)."""
     package = _package()
     header = {"compression": package.ZIP_COMPRESSION, "type": package.scanlineimage}
-    with temporary_files.written(outputs, name, ".exr") as path:
+    with temporary_files.temp_output(outputs, name, ".exr") as path:
         package.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(path)
 
 
 def read(inputs: Inputs, name: str) -> AnyArray:
     """Return the pixels (height, width, 3). Raises FormatError for what OpenEXR can't read."""
     package = _package()
-    with temporary_files.readable(inputs, name, ".exr") as path, temporary_files.hushed():
+    with temporary_files.temp_input(inputs, name, ".exr") as path, temporary_files.silence_native():
         try:
             with package.File(path) as file:
                 channels = file.channels()

@@ -9,16 +9,16 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.caches.formats import gltf_flipbook, gltf_morph
-from anim.caches.options import Reading, Writing, Written
-from anim.caches.storage import Inputs, Outputs, whole
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
+from anim.caches.storage import Inputs, Outputs, read_all
 from anim.caches.transforms import document_playback
 from anim.errors import FormatError, RangeError
-from anim.gltf.document import Document, items
+from anim.gltf.document import Document, json_array
 from anim.gltf.io import container
 from anim.gltf.reading.accessors import Accessors
 from anim.model import FrameChunk, VertexCache
 
-Write: TypeAlias = Callable[[VertexCache, Outputs, Writing], Written]
+Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
 
 LAYOUTS: dict[str, Write] = {
     "morph": gltf_morph.write,
@@ -27,24 +27,24 @@ LAYOUTS: dict[str, Write] = {
 }
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a GLB in the layout that `writing.layout` names. Raises RangeError for another."""
     if writing.layout not in LAYOUTS:
         raise RangeError(f"layout is '{writing.layout}' (expected {', '.join(LAYOUTS)})")
     return LAYOUTS[writing.layout](cache, outputs, writing)
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the frames of a flip-book of ours, or what the first clip of any other glTF plays.
 
     Morph targets and skins (linear blend) are played at the clip's own keys, or at `reading.fps`.
     """
-    with whole(inputs, inputs.main) as data:
+    with read_all(inputs, inputs.main) as data:
         document = container.read(np.frombuffer(data, np.uint8))
     found = pages(document)
     if found is not None:
         return found
-    played = document_playback.play(document, fps=reading.fps, note=reading.note)
+    played = document_playback.evaluate_document(document, fps=reading.fps, note=reading.note)
     if names := document_playback.directions(document):
         reading.note(f"{' and '.join(names)} are not played (bake --{' or --'.join(names)} does that)")
     return played
@@ -52,7 +52,7 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
 
 def pages(document: Document) -> VertexCache | None:
     """Return the frames of a flip-book of ours, None for any other document."""
-    for node in items(document.json, "nodes"):
+    for node in json_array(document.json, "nodes"):
         said = (node.get("extras") or {}).get(gltf_flipbook.EXTRAS) if isinstance(node.get("extras"), dict) else None
         if isinstance(said, dict) and said.get("cache") == gltf_flipbook.NAME:
             return _pages(document, node.get("children", []), "z" if said.get("up") == "z" else "y")
@@ -61,10 +61,10 @@ def pages(document: Document) -> VertexCache | None:
 
 def _pages(document: Document, children: list[int], up: str) -> VertexCache:
     accessors = Accessors(document)
-    nodes, meshes = items(document.json, "nodes"), items(document.json, "meshes")
+    nodes, meshes = json_array(document.json, "nodes"), json_array(document.json, "meshes")
     try:
         pages = [meshes[nodes[child]["mesh"]]["primitives"][0] for child in children]
-        samplers = [sampler for clip in items(document.json, "animations") for sampler in clip["samplers"]]
+        samplers = [sampler for clip in json_array(document.json, "animations") for sampler in clip["samplers"]]
         times = [accessors.floats(samplers[0]["input"])[0, 0] if samplers else 0.0]
         times += [accessors.floats(sampler["input"])[1, 0] for sampler in samplers[1:]]
         indices = pages[0].get("indices")

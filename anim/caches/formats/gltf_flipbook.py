@@ -12,7 +12,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive, signed
-from anim.caches.options import Writing, Written
+from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
 from anim.model import FrameChunk, VertexCache
 
@@ -21,16 +21,16 @@ EXTRAS = "gltf_anim"
 POINTER, VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
 
 
-def write_visibility(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write_visibility(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a flip-book whose pages are switched by KHR_node_visibility."""
     _write(cache, outputs, by_scale=False)
-    return Written(notes=(f"needs a viewer that knows {VISIBILITY}; the layout flip-scale plays everywhere",))
+    return WriteResult(notes=(f"needs a viewer that knows {VISIBILITY}; the layout flip-scale plays everywhere",))
 
 
-def write_scale(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write_scale(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a flip-book whose pages are switched by their scale."""
     _write(cache, outputs, by_scale=True)
-    return Written()
+    return WriteResult()
 
 
 def _write(cache: VertexCache, outputs: Outputs, *, by_scale: bool) -> None:

@@ -14,30 +14,30 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive, signed
-from anim.caches.formats.morph_encoding import SHORT, Form, stored
-from anim.caches.options import Writing, Written
+from anim.caches.formats.morph_encoding import SHORT, MorphEncoding, encode_morphs
+from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
 from anim.caches.transforms import bounds
-from anim.caches.transforms.frame_reduction import kept_frames
-from anim.caches.transforms.pca import basis
+from anim.caches.transforms.frame_reduction import reduce_frames
+from anim.caches.transforms.pca import fit_basis
 from anim.errors import RangeError, UnsupportedError
 from anim.model import FrameChunk, VertexCache
 
 DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given
-MOST_BYTES = 1 << 30  # of positions, which are in memory here, three times over
-MOST_TARGETS = 1024
-SURE_TARGETS = 8  # what glTF promises; engines take more
+MAX_BYTES = 1 << 30  # of positions, which are in memory here, three times over
+MAX_TARGETS = 1024
+PORTABLE_TARGETS = 8  # what glTF promises; engines take more
 BATCH = 16  # frames compared at a time
 MARGINS = 0.98, 0.5  # of the limit, what rounding to float32 may not eat; the second where it did
 NAME, EXTRAS = "cache", "gltf_anim"
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write the smallest form within `writing.max_error` m, by default 0.1 % of the diagonal.
 
     Raises UnsupportedError for caches over 1 GB, RangeError where no form keeps the limit.
     """
-    if 12 * cache.frame_count * cache.vertex_count > MOST_BYTES:
+    if 12 * cache.frame_count * cache.vertex_count > MAX_BYTES:
         raise UnsupportedError(
             f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices are "
             f"{12 * cache.frame_count * cache.vertex_count / 1e9:.1f} GB of positions (at most 1.1)",
@@ -45,53 +45,55 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         )
     whole = cache.whole()
     limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * bounds.diagonal(cache)
-    best = _smallest(whole.positions, cache.times, limit, quantize=writing.quantize)
+    best = _smallest_encoding(whole.positions, cache.times, limit, quantize=writing.quantize)
     if best is None:
         advice = "allow more --max-error" + (", or leave out --quantize" if writing.quantize else "")
         raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help=advice)
     form, worst = best
     _write(cache, whole, form, outputs, quantize=writing.quantize)
-    return Written(worst, _notes(form, cache.frame_count))
+    return WriteResult(worst, _notes(form, cache.frame_count))
 
 
-def _smallest(positions: AnyArray, times: Floats, limit: float, *, quantize: bool) -> tuple[Form, float] | None:
+def _smallest_encoding(
+    positions: AnyArray, times: Floats, limit: float, *, quantize: bool
+) -> tuple[MorphEncoding, float] | None:
     """The form of fewest bytes that keeps the limit as it is stored, and its error; None where none does."""
 
-    def within(forms: Iterable[Form]) -> list[tuple[Form, float]]:
-        changed = (stored(form, quantize=quantize) for form in forms)
+    def within(forms: Iterable[MorphEncoding]) -> list[tuple[MorphEncoding, float]]:
+        changed = (encode_morphs(form, quantize=quantize) for form in forms)
         errors = ((form, _worst(positions, times, form)) for form in changed)
         return [(form, error) for form, error in errors if error <= limit]
 
-    kept = kept_frames(positions, times, limit * MARGINS[0])
+    kept = reduce_frames(positions, times, limit * MARGINS[0])
     most = len(kept) - 1
-    found: list[tuple[Form, float]] = []
+    found: list[tuple[MorphEncoding, float]] = []
     for margin in MARGINS:
-        found = found or within(_combined(positions, times, limit * margin, most=most))
+        found = found or within(_pca_targets(positions, times, limit * margin, most=most))
     fewest = min((len(form.targets) for form, _ in found), default=most)
-    if most <= min(fewest + 1, MOST_TARGETS):
-        found += within([_one_hot(positions, kept)])
+    if most <= min(fewest + 1, MAX_TARGETS):
+        found += within([_frame_targets(positions, kept)])
     return min(found, key=lambda each: each[0].size(quantize=quantize), default=None)
 
 
-def _combined(positions: AnyArray, times: Floats, limit: float, *, most: int) -> Iterator[Form]:
+def _pca_targets(positions: AnyArray, times: Floats, limit: float, *, most: int) -> Iterator[MorphEncoding]:
     """Forms of few shapes that may be the smallest; the number of targets decides, nearly."""
     for name, share in (("basis", 0.0), ("both", 0.5)):
-        frames = kept_frames(positions, times, limit * share) if share else np.arange(len(positions))
+        frames = reduce_frames(positions, times, limit * share) if share else np.arange(len(positions))
         if share and len(frames) == len(positions):
             continue
-        found = basis(positions[frames], limit * (1 - share), most=min(most, MOST_TARGETS))
+        found = fit_basis(positions[frames], limit * (1 - share), most=min(most, MAX_TARGETS))
         if found is not None:
             most = len(found.shapes)
-            yield Form(name, found.base, found.shapes, frames, found.weights)
+            yield MorphEncoding(name, found.base, found.shapes, frames, found.weights)
 
 
-def _one_hot(positions: AnyArray, kept: Ints) -> Form:
+def _frame_targets(positions: AnyArray, kept: Ints) -> MorphEncoding:
     base = positions[kept[0]]
     weights = np.concatenate((np.zeros((1, len(kept) - 1)), np.eye(len(kept) - 1)))
-    return Form("keyframes", base, positions[kept[1:]] - base, kept, weights)
+    return MorphEncoding("keyframes", base, positions[kept[1:]] - base, kept, weights)
 
 
-def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
+def _worst(positions: AnyArray, times: Floats, form: MorphEncoding) -> float:
     """Farthest that a vertex of any frame is from where a viewer puts it."""
     keys = times[form.frames].astype(np.float32)  # as the file has them
     flat = form.targets.reshape(len(form.targets), form.base.size)
@@ -107,7 +109,7 @@ def _worst(positions: AnyArray, times: Floats, form: Form) -> float:
     return worst
 
 
-def _write(cache: VertexCache, whole: FrameChunk, form: Form, outputs: Outputs, *, quantize: bool) -> None:
+def _write(cache: VertexCache, whole: FrameChunk, form: MorphEncoding, outputs: Outputs, *, quantize: bool) -> None:
     from pygltflib import Animation, AnimationChannel, AnimationChannelTarget, AnimationSampler, Mesh, Node
 
     file = GlbFile()
@@ -147,7 +149,7 @@ def _write(cache: VertexCache, whole: FrameChunk, form: Form, outputs: Outputs, 
     file.write(outputs, outputs.main)
 
 
-def _directions(normals: AnyArray | None, form: Form) -> AnyArray | None:
+def _directions(normals: AnyArray | None, form: MorphEncoding) -> AnyArray | None:
     """Normals or tangents (1 + M, V, 3) of the base, unit, and of each target: the nearest that the weights allow."""
     if normals is None:
         return None
@@ -163,9 +165,11 @@ def _directions(normals: AnyArray | None, form: Form) -> AnyArray | None:
     return solved
 
 
-def _notes(form: Form, frames: int) -> tuple[str, ...]:
+def _notes(form: MorphEncoding, frames: int) -> tuple[str, ...]:
     words = {"keyframes": "a target per kept frame", "basis": "shapes and weights", "both": "shapes of kept frames"}
     notes = [f"{len(form.targets)} morph targets ({words[form.kind]}), {len(form.frames)} keys for {frames} frames"]
-    if len(form.targets) > SURE_TARGETS:
-        notes.append(f"glTF promises {SURE_TARGETS} targets at a time; three.js, Babylon.js and Blender take hundreds")
+    if len(form.targets) > PORTABLE_TARGETS:
+        notes.append(
+            f"glTF promises {PORTABLE_TARGETS} targets at a time; three.js, Babylon.js and Blender take hundreds"
+        )
     return tuple(notes)

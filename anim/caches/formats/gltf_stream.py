@@ -12,7 +12,7 @@ import numpy as np
 
 import anim
 from anim.arrays import AnyArray, Floats
-from anim.caches.storage import PIECE, Outputs
+from anim.caches.storage import COPY_BYTES, Outputs
 from anim.errors import UnsupportedError
 from anim.gltf.io.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB
 
@@ -104,7 +104,7 @@ class GlbFile:
             file.write(struct.pack("<4sII", MAGIC, 2, total) + struct.pack("<II", len(text), JSON_CHUNK) + text)
             file.write(struct.pack("<II", self.size, BIN_CHUNK))
             self._bin.seek(0)
-            shutil.copyfileobj(self._bin, file, PIECE)
+            shutil.copyfileobj(self._bin, file, COPY_BYTES)
 
 
 def signed(tangents: AnyArray, handedness: Floats) -> AnyArray:

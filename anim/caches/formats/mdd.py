@@ -11,7 +11,7 @@ import struct
 import numpy as np
 
 from anim.caches import frame_blocks, rest_mesh
-from anim.caches.options import Reading, Writing, Written
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs, read_exactly
 from anim.errors import FormatError
 from anim.model import VertexCache
@@ -19,7 +19,7 @@ from anim.model import VertexCache
 HEADER = struct.Struct(">ii")
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the cache in the main file, with the faces of the rest mesh beside it where there is one."""
     with inputs.open(inputs.main) as file:
         frames, points = HEADER.unpack(read_exactly(file, HEADER.size, "the header"))
@@ -39,11 +39,11 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
     )
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write the cache and a rest mesh beside it; times become float32."""
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
         file.write(cache.times.astype(">f4").tobytes())
         mark = frame_blocks.write(cache, file, ">f4")
     rest_mesh.write(cache, outputs, writing.rest, mark)
-    return Written()
+    return WriteResult()

@@ -21,7 +21,7 @@ _TRIMESH = b"https://github.com/mikedh/trimesh"
 
 
 @dataclass(frozen=True, slots=True)
-class Still:
+class MeshFrame:
     """positions (V, 3) float32, faces (T, 3), normals (V, 3) float32 or None, and the words of the remark."""
 
     positions: AnyArray
@@ -30,7 +30,7 @@ class Still:
     remark: dict[str, str]
 
 
-def write(still: Still, ending: str) -> bytes:
+def write(still: MeshFrame, ending: str) -> bytes:
     """Return the bytes of a file: ".ply" binary, ".obj" text, ".stl" binary, which keeps no order of vertices."""
     from trimesh import Trimesh
     from trimesh.exchange import obj, ply, stl
@@ -44,11 +44,11 @@ def write(still: Still, ending: str) -> bytes:
         return remark.ljust(80)[:80] + data[80:]
     if ending == ".obj":
         text = export_obj(mesh, include_normals=normals is not None, include_texture=False, digits=OBJ_DIGITS)
-        return _remarked(text.encode(), b"# ", remark)
-    return _remarked(ply.export_ply(mesh, vertex_normal=normals is not None), b"comment ", remark)
+        return _with_comment(text.encode(), b"# ", remark)
+    return _with_comment(ply.export_ply(mesh, vertex_normal=normals is not None), b"comment ", remark)
 
 
-def read(data: bytes, ending: str) -> Still:
+def read(data: bytes, ending: str) -> MeshFrame:
     """Return what a file holds, polygons cut into triangles. Raises FormatError for what trimesh can't read."""
     positions, faces, normals = _read_obj(data) if ending == ".obj" else _read_by_trimesh(data, ending)
     if not len(positions):
@@ -57,16 +57,16 @@ def read(data: bytes, ending: str) -> Still:
         raise FormatError("holds NaN or infinity")
     if faces.size and (faces.min() < 0 or faces.max() >= len(positions)):
         raise FormatError(f"a face uses vertex {faces.max()} of {len(positions)}")
-    return Still(positions.astype(np.float32), faces, normals, remark_of(data))
+    return MeshFrame(positions.astype(np.float32), faces, normals, comment_of(data))
 
 
-def remark_of(head: bytes) -> dict[str, str]:
+def comment_of(head: bytes) -> dict[str, str]:
     """Return the words of our remark in the first bytes of a file, none where there is no such."""
     found = REMARK.search(head[:1024])
     return dict(word.split("=", 1) for word in found[1].decode("ascii", "replace").split()) if found else {}
 
 
-def _remarked(data: bytes, opening: bytes, remark: bytes) -> bytes:
+def _with_comment(data: bytes, opening: bytes, remark: bytes) -> bytes:
     """The file with the comment that trimesh puts in replaced by ours; in front of all where there is none."""
     if opening + _TRIMESH in data[:200]:
         return data.replace(opening + _TRIMESH, opening + remark, 1)

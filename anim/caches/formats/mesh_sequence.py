@@ -11,8 +11,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks
 from anim.caches.formats import mesh_frame
-from anim.caches.options import Reading, Writing, Written
-from anim.caches.storage import Inputs, Outputs, whole
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
+from anim.caches.storage import Inputs, Outputs, read_all
 from anim.caches.transforms import frame_spacing
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
@@ -21,7 +21,7 @@ DEFAULT_FPS = 24.0  # for files of others, which say nothing
 HEAD = 1024  # bytes in which our remark lies
 
 
-def read(inputs: Inputs, reading: Reading, *, ending: str) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
     """Return the frames that belong together: of walk.ply if it is there, else of all walk_*.ply in order.
 
     All have the format that `ending` names, whatever they are called.
@@ -30,8 +30,8 @@ def read(inputs: Inputs, reading: Reading, *, ending: str) -> VertexCache:
     Times are those that our own files say, else frames at `reading.fps` or 24 per second. The first frame gives the
     faces; every other must have as many vertices.
     """
-    names = members(inputs)
-    with whole(inputs, names[0]) as data:
+    names = sequence_members(inputs)
+    with read_all(inputs, names[0]) as data:
         first = mesh_frame.read(data, ending)
     names = _of_one_sequence(inputs.main, names, first.remark.get("frames", ""))
     return VertexCache(
@@ -44,7 +44,7 @@ def read(inputs: Inputs, reading: Reading, *, ending: str) -> VertexCache:
     )
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
     """Write a file of the format `ending` for each frame, numbered from 1; the main file itself for the only one."""
     faces: Ints = cache.faces
     for chunk in cache.chunks():
@@ -52,34 +52,34 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str
             frame = chunk.first + i
             normals = chunk.normals[i] if chunk.normals is not None and ending != ".stl" else None
             remark = {"time": f"{cache.times[frame]:.9g}", "up": cache.up, "frames": str(cache.frame_count)}
-            name = outputs.main if cache.frame_count == 1 else numbered(outputs.main, frame + 1)
+            name = outputs.main if cache.frame_count == 1 else frame_number(outputs.main, frame + 1)
             with outputs.create(name) as file:
-                file.write(mesh_frame.write(mesh_frame.Still(positions, faces, normals, remark), ending))
+                file.write(mesh_frame.write(mesh_frame.MeshFrame(positions, faces, normals, remark), ending))
     notes = ("STL keeps no order of vertices: each triangle has three of its own",) if ending == ".stl" else ()
-    return Written(notes=(*notes, *frame_spacing.notes(cache.times)))
+    return WriteResult(notes=(*notes, *frame_spacing.notes(cache.times)))
 
 
-def numbered(name: str, number: int) -> str:
+def frame_number(name: str, number: int) -> str:
     """Return the name of a frame's file: numbered("walk.ply", 7) → "walk_00007.ply"."""
     return f"{_stem(name)}_{number:05d}{PurePath(name).suffix}"
 
 
-def belonging(main: str, names: Iterable[str]) -> Sequence[str]:
+def sequence_files(main: str, names: Iterable[str]) -> Sequence[str]:
     """Return those of the names that are numbered frames of `main`, in order."""
     pattern = re.compile(re.escape(_stem(main)) + r"_(\d+)" + re.escape(PurePath(main).suffix))
     found = sorted((int(match[1]), name) for name in names if (match := pattern.fullmatch(name)))
     return [name for _, name in found]
 
 
-def members(inputs: Inputs) -> Sequence[str]:
+def sequence_members(inputs: Inputs) -> Sequence[str]:
     """Return the files that are read for the main one: itself, or its frames. Raises FormatError where none is."""
     names = inputs.names()
     is_numbered = re.search(r"_\d+$", PurePath(inputs.main).stem) is not None
     if inputs.main in names and not is_numbered:
         return [inputs.main]
-    found = belonging(inputs.main, names)
+    found = sequence_files(inputs.main, names)
     if not found:
-        raise FormatError(f"is not there, nor is {numbered(inputs.main, 1)}")
+        raise FormatError(f"is not there, nor is {frame_number(inputs.main, 1)}")
     return found
 
 
@@ -90,7 +90,7 @@ def _of_one_sequence(main: str, names: Sequence[str], count: str) -> Sequence[st
     if int(count) == 1:
         return names[:1]
     there = set(names)
-    wanted = [numbered(main, number) for number in range(1, min(int(count), len(names) + 1) + 1)]
+    wanted = [frame_number(main, number) for number in range(1, min(int(count), len(names) + 1) + 1)]
     if missing := next((name for name in wanted if name not in there), None):
         raise FormatError(f"'{missing}' is not there (the sequence has {count} frames)", help="write all of it again")
     return wanted
@@ -104,7 +104,7 @@ def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
     said = []
     for name in names:
         with inputs.open(name) as file:
-            said.append(mesh_frame.remark_of(file.read(HEAD)).get("time"))
+            said.append(mesh_frame.comment_of(file.read(HEAD)).get("time"))
     if fps is None and None not in said:
         try:
             times = np.array(said, np.float64)
@@ -115,13 +115,13 @@ def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
     return np.arange(len(names)) / (fps or DEFAULT_FPS)
 
 
-def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.Still, ending: str) -> Iterator[FrameChunk]:
+def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.MeshFrame, ending: str) -> Iterator[FrameChunk]:
     vertices, has_normals = len(start.positions), start.normals is not None
     step = frame_blocks.per_chunk(vertices)
     for first in range(0, len(names), step):
         stills = []
         for name in names[first : first + step]:
-            with whole(inputs, name) as data:
+            with read_all(inputs, name) as data:
                 frame = mesh_frame.read(data, ending)
             if len(frame.positions) != vertices:
                 raise FormatError(f"'{name}' has {len(frame.positions)} vertices (the first has {vertices})")

@@ -16,7 +16,7 @@ SHORT = 32767
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class MorphEncoding:
     """A way to say all frames: frame f is scale · (base + Σ weights[f] targets).
 
     base: (V, 3). targets: (M, V, 3) float32. frames: (K,) which have a key. weights: (K, M). scale: m per unit.
@@ -34,7 +34,7 @@ class Form:
         return self.targets.size // 3 * (8 if quantize else 12) + 4 * self.weights.size + 4 * len(self.frames)
 
 
-def stored(form: Form, *, quantize: bool) -> Form:
+def encode_morphs(form: MorphEncoding, *, quantize: bool) -> MorphEncoding:
     """Return the form as a file keeps it: the same motion with every weight in 0…1, all rounded to float32.
 
     quantize: targets become multiples of 1 / 32767 within ±1, each by its own factor, which its weights take back; the
@@ -42,9 +42,9 @@ def stored(form: Form, *, quantize: bool) -> Form:
     The base takes what rounding changed on average, so that moving it to where all weights are positive costs nothing.
     (weights −1, 3 of target t) → weights 0, 1 of 4 t, and base − t
     """
-    changed = _within_unit(form)
+    changed = _to_unit_range(form)
     if quantize:
-        changed = _quantized(changed)
+        changed = _quantize(changed)
     weights = changed.weights.astype(np.float32).astype(np.float64)
     changed = replace(changed, weights=weights)
     if form.kind == "keyframes":  # the base is a frame, exactly
@@ -54,7 +54,7 @@ def stored(form: Form, *, quantize: bool) -> Form:
     return replace(changed, base=(base / changed.scale).astype(np.float32))
 
 
-def _within_unit(form: Form) -> Form:
+def _to_unit_range(form: MorphEncoding) -> MorphEncoding:
     """The form with each target's weights from 0 to 1; its base is not moved yet.
 
     Of the two ends of a weight the one nearer to 0 becomes 0 (the target is turned over if that is the upper end): so
@@ -69,7 +69,7 @@ def _within_unit(form: Form) -> Form:
     return replace(form, targets=targets, weights=np.abs(form.weights[:, used] - start) / np.abs(span))
 
 
-def _quantized(form: Form) -> Form:
+def _quantize(form: MorphEncoding) -> MorphEncoding:
     size = np.abs(form.targets).max(axis=(1, 2), initial=0.0).astype(np.float64)
     size = np.where(size > 0, size, 1.0)
     scale = 2.0 ** np.ceil(np.log2(size.max(initial=1.0)))  # a power of two, which rounds nothing
@@ -77,7 +77,7 @@ def _quantized(form: Form) -> Form:
     return replace(form, targets=targets, weights=form.weights * (size / scale), scale=float(scale))
 
 
-def _mean_offset(form: Form) -> Floats:
+def _mean_offset(form: MorphEncoding) -> Floats:
     """What the targets add to the base (V, 3), on average over all keys, in units of the form."""
     total = np.zeros(form.base.shape)
     for target, weight in zip(form.targets, form.weights.mean(axis=0), strict=True):

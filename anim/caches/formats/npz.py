@@ -29,8 +29,8 @@ from numpy.lib import format as npy
 
 from anim.arrays import AnyArray, Floats
 from anim.caches import frame_blocks
-from anim.caches.options import Reading, Writing, Written
-from anim.caches.storage import PIECE, Inputs, Outputs
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
+from anim.caches.storage import COPY_BYTES, Inputs, Outputs
 from anim.errors import AnimError, FormatError
 from anim.model import FrameChunk, MeshPart, VertexCache
 
@@ -39,7 +39,7 @@ DIRECTIONS = ("normals", "tangents")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every member: same cache, same bytes
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the cache in the main file; frames are read when they are asked for, a chunk at a time."""
     with inputs.open(inputs.main) as file, _opened(file) as archive:
         shape = _shape(archive, "positions")
@@ -72,7 +72,7 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
     )
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write the cache into the main file, frame by frame; nothing is lost."""
     with (
         outputs.create(outputs.main) as file,
@@ -97,9 +97,9 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         for name, file_aside in aside.items():
             file_aside.seek(0)
             with _member(archive, name, shape) as member:
-                while piece := file_aside.read(PIECE):
+                while piece := file_aside.read(COPY_BYTES):
                     member.write(piece)
-    return Written()
+    return WriteResult()
 
 
 def _opened(file: BinaryIO) -> zipfile.ZipFile:

@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.caches import frame_blocks, rest_mesh
-from anim.caches.options import Reading, Writing, Written
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs, read_exactly
 from anim.caches.transforms import frame_spacing
 from anim.errors import FormatError, RangeError
@@ -24,7 +24,7 @@ HEADER = struct.Struct("<12siiffi")
 DEFAULT_FPS = 24.0  # Blender's own default, for files of others that say nothing
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the cache in the main file, with the faces of the rest mesh beside it where there is one.
 
     Frames per second: `reading.fps`, or what the rest mesh says, or 24.
@@ -50,7 +50,7 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
     )
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write the cache and a rest mesh beside it. Raises RangeError where frames don't come at even steps."""
     fps, notes = _rate(cache.times)
     notes += (f"PC2 keeps no frame rate: play it at {fps:g} frames per second",)
@@ -59,14 +59,14 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing) -> Written:
         file.write(HEADER.pack(MAGIC, 1, cache.vertex_count, start, 1.0, cache.frame_count))
         mark = frame_blocks.write(cache, file, "<f4")
     rest_mesh.write(cache, outputs, writing.rest, mark, fps=fps)
-    return Written(notes=notes)
+    return WriteResult(notes=notes)
 
 
 def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
     """Frames per second, and what has to be said about the last frame, which may come early at a clip's end."""
     if len(times) == 1:
         return DEFAULT_FPS, ()
-    step, off = frame_spacing.pace(times)
+    step, off = frame_spacing.frame_spacing(times)
     if off[:-1].max() > frame_spacing.EVEN:
         k = int(np.argmax(off[:-1] > frame_spacing.EVEN))
         raise RangeError(
@@ -74,5 +74,5 @@ def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
         )
     fps = float(f"{1 / step:.6g}")
     if off[-1] > frame_spacing.EVEN:
-        return fps, (f"{frame_spacing.late(times, off)}; PC2 shows it one step after the one before",)
+        return fps, (f"{frame_spacing.last_frame_note(times, off)}; PC2 shows it one step after the one before",)
     return fps, ()

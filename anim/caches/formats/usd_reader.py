@@ -13,13 +13,13 @@ from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks, temporary_files
 from anim.caches.formats import usd_writer
 from anim.caches.formats.npz import parts_of
-from anim.caches.options import Reading
+from anim.caches.options import ReadOptions
 from anim.caches.storage import Inputs
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return all meshes of the stage in one cache, in metres, at every time at which one has points.
 
     Meshes are placed by their transforms and follow each other in the order of the stage; polygons become triangles.
@@ -47,9 +47,9 @@ def _opened(inputs: Inputs) -> Iterator[_Stage]:
     usd_writer.package()
     from pxr import Tf
 
-    with temporary_files.readable(inputs, inputs.main, ".usd") as path:
+    with temporary_files.temp_input(inputs, inputs.main, ".usd") as path:
         try:
-            with temporary_files.hushed():
+            with temporary_files.silence_native():
                 stage = _Stage(path)
             yield stage
         except (Tf.ErrorException, UnicodeDecodeError):  # its own words are about its source code, and not always text
@@ -167,7 +167,7 @@ def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangent
     with _opened(inputs) as stage:
         for first in range(0, len(codes), step):
             some = codes[first : first + step].tolist()
-            with temporary_files.hushed():
+            with temporary_files.silence_native():
                 rows = [_checked(stage.positions(code), vertices, code) for code in some]
             positions = np.stack(rows) * stage.unit
             wanted = ((normals, stage.normals), (tangents, stage.tangents))

@@ -16,7 +16,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats
 from anim.caches import frame_blocks, rest_mesh, temporary_files
 from anim.caches.formats.npz import about
-from anim.caches.options import Writing, Written
+from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
 from anim.errors import UnsupportedError
 from anim.model import VertexCache
@@ -28,7 +28,7 @@ KEY = "gltf_anim"  # of the layer's custom data: the parts, as in an .npz
 PER_SECOND = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # rates that frames are tried on
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
     """Write a stage with one mesh, ".usdc" binary or ".usda" text; nothing is lost.
 
     Raises UnsupportedError without usd-core.
@@ -36,7 +36,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str
     usd, geom, vt = package()
     rate = _rate(cache.times)
     codes = np.round(cache.times * rate, 9).tolist()
-    with temporary_files.written(outputs, outputs.main, ending) as path:
+    with temporary_files.temp_output(outputs, outputs.main, ending) as path:
         is_text = ending == ".usda"
         stage = usd.Stage.CreateNew(f"{path}.usdc" if is_text else path)
         geom.SetStageUpAxis(stage, geom.Tokens.z if cache.up == "z" else geom.Tokens.y)
@@ -65,7 +65,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str
         layer.Save()
         if is_text:
             layer.Export(path)
-    return Written()
+    return WriteResult()
 
 
 def package() -> tuple[Any, Any, Any]:

@@ -9,15 +9,15 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import NotFoundError
-from anim.gltf.document import Document, items
+from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
 from anim.sampling import frame_times
-from anim.skinning.analysis.weight_sums import bad_sums
+from anim.skinning.analysis.weight_sums import unnormalized_weights
 from anim.skinning.bake import bake
 
 
-def play(
+def evaluate_document(
     document: Document, *, clip: int = 0, fps: float | None = None, note: Callable[[str], None] = lambda _: None
 ) -> VertexCache:
     """Return every vertex of the file while a clip plays, in world space, nodes depth-first, primitives in order.
@@ -27,20 +27,20 @@ def play(
     Raises NotFoundError where the file has no vertices.
     """
     scene, clips = reader.scene(document), reader.clips(document)
-    for bad in bad_sums(scene.instances):
+    for bad in unnormalized_weights(scene.instances):
         for words in bad.in_words():
             note(words)
     chosen = clips[clip] if clips else Clip("", ())
     if not scene.vertex_count:
         raise NotFoundError("has no mesh with vertices")
     times = frame_times(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
-    said = f"{reader.label(chosen.name, clip)}, one of {len(clips)}" if len(clips) > 1 else ""
+    said = f"{reader.clip_label(chosen.name, clip)}, one of {len(clips)}" if len(clips) > 1 else ""
     return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
 
 
 def directions(document: Document) -> tuple[str, ...]:
     """Return "normals" and "tangents" where a mesh has them, which `play` leaves out."""
-    primitives = [each for mesh in items(document.json, "meshes") for each in mesh.get("primitives", [])]
+    primitives = [each for mesh in json_array(document.json, "meshes") for each in mesh.get("primitives", [])]
     return tuple(
         word
         for word, name in (("normals", "NORMAL"), ("tangents", "TANGENT"))
@@ -54,6 +54,6 @@ def _keys(clip: Clip) -> Floats:
 
 
 def _up(document: Document) -> str:
-    extras = [node.get("extras") for node in items(document.json, "nodes")]
+    extras = [node.get("extras") for node in json_array(document.json, "nodes")]
     said = [each.get("gltf_anim") for each in extras if isinstance(each, dict)]
     return "z" if any(isinstance(each, dict) and each.get("up") == "z" for each in said) else "y"

@@ -9,7 +9,7 @@ from anim.arrays import AnyArray, Floats, Ints
 BATCH = 1 << 22  # numbers compared at a time
 
 
-def kept_frames(positions: AnyArray, times: Floats, limit: float) -> Ints:
+def reduce_frames(positions: AnyArray, times: Floats, limit: float) -> Ints:
     """Return the numbers of frames to keep: every vertex of the others lies within `limit` m of the line between.
 
     positions (F, V, 3). The first and the last frame stay. Greedy: each step goes as far as it can, found by doubling

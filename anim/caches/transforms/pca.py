@@ -14,7 +14,7 @@ RANK = 1e-15  # share of the largest eigenvalue below which there is only noise
 
 
 @dataclass(frozen=True, slots=True)
-class Basis:
+class PcaBasis:
     """base (V, 3), shapes (k, V, 3), both float32, weights (F, k): frame f is base + Σ weights[f] shapes."""
 
     base: AnyArray
@@ -22,7 +22,7 @@ class Basis:
     weights: Floats
 
 
-def basis(positions: AnyArray, limit: float, *, most: int) -> Basis | None:
+def fit_basis(positions: AnyArray, limit: float, *, most: int) -> PcaBasis | None:
     """Return the fewest shapes with every vertex of every frame within `limit` m; None where `most` are too few.
 
     positions: (F, V, 3). Found through the F×F products of frames, which keep half of float64's digits: enough for
@@ -35,7 +35,7 @@ def basis(positions: AnyArray, limit: float, *, most: int) -> Basis | None:
     values, vectors = np.linalg.eigh(products)
     rank = int(np.count_nonzero(values > values.max() * RANK))
     vectors = vectors[:, ::-1][:, : min(rank, most)]
-    count = _fewest(positions, vectors, limit)
+    count = _min_shapes(positions, vectors, limit)
     if count is None:
         return None
     vectors = vectors[:, :count]
@@ -47,7 +47,7 @@ def basis(positions: AnyArray, limit: float, *, most: int) -> Basis | None:
     size = np.abs(shapes).max(axis=(1, 2), initial=0.0).astype(np.float64)
     size = np.where(size > 0, size, 1.0) * np.where(shapes.sum(axis=(1, 2), dtype=np.float64) < 0, -1, 1)
     shapes /= size[:, None, None].astype(np.float32)
-    return Basis(base, shapes, vectors * size)
+    return PcaBasis(base, shapes, vectors * size)
 
 
 def _blocks(positions: AnyArray) -> Iterator[tuple[slice, Floats, Floats]]:
@@ -60,7 +60,7 @@ def _blocks(positions: AnyArray) -> Iterator[tuple[slice, Floats, Floats]]:
         yield some, rows - mean, mean
 
 
-def _fewest(positions: AnyArray, vectors: Floats, limit: float) -> int | None:
+def _min_shapes(positions: AnyArray, vectors: Floats, limit: float) -> int | None:
     low, high = 0, int(vectors.shape[1])
     if not _fits(positions, vectors, limit):
         return None

@@ -19,7 +19,7 @@ Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents o
 SAME = 1e-6  # s; times closer than this are the same frame
 
 
-def at_times(cache: VertexCache, times: Floats) -> VertexCache:
+def resample_frames(cache: VertexCache, times: Floats) -> VertexCache:
     """Return the cache with frames at increasing `times` (F,) in seconds; outside the frames it holds still.
 
     Memory: some frames of the old cache and a chunk of the new.
@@ -37,7 +37,7 @@ def at_times(cache: VertexCache, times: Floats) -> VertexCache:
 
 def at_rate(cache: VertexCache, fps: float) -> VertexCache:
     """Return the cache with frames at start + k / fps, and one at its end. Raises RangeError unless fps is above 0."""
-    return at_times(cache, frame_times(float(cache.times[0]), float(cache.times[-1]), fps=fps))
+    return resample_frames(cache, frame_times(float(cache.times[0]), float(cache.times[-1]), fps=fps))
 
 
 def at_time(cache: VertexCache, time: float) -> VertexCache:
@@ -45,7 +45,7 @@ def at_time(cache: VertexCache, time: float) -> VertexCache:
     first, last = float(cache.times[0]), float(cache.times[-1])
     if not first - SAME <= time <= last + SAME:
         raise RangeError(f"there is no frame at {time:g} s (the cache goes from {first:g} s to {last:g} s)")
-    return at_times(cache, np.array([min(max(time, first), last)]))
+    return resample_frames(cache, np.array([min(max(time, first), last)]))
 
 
 def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Iterator[FrameChunk]:
@@ -55,7 +55,7 @@ def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Itera
     for first in range(0, len(left), step):
         rows = range(first, min(first + step, len(left)))
         found = [window.between(int(left[i]), int(right[i]), np.float32(share[i])) for i in rows]
-        positions, normals, tangents = (_stacked(arrays) for arrays in zip(*found, strict=True))
+        positions, normals, tangents = (_stack(arrays) for arrays in zip(*found, strict=True))
         assert positions is not None
         yield FrameChunk(first, positions, normals, tangents)
 
@@ -82,7 +82,7 @@ class _Window:
         return mixed[0], *(None if each is None else _unit(each) for each in mixed[1:])
 
 
-def _stacked(arrays: tuple[AnyArray | None, ...]) -> AnyArray | None:
+def _stack(arrays: tuple[AnyArray | None, ...]) -> AnyArray | None:
     there = [each for each in arrays if each is not None]
     return np.stack(there) if len(there) == len(arrays) else None
 

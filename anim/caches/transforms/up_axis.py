@@ -14,7 +14,7 @@ from anim.model import FrameChunk, VertexCache
 UPS = ("y", "z")
 
 
-def turned(cache: VertexCache, up: str) -> VertexCache:
+def to_up_axis(cache: VertexCache, up: str) -> VertexCache:
     """Return the cache with this axis up: "y" as in glTF, "z" as in Blender, where (x, y, z) becomes (x, −z, y).
 
     Raises RangeError for another axis. The cache itself where nothing is to do.

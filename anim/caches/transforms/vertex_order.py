@@ -14,7 +14,7 @@ from anim.model import FrameChunk, MeshPart, VertexCache
 ORDERS = ("file", "blender")
 
 
-def ordered(cache: VertexCache, order: str) -> VertexCache:
+def reorder(cache: VertexCache, order: str) -> VertexCache:
     """Return the cache with vertices in the order of the file, or as Blender's glTF importer has them.
 
     Blender leaves out vertices that no triangle of a primitive uses and keeps the others in ascending order, primitive

@@ -24,7 +24,7 @@ FORMATS = ("float", "half", "unorm16")
 
 
 @dataclass(frozen=True, slots=True)
-class About:
+class VatMetadata:
     """What the JSON says. format: of FORMATS; encoding: "absolute" or "offset" (from the mesh at rest)."""
 
     preset: str
@@ -41,12 +41,12 @@ class About:
     times: tuple[float, ...]
     up: str
 
-    def with_normals(self, name: str) -> About:
+    def with_normals(self, name: str) -> VatMetadata:
         """Return the same with normals in a file of this name."""
         return replace(self, normal=name)
 
 
-def text(about: About, engine: Preset) -> bytes:
+def text(about: VatMetadata, engine: Preset) -> bytes:
     """Return the JSON, UTF-8, one value a line."""
     times = np.array(about.times)
     steps = np.diff(times)
@@ -86,14 +86,14 @@ def text(about: About, engine: Preset) -> bytes:
     return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
 
 
-def parse(data: bytes) -> About:
+def parse(data: bytes) -> VatMetadata:
     """Return what a JSON says. Raises FormatError where it is none of ours or not whole."""
     try:
         content = json.loads(data)
         if not isinstance(content, dict) or content.get("kind") != KIND or content["preset"] not in PRESETS:
             raise FormatError(f"JSON says of no {KIND}")
         position, normal = content["position"], content["normal"]
-        found = About(
+        found = VatMetadata(
             content["preset"],
             str(position["file"]),
             None if normal is None else str(normal["file"]),

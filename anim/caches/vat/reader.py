@@ -6,28 +6,28 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats import exr, png
-from anim.caches.options import Reading
-from anim.caches.storage import Inputs, whole
+from anim.caches.options import ReadOptions
+from anim.caches.storage import Inputs, read_all
 from anim.caches.vat import metadata, presets
-from anim.caches.vat.metadata import About
+from anim.caches.vat.metadata import VatMetadata
 from anim.caches.vat.presets import Preset
-from anim.caches.vat.writer import Packed, of_directions
+from anim.caches.vat.writer import PixelEncoding, of_directions
 from anim.errors import FormatError
 from anim.gltf.io import container
 from anim.gltf.reading import reader as gltf
 from anim.model import FrameChunk, Mesh, VertexCache
 
 
-def read(inputs: Inputs, reading: Reading) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the frames in textures, as exactly as their numbers allow; faces are those of the mesh beside them."""
     name = f"{inputs.main}.json"
     if name not in inputs.names():
         raise FormatError(f"'{name}' is not beside it, and only that says what the pixels mean")
-    with whole(inputs, name) as data:
+    with read_all(inputs, name) as data:
         about = metadata.parse(data)
     engine = presets.PRESETS[about.preset]
     mesh = _mesh(inputs, about)
-    packed = Packed(about.format, np.array(about.offset), np.array(about.scale))
+    packed = PixelEncoding(about.format, np.array(about.offset), np.array(about.scale))
     numbers = packed.numbers(_pixels(inputs, about.position, about))
     if about.encoding == "offset":
         numbers = numbers + presets.to_engine(mesh.positions, engine)
@@ -45,18 +45,18 @@ def read(inputs: Inputs, reading: Reading) -> VertexCache:
     )
 
 
-def _mesh(inputs: Inputs, about: About) -> Mesh:
-    with whole(inputs, about.mesh) as data:
+def _mesh(inputs: Inputs, about: VatMetadata) -> Mesh:
+    with read_all(inputs, about.mesh) as data:
         scene = gltf.scene(container.read(np.frombuffer(data, np.uint8)))
     if scene.vertex_count != about.vertices:
         raise FormatError(f"'{about.mesh}' has {scene.vertex_count} vertices (the JSON says {about.vertices})")
     return scene.instances[0].mesh
 
 
-def _pixels(inputs: Inputs, name: str, about: About) -> AnyArray:
+def _pixels(inputs: Inputs, name: str, about: VatMetadata) -> AnyArray:
     """The pixels (F, V, 3) of all frames."""
     if about.format == "unorm16":
-        with whole(inputs, name) as data:
+        with read_all(inputs, name) as data:
             image: AnyArray = png.read(data)
     else:
         image = exr.read(inputs, name)
@@ -66,7 +66,7 @@ def _pixels(inputs: Inputs, name: str, about: About) -> AnyArray:
     return image.reshape(len(about.times), -1, 3)[:, : about.vertices]
 
 
-def _normals(inputs: Inputs, name: str, about: About, engine: Preset) -> Floats:
+def _normals(inputs: Inputs, name: str, about: VatMetadata, engine: Preset) -> Floats:
     numbers = of_directions(about.format).numbers(_pixels(inputs, name, about))
     turned = presets.from_engine(numbers, engine, lengths=False)
     return turned.astype(np.float32)

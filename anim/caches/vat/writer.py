@@ -24,8 +24,8 @@ from anim.arrays import AnyArray, Floats
 from anim.caches import rest_mesh
 from anim.caches.formats import exr, png
 from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive
-from anim.caches.options import Writing, Written
-from anim.caches.storage import Outputs, beside
+from anim.caches.options import WriteOptions, WriteResult
+from anim.caches.storage import Outputs, companion_name
 from anim.caches.transforms import frame_spacing
 from anim.caches.vat import metadata, presets
 from anim.caches.vat.presets import Preset
@@ -37,7 +37,7 @@ UNORM = 65535
 
 
 @dataclass(frozen=True, slots=True)
-class Grid:
+class TextureLayout:
     """Where vertices lie. width: pixels. rows: of a frame."""
 
     width: int
@@ -51,7 +51,7 @@ class Grid:
 
 
 @dataclass(frozen=True, slots=True)
-class Packed:
+class PixelEncoding:
     """How numbers become pixels: number = offset + scale · pixel, (3,) each; kind: float, half or unorm16."""
 
     kind: str
@@ -70,7 +70,7 @@ class Packed:
         return self.offset + self.scale * shares
 
 
-def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str) -> Written:
+def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
     """Write textures as ".exr" or ".png", JSON and mesh. Raises RangeError for more than 4096 × 8192 pixels."""
     engine = presets.preset(writing.preset, ending)
     grid = _grid(cache)
@@ -79,27 +79,37 @@ def write(cache: VertexCache, outputs: Outputs, writing: Writing, *, ending: str
         raise RangeError(f"depth is '{kind}' (expected {', '.join(exr.TYPES)})")
     still = rest_mesh.positions(cache)
     base = np.zeros_like(still) if kind == "float" else presets.to_engine(still, engine)
-    packed = _packed(cache, engine, base, kind)
+    packed = _encode_pixels(cache, engine, base, kind)
     worst = _write_image(_bands(cache, engine, base, packed), outputs, outputs.main, grid, packed)
-    about = metadata.About(
-        writing.preset, outputs.main, None, beside(outputs.main, "-mesh.glb"), packed.kind, grid.width, grid.rows,
-        "absolute" if kind == "float" else "offset", tuple(packed.offset.tolist()), tuple(packed.scale.tolist()),
-        cache.vertex_count, tuple(cache.times.tolist()), cache.up,
-    )  # fmt: skip
+    about = metadata.VatMetadata(
+        preset=writing.preset,
+        position=outputs.main,
+        normal=None,
+        mesh=companion_name(outputs.main, "-mesh.glb"),
+        format=packed.kind,
+        width=grid.width,
+        rows=grid.rows,
+        encoding="absolute" if kind == "float" else "offset",
+        offset=tuple(packed.offset.tolist()),
+        scale=tuple(packed.scale.tolist()),
+        vertices=cache.vertex_count,
+        times=tuple(cache.times.tolist()),
+        up=cache.up,
+    )
     if cache.has_normals:
-        name = beside(outputs.main, f"-normal{ending}")
+        name = companion_name(outputs.main, f"-normal{ending}")
         turned = of_directions(kind)
         _write_image(_normal_bands(cache, engine, turned), outputs, name, grid, turned)
         about = about.with_normals(name)
     _write_mesh(cache, still, grid, engine, outputs, about.mesh)
     with outputs.create(f"{outputs.main}.json") as file:
         file.write(metadata.text(about, engine))
-    return Written(worst / engine.per_meter, (*engine.advice, *frame_spacing.notes(cache.times)))
+    return WriteResult(worst / engine.per_meter, (*engine.advice, *frame_spacing.notes(cache.times)))
 
 
-def _grid(cache: VertexCache) -> Grid:
+def _grid(cache: VertexCache) -> TextureLayout:
     rows = max(-(-cache.vertex_count // MAX_WIDTH), 1)
-    found = Grid(-(-cache.vertex_count // rows), rows, cache.frame_count)
+    found = TextureLayout(-(-cache.vertex_count // rows), rows, cache.frame_count)
     if found.height > MAX_HEIGHT:
         most = MAX_HEIGHT // rows
         raise RangeError(
@@ -109,16 +119,16 @@ def _grid(cache: VertexCache) -> Grid:
     return found
 
 
-def of_directions(kind: str) -> Packed:
+def of_directions(kind: str) -> PixelEncoding:
     """Return how numbers from −1 to 1 become pixels."""
-    return Packed(kind, np.full(3, -1.0), np.full(3, 2.0)) if kind == "unorm16" else _plain(kind)
+    return PixelEncoding(kind, np.full(3, -1.0), np.full(3, 2.0)) if kind == "unorm16" else _plain(kind)
 
 
-def _plain(kind: str) -> Packed:
-    return Packed(kind, np.zeros(3), np.ones(3))
+def _plain(kind: str) -> PixelEncoding:
+    return PixelEncoding(kind, np.zeros(3), np.ones(3))
 
 
-def _packed(cache: VertexCache, engine: Preset, base: AnyArray, kind: str) -> Packed:
+def _encode_pixels(cache: VertexCache, engine: Preset, base: AnyArray, kind: str) -> PixelEncoding:
     if kind != "unorm16":
         return _plain(kind)
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
@@ -127,13 +137,13 @@ def _packed(cache: VertexCache, engine: Preset, base: AnyArray, kind: str) -> Pa
         least = np.minimum(least, moved.min(axis=(0, 1), initial=np.inf))
         most = np.maximum(most, moved.max(axis=(0, 1), initial=-np.inf))
     span = most - least
-    return Packed(kind, least, np.where(span > 0, span, 1.0))
+    return PixelEncoding(kind, least, np.where(span > 0, span, 1.0))
 
 
 Band = tuple[AnyArray, float]  # pixels (n, V, 3) of some frames, and the farthest that a number is off
 
 
-def _bands(cache: VertexCache, engine: Preset, base: AnyArray, packed: Packed) -> Iterator[Band]:
+def _bands(cache: VertexCache, engine: Preset, base: AnyArray, packed: PixelEncoding) -> Iterator[Band]:
     for chunk in cache.chunks():
         moved = presets.to_engine(chunk.positions, engine) - base
         pixels = packed.pixels(moved)
@@ -141,13 +151,15 @@ def _bands(cache: VertexCache, engine: Preset, base: AnyArray, packed: Packed) -
         yield pixels, float(np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0)))
 
 
-def _normal_bands(cache: VertexCache, engine: Preset, packed: Packed) -> Iterator[Band]:
+def _normal_bands(cache: VertexCache, engine: Preset, packed: PixelEncoding) -> Iterator[Band]:
     for chunk in cache.chunks():
         if chunk.normals is not None:
             yield packed.pixels(presets.to_engine(chunk.normals, engine, lengths=False)), 0.0
 
 
-def _write_image(bands: Iterator[Band], outputs: Outputs, name: str, grid: Grid, packed: Packed) -> float:
+def _write_image(
+    bands: Iterator[Band], outputs: Outputs, name: str, grid: TextureLayout, packed: PixelEncoding
+) -> float:
     worst = [0.0]
 
     def images() -> Iterator[AnyArray]:
@@ -165,7 +177,9 @@ def _write_image(bands: Iterator[Band], outputs: Outputs, name: str, grid: Grid,
     return worst[0]
 
 
-def _write_mesh(cache: VertexCache, still: Floats, grid: Grid, engine: Preset, outputs: Outputs, name: str) -> None:
+def _write_mesh(
+    cache: VertexCache, still: Floats, grid: TextureLayout, engine: Preset, outputs: Outputs, name: str
+) -> None:
     """The mesh at rest as a GLB, in glTF's axes: the engine's importer turns it as the preset turns the texture."""
     from pygltflib import Mesh, Node
 

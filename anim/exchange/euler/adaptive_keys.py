@@ -17,7 +17,7 @@ MAX_TRAVEL = np.radians(360)  # of all axes in a piece before it is sampled, so 
 ROUNDING = 1e-4  # share of a piece that float32 times make it longer or shorter
 SAMPLES = np.arange(1, 16) / 16
 SAFETY = 1.02  # the greatest error lies between samples
-MOST_PIECES = 64  # that one piece is split into at a time
+MAX_SUBDIVISIONS = 64  # that one piece is split into at a time
 MAX_KEYS = 2_000_000
 ROUNDS = 40
 
@@ -25,7 +25,7 @@ Travel: TypeAlias = Callable[[Floats, Floats], Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class SampledPath:
     """A value (..., C) at any times (...) in seconds.
 
     value(times, before): before asks for the value just before each time, where it jumps.
@@ -38,7 +38,7 @@ class Path:
     turns: bool
 
 
-def keys(path: Path, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
+def adaptive_keys(path: SampledPath, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
     """Return key times (K,) and values (K, C) whose slerp, or lerp, follows the path within `tolerance`.
 
     knots: (T,) float32-exact times between which the path is smooth; each one is a key. Where the value jumps, a key
@@ -48,7 +48,7 @@ def keys(path: Path, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats
     Source: the chord of a piece of length h is off by about h² · α / 8, so an error e wants √(e / tolerance) pieces.
     Raises RangeError for over two million keys.
     """
-    times = _followed(path, knots, tolerance) if len(knots) > 1 else knots
+    times = _follow_path(path, knots, tolerance) if len(knots) > 1 else knots
     values = path.value(times, False)
     earlier = np.nextafter(times[1:].astype(np.float32), np.float32(0)).astype(np.float64)
     arriving = path.value(times[1:], True)
@@ -58,12 +58,12 @@ def keys(path: Path, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats
     return times, quaternion.align_signs(values) if path.turns else values
 
 
-def _followed(path: Path, knots: Floats, tolerance: float) -> Floats:
-    starts, _ = _split(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL))
-    return refined(np.append(starts, knots[-1]), lambda a, b: _wanted(path, a, b, tolerance))
+def _follow_path(path: SampledPath, knots: Floats, tolerance: float) -> Floats:
+    starts, _ = _split_interval(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL))
+    return refine_keys(np.append(starts, knots[-1]), lambda a, b: _required_keys(path, a, b, tolerance))
 
 
-def refined(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floats:
+def refine_keys(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floats:
     """Return times (K,) and more between them, until no piece wants to be split.
 
     times: (T,) float32-exact. wanted: how many pieces (B,), up to MOST_PIECES, those from a to b (B,) should become;
@@ -72,18 +72,18 @@ def refined(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floats:
     found, a, b = [times], times[:-1], times[1:]
     for _ in range(ROUNDS):
         pieces = wanted(a, b)
-        middle = _stored((a + b) / 2)
+        middle = _as_stored((a + b) / 2)
         again: Bools = (pieces > 1) & (middle > a) & (middle < b)
         if not again.any():
             break
         if pieces[again].sum() + sum(map(len, found)) > MAX_KEYS:
             raise RangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
-        a, b = _split(a[again], b[again], pieces[again])
+        a, b = _split_interval(a[again], b[again], pieces[again])
         found.append(a)
     return unique_sorted(np.concatenate(found))
 
 
-def _wanted(path: Path, a: Floats, b: Floats, tolerance: float) -> Ints:
+def _required_keys(path: SampledPath, a: Floats, b: Floats, tolerance: float) -> Ints:
     """How many pieces (B,) each should become; 1 where it is good."""
     u = np.concatenate(([0.0], SAMPLES, [1.0]))
     at = a[:, None] + (b - a)[:, None] * u
@@ -100,11 +100,11 @@ def _wanted(path: Path, a: Floats, b: Floats, tolerance: float) -> Ints:
         turns = np.ones(len(a))
     error = _distance(path, chord, values[:, 1:-1]).max(axis=1) * SAFETY
     bent = np.ceil(np.sqrt(error / tolerance) - 1e-9)
-    pieces: Ints = np.clip(np.where(turns > 1, turns, bent), 1, MOST_PIECES).astype(np.int64)
+    pieces: Ints = np.clip(np.where(turns > 1, turns, bent), 1, MAX_SUBDIVISIONS).astype(np.int64)
     return pieces
 
 
-def _split(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]:
+def _split_interval(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]:
     """The ends (B,) of all pieces from a to b, evenly split at times that float32 holds; none has no length."""
     counts = np.maximum(pieces, 1)
     if counts.sum() > MAX_KEYS:
@@ -113,16 +113,16 @@ def _split(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]
     piece = np.repeat(np.arange(len(a)), counts)
     step = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
     length = (b - a)[piece] / counts[piece]
-    starts = np.where(step == 0, a[piece], _stored(a[piece] + step * length))
+    starts = np.where(step == 0, a[piece], _as_stored(a[piece] + step * length))
     last = step == counts[piece] - 1
-    ends = np.where(last, b[piece], _stored(a[piece] + (step + 1) * length))
+    ends = np.where(last, b[piece], _as_stored(a[piece] + (step + 1) * length))
     some = ends > starts
     return starts[some], ends[some]
 
 
-def _stored(times: Floats) -> Floats:
+def _as_stored(times: Floats) -> Floats:
     return np.asarray(times.astype(np.float32).astype(np.float64))
 
 
-def _distance(path: Path, p: Floats, q: Floats) -> Floats:
+def _distance(path: SampledPath, p: Floats, q: Floats) -> Floats:
     return quaternion.angle_between(p, q) if path.turns else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))

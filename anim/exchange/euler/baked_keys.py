@@ -16,7 +16,7 @@ MIN_KEYS = 4
 EVEN = 0.01  # share of a step by which steps may differ
 
 
-class Keys(StrEnum):
+class KeyPlacement(StrEnum):
     """Where the keys of what is written stand."""
 
     AUTO = "auto"
@@ -24,17 +24,17 @@ class Keys(StrEnum):
     ADAPTIVE = "adaptive"
 
 
-def stays_on_grid(motion: EulerMotion, node: EulerNode, keys: Keys) -> bool:
+def is_baked(motion: EulerMotion, node: EulerNode, keys: KeyPlacement) -> bool:
     """Return whether a node keeps the source's key times and gets no others.
 
     AUTO: recordings do: BVH, or straight curves on one even grid of ten keys a second or more.
     """
-    if keys != Keys.AUTO:
-        return keys == Keys.GRID
+    if keys != KeyPlacement.AUTO:
+        return keys == KeyPlacement.GRID
     if motion.sampled is not None:
         return motion.sampled
     changing = [curve for curve in curves_of(node) if not curve.is_constant]
-    return bool(changing) and all(_is_recorded(curve, changing[0]) for curve in changing)
+    return bool(changing) and all(_is_dense(curve, changing[0]) for curve in changing)
 
 
 def curves_of(node: EulerNode) -> list[Curve]:
@@ -42,7 +42,7 @@ def curves_of(node: EulerNode) -> list[Curve]:
     return [c for c in (*node.rotation, *node.moves.values(), *node.scales.values()) if c is not None]
 
 
-class StoredTimes:
+class Float32Times:
     """Rounds key times to float32, once per array, so that curves that share their times go on sharing them."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class StoredTimes:
         return curve.kept(kept, times)
 
 
-def _is_recorded(curve: Curve, first: Curve) -> bool:
+def _is_dense(curve: Curve, first: Curve) -> bool:
     if len(curve.times) < MIN_KEYS or (curve.modes[:-1] != Mode.LINEAR).any():
         return False
     steps = np.diff(curve.times)

@@ -11,7 +11,7 @@ from anim.maths.euler import ORDERS, AxesConvention, check_order
 
 
 @dataclass(frozen=True, slots=True)
-class Stated:
+class PartialConvention:
     """What one side says; None where it says nothing."""
 
     order: str | None = None
@@ -19,10 +19,10 @@ class Stated:
     unit: Unit | None = None
 
 
-NOTHING = Stated()
+UNSPECIFIED = PartialConvention()
 
 
-def stated(values: dict[str, Any], where: str) -> Stated:
+def parse_convention(values: dict[str, Any], where: str) -> PartialConvention:
     """Return what a file says under "order", "frame" and "unit", in letters of any case.
 
     Raises FormatError for words that are none.
@@ -35,25 +35,25 @@ def stated(values: dict[str, Any], where: str) -> Stated:
         raise FormatError(f"frame is '{frame}' (expected {' or '.join(AxesConvention)})", where=where)
     if unit is not None and unit not in list(Unit):
         raise FormatError(f"unit is '{unit}' (expected {' or '.join(Unit)})", where=where)
-    return Stated(
+    return PartialConvention(
         None if order is None else str(order).upper(),
         None if frame is None else AxesConvention(frame),
         None if unit is None else Unit(unit),
     )
 
 
-def agreed(file: Stated, options: Stated) -> Stated:
+def merge_strict(file: PartialConvention, options: PartialConvention) -> PartialConvention:
     """Return what file and options say together. Raises RangeError where both name a part of it and differ."""
     if options.order is not None:
-        options = Stated(check_order(options.order), options.frame, options.unit)
+        options = PartialConvention(check_order(options.order), options.frame, options.unit)
     for name in ("order", "frame", "unit"):
         here, there = getattr(file, name), getattr(options, name)
         if here is not None and there is not None and here != there:
             raise RangeError(f"the file says {name} {here}, the options say {there}")
-    return merged(file, options)
+    return fill_from(file, options)
 
 
-def complete(said: Stated) -> Convention:
+def require_complete(said: PartialConvention) -> Convention:
     """Return the convention in full. Raises RangeError where nobody names a part of it."""
     if said.order is not None and said.frame is not None and said.unit is not None:
         return Convention(said.order, said.frame, said.unit)
@@ -64,16 +64,16 @@ def complete(said: Stated) -> Convention:
     )
 
 
-def merged(first: Stated, otherwise: Stated) -> Stated:
+def fill_from(first: PartialConvention, otherwise: PartialConvention) -> PartialConvention:
     """Return what `first` says, and where it says nothing what `otherwise` does."""
-    return Stated(
+    return PartialConvention(
         first.order if first.order is not None else otherwise.order,
         first.frame if first.frame is not None else otherwise.frame,
         first.unit if first.unit is not None else otherwise.unit,
     )
 
 
-def place_of_axis(axis: str, order: str) -> int | None:
+def axis_index(axis: str, order: str) -> int | None:
     """Return which angle of the order an axis name means: "x" … "z" by axis, "1" … "3" by place; None where unclear.
 
     place_of_axis("y", "ZXY") → 2

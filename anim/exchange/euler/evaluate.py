@@ -9,13 +9,13 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.euler.curve import Curve, evaluate
-from anim.exchange.euler.motion import PLAIN, EulerMotion, EulerNode
+from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths import euler, quaternion
 from anim.model import Skeleton
 from anim.sampling import rest_pose, world_matrices
 
 
-def rotation_at(node: EulerNode, at: Floats, before: bool = False) -> Floats:
+def evaluate_rotation(node: EulerNode, at: Floats, before: bool = False) -> Floats:
     """Return the local rotation (..., 4) of a node at times (...) in seconds: Rpre · R(angles) · Rpost⁻¹.
 
     before: just before each time, where steps jump.
@@ -26,29 +26,29 @@ def rotation_at(node: EulerNode, at: Floats, before: bool = False) -> Floats:
     ]
     stacked: Floats = np.stack(angles, axis=-1) if angles else np.zeros((*at.shape, 0))
     turn = euler.to_quaternion(stacked, order=node.order, frame=node.frame)
-    if node.pivots is PLAIN:
+    if node.pivots is NO_PIVOTS:
         return turn
     after = quaternion.conjugate(node.pivots.post_rotation)
     return quaternion.multiply(quaternion.multiply(node.pivots.pre_rotation, turn), after)
 
 
-def scale_at(node: EulerNode, at: Floats, before: bool = False) -> Floats:
+def evaluate_scale(node: EulerNode, at: Floats, before: bool = False) -> Floats:
     """Return the local scale (..., 3) of a node at times (...)."""
     return _by_axis(node.scale, node.scales, at, before)
 
 
-def translation_at(node: EulerNode, at: Floats, before: bool = False) -> Floats:
+def evaluate_translation(node: EulerNode, at: Floats, before: bool = False) -> Floats:
     """Return the local translation (..., 3) of a node at times (...), with what its pivots add.
 
     T·Roff·Rp·Q·Rp⁻¹·Soff·Sp·S·Sp⁻¹ takes 0 to T + Roff + Rp + Q (Soff + Sp − Rp − S Sp).
     """
     moved = _by_axis(node.translation, node.moves, at, before)
     pivots = node.pivots
-    if pivots is PLAIN:
+    if pivots is NO_PIVOTS:
         return moved
     arm = pivots.scaling_offset + pivots.scaling_pivot - pivots.rotation_pivot
-    arm = arm - scale_at(node, at, before) * pivots.scaling_pivot
-    swung = quaternion.rotate(rotation_at(node, at, before), arm)
+    arm = arm - evaluate_scale(node, at, before) * pivots.scaling_pivot
+    swung = quaternion.rotate(evaluate_rotation(node, at, before), arm)
     return np.asarray(moved + pivots.rotation_offset + pivots.rotation_pivot + swung)
 
 
@@ -59,8 +59,8 @@ def skeleton(motion: EulerMotion) -> Skeleton:
     return Skeleton(
         tuple(node.name for node in still),
         np.array([node.parent for node in still], np.int64),
-        np.array([translation_at(node, start)[0] for node in still]).reshape(-1, 3),
-        np.array([rotation_at(node, start)[0] for node in still]).reshape(-1, 4),
+        np.array([evaluate_translation(node, start)[0] for node in still]).reshape(-1, 3),
+        np.array([evaluate_rotation(node, start)[0] for node in still]).reshape(-1, 4),
         np.array([node.scale for node in still]).reshape(-1, 3),
     )
 
@@ -70,7 +70,7 @@ def rest_positions(skeleton: Skeleton) -> Floats:
     return world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
 
 
-def extent(skeleton: Skeleton) -> float:
+def bounding_size(skeleton: Skeleton) -> float:
     """Return the longest side of the box around all nodes at rest, in metres."""
     return float(np.ptp(rest_positions(skeleton), axis=0).max()) if len(skeleton) else 0.0
 

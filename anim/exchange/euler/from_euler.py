@@ -10,20 +10,26 @@ import numpy as np
 from anim.arrays import Floats, unique_sorted
 from anim.errors import AnimError, RangeError
 from anim.exchange.euler import adaptive_keys as placing
-from anim.exchange.euler.adaptive_keys import Path
-from anim.exchange.euler.baked_keys import Keys, StoredTimes, curves_of, stays_on_grid
+from anim.exchange.euler.adaptive_keys import SampledPath
+from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement, curves_of, is_baked
 from anim.exchange.euler.curve import Curve, Mode, travel
-from anim.exchange.euler.evaluate import extent, rotation_at, scale_at, skeleton, translation_at
-from anim.exchange.euler.motion import PLAIN, EulerMotion, EulerNode
+from anim.exchange.euler.evaluate import (
+    bounding_size,
+    evaluate_rotation,
+    evaluate_scale,
+    evaluate_translation,
+    skeleton,
+)
+from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, Track
 
 MIN_TOLERANCE = 1e-6  # rad; float32 quaternions resolve no less
-STILL = 1e-9  # share of the skeleton's size
+CONSTANT_TOLERANCE = 1e-9  # share of the skeleton's size
 
 
 @dataclass(frozen=True, slots=True)
-class Converted:
+class ImportedMotion:
     """A skeleton in its rest pose, and its motion.
 
     ends: numbers of nodes that only mark where their parent ends. tolerance: rad, within which the clip follows the
@@ -36,7 +42,9 @@ class Converted:
     tolerance: float | None = None
 
 
-def from_euler(motion: EulerMotion, *, tolerance: float, keys: Keys = Keys.AUTO, name: str = "") -> Converted:
+def from_euler(
+    motion: EulerMotion, *, tolerance: float, keys: KeyPlacement = KeyPlacement.AUTO, name: str = ""
+) -> ImportedMotion:
     """Return the skeleton of the motion, and a clip in which slerp follows the Euler motion.
 
     Every axis curve is evaluated on its own keys, then the axes are combined; source key times are kept (rounded to
@@ -52,19 +60,19 @@ def from_euler(motion: EulerMotion, *, tolerance: float, keys: Keys = Keys.AUTO,
     if not MIN_TOLERANCE <= tolerance <= np.pi:
         raise RangeError(f"tolerance is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
     bones = skeleton(motion)
-    size = extent(bones) or 1.0
-    stored, axes = StoredTimes(), _Axes()
+    size = bounding_size(bones) or 1.0
+    stored, axes = Float32Times(), _Axes()
     tracks: list[Track] = []
     adaptive = False
     for number, node in enumerate(motion.nodes):
-        on_grid = stays_on_grid(motion, node, keys)
+        on_grid = is_baked(motion, node, keys)
         adaptive |= not on_grid and any(not curve.is_constant for curve in curves_of(node))
         try:
             tracks += _tracks(number, stored.node(node), None if on_grid else tolerance, size, axes)
         except AnimError as error:
             raise error.at(f"node '{node.name}'") from None
     ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
-    return Converted(bones, Clip(name, tuple(tracks)), ends, tolerance if adaptive else None)
+    return ImportedMotion(bones, Clip(name, tuple(tracks)), ends, tolerance if adaptive else None)
 
 
 class _Axes:
@@ -89,22 +97,34 @@ def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, 
     """Tracks of one node; tolerance None keeps the keys where they are."""
     turning = [curve for curve in node.rotation if curve is not None]
     moving, scaling = [*node.moves.values()], [*node.scales.values()]
-    if node.pivots is not PLAIN:
+    if node.pivots is not NO_PIVOTS:
         moving = curves_of(node)
-    parts: list[tuple[str, list[Curve], Path, float]] = [
-        ("translation", moving, Path(lambda at, before: translation_at(node, at, before), _no_travel, False), size),
-        ("rotation", turning, Path(lambda at, before: rotation_at(node, at, before), _travel(turning), True), 1.0),
-        ("scale", scaling, Path(lambda at, before: scale_at(node, at, before), _no_travel, False), 1.0),
+    parts: list[tuple[str, list[Curve], SampledPath, float]] = [
+        (
+            "translation",
+            moving,
+            SampledPath(lambda at, before: evaluate_translation(node, at, before), _no_travel, False),
+            size,
+        ),
+        (
+            "rotation",
+            turning,
+            SampledPath(lambda at, before: evaluate_rotation(node, at, before), _travel(turning), True),
+            1.0,
+        ),
+        ("scale", scaling, SampledPath(lambda at, before: evaluate_scale(node, at, before), _no_travel, False), 1.0),
     ]
     tracks = [
         _track(number, name, curves, path, None if tolerance is None else tolerance * unit, axes)
         for name, curves, path, unit in parts
         if curves
     ]
-    return [track for track in tracks if not _says_nothing(track, node, size)]
+    return [track for track in tracks if not _is_rest(track, node, size)]
 
 
-def _track(number: int, name: str, curves: list[Curve], path: Path, tolerance: float | None, axes: _Axes) -> Track:
+def _track(
+    number: int, name: str, curves: list[Curve], path: SampledPath, tolerance: float | None, axes: _Axes
+) -> Track:
     knots = axes.union(curves)
     changing = [curve for curve in curves if not curve.is_constant]
     stepped = bool(changing) and all((curve.modes[:-1] == Mode.STEP).all() for curve in changing)
@@ -112,16 +132,16 @@ def _track(number: int, name: str, curves: list[Curve], path: Path, tolerance: f
         values = path.value(knots, False)
         values = quaternion.align_signs(values) if path.turns else values
         return Track(number, name, Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
-    times, values = placing.keys(path, knots, tolerance=tolerance)
+    times, values = placing.adaptive_keys(path, knots, tolerance=tolerance)
     return Track(number, name, Interpolation.LINEAR, axes.shared(times), values)
 
 
-def _says_nothing(track: Track, node: EulerNode, size: float) -> bool:
+def _is_rest(track: Track, node: EulerNode, size: float) -> bool:
     """Whether it holds what is at rest there anyway: many recorders write six channels for every joint."""
-    if track.path != "translation" or (node.parent < 0 and node.pivots is PLAIN):
+    if track.path != "translation" or (node.parent < 0 and node.pivots is NO_PIVOTS):
         return False
-    still = translation_at(node, track.times[:1])[0] if node.pivots is not PLAIN else node.translation
-    return bool((np.abs(track.values - still) <= STILL * size).all())
+    still = evaluate_translation(node, track.times[:1])[0] if node.pivots is not NO_PIVOTS else node.translation
+    return bool((np.abs(track.values - still) <= CONSTANT_TOLERANCE * size).all())
 
 
 def _travel(curves: list[Curve]) -> placing.Travel:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.euler.motion import PLAIN, EulerMotion, Pivots
+from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, Pivots
 from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, AxesConvention
 from anim.model import Clip, Interpolation, Track
@@ -20,7 +20,7 @@ CELLS = 200_000  # quaternions looked at together
 
 
 @dataclass(frozen=True, slots=True)
-class GimbalRow:
+class GimbalStats:
     """One joint under its own order.
 
     nearest_deg: least distance from lock, and when (at_s). near_s: time within 5° of it.
@@ -41,7 +41,7 @@ class GimbalRow:
     best_nearest_deg: float
 
 
-def gimbal(motion: EulerMotion, clip: Clip) -> tuple[GimbalRow, ...]:
+def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
     """Return a row for each node that turns about three axes, in the order of nodes.
 
     clip: the motion as quaternions, whose node numbers are the motion's. Looked at are its keys; where they are few,
@@ -50,8 +50,8 @@ def gimbal(motion: EulerMotion, clip: Clip) -> tuple[GimbalRow, ...]:
     """
     turning = [(t.node, t) for t in clip.tracks if t.path == "rotation" and t.node is not None]
     rows = []
-    for times, nodes, values in _stacked(
-        [_looked_at(motion, node, t) for node, t in turning if _has_lock(motion, node)]
+    for times, nodes, values in _stack_angles(
+        [_check_times(motion, node, t) for node, t in turning if _can_lock(motion, node)]
     ):
         by_order = {order: euler.gimbal_distance(values, order=order) for order in ORDERS}
         nearest = {order: distance.min(axis=0) for order, distance in by_order.items()}
@@ -66,28 +66,28 @@ def gimbal(motion: EulerMotion, clip: Clip) -> tuple[GimbalRow, ...]:
     return tuple(row for _, row in sorted(rows, key=lambda each: each[0]))
 
 
-def _has_lock(motion: EulerMotion, node: int) -> bool:
+def _can_lock(motion: EulerMotion, node: int) -> bool:
     return motion.nodes[node].order in ORDERS
 
 
-def _looked_at(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
+def _check_times(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
     """Node, times and the rotations of its angles: at the track's keys, or with BETWEEN more in each piece."""
     if len(track.times) > MANY or track.interpolation is Interpolation.STEP or len(track.times) == 1:
-        return node, track.times, _of_angles(motion.nodes[node].pivots, track.values)
+        return node, track.times, _stats_of_angles(motion.nodes[node].pivots, track.values)
     shares = np.arange(BETWEEN + 1) / (BETWEEN + 1)
     pieces = track.times[:-1, None] + np.diff(track.times)[:, None] * shares
     at = np.append(pieces.ravel(), track.times[-1])
-    return node, at, _of_angles(motion.nodes[node].pivots, sample(track, at))
+    return node, at, _stats_of_angles(motion.nodes[node].pivots, sample(track, at))
 
 
-def _of_angles(pivots: Pivots, q: Floats) -> Floats:
+def _stats_of_angles(pivots: Pivots, q: Floats) -> Floats:
     """R (K, 4) from Rpre · R · Rpost⁻¹."""
-    if pivots is PLAIN:
+    if pivots is NO_PIVOTS:
         return q
     return quaternion.multiply(quaternion.multiply(quaternion.conjugate(pivots.pre_rotation), q), pivots.post_rotation)
 
 
-def _stacked(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, list[int], Floats]]:
+def _stack_angles(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, list[int], Floats]]:
     """Tracks on one time axis together: times (K,), node numbers, values (K, G, 4), of a size that caches like."""
     groups: dict[int, list[tuple[int, Floats, Floats]]] = {}
     for track in tracks:
@@ -101,14 +101,16 @@ def _stacked(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, lis
     return stacked
 
 
-def _row(motion: EulerMotion, node: int, times: Floats, distance: Floats, best: str, best_nearest: float) -> GimbalRow:
+def _row(
+    motion: EulerMotion, node: int, times: Floats, distance: Floats, best: str, best_nearest: float
+) -> GimbalStats:
     about = motion.nodes[node]
     least = int((distance <= distance.min() + SAME).argmax())
     spans = np.zeros(len(times))  # each key stands for half the way to its neighbors
     spans[1:] += np.diff(times) / 2
     spans[:-1] += np.diff(times) / 2
     sine = min(float(np.cos(distance[least])), 1 - 1e-12)
-    return GimbalRow(
+    return GimbalStats(
         about.name,
         about.order,
         str(about.frame),

@@ -13,7 +13,7 @@ from anim.exchange.euler.curve import Curve
 from anim.maths.euler import AxesConvention
 
 ZERO = np.zeros(3)
-NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
+IDENTITY = np.array((0.0, 0.0, 0.0, 1.0))
 
 
 class Unit(StrEnum):
@@ -47,15 +47,15 @@ class Pivots:
     pre_rotation, post_rotation: unit quaternions (4,). The others: offsets (3,) in metres.
     """
 
-    pre_rotation: Floats = field(default_factory=lambda: NO_TURN)
-    post_rotation: Floats = field(default_factory=lambda: NO_TURN)
+    pre_rotation: Floats = field(default_factory=lambda: IDENTITY)
+    post_rotation: Floats = field(default_factory=lambda: IDENTITY)
     rotation_offset: Floats = field(default_factory=lambda: ZERO)
     rotation_pivot: Floats = field(default_factory=lambda: ZERO)
     scaling_offset: Floats = field(default_factory=lambda: ZERO)
     scaling_pivot: Floats = field(default_factory=lambda: ZERO)
 
 
-PLAIN = Pivots()
+NO_PIVOTS = Pivots()
 OFFSETS = ("rotation_offset", "rotation_pivot", "scaling_offset", "scaling_pivot")
 
 
@@ -80,7 +80,7 @@ class EulerNode:
     moves: Mapping[int, Curve] = field(default_factory=dict)
     scale: Floats = field(default_factory=lambda: np.ones(3))
     scales: Mapping[int, Curve] = field(default_factory=dict)
-    pivots: Pivots = PLAIN
+    pivots: Pivots = NO_PIVOTS
     end: bool = False
 
 
@@ -100,28 +100,28 @@ class EulerMotion:
     notes: tuple[str, ...] = ()
 
 
-def scaled(motion: EulerMotion, factor: float) -> EulerMotion:
+def scale_motion(motion: EulerMotion, factor: float) -> EulerMotion:
     """Return the motion with every length multiplied: offsets, pivots and translation curves."""
-    return motion if factor == 1 else replace(motion, nodes=tuple(_scaled(node, factor) for node in motion.nodes))
+    return motion if factor == 1 else replace(motion, nodes=tuple(_scale_curve(node, factor) for node in motion.nodes))
 
 
-def turned_up(motion: EulerMotion) -> EulerMotion:
+def z_up_to_y_up(motion: EulerMotion) -> EulerMotion:
     """Return a motion with Z up as one with Y up: every coordinate (x, y, z) becomes (x, z, −y).
 
     Axes change their names, rotations stay Euler rotations: about Z becomes about Y, about Y becomes about −Z.
     """
-    return replace(motion, nodes=tuple(_turned_up(node) for node in motion.nodes))
+    return replace(motion, nodes=tuple(_rotate_node(node) for node in motion.nodes))
 
 
-def _scaled(node: EulerNode, factor: float) -> EulerNode:
+def _scale_curve(node: EulerNode, factor: float) -> EulerNode:
     pivots = node.pivots
-    if pivots is not PLAIN:
+    if pivots is not NO_PIVOTS:
         pivots = replace(pivots, **{name: getattr(pivots, name) * factor for name in OFFSETS})
     moves = {axis: curve.scaled(factor) for axis, curve in node.moves.items()}
     return replace(node, translation=node.translation * factor, moves=moves, pivots=pivots)
 
 
-def _turned_up(node: EulerNode) -> EulerNode:
+def _rotate_node(node: EulerNode) -> EulerNode:
     sign = [-1.0 if axis == "Y" else 1.0 for axis in node.order]
     rotation = tuple(
         curve.scaled(-1.0) if curve is not None and s < 0 else curve
@@ -129,16 +129,16 @@ def _turned_up(node: EulerNode) -> EulerNode:
     )
     moves = {(0, 2, 1)[axis]: curve.scaled(-1.0) if axis == 1 else curve for axis, curve in node.moves.items()}
     pivots = node.pivots
-    if pivots is not PLAIN:
-        turned = {name: _up(getattr(pivots, name)) for name in OFFSETS}
+    if pivots is not NO_PIVOTS:
+        turned = {name: _rotate_vector(getattr(pivots, name)) for name in OFFSETS}
         turned |= {
-            name: np.append(_up(getattr(pivots, name)[:3]), getattr(pivots, name)[3])
+            name: np.append(_rotate_vector(getattr(pivots, name)[:3]), getattr(pivots, name)[3])
             for name in ("pre_rotation", "post_rotation")
         }
         pivots = replace(pivots, **turned)
     return replace(
         node,
-        translation=_up(node.translation),
+        translation=_rotate_vector(node.translation),
         order=node.order.translate(str.maketrans("YZ", "ZY")),
         angles=node.angles * sign,
         rotation=rotation,
@@ -149,5 +149,5 @@ def _turned_up(node: EulerNode) -> EulerNode:
     )
 
 
-def _up(vector: Floats) -> Floats:
+def _rotate_vector(vector: Floats) -> Floats:
     return np.array((vector[0], vector[2], -vector[1]))

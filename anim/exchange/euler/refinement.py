@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.exchange.euler import adaptive_keys
-from anim.exchange.euler.adaptive_keys import MAX_TURN, MOST_PIECES, SAFETY
+from anim.exchange.euler.adaptive_keys import MAX_SUBDIVISIONS, MAX_TURN, SAFETY
 from anim.maths import quaternion
 
 SAMPLES = np.arange(1, 8) / 8
@@ -17,17 +17,17 @@ SAMPLES = np.arange(1, 8) / 8
 Motion: TypeAlias = Callable[[Floats], tuple[dict[int, Floats], Floats]]
 
 
-def refined(times: Floats, motion: Motion, *, tolerance: float, size: float) -> Floats:
+def refine_linear(times: Floats, motion: Motion, *, tolerance: float, size: float) -> Floats:
     """Return key times, `times` among them, between which slerp and lerp stay within the tolerance of the motion.
 
     times: (K,) s, float32-exact. motion: at times (F,) → unit quaternions (F, 4) by node, and paths (F, P, 3), m.
     tolerance: rad for each rotation; paths are held within tolerance × size. No joint turns by over 120° in a piece.
     Raises RangeError for over two million keys.
     """
-    return adaptive_keys.refined(times, lambda a, b: _wanted(motion, a, b, tolerance, size))
+    return adaptive_keys.refine_keys(times, lambda a, b: _intervals_to_split(motion, a, b, tolerance, size))
 
 
-def _wanted(motion: Motion, a: Floats, b: Floats, tolerance: float, size: float) -> Ints:
+def _intervals_to_split(motion: Motion, a: Floats, b: Floats, tolerance: float, size: float) -> Ints:
     """How many pieces (B,) each should become; 1 where it is good."""
     shares = np.concatenate(([0.0], SAMPLES, [1.0]))
     at = a[:, None] + (b - a)[:, None] * shares
@@ -44,5 +44,5 @@ def _wanted(motion: Motion, a: Floats, b: Floats, tolerance: float, size: float)
         turned = quaternion.angle_between(q[:, 1:], q[:, :-1]).sum(axis=1)
         turns = np.maximum(turns, np.ceil(turned / MAX_TURN - 1e-4))
     bent = np.ceil(np.sqrt(error * SAFETY / tolerance) - 1e-9)
-    pieces: Ints = np.clip(np.maximum(turns, bent), 1, MOST_PIECES).astype(np.int64)
+    pieces: Ints = np.clip(np.maximum(turns, bent), 1, MAX_SUBDIVISIONS).astype(np.int64)
     return pieces

@@ -20,7 +20,7 @@ CANDIDATES = (USUAL, *(order for order in ORDERS if not euler.is_proper(order) a
 
 
 @dataclass(frozen=True, slots=True)
-class Orders:
+class OrderRules:
     """Orders by node name. rules: (glob, order), the first that fits counts; `otherwise` where none does.
 
     An order is one of the twelve or "auto": of the six without a repeated axis, which are what BVH, Maya and FBX
@@ -52,7 +52,7 @@ class Orders:
                 raise NotFoundError(f"order '{glob}={order}', but no node is called that", help=help)
 
 
-def parse(text: str) -> Orders:
+def parse(text: str) -> OrderRules:
     """Return what "ZXY", "auto" or "hips=ZXY,*arm=YZX,auto" says, in letters of any case.
 
     Raises RangeError for an order that is none, or more than one without a name.
@@ -67,7 +67,7 @@ def parse(text: str) -> Orders:
             otherwise.append(checked)
     if len(otherwise) > 1:
         raise RangeError(f"order is '{text}' (expected one for all nodes, and NAME=ORDER for others)")
-    return Orders(otherwise[0] if otherwise else USUAL, tuple(rules))
+    return OrderRules(otherwise[0] if otherwise else USUAL, tuple(rules))
 
 
 def _best(q: Floats) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
-def start(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
+def shift_to_zero(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
     """Return by how many seconds all keys must come later for none to be before 0, and a note where they must.
 
     start([-0.5, 0, 1]) → 0.5, ("the first key is at -0.5 s: all are moved by 0.5 s, to begin at 0",)

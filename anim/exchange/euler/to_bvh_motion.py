@@ -9,10 +9,10 @@ import numpy as np
 from anim.arrays import Floats, unique_sorted
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, linear
-from anim.exchange.euler.motion import NO_TURN, ZERO, EulerMotion, EulerNode
-from anim.exchange.euler.rotation_order import Orders
+from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
+from anim.exchange.euler.rotation_order import OrderRules
 from anim.exchange.euler.to_euler import FILE_LOCK
-from anim.exchange.formats.labels import label_of, labels, left_out, unique
+from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
@@ -31,7 +31,7 @@ def to_bvh(
     skeleton: Skeleton,
     clip: Clip,
     *,
-    order: str | Orders,
+    order: str | OrderRules,
     fps: float | None = None,
     joints: Collection[int] = (),
     meters_per_unit: float = 1.0,
@@ -45,19 +45,21 @@ def to_bvh(
     they have none.
     joints: nodes to write, with what lies between them; empty for all. Lengths are divided by meters_per_unit.
     """
-    orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
-    chosen, names = _chosen(skeleton, clip, joints), _names(skeleton)
+    orders = order if isinstance(order, OrderRules) else OrderRules(euler.check_order(order))
+    chosen, names = _choose_frames(skeleton, clip, joints), _names(skeleton)
     if not chosen:
         raise UnsupportedError("there is no node to write")
     orders.check([names[node] for node in chosen])
     shown, times = _frames(clip, fps)
     figure = _Figure(skeleton, clip, chosen, times)
     nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
-    notes = left_out(_lost(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen) + _begun(clip)
+    notes = skipped_note(_lost_tracks(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen) + _shift_start(clip)
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 
-Placed = tuple[Floats, Floats, Floats]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
+PlacedJoint = tuple[
+    Floats, Floats, Floats
+]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
 
 
 class _Figure:
@@ -72,17 +74,19 @@ class _Figure:
         self._turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
         self.size = float(np.ptp(self._home[chosen], axis=0).max()) or 1.0
 
-    def placed(self, node: int) -> Placed:
+    def placed(self, node: int) -> PlacedJoint:
         """Where a node is in the world; −1 is the world itself."""
         if node < 0:
-            return ZERO, NO_TURN[None], ZERO
+            return ZERO, IDENTITY[None], ZERO
         return self._home[node], self._turns[node], self._places[:, node]
 
 
-def _node(figure: _Figure, node: int, name: str, orders: Orders, shown: Floats, meters_per_unit: float) -> EulerNode:
+def _node(
+    figure: _Figure, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
+) -> EulerNode:
     """A joint with the curves that it needs; lengths in the file's unit, keys at times `shown`."""
-    parent = _above(figure.skeleton, node, figure.numbers)
-    offset, turn, path = _seen_from(figure.placed(node), figure.placed(parent))
+    parent = _ancestors_outside(figure.skeleton, node, figure.numbers)
+    offset, turn, path = _relative_to(figure.placed(node), figure.placed(parent))
     moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * figure.size)
     end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
     order = orders.of(name, turn)
@@ -100,7 +104,7 @@ def _node(figure: _Figure, node: int, name: str, orders: Orders, shown: Floats, 
     )
 
 
-def _seen_from(node: Placed, parent: Placed) -> Placed:
+def _relative_to(node: PlacedJoint, parent: PlacedJoint) -> PlacedJoint:
     """The same from the parent: offset at rest, turn, and offset at all times."""
     back = quaternion.conjugate(parent[1])
     return node[0] - parent[0], quaternion.multiply(back, node[1]), quaternion.rotate(back, node[2] - parent[2])
@@ -126,7 +130,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     return shown, np.where(np.abs(nearest - at) <= ROUNDING * at, nearest, at)
 
 
-def _chosen(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
+def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
     """Nodes to write, parents first: the joints, what lies between them, and leaves that mark where they end."""
     wanted = set(joints) or set(range(len(skeleton)))
     top = set(wanted)
@@ -159,11 +163,11 @@ def _renamed(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) 
     return (f"braces in names became parentheses: {', '.join(changed)}",) if changed else ()
 
 
-def _begun(clip: Clip) -> tuple[str, ...]:
+def _shift_start(clip: Clip) -> tuple[str, ...]:
     return (f"the first key is at {clip.start:.6g} s: a BVH begins there, at 0",) if clip.start > 0 else ()
 
 
-def _lost(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
+def _lost_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
     """What of the clip a BVH of the chosen nodes doesn't show, in words."""
     carrying = set(chosen)
     for node in chosen:
@@ -177,7 +181,7 @@ def _lost(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
     ]
 
 
-def _above(skeleton: Skeleton, node: int, among: Collection[int]) -> int:
+def _ancestors_outside(skeleton: Skeleton, node: int, among: Collection[int]) -> int:
     parent = int(skeleton.parents[node])
     while parent >= 0 and parent not in among:
         parent = int(skeleton.parents[parent])

@@ -11,8 +11,8 @@ from anim.arrays import Floats, unique_sorted
 from anim.errors import RangeError
 from anim.exchange.euler.curve import Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import EulerMotion, EulerNode
-from anim.exchange.euler.rotation_order import Orders
-from anim.exchange.formats.labels import label_of, labels, left_out
+from anim.exchange.euler.rotation_order import OrderRules
+from anim.exchange.formats.labels import label_of, labels, skipped_note
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Clip, Interpolation, Skeleton, Track
@@ -41,7 +41,7 @@ def to_euler(
     skeleton: Skeleton,
     clip: Clip,
     *,
-    order: str | Orders,
+    order: str | OrderRules,
     frame: AxesConvention = AxesConvention.INTRINSIC,
     fps: float | None = None,
     tolerance: float | None = None,
@@ -56,25 +56,25 @@ def to_euler(
     tolerance: rad; keys are added where straight curves would leave the motion by more. Raises RangeError below 1e-6.
     without: nodes to leave out where nothing moves them and nothing hangs on them, such as those that hold a skin.
     """
-    orders = order if isinstance(order, Orders) else Orders(euler.check_order(order))
+    orders = order if isinstance(order, OrderRules) else OrderRules(euler.check_order(order))
     if tolerance is not None and not 1e-6 <= tolerance < np.inf:
         raise RangeError(f"tolerance is {tolerance:g} rad (expected 1e-06 or more)")
     frames = key_times(frame_times(clip.start, clip.end, fps=fps)) if fps is not None else None
     names = labels(skeleton)
     orders.check(names)
     by_node, lost = _by_node(clip, names)
-    asked = _Asked(orders, frame, frames, tolerance)
+    asked = _Options(orders, frame, frames, tolerance)
     found = [_node(skeleton, number, name, by_node.get(number, {}), asked) for number, name in enumerate(names)]
     nodes, deviation = [node for node, _ in found], max((off for _, off in found), default=0.0)
     kept = [n for n in range(len(nodes)) if n not in without or n in by_node or (skeleton.parents == n).any()]
-    return EulerCurves(EulerMotion(_renumbered(nodes, kept), notes=left_out(lost)), deviation)
+    return EulerCurves(EulerMotion(_renumber_nodes(nodes, kept), notes=skipped_note(lost)), deviation)
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _Options:
     """How curves shall be. frames: (F,) s, where their keys stand; None for the tracks' own. tolerance: rad."""
 
-    orders: Orders
+    orders: OrderRules
     frame: AxesConvention
     frames: Floats | None
     tolerance: float | None
@@ -93,11 +93,11 @@ def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]],
 
 
 def _node(
-    skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Asked
+    skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Options
 ) -> tuple[EulerNode, float]:
     """A node with curves of its tracks by path, and how far those of its rotation leave it between keys, rad."""
     turn, still, frame = tracks.get("rotation"), skeleton.rotation[number], asked.frame
-    order = asked.orders.of(name, still if turn is None else _seen(turn), frame)
+    order = asked.orders.of(name, still if turn is None else _observed_angles(turn), frame)
     rotation: tuple[Curve | None, ...] = (None, None, None)
     deviation = 0.0
     if turn is not None:
@@ -117,18 +117,18 @@ def _node(
     return node, deviation
 
 
-def _renumbered(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...]:
+def _renumber_nodes(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...]:
     places = {-1: -1, **{node: place for place, node in enumerate(kept)}}
     return tuple(replace(nodes[node], parent=places[nodes[node].parent]) for node in kept)
 
 
-def _seen(track: Track) -> Floats:
+def _observed_angles(track: Track) -> Floats:
     """Rotations at the keys and half way between."""
     halves = (track.times[1:] + track.times[:-1]) / 2
     return sample(track, unique_sorted(np.concatenate((track.times, halves))))
 
 
-def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...], float]:
+def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, ...], float]:
     """The three curves of a rotation, and how far they leave it between keys."""
     stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
     times = track.times if asked.frames is None or stepped else asked.frames
@@ -140,7 +140,7 @@ def _rotation(track: Track, order: str, asked: _Asked) -> tuple[tuple[Curve, ...
         errors = _between(track, times, angles, order, frame)
         if tolerance is None or errors.max() <= tolerance:
             break
-        finer = _refined(times, errors, tolerance)
+        finer = _refine(times, errors, tolerance)
         if len(finer) == len(times) or len(finer) > MAX_KEYS:
             break
         times = finer
@@ -158,7 +158,7 @@ def _between(track: Track, times: Floats, angles: Floats, order: str, frame: Axe
     return np.where(jumps, 0.0, quaternion.angle_between(made, true).max(axis=0))
 
 
-def _refined(times: Floats, errors: Floats, tolerance: float) -> Floats:
+def _refine(times: Floats, errors: Floats, tolerance: float) -> Floats:
     pieces = np.clip(np.ceil(np.sqrt(errors / tolerance)), 1, MOST_PIECES).astype(np.int64)
     new = [
         times[k] + (times[k + 1] - times[k]) * np.arange(1, pieces[k]) / pieces[k] for k in np.flatnonzero(pieces > 1)

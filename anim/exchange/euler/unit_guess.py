@@ -5,11 +5,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-PERSON = 1.7  # m; recorded skeletons are people's more often than not
+PERSON_HEIGHT_M = 1.7  # m; recorded skeletons are people's more often than not
 
 # m. CMU's skeletons are in inches × 0.45 (asfmt "length 0.45" of the ASF files).
-UNITS = {"meters": 1.0, "decimeters": 0.1, "feet": 0.3048, "inches": 0.0254, "centimeters": 0.01, "millimeters": 0.001,
-         "CMU's unit of 1/0.45 inch": 0.0254 / 0.45}  # fmt: skip
+UNIT_METRES = {
+    "meters": 1.0,
+    "decimeters": 0.1,
+    "feet": 0.3048,
+    "inches": 0.0254,
+    "centimeters": 0.01,
+    "millimeters": 0.001,
+    "CMU's unit of 1/0.45 inch": 0.0254 / 0.45,
+}
 
 
 class UnitGuess(NamedTuple):
@@ -27,5 +34,5 @@ def guess_unit(height: float) -> UnitGuess:
     """
     if height <= 0:
         return UnitGuess(1.0, "meters", 0.0)
-    name = min(UNITS, key=lambda unit: abs(math.log(height * UNITS[unit] / PERSON)))
-    return UnitGuess(UNITS[name], name, height * UNITS[name])
+    name = min(UNIT_METRES, key=lambda unit: abs(math.log(height * UNIT_METRES[unit] / PERSON_HEIGHT_M)))
+    return UnitGuess(UNIT_METRES[name], name, height * UNIT_METRES[name])

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.exchange.formats.bvh_hierarchy import fail
 from anim.exchange.formats.text import GROUPED, LIMIT
-from anim.exchange.formats.text import number as number_of
+from anim.exchange.formats.text import parse_number as number_of
 
 RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100,
          120, 144, 150, 200, 240, 250, 300, 480, 500, 1000)  # fmt: skip
@@ -20,7 +20,7 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
+class BvhFrames:
     """Rows (F, C) in file units and degrees, frames per second, and lines about what was odd."""
 
     rows: Floats
@@ -28,7 +28,7 @@ class Frames:
     notes: tuple[str, ...]
 
 
-def frames(lines: list[str], start: int, column: int, channels: int) -> Frames:
+def read_frames(lines: list[str], start: int, column: int, channels: int) -> BvhFrames:
     """Return what stands behind MOTION, which is in line `start` (from 0) and ends at `column`.
 
     channels: numbers in a row. Rows may be wrapped. Another number of rows than claimed is noted; fewer than half of
@@ -47,10 +47,10 @@ def frames(lines: list[str], start: int, column: int, channels: int) -> Frames:
         if not len(rows) or 2 * len(rows) < claimed:
             fail(len(lines), f"the file holds {len(rows)} of {claimed} claimed frames (truncated?)")
         notes.append(f"Frames says {claimed}, the file holds {len(rows)}: all of them are read")
-    fps = _snapped(seconds)
+    fps = _snap_rate(seconds)
     if abs(fps * seconds - 1) > ROUNDED:
         notes.append(f"frame time {seconds:g} s is taken for 1/{fps:g} s")
-    return Frames(rows, fps, tuple(notes))
+    return BvhFrames(rows, fps, tuple(notes))
 
 
 def _head(lines: list[str], start: int, column: int) -> tuple[int, float, int]:
@@ -109,7 +109,7 @@ def _check_columns(lines: list[str], body: int, count: int, channels: int, claim
     fail(per_line[-1][0], f"the last frame has {count % channels} of {channels} numbers (truncated?)")
 
 
-def _snapped(seconds: float) -> float:
+def _snap_rate(seconds: float) -> float:
     """Frames per second: a usual rate where the frame time is one to within its digits."""
     rate = min(RATES, key=lambda rate: abs(rate * seconds - 1))
     return rate if abs(rate * seconds - 1) < SNAP else 1 / seconds

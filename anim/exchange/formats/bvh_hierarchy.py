@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, NoReturn
 
 from anim.errors import FormatError
-from anim.exchange.formats.text import number as number_of
-from anim.exchange.formats.text import wrong
+from anim.exchange.formats.text import error_at
+from anim.exchange.formats.text import parse_number as number_of
 
 CHANNELS = {f"{axis}{kind}".casefold(): (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
 MAX_JOINTS = 100_000
@@ -33,7 +33,7 @@ class BvhJoint:
     channels: list[tuple[str, str]] = field(default_factory=list)
 
 
-def hierarchy(lines: list[str]) -> tuple[list[BvhJoint], int, int]:
+def read_hierarchy(lines: list[str]) -> tuple[list[BvhJoint], int, int]:
     """Return the joints, parents first, and where MOTION stands: its line (from 0) and the place behind the word.
 
     Any number of ROOTs, joints with any channels in any order or none, names with spaces, statements on one line or
@@ -50,7 +50,7 @@ def hierarchy(lines: list[str]) -> tuple[list[BvhJoint], int, int]:
 
 def fail(line: int, problem: str) -> NoReturn:
     """Raise the FormatError for a line."""
-    raise wrong(line, problem)
+    raise error_at(line, problem)
 
 
 class _Parser:

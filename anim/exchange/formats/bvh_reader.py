@@ -14,7 +14,7 @@ from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
 from anim.exchange.formats import bvh_frames, bvh_hierarchy, bvh_writer
 from anim.exchange.formats.bvh_hierarchy import BvhJoint
 from anim.exchange.formats.labels import unique
-from anim.exchange.formats.text import text_of
+from anim.exchange.formats.text import decode_text
 from anim.maths.euler import AxesConvention
 
 
@@ -32,11 +32,11 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
     Names that appear twice get a number: "Hand", "Hand.2". Line ends of any system, UTF-8, UTF-16 or Latin-1.
     Raises FormatError with the line.
     """
-    lines = text_of(data).split("\n")
+    lines = decode_text(data).split("\n")
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()
-    joints, start, column = bvh_hierarchy.hierarchy(lines)
-    found = bvh_frames.frames(lines, start, column, sum(len(joint.channels) for joint in joints))
+    joints, start, column = bvh_hierarchy.read_hierarchy(lines)
+    found = bvh_frames.read_frames(lines, start, column, sum(len(joint.channels) for joint in joints))
     names = unique([joint.name for joint in joints])
     renamed = [name for name, joint in zip(names, joints, strict=True) if name != joint.name]
     times = np.arange(len(found.rows)) / found.fps

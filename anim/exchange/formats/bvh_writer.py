@@ -32,7 +32,7 @@ def write(motion: EulerMotion) -> bytes:
             continue
         number, depth = item
         node, below = motion.nodes[number], children.get(number, [])
-        lines += _opened(node, depth, is_leaf=not below)
+        lines += _open_joint(node, depth, is_leaf=not below)
         if not node.end:
             columns += _columns(node, times, _has_position(node))
             waiting.append("\t" * depth + "}")
@@ -56,7 +56,7 @@ def _frame_times(motion: EulerMotion) -> Floats:
     return times
 
 
-def _opened(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
+def _open_joint(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
     """The lines of a node up to where its children stand; an End Site, also that of a joint without children, whole."""
     tab = "\t" * depth
     offset = f"OFFSET {_numbers(node.translation)}"

@@ -7,23 +7,23 @@ import numpy as np
 from anim.arrays import Floats
 from anim.exchange.euler.curve import MODES, Curve, Mode
 from anim.exchange.euler.weighted_bezier import PLAIN
-from anim.exchange.formats.text import check_times, number_in, wrong
+from anim.exchange.formats.text import check_times, error_at, parse_cell
 
-Row = tuple[int, dict[str, str]]  # line, cells by column
+KeyRow = tuple[int, dict[str, str]]  # line, cells by column
 
 
-def keyed(rows: list[Row], later: float) -> Curve:
+def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
     """Return the curve of the rows of one channel, moved by `later` seconds. Raises FormatError with the line."""
     lines = [line for line, _ in rows]
-    times = np.array([number_in(row["time"], line, "time") for line, row in rows])
+    times = np.array([parse_cell(row["time"], line, "time") for line, row in rows])
     check_times(times, lines)
     times = times + later
-    values = np.array([number_in(row["value"], line, "value") for line, row in rows])
+    values = np.array([parse_cell(row["value"], line, "value") for line, row in rows])
     modes = np.zeros(len(rows), np.uint8)
     for i, (line, row) in enumerate(rows):
         word = row.get("interpolation") or "linear"
         if word not in MODES:
-            raise wrong(line, f"interpolation is '{word}' (expected {', '.join(MODES)})")
+            raise error_at(line, f"interpolation is '{word}' (expected {', '.join(MODES)})")
         modes[i] = MODES[word]
     if not (modes == Mode.CUBIC).any():
         return Curve(times, values, modes)
@@ -32,23 +32,23 @@ def keyed(rows: list[Row], later: float) -> Curve:
     return Curve(times, values, modes, arriving, leaving, _weights(rows, "in_weight"), _weights(rows, "out_weight"))
 
 
-def _check_tangents(rows: list[Row], modes: list[int]) -> None:
+def _check_tangents(rows: list[KeyRow], modes: list[int]) -> None:
     """A cubic piece needs the tangent that leaves its first key and the one that arrives at its second."""
     for mode, *ends in zip(modes, rows, rows[1:], strict=False):
         for (line, row), key in zip(ends, ("out_tangent", "in_tangent"), strict=True):
             if mode == Mode.CUBIC and not row.get(key):
-                raise wrong(line, f"a cubic piece lacks its {key} (expected the change of the value per second)")
+                raise error_at(line, f"a cubic piece lacks its {key} (expected the change of the value per second)")
 
 
-def _handles(rows: list[Row], key: str, otherwise: float) -> Floats:
-    return np.array([number_in(row[key], line, key) if row.get(key) else otherwise for line, row in rows])
+def _handles(rows: list[KeyRow], key: str, otherwise: float) -> Floats:
+    return np.array([parse_cell(row[key], line, key) if row.get(key) else otherwise for line, row in rows])
 
 
-def _weights(rows: list[Row], key: str) -> Floats | None:
+def _weights(rows: list[KeyRow], key: str) -> Floats | None:
     if not any(row.get(key) for _, row in rows):
         return None
     weights = _handles(rows, key, PLAIN)
     for (line, _), weight in zip(rows, weights.tolist(), strict=True):
         if not 0 <= weight <= 1:
-            raise wrong(line, f"{key} is {weight:g} (expected a share of the time between two keys, 0 … 1)")
+            raise error_at(line, f"{key} is {weight:g} (expected a share of the time between two keys, 0 … 1)")
     return weights

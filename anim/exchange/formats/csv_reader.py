@@ -35,14 +35,14 @@ from functools import partial
 import numpy as np
 
 from anim.errors import FormatError
-from anim.exchange.euler.convention import Stated, agreed, complete, stated
+from anim.exchange.euler.convention import PartialConvention, merge_strict, parse_convention, require_complete
 from anim.exchange.euler.curve import MODES, Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import Convention, EulerMotion
-from anim.exchange.euler.start_time import start
-from anim.exchange.formats.csv_keys import Row, keyed
+from anim.exchange.euler.start_time import shift_to_zero
+from anim.exchange.formats.csv_keys import KeyRow, curve_from_rows
 from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
-from anim.exchange.formats.node_builder import KINDS, MAX_UNIT, Draft, checked, finished
-from anim.exchange.formats.text import check_times, number, number_in, text_of, wrong
+from anim.exchange.formats.node_builder import KINDS, MAX_UNIT, NodeBuilder, build_nodes, check_nodes
+from anim.exchange.formats.text import check_times, decode_text, error_at, parse_cell, parse_number
 
 __all__ = ["read", "write"]
 
@@ -69,23 +69,23 @@ class _File:
         if "meters_per_unit" not in self.words:
             return 1.0
         line = self.lines["meters_per_unit"]
-        unit = number_in(self.words["meters_per_unit"], line, "meters_per_unit")
+        unit = parse_cell(self.words["meters_per_unit"], line, "meters_per_unit")
         if not 0 < unit < MAX_UNIT:
-            raise wrong(line, f"meters_per_unit is {unit:g} (expected a number above 0)")
+            raise error_at(line, f"meters_per_unit is {unit:g} (expected a number above 0)")
         return unit
 
 
-def read(data: bytes, options: Stated) -> EulerMotion:
+def read(data: bytes, options: PartialConvention) -> EulerMotion:
     """Return the motion in CSV curves, see above; lengths in metres, angles in radians.
 
     options: what the command line says about the convention. Raises FormatError with the line.
     """
-    file = _parsed(data)
-    convention = complete(agreed(stated(file.words, "the # lines"), options))
-    drafts = _Drafts(convention)
+    file = _parse(data)
+    convention = require_complete(merge_strict(parse_convention(file.words, "the # lines"), options))
+    drafts = _NodeBuilders(convention)
     for line, cells in file.nodes:
         drafts.describe(line, cells)
-    later, notes = start(_times(file))
+    later, notes = shift_to_zero(_times(file))
     if tuple(file.header[:1]) == ("time",):
         _read_frames(file, drafts, later)
     elif set(KEY_COLUMNS) <= set(file.header):
@@ -94,50 +94,50 @@ def read(data: bytes, options: Stated) -> EulerMotion:
         header = ",".join(file.header)
         hint = "; columns are separated by commas" if len(file.header) == 1 and re.search(r"[;\t]", header) else ""
         expected = f"expected time,NAME.rx,… or {','.join(KEY_COLUMNS)}{hint}"
-        raise wrong(file.header_line, f"the header is {header[:60]!r} ({expected})")
-    nodes, nested = finished([*drafts.by_name.values()], file.meters_per_unit())
+        raise error_at(file.header_line, f"the header is {header[:60]!r} ({expected})")
+    nodes, nested = build_nodes([*drafts.by_name.values()], file.meters_per_unit())
     return EulerMotion(nodes, nested=nested, notes=notes)
 
 
-class _Drafts:
+class _NodeBuilders:
     """Nodes by name, made where they first appear."""
 
     def __init__(self, convention: Convention) -> None:
-        self.by_name: dict[str, Draft] = {}
+        self.by_name: dict[str, NodeBuilder] = {}
         self._convention = convention
 
-    def named(self, name: str) -> Draft:
+    def named(self, name: str) -> NodeBuilder:
         if name not in self.by_name:
-            self.by_name[name] = Draft(name, self._convention)
+            self.by_name[name] = NodeBuilder(name, self._convention)
         return self.by_name[name]
 
     def describe(self, line: int, cells: list[str]) -> None:
         if len(cells) not in (5, 8, 11) or not cells[0]:
-            raise wrong(line, "expected #node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]")
+            raise error_at(line, "expected #node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]")
         if cells[0] in self.by_name:
-            raise wrong(line, f"a second #node line for '{cells[0]}'")
+            raise error_at(line, f"a second #node line for '{cells[0]}'")
         draft = self.named(cells[0])
         draft.parent = cells[1] or None
-        numbers = np.array([number_in(cell, line, "a rest") for cell in cells[2:]])
+        numbers = np.array([parse_cell(cell, line, "a rest") for cell in cells[2:]])
         draft.translation = numbers[:3]
         if len(numbers) > 3:
             draft.angles = numbers[3:6]
         if len(numbers) > 6:
             draft.scale = numbers[6:]
 
-    def channel(self, name: str, channel: str, line: int) -> tuple[Draft, tuple[str, int]]:
+    def channel(self, name: str, channel: str, line: int) -> tuple[NodeBuilder, tuple[str, int]]:
         if not name or len(channel) != 2 or channel[0] not in KINDS:
-            raise wrong(line, f"unknown channel '{channel}' of '{name}' (expected tx … tz, rx … rz, sx … sz)")
+            raise error_at(line, f"unknown channel '{channel}' of '{name}' (expected tx … tz, rx … rz, sx … sz)")
         draft = self.named(name)
         try:
             return draft, draft.place(KINDS[channel[0]], channel[1])
         except FormatError as error:
-            raise wrong(line, error.problem) from None
+            raise error_at(line, error.problem) from None
 
 
-def _parsed(data: bytes) -> _File:
+def _parse(data: bytes) -> _File:
     file = _File()
-    rows = csv.reader(io.StringIO(text_of(data)), strict=True)
+    rows = csv.reader(io.StringIO(decode_text(data)), strict=True)
     try:
         for cells in rows:
             cells = [cell.strip() for cell in cells]
@@ -150,13 +150,15 @@ def _parsed(data: bytes) -> _File:
             elif not file.header:
                 file.header, file.header_line = cells, rows.line_num
                 if len(set(cells)) != len(cells):
-                    raise wrong(rows.line_num, f"column '{next(c for c in cells if cells.count(c) > 1)}' twice")
+                    raise error_at(rows.line_num, f"column '{next(c for c in cells if cells.count(c) > 1)}' twice")
             else:
                 if len(cells) != len(file.header):
-                    raise wrong(rows.line_num, f"{len(cells)} columns (expected {len(file.header)}, as in the header)")
+                    raise error_at(
+                        rows.line_num, f"{len(cells)} columns (expected {len(file.header)}, as in the header)"
+                    )
                 file.rows.append((rows.line_num, cells))
     except csv.Error as error:
-        raise wrong(rows.line_num, f"broken CSV ({error})") from None
+        raise error_at(rows.line_num, f"broken CSV ({error})") from None
     if not file.header or not file.rows:
         raise FormatError("has no rows of keys" if file.header else "is empty (expected a CSV of curves)")
     return file
@@ -166,15 +168,15 @@ def _times(file: _File) -> Iterator[float]:
     """All key times that are numbers."""
     if "time" in file.header:
         column = file.header.index("time")
-        found = (number(cells[column]) for _, cells in file.rows)
+        found = (parse_number(cells[column]) for _, cells in file.rows)
         yield from (time for time in found if time is not None)
 
 
-def _read_frames(file: _File, drafts: _Drafts, later: float) -> None:
+def _read_frames(file: _File, drafts: _NodeBuilders, later: float) -> None:
     mode = MODES.get(file.words.get("interpolation", "linear"), Mode.CUBIC)
     if mode is Mode.CUBIC:
         raise FormatError(f"interpolation is '{file.words['interpolation']}' (frames have no tangents: step or linear)")
-    times = np.array([number_in(cells[0], line, "time") for line, cells in file.rows])
+    times = np.array([parse_cell(cells[0], line, "time") for line, cells in file.rows])
     check_times(times, [line for line, _ in file.rows])
     times = times + later
     for column, title in enumerate(file.header[1:], 1):
@@ -183,19 +185,19 @@ def _read_frames(file: _File, drafts: _Drafts, later: float) -> None:
         there = [i for i, (_, cells) in enumerate(file.rows) if cells[column]]
         if not there:
             continue
-        values = np.array([number_in(file.rows[i][1][column], file.rows[i][0], title) for i in there])
+        values = np.array([parse_cell(file.rows[i][1][column], file.rows[i][0], title) for i in there])
         own = times if len(there) == len(times) else times[there]
         draft.add(slot, Curve(own, values, uniform_modes(len(own), mode)))
 
 
-def _read_keys(file: _File, drafts: _Drafts, later: float) -> None:
+def _read_keys(file: _File, drafts: _NodeBuilders, later: float) -> None:
     unknown = set(file.header) - {*KEY_COLUMNS, *EXTRA_COLUMNS}
     if unknown:
         raise FormatError(f"unknown column '{min(unknown)}' (expected {', '.join((*KEY_COLUMNS, *EXTRA_COLUMNS))})")
-    found: dict[tuple[str, tuple[str, int]], list[Row]] = {}
+    found: dict[tuple[str, tuple[str, int]], list[KeyRow]] = {}
     for line, cells in file.rows:
         row = dict(zip(file.header, cells, strict=True))
         draft, slot = drafts.channel(row["node"], row["channel"], line)
         found.setdefault((draft.name, slot), []).append((line, row))
     for (name, slot), rows in found.items():
-        checked(drafts.named(name), slot, partial(keyed, rows, later))
+        check_nodes(drafts.named(name), slot, partial(curve_from_rows, rows, later))

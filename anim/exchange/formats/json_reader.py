@@ -41,12 +41,18 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import FormatError
-from anim.exchange.euler.convention import Stated, agreed, complete, merged, stated
+from anim.exchange.euler.convention import (
+    PartialConvention,
+    fill_from,
+    merge_strict,
+    parse_convention,
+    require_complete,
+)
 from anim.exchange.euler.curve import HANDLES, MODES, WEIGHTS, Curve, Mode
 from anim.exchange.euler.motion import OFFSETS, Convention, EulerMotion, Pivots
-from anim.exchange.euler.start_time import start
+from anim.exchange.euler.start_time import shift_to_zero
 from anim.exchange.formats.json_writer import SCHEMA, write
-from anim.exchange.formats.node_builder import MAX_UNIT, Draft, checked, finished
+from anim.exchange.formats.node_builder import MAX_UNIT, NodeBuilder, build_nodes, check_nodes
 from anim.exchange.formats.text import LIMIT
 from anim.gltf.io import json_text
 from anim.maths import euler, quaternion
@@ -56,12 +62,22 @@ __all__ = ["read", "write"]
 
 CONVENTION_KEYS = ("order", "frame", "unit")
 FILE_KEYS = ("schema", *CONVENTION_KEYS, "meters_per_unit", "nodes")
-TURNS = ("pre_rotation", "post_rotation")
-NODE_KEYS = ("name", "parent", *CONVENTION_KEYS, "translation", "rotation", "scale", *TURNS, *OFFSETS, "curves")
+PIVOT_ROTATION_KEYS = ("pre_rotation", "post_rotation")
+NODE_KEYS = (
+    "name",
+    "parent",
+    *CONVENTION_KEYS,
+    "translation",
+    "rotation",
+    "scale",
+    *PIVOT_ROTATION_KEYS,
+    *OFFSETS,
+    "curves",
+)
 CURVE_KEYS = ("times", "values", "interpolation", *HANDLES)
 
 
-def read(data: bytes, options: Stated) -> EulerMotion:
+def read(data: bytes, options: PartialConvention) -> EulerMotion:
     """Return the motion in a JSON of curves, see above; lengths in metres, angles in radians.
 
     options: what the command line says about the convention. Raises FormatError with the place.
@@ -72,15 +88,15 @@ def read(data: bytes, options: Stated) -> EulerMotion:
     if content.get("schema") != SCHEMA:
         raise FormatError(f"schema is {content.get('schema')!r} (expected '{SCHEMA}')")
     _check_keys(content, FILE_KEYS, "")
-    said = agreed(stated(content, ""), options)
+    said = merge_strict(parse_convention(content, ""), options)
     nodes = content.get("nodes")
     if not isinstance(nodes, list) or not nodes:
         raise FormatError("has no nodes")
-    later, notes = start(_times(nodes))
+    later, notes = shift_to_zero(_times(nodes))
     drafts, names = [], set[str]()
     for i, node in enumerate(nodes):
         where = f"nodes[{i}]"
-        draft = _draft(node, said, later, where)
+        draft = _node_builder(node, said, later, where)
         if draft.name in names:
             raise FormatError(f"a second node '{draft.name}'", where=where)
         names.add(draft.name)
@@ -88,7 +104,7 @@ def read(data: bytes, options: Stated) -> EulerMotion:
     unit = content.get("meters_per_unit", 1.0)
     if type(unit) not in (int, float) or not 0 < unit < MAX_UNIT:
         raise FormatError(f"meters_per_unit is {unit!r} (expected a number above 0)")
-    finished_nodes, nested = finished(drafts, float(unit))
+    finished_nodes, nested = build_nodes(drafts, float(unit))
     return EulerMotion(finished_nodes, nested=nested, notes=notes)
 
 
@@ -102,19 +118,19 @@ def _times(nodes: list[Any]) -> Iterator[float]:
                 yield from (time for time in times if type(time) in (int, float) and abs(time) <= LIMIT)
 
 
-def _draft(node: Any, said: Stated, later: float, where: str) -> Draft:
+def _node_builder(node: Any, said: PartialConvention, later: float, where: str) -> NodeBuilder:
     if not isinstance(node, dict) or not isinstance(node.get("name"), str) or not node["name"]:
         raise FormatError("has no name", where=where)
     _check_keys(node, NODE_KEYS, where)
     parent = node.get("parent")
     if parent is not None and not isinstance(parent, str):
         raise FormatError(f"parent is {parent!r} (expected a name)", where=where)
-    convention = complete(merged(stated(node, where), said))
-    draft = Draft(node["name"], convention, parent)
+    convention = require_complete(fill_from(parse_convention(node, where), said))
+    draft = NodeBuilder(node["name"], convention, parent)
     draft.translation = _numbers(node, "translation", (3,), np.zeros(3), where)
     draft.angles = _numbers(node, "rotation", (3,), np.zeros(3), where)
     draft.scale = _numbers(node, "scale", (3,), np.ones(3), where)
-    if any(key in node for key in (*OFFSETS, *TURNS)):
+    if any(key in node for key in (*OFFSETS, *PIVOT_ROTATION_KEYS)):
         draft.pivots = _pivots(node, convention, where)
     curves = node.get("curves", {})
     if not isinstance(curves, dict):
@@ -124,7 +140,7 @@ def _draft(node: Any, said: Stated, later: float, where: str) -> Draft:
         try:
             kind, _, axis = channel.partition(".")
             slot = draft.place(kind, axis)
-            checked(draft, slot, partial(_curve, about, later, at))
+            check_nodes(draft, slot, partial(_curve, about, later, at))
         except FormatError as error:
             raise (error if error.where.startswith(at) else error.at(at)) from None
     return draft
@@ -132,7 +148,7 @@ def _draft(node: Any, said: Stated, later: float, where: str) -> Draft:
 
 def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivots:
     turns = {}
-    for key in TURNS:
+    for key in PIVOT_ROTATION_KEYS:
         given = _numbers(node, key, (3, 4), np.zeros(3), where)
         if len(given) == 4:
             if not given.any():

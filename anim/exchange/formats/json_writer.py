@@ -17,7 +17,7 @@ SCHEMA = "euler-curves/1"
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
     """Return the motion as a JSON of curves, see `json`; the convention has the unit to use, and most nodes' order."""
-    nodes = [_described(node, motion, convention) for node in motion.nodes]
+    nodes = [_node_json(node, motion, convention) for node in motion.nodes]
     content = {
         "schema": SCHEMA,
         "order": convention.order,
@@ -28,7 +28,7 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     return json_text.dump(content, indent=1) + b"\n"
 
 
-def _described(node: EulerNode, motion: EulerMotion, convention: Convention) -> dict[str, Any]:
+def _node_json(node: EulerNode, motion: EulerMotion, convention: Convention) -> dict[str, Any]:
     about: dict[str, Any] = {"name": node.name}
     if node.order != convention.order:
         about["order"] = node.order

@@ -37,7 +37,7 @@ def label_of(track: Track, names: Sequence[str]) -> str:
     return f"{track.path} of '{names[track.node]}'" if track.node is not None else f"{track.pointer}"
 
 
-def left_out(what: Sequence[str]) -> tuple[str, ...]:
+def skipped_note(what: Sequence[str]) -> tuple[str, ...]:
     """Return one note: "left out: weights of 'head', scale of 'arm' and 3 more"; none where nothing is."""
     more = f" and {len(what) - LISTED} more" if len(what) > LISTED else ""
     return (f"left out: {', '.join(what[:LISTED])}{more}",) if what else ()

@@ -9,16 +9,16 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import AnimError, FormatError
-from anim.exchange.euler.convention import place_of_axis
+from anim.exchange.euler.convention import axis_index
 from anim.exchange.euler.curve import Curve
-from anim.exchange.euler.motion import PLAIN, Convention, EulerNode, Pivots
+from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerNode, Pivots
 
 MAX_UNIT = 1e9  # m; of a file's unit of length
 KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
 
 
 @dataclass(slots=True)
-class Draft:
+class NodeBuilder:
     """A node that is being read. Angles and rotation curves are in the file's unit, lengths in the file's."""
 
     name: str
@@ -27,13 +27,13 @@ class Draft:
     translation: Floats = field(default_factory=lambda: np.zeros(3))
     angles: Floats = field(default_factory=lambda: np.zeros(3))
     scale: Floats = field(default_factory=lambda: np.ones(3))
-    pivots: Pivots = PLAIN
+    pivots: Pivots = NO_PIVOTS
     curves: dict[tuple[str, int], Curve] = field(default_factory=dict)
 
     def place(self, kind: str, axis: str) -> tuple[str, int]:
         """Return the slot of a channel such as ("rotation", "x"). Raises FormatError where it names none."""
         if kind == "rotation" and axis in tuple("xyz123"):
-            number = place_of_axis(axis, self.convention.order)
+            number = axis_index(axis, self.convention.order)
             if number is None:
                 raise FormatError(
                     f"axis '{axis}' has no single place in order {self.convention.order} (expected 1, 2, 3 by place)"
@@ -50,13 +50,13 @@ class Draft:
         self.curves[slot] = curve.scaled(self.convention.unit.radians) if slot[0] == "rotation" else curve
 
 
-def finished(drafts: list[Draft], meters_per_unit: float) -> tuple[tuple[EulerNode, ...], bool]:
+def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tuple[EulerNode, ...], bool]:
     """Return the nodes, parents first, lengths in metres, and whether any has a parent.
 
     Raises FormatError for a parent that is missing, or a circle of parents.
     """
     by_name = {draft.name: draft for draft in drafts}
-    ordered: list[Draft] = []
+    ordered: list[NodeBuilder] = []
     numbers: dict[str, int] = {}
     for draft in drafts:
         chain = [draft]
@@ -75,7 +75,7 @@ def finished(drafts: list[Draft], meters_per_unit: float) -> tuple[tuple[EulerNo
     return nodes, any(node.parent >= 0 for node in nodes)
 
 
-def checked(draft: Draft, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
+def check_nodes(draft: NodeBuilder, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
     """Put the curve that `build()` makes into a node's slot. Raises FormatError for what is wrong with it."""
     try:
         draft.add(slot, build())
@@ -85,7 +85,7 @@ def checked(draft: Draft, slot: tuple[str, int], build: Callable[[], Curve]) -> 
         raise FormatError(error.problem, where=error.where, help=error.help) from None
 
 
-def _node(draft: Draft, parent: int, meters_per_unit: float) -> EulerNode:
+def _node(draft: NodeBuilder, parent: int, meters_per_unit: float) -> EulerNode:
     curves, convention = draft.curves, draft.convention
     moves = {axis: curve.scaled(meters_per_unit) for (kind, axis), curve in curves.items() if kind == "translation"}
     return EulerNode(

@@ -6,17 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from anim.errors import FormatError, RangeError
-from anim.exchange.euler.convention import NOTHING, Stated
+from anim.exchange.euler.convention import UNSPECIFIED, PartialConvention
 from anim.exchange.euler.motion import Convention, EulerMotion
 from anim.exchange.formats import bvh_reader, csv_reader, json_reader
 from anim.exchange.formats.bvh_reader import BvhPosition
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class TrackReadOptions:
     """What a reader may need to be told: the convention, and what BVH's position channels mean."""
 
-    stated: Stated = NOTHING
+    stated: PartialConvention = UNSPECIFIED
     bvh_position: BvhPosition = BvhPosition.REPLACE
 
 
@@ -29,20 +29,22 @@ class TrackFormat:
     """
 
     suffix: str
-    read: Callable[[bytes, Reading], EulerMotion]
+    read: Callable[[bytes, TrackReadOptions], EulerMotion]
     write: Callable[[EulerMotion, Convention], bytes]
     begins: Callable[[bytes], bool]
     has_units: bool
 
 
-def _read_bvh(data: bytes, reading: Reading) -> EulerMotion:
-    if reading.stated != NOTHING:
+def _read_bvh(data: bytes, reading: TrackReadOptions) -> EulerMotion:
+    if reading.stated != UNSPECIFIED:
         raise RangeError("a BVH says the order of every joint itself (no --order, --frame or --unit)")
     return bvh_reader.read(data, position=reading.bvh_position)
 
 
-def _curves(read: Callable[[bytes, Stated], EulerMotion]) -> Callable[[bytes, Reading], EulerMotion]:
-    def read_curves(data: bytes, reading: Reading) -> EulerMotion:
+def _curves(
+    read: Callable[[bytes, PartialConvention], EulerMotion],
+) -> Callable[[bytes, TrackReadOptions], EulerMotion]:
+    def read_curves(data: bytes, reading: TrackReadOptions) -> EulerMotion:
         if reading.bvh_position is not BvhPosition.REPLACE:
             raise RangeError("these curves have no OFFSET (--bvh-position is about BVH)")
         return read(data, reading.stated)

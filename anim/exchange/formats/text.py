@@ -13,12 +13,12 @@ GROUPED = "_"  # Python reads 1_000 as a number; no file means that
 LIMIT = 1e15  # greatest number that is taken: float32 and products of lengths stay far from overflow
 
 
-def wrong(line: int, problem: str) -> FormatError:
+def error_at(line: int, problem: str) -> FormatError:
     """Return the error for a line (from 1)."""
     return FormatError(problem, where=f"line {line}")
 
 
-def text_of(data: bytes) -> str:
+def decode_text(data: bytes) -> str:
     """Return the text of a file in UTF-8, UTF-16 with its mark, or else Latin-1, with one kind of line end.
 
     text_of(b"a\\r\\nb\\rc") → "a\\nb\\nc"
@@ -33,7 +33,7 @@ def text_of(data: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def number(text: str) -> float | None:
+def parse_number(text: str) -> float | None:
     """Return the number that a word means, None where it means none, or none that is finite and below 1e15.
 
     number("1e3") → 1000.0
@@ -47,11 +47,11 @@ def number(text: str) -> float | None:
     return value if math.isfinite(value) and abs(value) <= LIMIT else None
 
 
-def number_in(text: str, line: int, what: str) -> float:
+def parse_cell(text: str, line: int, what: str) -> float:
     """Return the number that a cell holds. Raises FormatError with the line."""
-    value = number(text)
+    value = parse_number(text)
     if value is None:
-        raise wrong(line, f"{what} is '{text[:40]}' (expected a finite number)")
+        raise error_at(line, f"{what} is '{text[:40]}' (expected a finite number)")
     return value
 
 
@@ -60,4 +60,4 @@ def check_times(times: Floats, lines: list[int]) -> None:
     steps = np.diff(times)
     if (steps <= 0).any():
         k = int(np.argmax(steps <= 0)) + 1
-        raise wrong(lines[k], f"time {times[k]:g} s after {times[k - 1]:g} s (expected increasing times)")
+        raise error_at(lines[k], f"time {times[k]:g} s after {times[k - 1]:g} s (expected increasing times)")

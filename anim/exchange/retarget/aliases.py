@@ -6,7 +6,7 @@ import csv
 import io
 
 from anim.errors import FormatError
-from anim.exchange.formats.text import text_of, wrong
+from anim.exchange.formats.text import decode_text, error_at
 from anim.gltf.io import json_text
 
 
@@ -23,14 +23,14 @@ def read(data: bytes) -> dict[str, str]:
                 raise FormatError(f"'{name}' has {other!r} (expected the name of a node)")
         return content
     found: dict[str, str] = {}
-    rows = csv.reader(io.StringIO(text_of(data)), strict=True)
+    rows = csv.reader(io.StringIO(decode_text(data)), strict=True)
     try:
         for cells in rows:
             if not cells or cells[0].startswith("#"):
                 continue
             if len(cells) != 2 or not cells[0].strip():
-                raise wrong(rows.line_num, f"{len(cells)} columns (expected source,target)")
+                raise error_at(rows.line_num, f"{len(cells)} columns (expected source,target)")
             found[cells[0].strip()] = cells[1].strip()
     except csv.Error as error:
-        raise wrong(rows.line_num, f"broken CSV ({error})") from None
+        raise error_at(rows.line_num, f"broken CSV ({error})") from None
     return found

@@ -11,7 +11,7 @@ Pair: TypeAlias = tuple[int, int]  # a source node and a target node
 NONE: Pair = (-1, -1)
 
 
-def anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -> dict[int, Pair]:
+def find_anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -> dict[int, Pair]:
     """Return the matched pair that each matched target node is placed from; (−1, −1) for those that carry the path.
 
     It is the nearest matched joint above, in the skeleton that has the nearer one: a foot of an IK rig, which descends
@@ -20,10 +20,10 @@ def anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -> dic
     back = {b: a for a, b in pairs.items()}
     found: dict[int, Pair] = {}
     for a, b in pairs.items():
-        in_source = next(((up, pairs[up]) for up in above(source, a) if up in pairs), NONE)
-        in_target = next(((back[up], up) for up in above(target, b) if up in back), NONE)
-        is_nearer = in_target == NONE or in_source[1] not in above(target, in_target[1])
-        depends = in_source[1] == b or b in above(target, in_source[1])
+        in_source = next(((up, pairs[up]) for up in matched_ancestor(source, a) if up in pairs), NONE)
+        in_target = next(((back[up], up) for up in matched_ancestor(target, b) if up in back), NONE)
+        is_nearer = in_target == NONE or in_source[1] not in matched_ancestor(target, in_target[1])
+        depends = in_source[1] == b or b in matched_ancestor(target, in_source[1])
         found[b] = in_source if in_source != NONE and is_nearer and not depends else in_target
     return found
 
@@ -41,11 +41,11 @@ def placing_order(target: Skeleton, chosen: dict[int, Pair], pairs: Mapping[int,
         waiting = [node for node in waiting if not _is_ready(target, node, chosen, done)]
         if len(waiting) == before:
             node = next(n for n in waiting if int(target.parents[n]) in done)
-            chosen[node] = next(((back[up], up) for up in above(target, node) if up in back), NONE)
+            chosen[node] = next(((back[up], up) for up in matched_ancestor(target, node) if up in back), NONE)
     return [node for node in done if node >= 0]
 
 
-def above(skeleton: Skeleton, node: int) -> list[int]:
+def matched_ancestor(skeleton: Skeleton, node: int) -> list[int]:
     """Return the ancestors of a node, the nearest first; none of −1."""
     found = []
     while node >= 0 and (node := int(skeleton.parents[node])) >= 0:

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from anim.errors import NotFoundError
-from anim.exchange.euler.from_euler import Converted
-from anim.exchange.retarget.bind_pose import bind_pose, completed
+from anim.exchange.euler.from_euler import ImportedMotion
+from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
 from anim.exchange.retarget.ground_contact import has_feet
-from anim.exchange.retarget.joint_matching import Matching, match
+from anim.exchange.retarget.joint_matching import JointMatch, match_joints
 from anim.exchange.retarget.rest_alignment import Measure
-from anim.exchange.retarget.retarget import Floor, retarget
-from anim.exchange.retarget.same_hierarchy import same_tree
+from anim.exchange.retarget.retarget import GroundMode, retarget
+from anim.exchange.retarget.same_hierarchy import is_same_hierarchy
 from anim.model import Clip, Scene
 
 
 @dataclass(frozen=True, slots=True)
-class Onto:
+class CharacterClip:
     """The clip for the character, and what became of the motion's joints.
 
     scale: of the path, character by motion. lowered: least and most that hips went down, metres.
@@ -28,7 +28,7 @@ class Onto:
     """
 
     clip: Clip
-    matching: Matching
+    matching: JointMatch
     scale: float
     lowered: tuple[float, float]
     num_bound: int = 0
@@ -36,16 +36,16 @@ class Onto:
     without: tuple[str, ...] = ()
 
 
-def onto(
-    source: Converted,
+def apply_to_character(
+    source: ImportedMotion,
     target: Scene,
     *,
     aliases: Mapping[str, str],
     nested: bool,
     stated: Mapping[str, int] = MappingProxyType({}),
-    floor: Floor = Floor.CONTACT,
+    floor: GroundMode = GroundMode.CONTACT,
     rest_at: float | None = None,
-) -> Onto:
+) -> CharacterClip:
     """Return the motion as a clip of the character.
 
     Joints are those of the character's skins, then nodes without mesh in their tree; all its nodes where it has none,
@@ -57,14 +57,14 @@ def onto(
     """
     joints = _skin_joints(target)
     moving, moved = to_match(source, target, nested=nested)
-    matching = match(
+    matching = match_joints(
         source.skeleton.names,
         target.skeleton.names,
         aliases=aliases,
         of_source=moving,
         of_target=moved,
         others=_others(target, joints) if nested else [],
-        same=same_tree(source.skeleton, target.skeleton, moving) if nested else {},
+        same=is_same_hierarchy(source.skeleton, target.skeleton, moving) if nested else {},
         stated=stated,
     )
     if not target.skeleton.names:
@@ -81,17 +81,19 @@ def onto(
             target.skeleton, [(each.node, each.skin) for each in target.instances if each.skin is not None]
         )
         done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, rest_at=rest_at)
-        clip = completed(done.clip, bound.skeleton, target.skeleton)
-        return Onto(clip, matching, done.scale, done.lowered, bound.num_joints, done.measure, _without(matching))
+        clip = fill_from_parents(done.clip, bound.skeleton, target.skeleton)
+        return CharacterClip(
+            clip, matching, done.scale, done.lowered, bound.num_joints, done.measure, _drop_unmatched(matching)
+        )
     tracks = [
         replace(track, node=matching.pairs[track.node])
         for track in source.clip.tracks
         if track.node is not None and track.node in matching.pairs
     ]
-    return Onto(Clip(source.clip.name, tuple(tracks)), matching, 1.0, (0.0, 0.0))
+    return CharacterClip(Clip(source.clip.name, tuple(tracks)), matching, 1.0, (0.0, 0.0))
 
 
-def to_match(source: Converted, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
+def to_match(source: ImportedMotion, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
     """Return the nodes of the motion, parents first, and those of the character that are matched with each other.
 
     nested: as for `onto`.
@@ -105,14 +107,14 @@ def _skin_joints(scene: Scene) -> set[int]:
     return {int(node) for each in scene.instances if each.skin is not None for node in each.skin.joints}
 
 
-def _without(matching: Matching) -> tuple[str, ...]:
+def _drop_unmatched(matching: JointMatch) -> tuple[str, ...]:
     found = set(matching.target_roles)
     legs = any({f"{side}_{role}" for role in ("upper_leg", "lower_leg")} <= found for side in ("left", "right"))
     here = {"hips": "hips" in found, "legs": legs, "feet": has_feet(found)}
     return tuple(name for name, known in here.items() if not known)
 
 
-def _parents_first(source: Converted) -> list[int]:
+def _parents_first(source: ImportedMotion) -> list[int]:
     return [int(n) for level in source.skeleton.levels() for n in level if int(n) not in source.ends]
 
 

@@ -43,7 +43,7 @@ def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose
     return _resting(skeleton, world, bound)
 
 
-def completed(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
+def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
     """Return the clip with a key for whatever rests otherwise in `skeleton` than in `other` and is not animated.
 
     So the clip plays alike on both: what it left at the rest of `skeleton` it now says.
@@ -72,11 +72,13 @@ def _bound(skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dic
     if shared:
         placed = matrix.multiply(known[int(joints[shared[0]])], inverse[shared[0]])
     else:
-        placed = _placed(skeleton, world, held[0], joints[sound], in_mesh[sound], usual)
+        placed = _place_joints(skeleton, world, held[0], joints[sound], in_mesh[sound], usual)
     return {int(joints[j]): matrix.multiply(placed, in_mesh[j]) for j in sound.tolist()}
 
 
-def _placed(skeleton: Skeleton, world: Floats, holder: int, joints: Ints, in_mesh: Floats, volume: float) -> Floats:
+def _place_joints(
+    skeleton: Skeleton, world: Floats, holder: int, joints: Ints, in_mesh: Floats, volume: float
+) -> Floats:
     """world_from_mesh (3, 4) when the skin was bound, of the scale that gives `volume`.
 
     The scale is the joints' own: vertices may be in centimeters where nodes are in meters.

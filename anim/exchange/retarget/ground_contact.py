@@ -13,7 +13,7 @@ from anim.maths import matrix
 from anim.model import MeshInstance, Scene, Skeleton
 from anim.sampling import rest_pose, world_matrices
 
-LOWEST = 5.0  # percentile of a foot's lowest height that is taken for the ground under it
+SOLE_FRACTION = 5.0  # percentile of a foot's lowest height that is taken for the ground under it
 DOWN = 0.03  # share of the height that the lowest foot may be above its ground while it is down
 STANDS, LEAVES = 0.015, 0.04  # shares of the height: up to the first clearance is noise, from the second on none of it
 UNEVEN = 0.04  # share of the height that a foot's ground may be above that of all: markers and floors are never level
@@ -23,7 +23,7 @@ DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)]
 
 
 @dataclass(frozen=True, slots=True)
-class Soles:
+class SolePoints:
     """Points fixed to foot joints: nodes (P,), points (P, 3) in the node's space. floor: world height at rest."""
 
     nodes: Ints
@@ -41,7 +41,7 @@ def has_feet(roles: Iterable[str]) -> bool:
     return any(role.endswith(FEET) for role in roles)
 
 
-def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> Soles:
+def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> SolePoints:
     """Return the outermost points of the skin on feet and toes, and where the floor is: the lowest of all at rest.
 
     positions: (N, 3) of all nodes at rest. roles: (role, node), with a foot or toe among them (`has_feet`). Without
@@ -53,7 +53,7 @@ def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> 
     for instance in scene.instances:
         if instance.skin is None or not instance.mesh.joints.shape[1]:
             continue
-        placed, holder = _placed(instance, world)
+        placed, holder = _offset_path(instance, world)
         lowest.append(float(placed[:, 1].min()))
         for node in sorted(below):
             mine = placed[holder == node]
@@ -64,7 +64,7 @@ def soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> 
     if not nodes:
         nodes, points = sorted(below), [positions[sorted(below)]]
     numbers = np.array(nodes, np.int64)
-    return Soles(
+    return SolePoints(
         numbers, matrix.apply(matrix.inverse(world[numbers]), np.concatenate(points)[:, None])[:, 0], min(lowest)
     )
 
@@ -81,7 +81,7 @@ def at_or_below(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
     return np.array(found, np.int64)
 
 
-def heights_above_contact(
+def ground_offset(
     times: Floats, source: Floats, feet: Sequence[Ints], target: Floats, floor: float, scale: float
 ) -> Floats:
     """Return by how much the target stands too high (F,), in metres, smooth in time.
@@ -97,23 +97,23 @@ def heights_above_contact(
     down = clearance <= DOWN * height
     above = target.min(axis=1) - floor - scale * clearance
     noise = np.minimum(clearance, height * np.interp(clearance / height, (STANDS, LEAVES), (STANDS, 0.0)))
-    return _smoothed(times, np.interp(times, times[down], above[down]) + scale * noise)
+    return _smooth(times, np.interp(times, times[down], above[down]) + scale * noise)
 
 
 def _clearance(source: Floats, feet: Sequence[Ints], uneven: float) -> Floats:
     """How high (F,) the source is: its lowest node above the ground, or a foot above the ground under this one."""
     lowest = source.min(axis=1)
-    ground = float(np.percentile(lowest, LOWEST))
+    ground = float(np.percentile(lowest, SOLE_FRACTION))
     clearance = lowest - ground
     for foot in feet:
         own = source[:, foot].min(axis=1)
-        under = float(np.percentile(own, LOWEST))
+        under = float(np.percentile(own, SOLE_FRACTION))
         if abs(under - ground) <= uneven:
             clearance = np.minimum(clearance, own - under)
     return np.asarray(np.maximum(clearance, 0.0))
 
 
-def _smoothed(times: Floats, values: Floats) -> Floats:
+def _smooth(times: Floats, values: Floats) -> Floats:
     """Values (F,) under a Hann window of WINDOW seconds, ends held."""
     count = int(np.ceil((times[-1] - times[0]) / STEP)) + 1
     if count < 3:
@@ -125,7 +125,7 @@ def _smoothed(times: Floats, values: Floats) -> Floats:
     return np.interp(times, grid[half : half + len(even)], even)
 
 
-def _placed(instance: MeshInstance, world: Floats) -> tuple[Floats, Ints]:
+def _offset_path(instance: MeshInstance, world: Floats) -> tuple[Floats, Ints]:
     """Vertices (V, 3) of a skinned mesh at rest, and the node (V,) that holds each most."""
     assert instance.skin is not None
     mesh, skin = instance.mesh, instance.skin

@@ -9,14 +9,14 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from anim.errors import NotFoundError
-from anim.exchange.retarget.joint_names import plain
-from anim.exchange.retarget.joint_roles import roles
+from anim.exchange.retarget.joint_names import normalize_names
+from anim.exchange.retarget.joint_roles import joint_roles
 
-Way: TypeAlias = Callable[[int], int | None]  # from a source node to the target node, where there is one
+MatchReason: TypeAlias = Callable[[int], int | None]  # from a source node to the target node, where there is one
 
 
 @dataclass(frozen=True, slots=True)
-class Matching:
+class JointMatch:
     """Pairs of nodes, source → target, in the source's order; source nodes left over; and what persons' joints are.
 
     source_roles, target_roles: nodes by role ("left_foot"), for alignment; a role is in both or in none.
@@ -28,7 +28,7 @@ class Matching:
     target_roles: Mapping[str, int]
 
 
-def match(
+def match_joints(
     source: Sequence[str],
     target: Sequence[str],
     *,
@@ -38,7 +38,7 @@ def match(
     others: Sequence[int] = (),
     same: Mapping[int, int] = MappingProxyType({}),
     stated: Mapping[str, int] = MappingProxyType({}),
-) -> Matching:
+) -> JointMatch:
     """Return the pairs of nodes whose names mean the same, each node in one pair at most.
 
     In this order: aliases (source name → target name; "" for none), `same` (source → target node, see `same_tree`), the
@@ -49,18 +49,18 @@ def match(
     """
     left = {source[node]: node for node in reversed(of_source)}
     everywhere = {target[node]: node for node in (*range(len(target))[::-1], *reversed(of_target))}
-    pairs, excluded = _named(aliases, left, everywhere)
-    plain_source, plain_target = plain(source), plain(target)
-    source_roles = roles(plain_source, of_source)
+    pairs, excluded = _match_by_name(aliases, left, everywhere)
+    plain_source, plain_target = normalize_names(source), normalize_names(target)
+    source_roles = joint_roles(plain_source, of_source)
     by_role = {node: role for role, node in source_roles.items()}
 
-    def by_names(nodes: Sequence[int]) -> tuple[Way, ...]:
+    def by_names(nodes: Sequence[int]) -> tuple[MatchReason, ...]:
         """Partners among these nodes: of the same name, of the same one taken apart, of the same role.
 
         Numbers mean other joints in other rigs ("spine1"): roles win over names that were taken apart.
         """
         right = {target[node]: node for node in reversed(nodes)}
-        by_own_role = roles(plain_target, [node for node in nodes if node not in stated.values()])
+        by_own_role = joint_roles(plain_target, [node for node in nodes if node not in stated.values()])
         shared = source_roles.keys() & by_own_role.keys()
         in_role = {source_roles[role] for role in shared}
         of_role = {by_own_role[role] for role in shared}
@@ -86,7 +86,7 @@ def match(
                 taken.add(found)
     ordered = {node: pairs[node] for node in sorted(pairs)}
     shared = {role: node for role, node in source_roles.items() if node in ordered}
-    return Matching(
+    return JointMatch(
         ordered,
         tuple(node for node in sorted(of_source) if node not in ordered),
         shared,
@@ -94,7 +94,7 @@ def match(
     )
 
 
-def _named(
+def _match_by_name(
     aliases: Mapping[str, str], left: Mapping[str, int], right: Mapping[str, int]
 ) -> tuple[dict[int, int], set[int]]:
     """The pairs that aliases name, and the source nodes that they leave out."""
@@ -102,16 +102,16 @@ def _named(
     excluded: set[int] = set()
     for name, other in aliases.items():
         if name not in left:
-            raise NotFoundError(f"alias for '{name}', which the motion does not have", help=_near(name, left))
+            raise NotFoundError(f"alias for '{name}', which the motion does not have", help=_suggest(name, left))
         if not other:
             excluded.add(left[name])
         elif other not in right:
-            raise NotFoundError(f"alias '{name}' → '{other}', which is not there", help=_near(other, right))
+            raise NotFoundError(f"alias '{name}' → '{other}', which is not there", help=_suggest(other, right))
         else:
             pairs[left[name]] = right[other]
     return pairs, excluded
 
 
-def _near(name: str, names: Mapping[str, int]) -> str:
+def _suggest(name: str, names: Mapping[str, int]) -> str:
     found = difflib.get_close_matches(name, names, n=1)
     return f"did you mean '{found[0]}'?" if found else ""

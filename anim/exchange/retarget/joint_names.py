@@ -15,14 +15,14 @@ DISTINCT = 0.9  # share of names that must stay different
 SHARED = 0.6  # share of names that must begin or end alike for that to tell nothing
 
 
-class Name(NamedTuple):
+class JointName(NamedTuple):
     """A name without what differs between tools: "mixamorig:LeftUpLeg" → ("left", "upleg")."""
 
     side: str
     stem: str
 
 
-def plain(names: Sequence[str]) -> list[Name]:
+def normalize_names(names: Sequence[str]) -> list[JointName]:
     """Return the names of one skeleton taken apart, without namespaces and what most of them begin or end with.
 
     That is a prefix ("Bip01 "), an ending ("_Armature"), or a number that counts them ("_023").
@@ -30,22 +30,22 @@ def plain(names: Sequence[str]) -> list[Name]:
     """
     bare = [TOOL.sub("", re.split(r"[:|]", name)[-1]) for name in names]
     for _ in range(ROUNDS):
-        bare = _without_prefix(_without_ending(_without_numbers(bare)))
-    return [_taken_apart(name) for name in bare]
+        bare = _drop_prefix(_drop_suffix(_drop_numbers(bare)))
+    return [_split_side(name) for name in bare]
 
 
-def _without_prefix(names: list[str]) -> list[str]:
+def _drop_prefix(names: list[str]) -> list[str]:
     prefix = _shared([_begins(name) for name in names])
     return [name[len(prefix) :] if prefix and _begins(name) == prefix else name for name in names]
 
 
-def _without_ending(names: list[str]) -> list[str]:
+def _drop_suffix(names: list[str]) -> list[str]:
     ending = _shared([_ends(name) for name in names])
     shorter = [name.removesuffix(ending) for name in names]
     return shorter if _differ(shorter) else names
 
 
-def _without_numbers(names: list[str]) -> list[str]:
+def _drop_numbers(names: list[str]) -> list[str]:
     """Names without the numbers that an exporter gave to all of them, which tell nothing."""
     numbers = [match[0] for name in names if (match := re.search(r"_\d+$", name))]
     shorter = [re.sub(r"_\d+$", "", name) for name in names]
@@ -77,10 +77,10 @@ def _begins(name: str) -> str:
     return match[1] if match else ""
 
 
-def _taken_apart(name: str) -> Name:
+def _split_side(name: str) -> JointName:
     words = [word.casefold() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+", name)]
     side = next((SIDES[word] for word in words if word in SIDES), "")
     stem = [str(int(word)) if word.isdecimal() else word for word in words if word not in SIDES]
     if len(stem) > 1 and stem[0] == CENTER and not side:
         stem = stem[1:]
-    return Name(side, "".join(stem))
+    return JointName(side, "".join(stem))

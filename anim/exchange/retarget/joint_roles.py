@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from anim.exchange.retarget.joint_names import Name
+from anim.exchange.retarget.joint_names import JointName
 
 # Stems by role, the surest first: CMU, Mixamo, Biped (3ds Max), Rigify, Unreal, VRM, Poser, KayKit, Quaternius,
 # Daz; last what Rigify calls them, whose spine begins with the hips, as in rigs that only number theirs.
@@ -28,7 +28,7 @@ SIDED = {
 PERSON = ("hips", "left_upper_leg", "right_upper_leg", "left_foot", "right_foot")
 
 
-def roles(names: Sequence[Name], chosen: Sequence[int]) -> dict[str, int]:
+def joint_roles(names: Sequence[JointName], chosen: Sequence[int]) -> dict[str, int]:
     """Return the nodes by role ("left_upper_arm"), for those of `chosen` whose names say it; each node at most once.
 
     roles of CMU's names → {"hips": 0, "left_upper_leg": 2, …}
@@ -37,12 +37,12 @@ def roles(names: Sequence[Name], chosen: Sequence[int]) -> dict[str, int]:
     taken: set[int] = set()
     wanted = [(role, "", stems) for role, stems in MIDDLE.items()]
     wanted += [(role, side, stems) for side in ("left", "right") for role, stems in SIDED.items()]
-    by_name: dict[Name, int] = {}
+    by_name: dict[JointName, int] = {}
     for node in chosen:
         by_name.setdefault(names[node], node)
     for role, side, stems in wanted:
         for stem in stems:
-            node = by_name.get(Name(side, stem), -1)
+            node = by_name.get(JointName(side, stem), -1)
             if node >= 0 and node not in taken:
                 found[f"{side}_{role}" if side else role] = node
                 taken.add(node)

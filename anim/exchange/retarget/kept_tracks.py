@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.retarget.anchors import above
-from anim.exchange.retarget.apply import Onto
+from anim.exchange.retarget.anchors import matched_ancestor
+from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, Track
@@ -17,7 +17,7 @@ from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
 
 
-def left_over(old: Clip, done: Onto) -> tuple[tuple[Track, ...], int]:
+def kept_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], int]:
     """Return the tracks of a clip that gives way which stay, and how many go though the motion has no node for them.
 
     Those are of nodes that no joint of the motion is matched to, of morph weights and of pointers. They stay where the
@@ -28,7 +28,7 @@ def left_over(old: Clip, done: Onto) -> tuple[tuple[Track, ...], int]:
     return (found, 0) if done.measure is Measure.BUILD else ((), len(found))
 
 
-def with_left_over(done: Onto, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
+def add_kept_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
     """Return the motion's clip with tracks that stay. Joints keep their way in the world below nodes that move now."""
     moving = {track.node for track in stay if track.path != "weights"}
     known = set(done.matching.pairs.values())
@@ -41,7 +41,7 @@ def with_left_over(done: Onto, stay: Sequence[Track], skeleton: Skeleton) -> Cli
     tracks = {(track.node, track.path): track for track in done.clip.tracks}
     for node in below:
         parent = int(skeleton.parents[node])
-        top = next((up for up in above(skeleton, node) if up in known), -1)
+        top = next((up for up in matched_ancestor(skeleton, node) if up in known), -1)
         carried = world[parent]
         if top >= 0:  # where the parent is once its matched joint is back in its place
             carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
@@ -51,7 +51,7 @@ def with_left_over(done: Onto, stay: Sequence[Track], skeleton: Skeleton) -> Cli
 
 
 def _between(skeleton: Skeleton, node: int, known: set[int]) -> Iterator[int]:
-    for up in above(skeleton, node):
+    for up in matched_ancestor(skeleton, node):
         if up in known:
             return
         yield up

@@ -9,11 +9,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
-from anim.exchange.retarget.anchors import NONE, Pair, above, anchors, placing_order
-from anim.exchange.retarget.joint_matching import Matching
-from anim.exchange.retarget.rest_alignment import Alignment, alignment, raised
-from anim.exchange.retarget.rest_pose import UP, RestPose, corrections
-from anim.exchange.retarget.same_hierarchy import same_tree
+from anim.exchange.retarget.anchors import NONE, Pair, find_anchors, matched_ancestor, placing_order
+from anim.exchange.retarget.joint_matching import JointMatch
+from anim.exchange.retarget.rest_alignment import RestAlignment, align_rests, with_offset
+from anim.exchange.retarget.rest_pose import UP, RestPose, rest_corrections
+from anim.exchange.retarget.same_hierarchy import is_same_hierarchy
 from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
@@ -26,7 +26,7 @@ LOOKS = 64  # times at which the height of the motion is looked at
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
+class TargetMotion:
     """The target at times (F,), by node: local rotations (F, 4), translations (F, 3) and scales (F, 3).
 
     source, world: world matrices (N, F, 3, 4) of both skeletons.
@@ -40,7 +40,7 @@ class Followed:
 
 
 @dataclass(frozen=True, slots=True)
-class Transfer:
+class PoseTransfer:
     """How a target follows a source.
 
     aligned: the target's rest pose as a whole, from the source's. fixes: by target node, the world rotation (4,) that
@@ -55,7 +55,7 @@ class Transfer:
     pairs: Mapping[int, int]
     of_source: RestPose
     at_rest: RestPose
-    aligned: Alignment
+    aligned: RestAlignment
     fixes: Mapping[int, Floats]
     anchors: Mapping[int, Pair]
     order: tuple[int, ...]
@@ -63,16 +63,16 @@ class Transfer:
     lifted: frozenset[int]
     origin: Floats
 
-    def at(self, times: Floats, lowered: Floats | None = None) -> Followed:
+    def at(self, times: Floats, lowered: Floats | None = None) -> TargetMotion:
         """Return what the target does at times (F,) in seconds, as far down (F,) as `lowered` says, in metres."""
         motion = posed(self.source, self.clip, times)
         of_source = world_by_node(self.source, motion)
         rotations = self._rotations(world_rotations(self.source, motion.rotation))
         scales = {b: self._scale(a, b, motion.scale[:, a]) for a, b in self.pairs.items()}
         still = rest_pose(self.target)
-        local = local_by_node(self.target, _with(still, len(times), rotations, scales))
+        local = local_by_node(self.target, _with_joint(still, len(times), rotations, scales))
         world = self._place(local, of_source, motion, lowered)
-        return Followed(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, of_source, world)
+        return TargetMotion(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, of_source, world)
 
     def _rotations(self, of_source: dict[int, Floats]) -> dict[int, Floats]:
         """Local rotations (F, 4): in the world as the source's away from rest, between rest poses that agree."""
@@ -103,7 +103,7 @@ class Transfer:
                 if lowered is not None and node in self.lifted:
                     place = place - lowered[:, None] * [0, 1, 0]
                 still = local[node, :, :, 3]
-                local[node, :, :, 3] = place if parent < 0 else _inside(world[parent], place, still)
+                local[node, :, :, 3] = place if parent < 0 else _descends(world[parent], place, still)
             world[node] = local[node] if parent < 0 else matrix.multiply(world[parent], local[node])
         return world
 
@@ -132,7 +132,7 @@ class Transfer:
 
         What nodes without a partner turn between the two does not count: the target has no joint there that bends.
         """
-        between = above(self.source, a)
+        between = matched_ancestor(self.source, a)
         if anchor not in between:
             return np.asarray(of_source[a, :, :, 3] - of_source[anchor, :, :, 3])
         inside = motion.translation[:, a]
@@ -141,7 +141,9 @@ class Transfer:
         return np.asarray((of_source[anchor, :, :, :3] @ inside[..., None])[..., 0])
 
 
-def transfer(source: Skeleton, clip: Clip, target: Skeleton, matching: Matching, *, rest_at: float | None) -> Transfer:
+def build_transfer(
+    source: Skeleton, clip: Clip, target: Skeleton, matching: JointMatch, *, rest_at: float | None
+) -> PoseTransfer:
     """Return how the target's matched joints follow the source's.
 
     World rotations are taken over as turns away from the rest pose, between rest poses that are made to agree
@@ -156,12 +158,12 @@ def transfer(source: Skeleton, clip: Clip, target: Skeleton, matching: Matching,
         raise RangeError(f"rest at {rest_at:g} s (the motion runs from {clip.start:g} to {clip.end:.4g} s)")
     still = rest_pose(source) if rest_at is None else posed(source, clip, np.array([rest_at]))
     of_source, at_rest = _rest_pose(source, still), _rest_pose(target, rest_pose(target))
-    of_one_tree = not matching.unmatched and bool(same_tree(source, target, [*matching.pairs]))
-    aligned = alignment(of_source, at_rest, matching, of_one_tree=of_one_tree)
-    chosen = anchors(source, target, matching.pairs)
+    of_one_tree = not matching.unmatched and bool(is_same_hierarchy(source, target, [*matching.pairs]))
+    aligned = align_rests(of_source, at_rest, matching, of_one_tree=of_one_tree)
+    chosen = find_anchors(source, target, matching.pairs)
     order = placing_order(target, chosen, matching.pairs)
     top_of_source, top = _topmost(source, matching)
-    return Transfer(
+    return PoseTransfer(
         source=source,
         clip=clip,
         target=target,
@@ -169,11 +171,11 @@ def transfer(source: Skeleton, clip: Clip, target: Skeleton, matching: Matching,
         of_source=of_source,
         at_rest=at_rest,
         aligned=aligned,
-        fixes=corrections(of_source, at_rest, matching, aligned.rotation),
+        fixes=rest_corrections(of_source, at_rest, matching, aligned.rotation),
         anchors=chosen,
         order=tuple(order),
         top=top,
-        lifted=_lifted(chosen, top),
+        lifted=_lift_root(chosen, top),
         origin=_origin(source, clip, at_rest, top_of_source),
     )
 
@@ -191,7 +193,7 @@ def _rest_pose(skeleton: Skeleton, still: Pose) -> RestPose:
     )
 
 
-def _inside(parent: Floats, place: Floats, still: Floats) -> Floats:
+def _descends(parent: Floats, place: Floats, still: Floats) -> Floats:
     """World positions (F, 3) in a parent's space; as they rest (F, 3) along what the parent's scale flattens."""
     linear, beyond = parent[:, :, :3], place - matrix.apply(parent, still[:, None])[:, 0]
     largest = np.sqrt((linear * linear).sum(axis=-2)).max(axis=-1)
@@ -201,7 +203,7 @@ def _inside(parent: Floats, place: Floats, still: Floats) -> Floats:
     return np.asarray(still + (back @ beyond[..., None])[..., 0])
 
 
-def _with(still: Pose, frames: int, rotations: Mapping[int, Floats], scales: Mapping[int, Floats]) -> Pose:
+def _with_joint(still: Pose, frames: int, rotations: Mapping[int, Floats], scales: Mapping[int, Floats]) -> Pose:
     """A rest pose for many frames, with other rotations and scales of some nodes."""
     rotation, scale = np.repeat(still.rotation, frames, axis=0), np.repeat(still.scale, frames, axis=0)
     for node, values in rotations.items():
@@ -237,10 +239,10 @@ def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
     at_rest = world_matrices(source, rest_pose(source))[0, :, :, 3]
     looks = np.linspace(clip.start, clip.end, LOOKS)
     heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
-    return at_rest + raised(at_rest, target.positions, heights, top) * UP
+    return at_rest + with_offset(at_rest, target.positions, heights, top) * UP
 
 
-def _lifted(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
+def _lift_root(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
     """The topmost joint, and what is placed from joints above it: all that the floor lifts but those themselves."""
     chain, node = [-1], top
     while (node := chosen.get(node, NONE)[1]) >= 0:
@@ -248,7 +250,7 @@ def _lifted(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
     return frozenset(node for node, (_, anchor) in chosen.items() if anchor in chain and node not in chain)
 
 
-def _topmost(source: Skeleton, matching: Matching) -> tuple[int, int]:
+def _topmost(source: Skeleton, matching: JointMatch) -> tuple[int, int]:
     """The hips, or the matched source node nearest to the root, and its partner."""
     if "hips" in matching.source_roles:
         return matching.source_roles["hips"], matching.target_roles["hips"]

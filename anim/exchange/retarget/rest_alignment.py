@@ -9,9 +9,9 @@ from enum import StrEnum
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.exchange.retarget.joint_matching import Matching
-from anim.exchange.retarget.rest_pose import RestPose, facing
-from anim.exchange.retarget.similarity import similarity
+from anim.exchange.retarget.joint_matching import JointMatch
+from anim.exchange.retarget.rest_pose import RestPose, facing_rotation
+from anim.exchange.retarget.similarity import fit_similarity
 
 ALIKE = 1e-3  # of the radius; joints that differ less between two rest poses are those of one build
 MOST = 0.5  # share of the source's joints that must be matched for them to tell the figure's size
@@ -28,7 +28,7 @@ class Measure(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Alignment:
+class RestAlignment:
     """target_from_source: rotation (4,) and scale of lengths, from one rest pose to the other."""
 
     rotation: Floats
@@ -41,7 +41,7 @@ class Alignment:
         return self.measure is Measure.BUILD
 
 
-def alignment(source: RestPose, target: RestPose, matching: Matching, *, of_one_tree: bool) -> Alignment:
+def align_rests(source: RestPose, target: RestPose, matching: JointMatch, *, of_one_tree: bool) -> RestAlignment:
     """Return how the target's rest pose lies to the source's.
 
     Of one build (moved, turned, scaled as a whole): exactly so. Otherwise a turn about the vertical, see `facing`, and
@@ -51,9 +51,9 @@ def alignment(source: RestPose, target: RestPose, matching: Matching, *, of_one_
     single one, are of one build with any other such: there it decides.
     """
     pairs = np.array([*matching.pairs.items()], np.int64)
-    found = similarity(source.positions[pairs[:, 0]], target.positions[pairs[:, 1]])
+    found = fit_similarity(source.positions[pairs[:, 0]], target.positions[pairs[:, 1]])
     if found.error <= ALIKE and (found.unique or of_one_tree):
-        return Alignment(found.rotation, found.scale, Measure.BUILD)
+        return RestAlignment(found.rotation, found.scale, Measure.BUILD)
     one, other = _legs(source, matching.source_roles), _legs(target, matching.target_roles)
     measure = Measure.LEGS
     if not one > 0 or not other > 0:
@@ -63,10 +63,10 @@ def alignment(source: RestPose, target: RestPose, matching: Matching, *, of_one_
         one, other = _spread(source.positions[pairs[:, 0]]), _spread(target.positions[pairs[:, 1]])
     elif measure is Measure.EXTENT:
         one, other = _extent(source, pairs[:, 0]), _extent(target, pairs[:, 1])
-    return Alignment(facing(source, target, matching), (other or 1.0) / (one or 1.0), measure)
+    return RestAlignment(facing_rotation(source, target, matching), (other or 1.0) / (one or 1.0), measure)
 
 
-def raised(source: Floats, target: Floats, heights: Floats, node: int) -> float:
+def with_offset(source: Floats, target: Floats, heights: Floats, node: int) -> float:
     """Return by how much the source's rest pose must go up to stand on the floor, in metres: 0 where it stands.
 
     A BVH's root mostly rests at the origin, its feet below; only the motion lifts it. That is so where the source

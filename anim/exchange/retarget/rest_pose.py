@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.euler.motion import NO_TURN
-from anim.exchange.retarget.joint_matching import Matching
+from anim.exchange.euler.motion import IDENTITY
+from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.joint_roles import PERSON
 from anim.maths import quaternion
 
@@ -34,7 +34,7 @@ class RestPose:
     to_node: Floats
 
 
-def facing(source: RestPose, target: RestPose, matching: Matching) -> Floats:
+def facing_rotation(source: RestPose, target: RestPose, matching: JointMatch) -> Floats:
     """Return the turn (4,) about the vertical from where the source faces to where the target does.
 
     A skeleton faces where its right-to-left crosses up; without pairs of sides the two face the same way.
@@ -56,7 +56,7 @@ def facing(source: RestPose, target: RestPose, matching: Matching) -> Floats:
     return quaternion.from_rotation_vector(UP * angle)
 
 
-def corrections(source: RestPose, target: RestPose, matching: Matching, turn: Floats) -> dict[int, Floats]:
+def rest_corrections(source: RestPose, target: RestPose, matching: JointMatch, turn: Floats) -> dict[int, Floats]:
     """Return for each matched target node the world rotation (4,) that puts its rest pose into the source's.
 
     turn: the source's heading to the target's. Of persons, arms and legs are turned by the shortest way to point as
@@ -70,20 +70,20 @@ def corrections(source: RestPose, target: RestPose, matching: Matching, turn: Fl
         if node in ends:
             (a, b), end = ends[node]
             goal = quaternion.rotate(turn, source.positions[b] - source.positions[a])
-            found[node] = shortest(target.positions[end] - target.positions[node], goal)
-        elif person and node in _upright(matching):
-            found[node] = NO_TURN
+            found[node] = rotation_between(target.positions[end] - target.positions[node], goal)
+        elif person and node in _up_rotation(matching):
+            found[node] = IDENTITY
         else:
             above = _matched_above(target, node, found)
-            found[node] = found[above] if above >= 0 else NO_TURN
+            found[node] = found[above] if above >= 0 else IDENTITY
     return found
 
 
-def shortest(a: Floats, b: Floats) -> Floats:
+def rotation_between(a: Floats, b: Floats) -> Floats:
     """Return the smallest turn (4,) that points direction a (3,) along b (3,); none where one has no length."""
     lengths = np.linalg.norm(a) * np.linalg.norm(b)
     if lengths < 1e-12:
-        return NO_TURN
+        return IDENTITY
     axis, cosine = np.cross(a, b), float(a @ b)
     if cosine < -0.999999 * lengths:
         side = np.cross(a, (1.0, 0, 0) if abs(a[0]) < 0.9 * np.linalg.norm(a) else (0, 0, 1.0))
@@ -91,11 +91,11 @@ def shortest(a: Floats, b: Floats) -> Floats:
     return quaternion.normalize(np.append(axis, lengths + cosine))
 
 
-Ends = dict[int, tuple[tuple[int, int], int]]  # target node → source start and end, target end
+LimbEnds = dict[int, tuple[tuple[int, int], int]]  # target node → source start and end, target end
 
 
-def _limb_ends(matching: Matching) -> Ends:
-    ends: Ends = {}
+def _limb_ends(matching: JointMatch) -> LimbEnds:
+    ends: LimbEnds = {}
     for side in ("left", "right"):
         for role, outer in LIMBS.items():
             start, end = f"{side}_{role}", f"{side}_{outer}"
@@ -105,16 +105,16 @@ def _limb_ends(matching: Matching) -> Ends:
     return ends
 
 
-def _upright(matching: Matching) -> set[int]:
+def _up_rotation(matching: JointMatch) -> set[int]:
     moved = (*LIMBS, "hand")
     return {node for role, node in matching.target_roles.items() if not role.endswith(moved)}
 
 
-def _chain_ends(source: RestPose, target: RestPose, matching: Matching) -> Ends:
+def _chain_ends(source: RestPose, target: RestPose, matching: JointMatch) -> LimbEnds:
     """Joints with one matched joint next below in both skeletons."""
     below_source = _next_below(source, set(matching.pairs))
     below_target = _next_below(target, set(matching.pairs.values()))
-    ends: Ends = {}
+    ends: LimbEnds = {}
     for a, node in matching.pairs.items():
         children = below_source.get(a, [])
         if len(children) == 1 and below_target.get(node) == [matching.pairs[children[0]]]:

@@ -11,22 +11,22 @@ import numpy as np
 from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.euler import refinement
-from anim.exchange.euler.from_euler import Converted
-from anim.exchange.retarget.ground_contact import at_or_below, has_feet, heights_above_contact, soles
-from anim.exchange.retarget.joint_matching import Matching
-from anim.exchange.retarget.pose_transfer import Followed, Transfer, transfer
+from anim.exchange.euler.from_euler import ImportedMotion
+from anim.exchange.retarget.ground_contact import at_or_below, find_soles, ground_offset, has_feet
+from anim.exchange.retarget.joint_matching import JointMatch
+from anim.exchange.retarget.pose_transfer import PoseTransfer, TargetMotion, build_transfer
 from anim.exchange.retarget.rest_alignment import Measure
-from anim.exchange.retarget.step_keys import is_held, just_before, linear, step, within
+from anim.exchange.retarget.step_keys import as_linear, as_step, inside_interval, is_step, just_before
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import rest_pose, world_matrices
 
-LONGEST = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
-STILL = 1e-7  # rad, factor, and share of the target's size: what rounding leaves of no motion
+MAX_STEP_S = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
+CONSTANT_TOLERANCE = 1e-7  # rad, factor, and share of the target's size: what rounding leaves of no motion
 CONTACT_STEP = 1 / 30  # s between times at which soles are looked at, where keys stand farther apart
 
 
-class Floor(StrEnum):
+class GroundMode(StrEnum):
     """What heights the hips get."""
 
     CONTACT = "contact"
@@ -47,7 +47,7 @@ class Retargeted:
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
+class _RequiredKeys:
     """What the target does at times (K,), and which keys its tracks get.
 
     before: those of the times that stand before steps. inside: what it does at `within(knots)`; None without steps.
@@ -55,33 +55,33 @@ class _Wanted:
     """
 
     times: Floats
-    found: Followed
+    found: TargetMotion
     before: Floats
     knots: Floats
-    inside: Followed | None
+    inside: TargetMotion | None
     thin: bool
 
     def track(self, node: int, path: str, tolerance: float) -> Track:
         """STEP where the value holds between all knots of the source, LINEAR otherwise."""
         values = _of(self.found, node, path)
-        if self.inside is not None and is_held(_of(self.inside, node, path), tolerance=tolerance):
+        if self.inside is not None and is_step(_of(self.inside, node, path), tolerance=tolerance):
             at = np.isin(self.times, self.knots)
-            return step(node, path, self.times[at], values[at])
-        return linear(node, path, self.times, values, before=self.before, thin=self.thin)
+            return as_step(node, path, self.times[at], values[at])
+        return as_linear(node, path, self.times, values, before=self.before, thin=self.thin)
 
 
-def _of(found: Followed, node: int, path: str) -> Floats:
+def _of(found: TargetMotion, node: int, path: str) -> Floats:
     if path == "rotation":
         return quaternion.align_signs(found.rotations[node])
     return found.translations[node] if path == "translation" else found.scales[node]
 
 
 def retarget(
-    source: Converted,
+    source: ImportedMotion,
     target: Scene,
-    matching: Matching,
+    matching: JointMatch,
     *,
-    floor: Floor = Floor.CONTACT,
+    floor: GroundMode = GroundMode.CONTACT,
     rest_at: float | None = None,
 ) -> Retargeted:
     """Return a clip that moves the target's matched joints as the source's move; see `transfer` for how.
@@ -95,28 +95,28 @@ def retarget(
     """
     if not matching.pairs:
         raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
-    if floor == Floor.CONTACT and source.clip.end - source.clip.start > LONGEST:
+    if floor == GroundMode.CONTACT and source.clip.end - source.clip.start > MAX_STEP_S:
         seconds = source.clip.end - source.clip.start
         raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
-    follow = transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
+    follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
     size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
     knots, before = _times(source.clip)
     times = unique_sorted(np.concatenate((knots, before)))
     looked_at, lowered = times, np.zeros(len(times))
-    if floor == Floor.CONTACT and not follow.aligned.alike and has_feet(matching.target_roles):
-        looked_at = times if source.tolerance is None else _no_farther(times, CONTACT_STEP)
-        lowered = _too_high(follow, target, matching, looked_at)
+    if floor == GroundMode.CONTACT and not follow.aligned.alike and has_feet(matching.target_roles):
+        looked_at = times if source.tolerance is None else _limit_distance(times, CONTACT_STEP)
+        lowered = _is_above_ground(follow, target, matching, looked_at)
 
-    def at(when: Floats) -> Followed:
+    def at(when: Floats) -> TargetMotion:
         return follow.at(when, np.interp(when, looked_at, lowered))
 
     if source.tolerance is not None:
         lengths = _lengths(follow)
-        times = refinement.refined(
+        times = refinement.refine_linear(
             times, lambda when: _rotations_and_paths(at(when), lengths, size), tolerance=source.tolerance, size=size
         )
-    inside = at(within(knots)) if len(before) else None
-    wanted = _Wanted(times, at(times), before, knots, inside, thin=source.tolerance is not None)
+    inside = at(inside_interval(knots)) if len(before) else None
+    wanted = _RequiredKeys(times, at(times), before, knots, inside, thin=source.tolerance is not None)
     clip = Clip(source.clip.name, tuple(_tracks(follow, wanted, size)))
     return Retargeted(clip, follow.aligned.scale, (float(lowered.min()), float(lowered.max())), follow.aligned.measure)
 
@@ -128,23 +128,23 @@ def _times(clip: Clip) -> tuple[Floats, Floats]:
     return unique_sorted(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
 
 
-def _no_farther(times: Floats, step: float) -> Floats:
+def _limit_distance(times: Floats, step: float) -> Floats:
     """Times with others between them so that none is farther from the next than `step`."""
     grid = np.arange(times[0], times[-1], step)
     return unique_sorted(np.concatenate((times, grid)))
 
 
-def _too_high(follow: Transfer, target: Scene, matching: Matching, times: Floats) -> Floats:
+def _is_above_ground(follow: PoseTransfer, target: Scene, matching: JointMatch, times: Floats) -> Floats:
     """How far (F,) above the floor the target would be with heights scaled only, in metres."""
     found = follow.at(times)
-    feet = soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
+    feet = find_soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
     roles = matching.source_roles
     of_source = [at_or_below(follow.source, {roles[f]}) for f in ("left_foot", "right_foot") if f in roles]
     heights, world = found.source[:, :, 1, 3].T, found.world.transpose(1, 0, 2, 3)
-    return heights_above_contact(times, heights, of_source, feet.heights(world), feet.floor, follow.aligned.scale)
+    return ground_offset(times, heights, of_source, feet.heights(world), feet.floor, follow.aligned.scale)
 
 
-def _lengths(follow: Transfer) -> dict[int, float]:
+def _lengths(follow: PoseTransfer) -> dict[int, float]:
     """Meters per unit of the space that each matched node of the target moves in, at rest."""
     skeleton = follow.target
     world = world_matrices(skeleton, rest_pose(skeleton))[0]
@@ -153,25 +153,25 @@ def _lengths(follow: Transfer) -> dict[int, float]:
 
 
 def _rotations_and_paths(
-    found: Followed, lengths: Mapping[int, float], size: float
+    found: TargetMotion, lengths: Mapping[int, float], size: float
 ) -> tuple[dict[int, Floats], Floats]:
     """What must be followed between keys: rotations, and as metres (F, P, 3) translations and scales."""
     places = [found.translations[node] * length for node, length in lengths.items()]
     return found.rotations, np.stack([*places, *(scale * size for scale in found.scales.values())], axis=1)
 
 
-def _tracks(follow: Transfer, wanted: _Wanted, size: float) -> list[Track]:
+def _tracks(follow: PoseTransfer, wanted: _RequiredKeys, size: float) -> list[Track]:
     """Tracks of the matched nodes; none for what stays at rest and has no track in the source either."""
     moved = {(track.node, track.path) for track in follow.clip.tracks}
     lengths, still, found = _lengths(follow), follow.target, wanted.found
     tracks = []
     for a, b in sorted(follow.pairs.items(), key=lambda pair: pair[1]):
         rotation = quaternion.align_signs(found.rotations[b])
-        if (a, "rotation") in moved or quaternion.angle_between(rotation, still.rotation[b]).max() > STILL:
-            tracks.append(wanted.track(b, "rotation", STILL))
+        if (a, "rotation") in moved or quaternion.angle_between(rotation, still.rotation[b]).max() > CONSTANT_TOLERANCE:
+            tracks.append(wanted.track(b, "rotation", CONSTANT_TOLERANCE))
         far = np.abs(found.translations[b] - still.translation[b]).max() * lengths[b]
-        if (b == follow.top and (a, "translation") in moved) or far > STILL * size:
-            tracks.append(wanted.track(b, "translation", STILL * size / lengths[b]))
-        if np.abs(found.scales[b] - still.scale[b]).max() > STILL:
-            tracks.append(wanted.track(b, "scale", STILL))
-    return tracks or [wanted.track(follow.top, "translation", STILL)]
+        if (b == follow.top and (a, "translation") in moved) or far > CONSTANT_TOLERANCE * size:
+            tracks.append(wanted.track(b, "translation", CONSTANT_TOLERANCE * size / lengths[b]))
+        if np.abs(found.scales[b] - still.scale[b]).max() > CONSTANT_TOLERANCE:
+            tracks.append(wanted.track(b, "scale", CONSTANT_TOLERANCE))
+    return tracks or [wanted.track(follow.top, "translation", CONSTANT_TOLERANCE)]

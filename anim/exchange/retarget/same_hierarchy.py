@@ -8,7 +8,7 @@ from anim.exchange.formats.labels import labels
 from anim.model import Skeleton
 
 
-def same_tree(source: Skeleton, target: Skeleton, chosen: Sequence[int]) -> dict[int, int]:
+def is_same_hierarchy(source: Skeleton, target: Skeleton, chosen: Sequence[int]) -> dict[int, int]:
     """Return the target node of each chosen source node, by name; none at all where the trees differ.
 
     They agree where every chosen node, and its parent where it has one, has the label (see `labels`) of a target node

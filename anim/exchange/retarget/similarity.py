@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.euler.motion import NO_TURN
-from anim.exchange.retarget.rest_pose import shortest
+from anim.exchange.euler.motion import IDENTITY
+from anim.exchange.retarget.rest_pose import rotation_between
 from anim.maths import quaternion
 
 MIN_RANK_FRACTION = 1e-6  # second singular value by the first; below it, points are within a thousandth of a line
@@ -27,7 +27,7 @@ class Similarity:
     unique: bool
 
 
-def similarity(source: Floats, target: Floats) -> Similarity:
+def fit_similarity(source: Floats, target: Floats) -> Similarity:
     """Return the transform that takes points (P, 3) to others (P, 3) best; of several, the one that turns least.
 
     Points on a line leave the turn about it open, points in one place every turn, and the scale: 1 then. The error is
@@ -38,11 +38,11 @@ def similarity(source: Floats, target: Floats) -> Similarity:
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)
     radii = [float(np.linalg.norm(points, axis=1).max(initial=0.0)) for points in (a, b)]
     if not min(radii) > 0:
-        return Similarity(NO_TURN, 1.0, 0.0 if max(radii) == 0 else np.inf, False)
+        return Similarity(IDENTITY, 1.0, 0.0 if max(radii) == 0 else np.inf, False)
     u, s, vt = np.linalg.svd(b.T @ a)
     unique = bool(s[1] > MIN_RANK_FRACTION * s[0])
     signs = np.array((1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt)))) if unique else np.array((1.0, 0, 0))
-    rotation = quaternion.from_matrix((u * signs) @ vt) if unique else shortest(vt[0], u[:, 0])
+    rotation = quaternion.from_matrix((u * signs) @ vt) if unique else rotation_between(vt[0], u[:, 0])
     scale = float((s * signs).sum() / (a * a).sum())
     error = np.linalg.norm(b - scale * quaternion.rotate(rotation, a), axis=1).max()
     return Similarity(rotation, scale, float(error) / radii[1], unique)

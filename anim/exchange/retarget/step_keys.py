@@ -16,26 +16,26 @@ def just_before(times: Floats) -> Floats:
     return np.nextafter(times.astype(np.float32), np.float32(0)).astype(np.float64)
 
 
-def within(knots: Floats) -> Floats:
+def inside_interval(knots: Floats) -> Floats:
     """Return times (3 (T - 1),) at the start, in the middle and just before the end of each piece of knots (T,)."""
     starts, ends = knots[:-1], just_before(knots[1:])
     return np.concatenate((starts, (starts + ends) / 2, ends))
 
 
-def is_held(values: Floats, *, tolerance: float) -> bool:
+def is_step(values: Floats, *, tolerance: float) -> bool:
     """Whether values at the times of `within` (3 (T - 1), C) are the same in each piece; of rotations, either sign."""
     start, middle, end = values.reshape(3, -1, values.shape[1])
     return all(_distance(start, other).max(initial=0.0) <= tolerance for other in (middle, end))
 
 
-def step(node: int, path: str, times: Floats, values: Floats) -> Track:
+def as_step(node: int, path: str, times: Floats, values: Floats) -> Track:
     """Return a STEP track of values (K, C) at times (K,), without keys that change nothing but the first and last."""
     kept = np.concatenate(([True], _distance(values[1:], values[:-1]) > ROUNDING))
     kept[-1] = True
     return Track(node, path, Interpolation.STEP, times[kept], values[kept])
 
 
-def linear(node: int, path: str, times: Floats, values: Floats, *, before: Floats, thin: bool) -> Track:
+def as_linear(node: int, path: str, times: Floats, values: Floats, *, before: Floats, thin: bool) -> Track:
     """Return a LINEAR track of values (K, C) at times (K,).
 
     before: times of keys that stand just before the next one in case of a jump; where this track has none, they are

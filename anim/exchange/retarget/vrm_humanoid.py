@@ -5,29 +5,29 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 
 EXTENSIONS = ("VRMC_vrm", "VRMC_vrm_animation", "VRM")
 ROLES = {"left_toes": "left_toe", "right_toes": "right_toe"}  # where VRM has another word
 
 
-def stated_roles(json: Json) -> dict[str, int]:
+def read_vrm_roles(json: Json) -> dict[str, int]:
     """Return the nodes by role ("left_upper_arm", see `roles`), as a file's extensions state them; none for others.
 
     Of VRM 1.0 and animations humanBones is an object of {"node": 3} by bone; of VRM 0.x a list of {"bone", "node"}.
     An upper chest is the chest where no chest is stated. What is not as the specifications say is left out.
     {"leftToes": {"node": 7}} → {"left_toe": 7}
     """
-    count = len(items(json, "nodes"))
+    count = len(json_array(json, "nodes"))
     extensions = json.get("extensions")
     for name in EXTENSIONS:
-        bones = _inside(_inside(_inside(extensions, name), "humanoid"), "humanBones")
+        bones = _lookup(_lookup(_lookup(extensions, name), "humanoid"), "humanBones")
         each = (
             bones.items()
             if isinstance(bones, dict)
-            else ((_inside(b, "bone"), b) for b in (bones if isinstance(bones, list) else ()))
+            else ((_lookup(b, "bone"), b) for b in (bones if isinstance(bones, list) else ()))
         )
-        found = {_role(bone): _inside(about, "node") for bone, about in each if isinstance(bone, str)}
+        found = {_role(bone): _lookup(about, "node") for bone, about in each if isinstance(bone, str)}
         nodes = {role: node for role, node in found.items() if type(node) is int and 0 <= node < count}
         if nodes:
             upper = nodes.pop("upper_chest", None)
@@ -35,7 +35,7 @@ def stated_roles(json: Json) -> dict[str, int]:
     return {}
 
 
-def _inside(value: Any, key: str) -> Any:
+def _lookup(value: Any, key: str) -> Any:
     return value.get(key) if isinstance(value, dict) else None
 
 

@@ -12,7 +12,7 @@ from typing import TypeAlias, TypeGuard
 import numpy as np
 
 from anim.errors import FormatError, ShapeError, UnsupportedError
-from anim.gltf.document import Buffer, Bytes, Document, Json, items
+from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.io import json_text, uri
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import structure
@@ -72,7 +72,7 @@ def glb(document: Document) -> list[Bytes]:
     Raises UnsupportedError beyond 4 GiB, FormatError where a buffer's bytes can't be had.
     """
     content = dict(document.json)
-    described = items(content, "buffers")
+    described = json_array(content, "buffers")
     if described:
         content["buffers"] = [
             _in_glb(i, d, b) for i, (d, b) in enumerate(zip(described, document.buffers, strict=True))
@@ -103,7 +103,7 @@ def gltf(
     each buffer that is to be a file, and returns its name.
     """
     content = dict(document.json)
-    described = items(content, "buffers")
+    described = json_array(content, "buffers")
     files: dict[str, list[Bytes]] = {}
     taken = {uri.relative_path(b.uri) for b in document.buffers if keep_external and _stays(b) and b.uri is not None}
     beside = []
@@ -197,7 +197,7 @@ def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
 def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
     """The JSON, and the nodes that had a matrix in it although they are animated."""
     parsed = json_text.parse(raw)
-    structure.check(parsed)
+    structure.validate(parsed)
     return expand_matrices(parsed)
 
 
@@ -206,7 +206,7 @@ def buffers_of(
 ) -> tuple[Buffer, ...]:
     """Return the buffers of a JSON. check: refuse a BIN chunk that is missing or too short for the first one."""
     buffers = []
-    for i, about in enumerate(items(parsed, "buffers")):
+    for i, about in enumerate(json_array(parsed, "buffers")):
         load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
         buffers.append(Buffer(about["byteLength"], about.get("uri"), load, where=where))
         if check and glb and i == 0 and "uri" not in about:

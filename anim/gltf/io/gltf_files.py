@@ -21,7 +21,7 @@ import numpy as np
 
 from anim.errors import AnimError, OutputError
 from anim.files import atomic, links, signals
-from anim.gltf.document import Bytes, Document, items
+from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container, uri
 
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name, for as long as others have the shorter ones
@@ -43,7 +43,7 @@ def write(
     never removed, since the input needs them. text: the document's own, which stays where all its buffers do. A link is
     followed: the pair lies where it leads to.
     """
-    named, path = path, links.followed(path)
+    named, path = path, links.resolve_links(path)
     if path.exists() and not path.is_file():
         raise OutputError(f"{named}: is no plain file (a .gltf needs a folder for its buffers)", help="write a .glb")
     with nullcontext() if dry_run else atomic.locked(path.parent):
@@ -157,7 +157,9 @@ def _external(path: Path) -> tuple[str, ...]:
 
 def _named(document: Document) -> set[str]:
     """Names of all files that a document refers to."""
-    addresses = [buffer.uri for buffer in document.buffers] + [i.get("uri") for i in items(document.json, "images")]
+    addresses = [buffer.uri for buffer in document.buffers] + [
+        i.get("uri") for i in json_array(document.json, "images")
+    ]
     return {_file_of(address) for address in addresses} - {""}
 
 

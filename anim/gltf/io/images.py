@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from anim.errors import FormatError, OutputError
 from anim.files import atomic, resolver
-from anim.gltf.document import Bytes, Document, Json, items
+from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
 
 
@@ -22,7 +22,7 @@ def along(document: Document, folder: Path, target: Path) -> tuple[Document, dic
     """
     copies: dict[Path, Bytes] = {}
     images: list[Json] = []
-    for image in items(document.json, "images"):
+    for image in json_array(document.json, "images"):
         address, data = external_uri(image), read_image(folder, image)
         if data is not None and address:
             name = _free(target, uri.relative_path(address), data, copies)
@@ -47,7 +47,7 @@ def embed(document: Document, folder: Path | None) -> Document:
     """Return the document with those of its external images that can be read as data URIs."""
     images = [
         image if (data := read_image(folder, image)) is None else {**image, "uri": _data_uri(data)}
-        for image in items(document.json, "images")
+        for image in json_array(document.json, "images")
     ]
     return replace(document, json={**document.json, "images": images}) if images else document
 

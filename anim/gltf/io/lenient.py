@@ -14,7 +14,7 @@ from anim.gltf.validation import salvage
 
 
 @dataclass(frozen=True, slots=True)
-class Broken:
+class BrokenFile:
     """document: the parts that can be looked at. faults: what is wrong with the rest, never empty.
 
     lost_clips, lost_skins: numbers of those that nothing can be said about.
@@ -26,7 +26,7 @@ class Broken:
     lost_skins: frozenset[int]
 
 
-def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimError) -> Broken:
+def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimError) -> BrokenFile:
     """Return what is left of a file. refusal: why it was refused, raised again where its JSON can't be read."""
     try:
         raw, binary = _chunks(data)
@@ -34,7 +34,7 @@ def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimErr
     except FormatError:
         raise refusal from None
     found = salvage.salvage(parsed)
-    json, rotations = _without_zero_rotations(found.json)
+    json, rotations = _drop_zero_rotations(found.json)
     faults = (*found.faults, *rotations)
     if not any(str(refusal) == str(fault) for fault in faults):  # of the container, or a sheared matrix
         faults = (refusal, *faults)
@@ -43,7 +43,7 @@ def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimErr
         json, expanded = expand_matrices(json)
     is_glb = data[:4].tobytes() == container.MAGIC
     buffers = container.buffers_of(json, binary, resolve, glb=is_glb, check=False)
-    return Broken(Document(json, buffers, expanded=expanded), faults, found.lost_clips, found.lost_skins)
+    return BrokenFile(Document(json, buffers, expanded=expanded), faults, found.lost_clips, found.lost_skins)
 
 
 def unread_buffers(document: Document) -> tuple[AnimError, ...]:
@@ -79,7 +79,7 @@ def _chunk(data: Bytes, start: int) -> tuple[int, int]:
     return start + 8 + size, kind
 
 
-def _without_zero_rotations(json: Json) -> tuple[Json, list[AnimError]]:
+def _drop_zero_rotations(json: Json) -> tuple[Json, list[AnimError]]:
     """The JSON without rotations that turn nowhere, and a fault for each."""
     faults: list[AnimError] = []
     nodes = list(json.get("nodes", ()))

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from anim.errors import FormatError
 from anim.files import atomic, links, resolver
-from anim.gltf.document import Buffer, Bytes, Document, items
+from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, gltf_files, images, uri
 
 MAX_TRIES = 20  # of opening a .gltf with its buffers, while others replace it
@@ -34,7 +34,7 @@ class Source:
 
     def is_beside(self, output: str) -> bool:
         """Return whether `output` lies in the same folder, so that relative URIs stay right."""
-        return self.folder is not None and links.followed(Path(output)).parent.resolve() == self.folder.resolve()
+        return self.folder is not None and links.resolve_links(Path(output)).parent.resolve() == self.folder.resolve()
 
     def bytes_of(self, document: Document) -> Bytes | None:
         """Return the bytes of the input where they are still those of a document: nothing of it was changed."""
@@ -51,10 +51,10 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     opener: makes a document of bytes. If the file is replaced while its buffers are opened, it is opened again.
     Raises FormatError.
     """
-    real = links.followed(Path(path))
+    real = links.resolve_links(Path(path))
     for _ in range(MAX_TRIES):
         before = _stamp(real)
-        data, buffers = resolver.mapped(real), resolver.Beside(real.parent)
+        data, buffers = resolver.mapped(real), resolver.CompanionFiles(real.parent)
         document = opener(data, buffers.open)
         outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
         for address in outside:
@@ -85,7 +85,7 @@ def write_file(
     """
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and not source.is_beside(path):
-        document, copies = images.along(document, source.folder, links.followed(Path(path)).parent)
+        document, copies = images.along(document, source.folder, links.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # some may have got other names
     if not dry_run:
         images.write_copies(copies)
@@ -127,7 +127,7 @@ def _stamp(path: Path) -> tuple[int, ...]:
 
 def _files_beside(source: Source) -> Iterator[Path]:
     """Yield where the buffers and images of an input lie."""
-    for about in (*items(source.document.json, "buffers"), *items(source.document.json, "images")):
+    for about in (*json_array(source.document.json, "buffers"), *json_array(source.document.json, "images")):
         address = about.get("uri")
         if source.folder is not None and address is not None and not uri.is_data(address):
             with suppress(FormatError):

@@ -51,7 +51,7 @@ def decode(stored: Bytes, about: Json) -> Bytes:
         raise FormatError(f"meshopt stream is broken ({error})") from None
     plain = np.ascontiguousarray(decoded).reshape(-1).view(np.uint8)
     if len(plain) != count * stride:
-        plain = _narrowed(np.asarray(decoded), count, stride)
+        plain = _narrow(np.asarray(decoded), count, stride)
     return plain
 
 
@@ -67,7 +67,7 @@ def _check_stride(mode: str, chosen_filter: str, stride: int, count: int) -> Non
         raise FormatError(f"meshopt byteStride {stride} and count {count} don't fit {mode} with filter {chosen_filter}")
 
 
-def _narrowed(indices: np.ndarray[tuple[int, ...], np.dtype[np.uint32]], count: int, stride: int) -> Bytes:
+def _narrow(indices: np.ndarray[tuple[int, ...], np.dtype[np.uint32]], count: int, stride: int) -> Bytes:
     """Indices come back as 32-bit numbers; the view holds them in 2 or 4 bytes."""
     flat = indices.reshape(-1)
     if len(flat) != count:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 
-from anim.gltf.document import Buffer, Json, items
+from anim.gltf.document import Buffer, Json, json_array
 from anim.gltf.io import json_text
 from anim.gltf.validation.buffer_layout import MESHOPT
 
 NAMES = ("extensionsUsed", "extensionsRequired")
 
 
-def about(length: int, extension: str) -> Json:
+def fallback_json(length: int, extension: str) -> Json:
     """Return the JSON of a buffer that only stands for bytes."""
     return {"byteLength": length, "extensions": {extension: {"fallback": True}}}
 
@@ -22,14 +22,14 @@ def is_marked(buffer: Json, *extensions: str) -> bool:
     return any(isinstance(there.get(name), dict) and there[name].get("fallback") for name in extensions or MESHOPT)
 
 
-def without_data(json: Json, buffers: tuple[Buffer, ...], frozen: Set[int]) -> set[int]:
+def drop_data(json: Json, buffers: tuple[Buffer, ...], frozen: Set[int]) -> set[int]:
     """Return the buffers that have no bytes and only stand for what compressed views become.
 
     frozen: buffers in which nothing may move.
     """
-    there = items(json, "buffers")
+    there = json_array(json, "buffers")
     compressed, others = set[int](), set[int]()
-    for view in items(json, "bufferViews"):
+    for view in json_array(json, "bufferViews"):
         extension = _extension(view)
         (compressed if extension else others).add(view["buffer"])
         if extension:
@@ -40,7 +40,7 @@ def without_data(json: Json, buffers: tuple[Buffer, ...], frozen: Set[int]) -> s
     return possible - others - frozen
 
 
-def choice(buffers: Sequence[Json], views: Sequence[Json], possible: Set[int], extension: str) -> int | None:
+def find_fallback(buffers: Sequence[Json], views: Sequence[Json], possible: Set[int], extension: str) -> int | None:
     """Return the buffer that new views of an extension can stand in; None where there is none.
 
     views: those that stay. One that no view is left on can become this extension's.
@@ -58,7 +58,7 @@ def overhead(json: Json, extension: str) -> int:
     if extension in _used(json):
         return 0
     named = sum(len(json_text.dump({key: [extension]})) - 1 for key in NAMES if extension not in json.get(key, []))
-    return named + len(json_text.dump(about(10_000, extension))) + 1
+    return named + len(json_text.dump(fallback_json(10_000, extension))) + 1
 
 
 def name_extensions(json: Json, before: Json, extension: str) -> None:
@@ -80,7 +80,7 @@ def name_extensions(json: Json, before: Json, extension: str) -> None:
 
 def _used(json: Json) -> set[str]:
     """Which of meshopt's extensions any view or buffer carries."""
-    objects = [*items(json, "bufferViews"), *items(json, "buffers")]
+    objects = [*json_array(json, "bufferViews"), *json_array(json, "buffers")]
     return {name for each in objects for name in MESHOPT if name in each.get("extensions", {})}
 
 

@@ -18,7 +18,7 @@ STRIDES = {"QUATERNION": 8}  # bytes of an element's codes; the others have 4 pe
 
 
 @dataclass(frozen=True, slots=True)
-class Filtered:
+class FilteredValues:
     """Values as one of meshopt's filters takes them, before the codec.
 
     name: "QUATERNION" (8 bytes a key, int16 normalized when decoded) or "EXPONENTIAL" (4 bytes a number, float32 when
@@ -36,7 +36,7 @@ class Filtered:
 
 
 @dataclass(frozen=True, slots=True)
-class Packing:
+class AccessorStorage:
     """How the numbers of new animations are stored.
 
     extension: meshopt's that compressed views use; empty for plain ones only.
@@ -44,13 +44,13 @@ class Packing:
     """
 
     extension: str = ""
-    filtered: Mapping[int, Filtered] = field(default_factory=lambda: MappingProxyType({}))
+    filtered: Mapping[int, FilteredValues] = field(default_factory=lambda: MappingProxyType({}))
 
 
-PLAIN = Packing()
+UNCOMPRESSED = AccessorStorage()
 
 
-def compressed(extension: str, filtered: Mapping[int, Filtered]) -> Packing:
+def compress_document(extension: str, filtered: Mapping[int, FilteredValues]) -> AccessorStorage:
     """Return a packing into views of "EXT_meshopt_compression" or "KHR_meshopt_compression", each where it pays.
 
     filtered: by id(track), for the tracks (those objects, which must stay alive) given to `replace_clips`.
@@ -58,22 +58,22 @@ def compressed(extension: str, filtered: Mapping[int, Filtered]) -> Packing:
     """
     if extension not in MESHOPT:
         raise RangeError(f"extension '{extension}' is not known (expected {' or '.join(MESHOPT)})")
-    return Packing(extension, filtered)
+    return AccessorStorage(extension, filtered)
 
 
-def decoded(filtered: Filtered, columns: int) -> Floats:
+def decompress_document(filtered: FilteredValues, columns: int) -> Floats:
     """Return the values (n, columns) that the codes decode to, by meshopt's own decoder: what a track has to hold.
 
     Computing them in float64 instead differs by one step of int16 in up to 0.5 % of quaternions.
     """
-    stored = decoded_bytes(filtered)
+    stored = decompressed_bytes(filtered)
     if filtered.name == "QUATERNION":
         integers = np.frombuffer(stored, "<i2")
         return denormalized(integers.astype(np.float64), integers.dtype).reshape(-1, 4)
     return np.frombuffer(stored, "<f4").astype(np.float64).reshape(-1, columns)
 
 
-def decoded_bytes(filtered: Filtered) -> bytes:
+def decompressed_bytes(filtered: FilteredValues) -> bytes:
     """Return the bytes that the codes decode to, as many as there are codes."""
     stride = STRIDES.get(filtered.name, 4)
     rows = np.frombuffer(filtered.codes, np.uint8).reshape(-1, stride)

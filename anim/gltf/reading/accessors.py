@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, UnsupportedError
-from anim.gltf.document import Bytes, Document, Json, items
+from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.meshopt import codec
 from anim.gltf.validation import buffer_layout
 
@@ -27,8 +27,8 @@ class Accessors:
 
     def __init__(self, document: Document) -> None:
         self._document = document
-        self._accessors = items(document.json, "accessors")
-        self._views = items(document.json, "bufferViews")
+        self._accessors = json_array(document.json, "accessors")
+        self._views = json_array(document.json, "bufferViews")
         self._bytes: dict[int, Bytes] = {}
         self._given: Mapping[int, NDArray[Any]] = {}
 
@@ -95,7 +95,7 @@ class Accessors:
         if index in self._given:
             return self._given[index]
         about = self._accessors[index]
-        form = _form(about["componentType"], about["type"])
+        form = _element_layout(about["componentType"], about["type"])
         if "bufferView" in about:
             number = about["bufferView"]
             stride = self._views[number].get("byteStride", form.columns * form.column)
@@ -104,10 +104,10 @@ class Accessors:
             base = np.broadcast_to(np.zeros((), form.dtype), (about["count"], form.columns * form.rows))
         return self._with_sparse(base, about, form) if "sparse" in about else base
 
-    def _with_sparse(self, base: NDArray[Any], about: Json, form: Form) -> NDArray[Any]:
+    def _with_sparse(self, base: NDArray[Any], about: Json, form: ElementLayout) -> NDArray[Any]:
         sparse = about["sparse"]
         count, where, values = sparse["count"], sparse["indices"], sparse["values"]
-        whole = _form(where["componentType"], "SCALAR")
+        whole = _element_layout(where["componentType"], "SCALAR")
         view = self.view(where["bufferView"])
         places = _strided(view, where.get("byteOffset", 0), count, whole.column, whole)[:, 0].astype(np.int64)
         if places[-1] >= about["count"] or (np.diff(places) <= 0).any():
@@ -164,7 +164,7 @@ def _slice(data: Bytes, place: Json) -> Bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class ElementLayout:
     """How one element lies in memory: columns of rows numbers, `column` bytes from column to column."""
 
     dtype: np.dtype[Any]
@@ -174,13 +174,13 @@ class Form:
 
 
 @cache
-def _form(component_type: int, kind: str) -> Form:
+def _element_layout(component_type: int, kind: str) -> ElementLayout:
     if kind not in buffer_layout.COMPONENTS:
         raise FormatError(f"has type '{kind}' (expected one of {', '.join(buffer_layout.COMPONENTS)})")
-    return Form(np.dtype(DTYPES[component_type]), *buffer_layout.element(component_type, kind))
+    return ElementLayout(np.dtype(DTYPES[component_type]), *buffer_layout.element(component_type, kind))
 
 
-def _strided(view: Bytes, offset: int, count: int, stride: int, form: Form) -> NDArray[Any]:
+def _strided(view: Bytes, offset: int, count: int, stride: int, form: ElementLayout) -> NDArray[Any]:
     """Elements (count, columns × rows) as a view into the bytes; `stride` in bytes from element to element."""
     size = form.dtype.itemsize
     if form.columns == 1:

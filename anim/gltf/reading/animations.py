@@ -7,7 +7,7 @@ from functools import cache
 from anim import arrays
 from anim.arrays import Floats
 from anim.errors import AnimError, FormatError, RangeError, ShapeError
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading.accessors import FLOAT, Accessors
 from anim.gltf.validation import channel_targets
 from anim.model import AccessorFormat, Interpolation, Track
@@ -22,7 +22,7 @@ class Reader:
     """Reads tracks of one document; tracks on one input accessor share one array of times."""
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
-        self._nodes = items(document.json, "nodes")
+        self._nodes = json_array(document.json, "nodes")
         self._json = document.json
         self._accessors = accessors
         self._times: dict[int, Floats] = {}
@@ -31,7 +31,7 @@ class Reader:
     def track(self, animation: Json, number: int) -> Track | None:
         """Return a channel of `animation` as a track, None where it has no target that is understood."""
         channel = animation["channels"][number]
-        found = channel_targets.of_channel(channel)
+        found = channel_targets.channel_target(channel)
         if found is None:
             return None
         node, path, address = found

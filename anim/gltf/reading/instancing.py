@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from anim.errors import UnsupportedError
-from anim.gltf.document import Document, Json, items, node_label
+from anim.gltf.document import Document, Json, json_array, node_label
 
 EXTENSION = "EXT_mesh_gpu_instancing"
 
 
 def instanced_nodes(json: Json) -> list[int]:
     """Return the numbers of the nodes whose mesh is shown in copies."""
-    nodes = enumerate(items(json, "nodes"))
+    nodes = enumerate(json_array(json, "nodes"))
     return [i for i, node in nodes if "mesh" in node and EXTENSION in node.get("extensions", {})]
 
 

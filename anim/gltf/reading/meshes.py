@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading import draco
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.skin_weights import read_influences
@@ -23,8 +23,8 @@ class Meshes:
     def __init__(
         self, document: Document, accessors: Accessors, *, normals: bool = False, tangents: bool = False
     ) -> None:
-        self._meshes = items(document.json, "meshes")
-        self._views = len(items(document.json, "bufferViews"))
+        self._meshes = json_array(document.json, "meshes")
+        self._views = len(json_array(document.json, "bufferViews"))
         self._accessors = accessors
         self._wanted = {"NORMAL": normals, "TANGENT": tangents}
         self._done: dict[tuple[int, int], Mesh] = {}
@@ -59,8 +59,8 @@ class Meshes:
             about.get("name", ""),
             np.concatenate([np.empty((0, 3)), *(part.positions for part in parts)]),
             np.concatenate([np.empty((0, 3), np.int64), *faces]),
-            _stacked([part.joints for part in parts], influences, np.int64),
-            _stacked([part.weights for part in parts], influences, np.float64),
+            _stack([part.joints for part in parts], influences, np.int64),
+            _stack([part.weights for part in parts], influences, np.float64),
             np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
             np.array(about.get("weights", [0.0] * count), float),
             _of_all([part.normals for part in parts]),
@@ -77,7 +77,7 @@ class Meshes:
             accessors, faces = draco.read_primitive(primitive, accessors, views=self._views)
         attributes = primitive["attributes"]
         if "POSITION" not in attributes:
-            return _nothing(len(primitive.get("targets", ())))
+            return _no_targets(len(primitive.get("targets", ())))
         positions = accessors.floats(attributes["POSITION"])
         if positions.shape[1] != 3:
             raise FormatError(f"POSITION has {positions.shape[1]} components (expected 3)")
@@ -148,7 +148,7 @@ def _triangles(indices: Ints, mode: int) -> Ints:
     return np.empty((0, 3), np.int64)
 
 
-def _stacked(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarray:
+def _stack(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarray:
     """Parts (V, I) under each other, filled up with zeros to the same number of influences."""
     filled = [np.pad(part, ((0, 0), (0, influences - part.shape[1]))) for part in parts]
     return np.concatenate([np.empty((0, influences), dtype), *filled])
@@ -175,7 +175,7 @@ def _targets_of_all(parts: list[tuple[Floats | None, Floats]]) -> Floats | None:
     return np.concatenate([np.zeros(moves.shape) if turns is None else turns for turns, moves in parts], axis=1)
 
 
-def _nothing(targets: int) -> Mesh:
+def _no_targets(targets: int) -> Mesh:
     none = np.empty((0, 0))
     faces = np.empty((0, 3), np.int64)
     joints, positions = none.astype(np.int64), np.empty((0, 3))

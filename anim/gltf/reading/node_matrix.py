@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import AnimError, FormatError
-from anim.gltf.document import Json, items, node_label
+from anim.gltf.document import Json, json_array, node_label
 from anim.gltf.validation import channel_targets
 from anim.maths import matrix
 
@@ -19,7 +19,7 @@ IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "s
 
 def animated_matrices(animations: Iterable[Json], nodes: list[Json]) -> list[int]:
     """Return the numbers of the nodes with a `matrix` whose translation, rotation or scale a channel animates."""
-    found = (channel_targets.of_channel(channel) for animation in animations for channel in animation["channels"])
+    found = (channel_targets.channel_target(channel) for animation in animations for channel in animation["channels"])
     numbers = {target[0] for target in found if target is not None and target[1] != "weights"}
     return sorted(n for n in numbers if n is not None and "matrix" in nodes[n])
 
@@ -31,14 +31,14 @@ def expand_matrices(json: Json) -> tuple[Json, tuple[int, ...]]:
     Raises FormatError for a matrix that no translation, rotation and scale give.
     {"matrix": [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 1, 0, 0, 1]} → {"translation": [1, 0, 0], "scale": [2, 2, 2]}
     """
-    nodes = items(json, "nodes")
-    numbers = animated_matrices(items(json, "animations"), nodes)
+    nodes = json_array(json, "nodes")
+    numbers = animated_matrices(json_array(json, "animations"), nodes)
     if not numbers:
         return json, ()
     new = list(nodes)
     for number in numbers:
         try:
-            new[number] = _expanded(nodes[number])
+            new[number] = _expand(nodes[number])
         except AnimError as error:
             raise error.at(node_label(json, number)) from None
     return {**json, "nodes": new}, tuple(numbers)
@@ -55,7 +55,7 @@ def decompose(values: list[float]) -> tuple[Floats, Floats, Floats, Floats | Non
     return translation, rotation, scale, whole[:3] if is_sheared else None
 
 
-def _expanded(node: Json) -> Json:
+def _expand(node: Json) -> Json:
     """The node with TRS where its matrix stood."""
     translation, rotation, scale, sheared = decompose(node["matrix"])
     if sheared is not None:
@@ -64,7 +64,7 @@ def _expanded(node: Json) -> Json:
             help="remove the shear where the file was made: apply the scale of the nodes above this one, then export",
         )
     rotation = -rotation if rotation[3] < 0 else rotation  # both mean the same; w ≥ 0 is what most tools write
-    pose = {key: _rounded(part) for key, part in zip(IDENTITY, (translation, rotation, scale), strict=True)}
+    pose = {key: _round_values(part) for key, part in zip(IDENTITY, (translation, rotation, scale), strict=True)}
     pose = {key: part for key, part in pose.items() if part != list(IDENTITY[key])}
     new: Json = {}
     for key, value in node.items():
@@ -72,5 +72,5 @@ def _expanded(node: Json) -> Json:
     return new
 
 
-def _rounded(part: Floats) -> list[float]:
+def _round_values(part: Floats) -> list[float]:
     return [float(f"{value:.{DIGITS}g}") + 0.0 for value in part.tolist()]

@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, ShapeError
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading import animations, instancing, node_matrix
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import Meshes
@@ -21,7 +21,7 @@ LISTED = 3  # clips that a message names
 def skeleton(document: Document) -> Skeleton:
     """Return all nodes in their rest pose; a `matrix` is taken apart, and kept whole where it is sheared."""
     _check(document)
-    nodes = items(document.json, "nodes")
+    nodes = json_array(document.json, "nodes")
     n = len(nodes)
     translation, rotation, scale = np.zeros((n, 3)), np.tile((0.0, 0.0, 0.0, 1.0), (n, 1)), np.ones((n, 3))
     sheared: dict[int, Floats] = {}
@@ -57,7 +57,7 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     accessors = accessors or Accessors(document)
     reader = animations.Reader(document, accessors)
     with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
-        return tuple(_clip(i, animation, reader) for i, animation in enumerate(items(document.json, "animations")))
+        return tuple(_clip(i, animation, reader) for i, animation in enumerate(json_array(document.json, "animations")))
 
 
 def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, Clip], list[AnimError]]:
@@ -66,7 +66,7 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
     found: dict[int, Clip] = {}
     faults: list[AnimError] = []
     with np.errstate(invalid="ignore"):
-        for i, animation in enumerate(items(document.json, "animations")):
+        for i, animation in enumerate(json_array(document.json, "animations")):
             try:
                 found[i] = _clip(i, animation, reader)
             except AnimError as error:
@@ -77,7 +77,7 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
 def names(document: Document) -> tuple[str, ...]:
     """Return the names of the animations, empty where one has none, without reading them."""
     _check(document)
-    return tuple(animation.get("name", "") for animation in items(document.json, "animations"))
+    return tuple(animation.get("name", "") for animation in json_array(document.json, "animations"))
 
 
 def scene(
@@ -94,8 +94,8 @@ def scene(
     instancing.check_not_required(document)
     accessors = accessors or Accessors(document)
     meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
-    skins = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
-    nodes = items(document.json, "nodes")
+    skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
+    nodes = json_array(document.json, "nodes")
     instances = []
     for number in depth_first(document.json):
         node = nodes[number]
@@ -110,15 +110,17 @@ def scene(
 def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
     """Return the nodes that hold a skinned mesh, each with its skin, without reading any vertex."""
     accessors = Accessors(document)
-    found = [_skin(i, skin, accessors) for i, skin in enumerate(items(document.json, "skins"))]
-    return tuple((i, found[node["skin"]]) for i, node in enumerate(items(document.json, "nodes")) if "skin" in node)
+    found = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
+    return tuple(
+        (i, found[node["skin"]]) for i, node in enumerate(json_array(document.json, "nodes")) if "skin" in node
+    )
 
 
 def depth_first(json: Json) -> Iterator[int]:
     """Yield node numbers depth-first: from the roots of the scenes, each once, then from roots in no scene."""
-    nodes = items(json, "nodes")
+    nodes = json_array(json, "nodes")
     parents = hierarchy.parents(json)
-    roots = [root for scene in items(json, "scenes") for root in scene.get("nodes", ())]
+    roots = [root for scene in json_array(json, "scenes") for root in scene.get("nodes", ())]
     roots += [i for i, parent in enumerate(parents) if parent < 0]
     seen: set[int] = set()
     stack = list(reversed(roots))
@@ -131,15 +133,15 @@ def depth_first(json: Json) -> Iterator[int]:
         stack.extend(reversed(nodes[node].get("children", ())))
 
 
-def label(name: str, number: int, what: str = "clip") -> str:
+def clip_label(name: str, number: int, what: str = "clip") -> str:
     """Return how messages call a clip (or another thing): "clip 'walk'", or "clip #3" where it has no name."""
     return f"{what} '{name}'" if name else f"{what} {clip_name(name, number)}"
 
 
-def labels(clips: Sequence[tuple[str, int]]) -> str:
+def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
     """Return how messages call several clips, by names and numbers: "clips 'walk', #3, 'run' and 4 more"."""
     if len(clips) == 1:
-        return label(*clips[0])
+        return clip_label(*clips[0])
     names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:LISTED]]
     more = f" and {len(clips) - LISTED} more" if len(clips) > LISTED else ""
     return f"clips {', '.join(names)}{more}"
@@ -165,7 +167,7 @@ def _clip(number: int, animation: Json, reader: animations.Reader) -> Clip:
         return Clip(name, tuple(track for track in tracks if track is not None))
     except AnimError as error:
         if not error.where.startswith("clip"):
-            error.at(label(name, number))
+            error.at(clip_label(name, number))
         raise
 
 

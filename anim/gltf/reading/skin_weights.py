@@ -55,10 +55,10 @@ def read_influences(accessors: Accessors, attributes: Json, vertices: int, joint
             f"vertex {int(np.argmax(outside.any(axis=1)))} uses joint {int(all_joints[outside][0])} "
             f"(the skin has {joint_count})"
         )
-    return _normalized(np.where(all_joints < joint_count, all_joints, 0), all_weights, SUM_TOLERANCE + 4 * sum(steps))
+    return _normalize(np.where(all_joints < joint_count, all_joints, 0), all_weights, SUM_TOLERANCE + 4 * sum(steps))
 
 
-def _normalized(joints: Ints, weights: Floats, tolerance: float) -> Influences:
+def _normalize(joints: Ints, weights: Floats, tolerance: float) -> Influences:
     """Weights as shares of their sum. Rows with a negative one are left for `Mesh` to refuse."""
     sums = weights.sum(axis=1)
     whole = weights.copy()

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from anim.errors import AnimError, FormatError, UnsupportedError
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 
 COMPONENT_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes by componentType
 COMPONENTS = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4)}  # (columns, rows) by type
@@ -17,13 +17,13 @@ MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 def check(json: Json) -> None:
     """Raise FormatError at the first view or accessor that leaves its bounds or is misaligned."""
-    buffers, views = items(json, "buffers"), items(json, "bufferViews")
+    buffers, views = json_array(json, "buffers"), json_array(json, "bufferViews")
     for i, view in enumerate(views):
         try:
             _check_view(view, buffers)
         except FormatError as error:
             raise error.at(f"bufferViews[{i}]", ".") from None
-    for i, accessor in enumerate(items(json, "accessors")):
+    for i, accessor in enumerate(json_array(json, "accessors")):
         try:
             _check_accessor(accessor, views)
         except AnimError as error:

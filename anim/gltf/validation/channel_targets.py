@@ -6,7 +6,7 @@ import re
 from typing import TypeAlias
 
 from anim.errors import FormatError, NotFoundError, RangeError
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 from anim.model.track import PATHS
 
 EXTENSION = "KHR_animation_pointer"
@@ -15,7 +15,7 @@ _NODE_PROPERTY = re.compile(r"/nodes/(0|[1-9][0-9]{0,8})/(translation|rotation|s
 Target: TypeAlias = tuple[int | None, str, str | None]  # node, path, pointer
 
 
-def of_channel(channel: Json) -> Target | None:
+def channel_target(channel: Json) -> Target | None:
     """Return (node, path, pointer) that a channel animates, None where glTF says to ignore it or it is not known.
 
     A pointer at a node's translation, rotation, scale or weights gives that node and path: plain channels could do it.
@@ -24,7 +24,7 @@ def of_channel(channel: Json) -> Target | None:
     target = channel["target"]
     path = target["path"]
     if path == "pointer":
-        return _pointed(target.get("extensions", {}).get(EXTENSION))
+        return _pointer_target(target.get("extensions", {}).get(EXTENSION))
     if path not in PATHS or "node" not in target:
         return None
     return target["node"], path, None
@@ -35,11 +35,11 @@ def check(json: Json) -> None:
 
     Two channels for one pointer outside the nodes stand in files of real exporters; they are read and kept as they are.
     """
-    nodes = items(json, "nodes")
-    for i, animation in enumerate(items(json, "animations")):
+    nodes = json_array(json, "nodes")
+    for i, animation in enumerate(json_array(json, "animations")):
         seen: set[tuple[int, str]] = set()
         for k, channel in enumerate(animation["channels"]):
-            found = of_channel(channel)
+            found = channel_target(channel)
             if found is None:
                 continue
             try:
@@ -50,7 +50,7 @@ def check(json: Json) -> None:
 
 def check_node(json: Json, node: int, path: str, width: int) -> None:
     """Raise NotFoundError or RangeError where no node has a `path` of `width` numbers to animate."""
-    nodes = items(json, "nodes")
+    nodes = json_array(json, "nodes")
     if node >= len(nodes):
         raise NotFoundError(f"there is no node {node} (the file has {len(nodes)}, from 0 on)")
     if path == "weights":
@@ -61,8 +61,8 @@ def check_node(json: Json, node: int, path: str, width: int) -> None:
 
 def target_count(json: Json, node: int) -> int:
     """Return how many morph targets the mesh of a node has."""
-    mesh = items(json, "nodes")[node].get("mesh")
-    primitives = items(json, "meshes")[mesh]["primitives"] if mesh is not None else []
+    mesh = json_array(json, "nodes")[node].get("mesh")
+    primitives = json_array(json, "meshes")[mesh]["primitives"] if mesh is not None else []
     return len(primitives[0].get("targets", ())) if primitives else 0
 
 
@@ -77,7 +77,7 @@ def _check(target: Target, nodes: list[Json], seen: set[tuple[int, str]]) -> Non
         raise FormatError(f"names node {node} (the file has {len(nodes)} nodes)")
 
 
-def _pointed(extension: object) -> Target | None:
+def _pointer_target(extension: object) -> Target | None:
     pointer = extension.get("pointer") if isinstance(extension, dict) else None
     if not isinstance(pointer, str):
         return None

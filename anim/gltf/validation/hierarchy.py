@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from anim.errors import FormatError
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 
 
 def parents(json: Json) -> list[int]:
     """Return each node's parent, −1 for roots. Raises FormatError for a second parent or a cycle."""
-    nodes = items(json, "nodes")
+    nodes = json_array(json, "nodes")
     parent = [-1] * len(nodes)
     for i, node in enumerate(nodes):
         for child in node.get("children", ()):
@@ -22,8 +22,8 @@ def parents(json: Json) -> list[int]:
 def check(json: Json) -> None:
     """Raise FormatError where nodes are no forest, or a skin's matrices don't fit its joints."""
     parents(json)
-    accessors = items(json, "accessors")
-    for i, skin in enumerate(items(json, "skins")):
+    accessors = json_array(json, "accessors")
+    for i, skin in enumerate(json_array(json, "skins")):
         if "inverseBindMatrices" not in skin:
             continue
         matrices = accessors[skin["inverseBindMatrices"]]

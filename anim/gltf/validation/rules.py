@@ -13,7 +13,7 @@ LARGEST = 3.4e38  # what float32 holds
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class ObjectRule:
     """What an object must look like: a check per property, what must be there, and a check of the whole."""
 
     properties: Mapping[str, Check]
@@ -33,30 +33,30 @@ class Rule:
                 try:
                     check(item)
                 except FormatError as error:
-                    raise error.at(key, _mark(error)) from None
+                    raise error.at(key, _join_path(error)) from None
         if self.whole is not None:
             self.whole(value)
 
 
-def named(key: str, rule: Check, value: Any) -> None:
+def check_property(key: str, rule: Check, value: Any) -> None:
     """Check the value of a property; errors name it."""
     try:
         rule(value)
     except FormatError as error:
-        raise error.at(key, _mark(error)) from None
+        raise error.at(key, _join_path(error)) from None
 
 
-def each(values: list[Any], rule: Check, key: str) -> None:
+def check_items(values: list[Any], rule: Check, key: str) -> None:
     """Check every value of an array; errors name its place."""
     i = 0
     try:
         for i, value in enumerate(values):  # noqa: B007 (i is read after the loop broke)
             rule(value)
     except FormatError as error:
-        raise error.at(f"{key}[{i}]", _mark(error)) from None
+        raise error.at(f"{key}[{i}]", _join_path(error)) from None
 
 
-def _mark(error: FormatError) -> str:
+def _join_path(error: FormatError) -> str:
     return "" if error.where.startswith("[") else "." if error.where else ""
 
 
@@ -65,7 +65,7 @@ def list_of(rule: Check) -> Check:
 
     def check_list(value: Any) -> None:
         of_type(value, list, "an array")
-        each(value, rule, "")
+        check_items(value, rule, "")
 
     return check_list
 
@@ -76,7 +76,7 @@ def map_of(rule: Check) -> Check:
     def check_map(value: Any) -> None:
         of_type(value, dict, "an object")
         for key, item in value.items():
-            named(key, rule, item)
+            check_property(key, rule, item)
 
     return check_map
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from anim.errors import AnimError, FormatError, UnsupportedError
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 from anim.gltf.validation import structure
 from anim.gltf.writing.references import views_of
 
@@ -32,10 +32,10 @@ class Salvage:
 
 def salvage(json: Json) -> Salvage:
     """Return the parts of the JSON that pass `structure.check`; what rests on a faulty part goes with it."""
-    left = _Left(json)
+    left = _Remaining(json)
     for _ in range(MAX_FAULTS):
         try:
-            structure.check(left.json)
+            structure.validate(left.json)
             break
         except (FormatError, UnsupportedError) as error:
             left.faults.append(error)
@@ -46,7 +46,7 @@ def salvage(json: Json) -> Salvage:
     return Salvage(left.json, tuple(left.faults), frozenset(left.clips), frozenset(left.skins))
 
 
-class _Left:
+class _Remaining:
     """What is left of a JSON, growing smaller."""
 
     def __init__(self, json: Json) -> None:
@@ -89,8 +89,8 @@ class _Left:
                     self._accessor(i)
         elif kind == "accessors":
             self.json.pop("meshes", None)
-            self.json["nodes"] = [_without(node, "mesh") for node in self.json.get("nodes", [])]
-            self.json["skins"] = [_without(skin, "inverseBindMatrices") for skin in self.json.get("skins", [])]
+            self.json["nodes"] = [_drop_items(node, "mesh") for node in self.json.get("nodes", [])]
+            self.json["skins"] = [_drop_items(skin, "inverseBindMatrices") for skin in self.json.get("skins", [])]
             for i in range(len(self.json.get("animations", []))):
                 self._animation(i, "", None)
 
@@ -143,18 +143,18 @@ class _Left:
         if type(node) is not dict:
             self._put("nodes", number, {})
         elif key:
-            self._put("nodes", number, _without(node, key))
+            self._put("nodes", number, _drop_items(node, key))
         elif "matrix" in node and node.keys() & {"translation", "rotation", "scale"}:
             self._node(number, "matrix")
         else:  # on a cycle, or under two parents: it becomes a root
-            self.json["nodes"] = [_without_child(each, number) for each in self.json["nodes"]]
+            self.json["nodes"] = [_drop_child(each, number) for each in self.json["nodes"]]
 
     def _skin(self, number: int, key: str) -> None:
         if key in ("inverseBindMatrices", "skeleton", "name"):
-            self._put("skins", number, _without(self.json["skins"][number], key))
+            self._put("skins", number, _drop_items(self.json["skins"][number], key))
             return
         self.skins.add(number)
-        if not items(self.json, "nodes"):
+        if not json_array(self.json, "nodes"):
             self.json.pop("skins")
             return
         self._put("skins", number, {"joints": [0]})
@@ -163,7 +163,7 @@ class _Left:
 
 def _objects(json: Json, kind: str) -> list[Json]:
     """The objects of an array, an empty one for what is none."""
-    return [each if type(each) is dict else {} for each in items(json, kind)]
+    return [each if type(each) is dict else {} for each in json_array(json, kind)]
 
 
 def _list(value: Json, key: str) -> list[Json]:
@@ -185,11 +185,11 @@ def _accessors_of(mesh: Json) -> Iterable[Any]:
             yield from attributes.values() if type(attributes) is dict else ()
 
 
-def _without(value: Any, key: str) -> Any:
+def _drop_items(value: Any, key: str) -> Any:
     return {k: v for k, v in value.items() if k != key} if type(value) is dict else value
 
 
-def _without_child(node: Any, child: int) -> Any:
+def _drop_child(node: Any, child: int) -> Any:
     if type(node) is not dict or child not in node.get("children", ()):
         return node
     return {**node, "children": [each for each in node["children"] if each != child]}

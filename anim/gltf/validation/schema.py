@@ -8,29 +8,40 @@ from typing import Any, TypeAlias
 from anim.errors import FormatError
 from anim.gltf.document import Json
 from anim.gltf.validation import buffer_layout
-from anim.gltf.validation.rules import Check, Rule, at_least, boolean, index, list_of, map_of, numbers, one_of, text
+from anim.gltf.validation.rules import (
+    Check,
+    ObjectRule,
+    at_least,
+    boolean,
+    index,
+    list_of,
+    map_of,
+    numbers,
+    one_of,
+    text,
+)
 
 Counts: TypeAlias = Mapping[str, int]  # how many of each kind the file has
-ANYTHING = Rule({})  # an object, whatever is in it
+ANYTHING = ObjectRule({})  # an object, whatever is in it
 
 
 def rules(counts: Counts) -> dict[str, Check]:
     """Return the check of each kind of object, by the name of its array in the file; "asset" is none."""
     return {
-        "asset": Rule({"version": _version, "minVersion": text}, ("version",)),
+        "asset": ObjectRule({"version": _version, "minVersion": text}, ("version",)),
         "accessors": _accessor(counts),
         "animations": _animation(counts),
-        "buffers": Rule({"byteLength": at_least(1), "uri": text, "extensions": ANYTHING}, ("byteLength",)),
+        "buffers": ObjectRule({"byteLength": at_least(1), "uri": text, "extensions": ANYTHING}, ("byteLength",)),
         "bufferViews": _view(counts),
-        "images": Rule({"uri": text, "bufferView": _index("bufferViews", counts)}),
+        "images": ObjectRule({"uri": text, "bufferView": _index("bufferViews", counts)}),
         "meshes": _mesh(counts),
         "nodes": _node(counts),
-        "scenes": Rule({"nodes": list_of(_index("nodes", counts))}),
+        "scenes": ObjectRule({"nodes": list_of(_index("nodes", counts))}),
         "skins": _skin(counts),
     }
 
 
-def _accessor(counts: Counts) -> Rule:
+def _accessor(counts: Counts) -> ObjectRule:
     view = _index("bufferViews", counts)
     indices: dict[str, Check] = {
         "bufferView": view,
@@ -39,8 +50,8 @@ def _accessor(counts: Counts) -> Rule:
     }
     sparse: dict[str, Check] = {
         "count": at_least(1),
-        "indices": Rule(indices, ("bufferView", "componentType")),
-        "values": Rule({"bufferView": view, "byteOffset": at_least(0)}, ("bufferView",)),
+        "indices": ObjectRule(indices, ("bufferView", "componentType")),
+        "values": ObjectRule({"bufferView": view, "byteOffset": at_least(0)}, ("bufferView",)),
     }
     properties: dict[str, Check] = {
         "bufferView": view,
@@ -49,12 +60,12 @@ def _accessor(counts: Counts) -> Rule:
         "count": at_least(1),
         "type": text,
         "normalized": boolean,
-        "sparse": Rule(sparse, ("count", "indices", "values")),
+        "sparse": ObjectRule(sparse, ("count", "indices", "values")),
     }
-    return Rule(properties, ("componentType", "count", "type"))
+    return ObjectRule(properties, ("componentType", "count", "type"))
 
 
-def _view(counts: Counts) -> Rule:
+def _view(counts: Counts) -> ObjectRule:
     properties: dict[str, Check] = {
         "buffer": _index("buffers", counts),
         "byteOffset": at_least(0),
@@ -62,19 +73,19 @@ def _view(counts: Counts) -> Rule:
         "byteStride": at_least(1),
         "extensions": ANYTHING,
     }
-    return Rule(properties, ("buffer", "byteLength"))
+    return ObjectRule(properties, ("buffer", "byteLength"))
 
 
-def _animation(counts: Counts) -> Rule:
+def _animation(counts: Counts) -> ObjectRule:
     accessor = _index("accessors", counts)
-    target = Rule({"node": _index("nodes", counts), "path": text, "extensions": ANYTHING}, ("path",))
-    channel = Rule({"sampler": at_least(0), "target": target}, ("sampler", "target"))
-    sampler = Rule({"input": accessor, "output": accessor, "interpolation": text}, ("input", "output"))
+    target = ObjectRule({"node": _index("nodes", counts), "path": text, "extensions": ANYTHING}, ("path",))
+    channel = ObjectRule({"sampler": at_least(0), "target": target}, ("sampler", "target"))
+    sampler = ObjectRule({"input": accessor, "output": accessor, "interpolation": text}, ("input", "output"))
     properties: dict[str, Check] = {"channels": list_of(channel), "samplers": list_of(sampler), "name": text}
-    return Rule(properties, ("channels", "samplers"), _check_channels)
+    return ObjectRule(properties, ("channels", "samplers"), _check_channels)
 
 
-def _mesh(counts: Counts) -> Rule:
+def _mesh(counts: Counts) -> ObjectRule:
     attributes = map_of(_index("accessors", counts))
     primitive: dict[str, Check] = {
         "attributes": attributes,
@@ -84,14 +95,14 @@ def _mesh(counts: Counts) -> Rule:
         "extensions": ANYTHING,
     }
     properties: dict[str, Check] = {
-        "primitives": list_of(Rule(primitive, ("attributes",))),
+        "primitives": list_of(ObjectRule(primitive, ("attributes",))),
         "weights": numbers(None),
         "name": text,
     }
-    return Rule(properties, ("primitives",), _check_mesh)
+    return ObjectRule(properties, ("primitives",), _check_mesh)
 
 
-def _node(counts: Counts) -> Rule:
+def _node(counts: Counts) -> ObjectRule:
     properties: dict[str, Check] = {
         "children": list_of(_index("nodes", counts)),
         "matrix": numbers(16),
@@ -104,17 +115,17 @@ def _node(counts: Counts) -> Rule:
         "name": text,
         "extensions": ANYTHING,
     }
-    return Rule(properties, whole=_check_node)
+    return ObjectRule(properties, whole=_check_node)
 
 
-def _skin(counts: Counts) -> Rule:
+def _skin(counts: Counts) -> ObjectRule:
     properties: dict[str, Check] = {
         "joints": list_of(_index("nodes", counts)),
         "inverseBindMatrices": _index("accessors", counts),
         "skeleton": _index("nodes", counts),
         "name": text,
     }
-    return Rule(properties, ("joints",), _check_skin)
+    return ObjectRule(properties, ("joints",), _check_skin)
 
 
 def _index(of: str, counts: Counts) -> Check:

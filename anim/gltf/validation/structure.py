@@ -9,7 +9,7 @@ from __future__ import annotations
 from anim.errors import FormatError
 from anim.gltf.document import Json
 from anim.gltf.validation import buffer_layout, channel_targets, hierarchy
-from anim.gltf.validation.rules import each, list_of, named, of_type, text
+from anim.gltf.validation.rules import check_items, check_property, list_of, of_type, text
 from anim.gltf.validation.schema import rules
 
 TOP_ARRAYS = frozenset(
@@ -19,7 +19,7 @@ TOP_ARRAYS = frozenset(
 )
 
 
-def check(json: Json) -> None:
+def validate(json: Json) -> None:
     """Raise FormatError, with the place as a path into the JSON, at the first thing that is not glTF 2.0."""
     for key in TOP_ARRAYS:
         of_type(json.get(key, []), list, "an array", key)
@@ -27,11 +27,11 @@ def check(json: Json) -> None:
     checks = rules(counts)
     if "asset" not in json:
         raise FormatError("has no 'asset' (every glTF names its version there)")
-    named("asset", checks.pop("asset"), json["asset"])
+    check_property("asset", checks.pop("asset"), json["asset"])
     for key in ("extensionsUsed", "extensionsRequired"):
-        named(key, list_of(text), json.get(key, []))
+        check_property(key, list_of(text), json.get(key, []))
     for key, check_one in checks.items():
-        each(json.get(key, []), check_one, key)
+        check_items(json.get(key, []), check_one, key)
     buffer_layout.check(json)
     hierarchy.check(json)
     channel_targets.check(json)

@@ -11,8 +11,8 @@ from anim.gltf import overlap
 from anim.gltf.document import Json
 from anim.gltf.io import json_text
 from anim.gltf.meshopt import codec, stream_order
-from anim.gltf.meshopt.storage import Packing
-from anim.gltf.writing.encoding import Numbers
+from anim.gltf.meshopt.storage import AccessorStorage
+from anim.gltf.writing.encoding import AccessorData
 
 TYPICAL = 10_000  # stands for an offset or a length where the price of their digits is asked
 PLAIN_VIEW = 50  # bytes of the JSON of the one plain view
@@ -57,32 +57,34 @@ class _Stream:
     members: tuple[int, ...]
 
 
-def laid_out(contents: Sequence[Numbers], packing: Packing, overhead: int) -> Layout:
+def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> Layout:
     """Return where all contents go: one plain view, and under an extension those compressed ones that pay.
 
     overhead: bytes that the first compressed view costs beside its own JSON and data.
     """
     aliases = overlap.inside(contents)
     own = [i for i in range(len(contents)) if i not in aliases]
-    streams = _paying(contents, own, packing, overhead) if packing.extension else []
+    streams = _worth_sharing(contents, own, packing, overhead) if packing.extension else []
     apart = {i for stream in streams for i in stream.members}
     rest = tuple(i for i in own if i not in apart)
     if rest:
-        data = b"".join(_padded(contents[i].data) for i in rest)
+        data = b"".join(_pad_rows(contents[i].data) for i in rest)
         streams = [_Stream(View(data, len(data)), rest), *streams]
     places: dict[int, tuple[int, int]] = {}
     for number, stream in enumerate(streams):
         at = 0
         for i in stream.members:
             places[i] = (number, at)
-            at += len(_padded(contents[i].data))
+            at += len(_pad_rows(contents[i].data))
     for i, (owner, offset) in aliases.items():
         number, at = places[owner]
         places[i] = (number, at + offset)
     return Layout(tuple(each.view for each in streams), tuple(places[i] for i in range(len(contents))))
 
 
-def _paying(contents: Sequence[Numbers], own: Sequence[int], packing: Packing, overhead: int) -> list[_Stream]:
+def _worth_sharing(
+    contents: Sequence[AccessorData], own: Sequence[int], packing: AccessorStorage, overhead: int
+) -> list[_Stream]:
     """The compressed streams with which all data and JSON take fewest bytes."""
     groups: dict[tuple[str, int], list[int]] = {}
     for i in own:
@@ -96,25 +98,27 @@ def _paying(contents: Sequence[Numbers], own: Sequence[int], packing: Packing, o
     return max(candidates, key=lambda candidate: candidate[1])[0]
 
 
-def _kind(content: Numbers) -> tuple[str, int]:
+def _kind(content: AccessorData) -> tuple[str, int]:
     """The filter, and the bytes of an element, whole fours."""
     return content.filtered.name if content.filtered else "NONE", content.element_size + -content.element_size % 4
 
 
-def _streams(contents: Sequence[Numbers], members: Sequence[int], extension: str) -> list[_Stream]:
+def _streams(contents: Sequence[AccessorData], members: Sequence[int], extension: str) -> list[_Stream]:
     """One stream of elements; or several, of whole keys, so that a weight stands above the same one of the last key."""
     name, stride = _kind(contents[members[0]])
-    one = [_encoded(contents, members, name, stride, extension)]
+    one = [_encode(contents, members, name, stride, extension)]
     by_key: dict[int, list[int]] = {}
     for i in members:
         by_key.setdefault(codec.row_size(contents[i].key_size, stride), []).append(i)
     if list(by_key) == [stride]:
         return one
-    several = [_encoded(contents, each, name, wide, extension) for wide, each in by_key.items()]
+    several = [_encode(contents, each, name, wide, extension) for wide, each in by_key.items()]
     return min(one, several, key=lambda streams: sum(_price(each.view, extension) for each in streams))
 
 
-def _encoded(contents: Sequence[Numbers], members: Sequence[int], name: str, stride: int, extension: str) -> _Stream:
+def _encode(
+    contents: Sequence[AccessorData], members: Sequence[int], name: str, stride: int, extension: str
+) -> _Stream:
     codes = [_codes(contents[i]) for i in members]
     order = stream_order.ordered(codes, stride, extension)
     data = b"".join(codes[k] for k in order)
@@ -122,8 +126,8 @@ def _encoded(contents: Sequence[Numbers], members: Sequence[int], name: str, str
     return _Stream(View(stored, len(data), stride, name), tuple(members[k] for k in order))
 
 
-def _codes(content: Numbers) -> bytes:
-    return content.filtered.codes if content.filtered else _padded(content.data)
+def _codes(content: AccessorData) -> bytes:
+    return content.filtered.codes if content.filtered else _pad_rows(content.data)
 
 
 def _price(view: View, extension: str) -> int:
@@ -136,7 +140,7 @@ def _size(data: bytes) -> int:
     return len(data) + -len(data) % 4
 
 
-def _padded(data: bytes) -> bytes:
+def _pad_rows(data: bytes) -> bytes:
     return data + bytes(-len(data) % 4)
 
 

@@ -49,7 +49,7 @@ def aligned(ranges: Iterable[Range]) -> list[Range]:
     return [(start, end) for start, end in inward if start < end]
 
 
-class Shift:
+class OffsetMap:
     """Where bytes go when `dropped` ranges are taken out of a buffer."""
 
     def __init__(self, dropped: list[Range]) -> None:

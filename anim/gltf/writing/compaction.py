@@ -6,24 +6,24 @@ from collections.abc import Iterator, Set
 
 import numpy as np
 
-from anim.gltf.document import Buffer, Bytes, Document, Json, items
+from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing import byte_ranges
-from anim.gltf.writing.byte_ranges import Range, Shift
+from anim.gltf.writing.byte_ranges import OffsetMap, Range
 from anim.gltf.writing.references import References, views_of
 
 
 def unused_views(document: Document, freed: Set[int], outside: References) -> set[int]:
     """Return the views that only the accessors in `freed` lie in."""
-    accessors = items(document.json, "accessors")
+    accessors = json_array(document.json, "accessors")
     theirs = {view for number in freed for view in views_of(accessors[number])}
     others = {view for i, accessor in enumerate(accessors) if i not in freed for view in views_of(accessor)}
     return theirs - others - outside.views
 
 
-def shifts(
+def offset_maps(
     document: Document, freed: Set[int], unused: Set[int], outside: References, movable: Set[int]
-) -> list[Shift]:
+) -> list[OffsetMap]:
     """Return, for each buffer, where its bytes go when freed accessors and unused views are dropped.
 
     A view that freed accessors share with others loses their bytes too, unless someone refers to the view itself.
@@ -32,19 +32,19 @@ def shifts(
     dropped: list[list[Range]] = [[] for _ in document.buffers]
     needed: list[list[Range]] = [[] for _ in document.buffers]
     spans = _spans(document.json, freed)
-    for number, view in enumerate(items(document.json, "bufferViews")):
-        for buffer, place in places(view):
+    for number, view in enumerate(json_array(document.json, "bufferViews")):
+        for buffer, place in referenced_ranges(view):
             if number in unused:
                 dropped[buffer] += [] if is_placeholder(view) else [place]
                 continue
             shared = [] if number in outside.views or buffer_layout.compression(view) else spans.get(number, [])
-            theirs = [_moved(span, place[0]) for i, span in shared if i in freed]
-            kept = [_moved(span, place[0]) for i, span in shared if i not in freed]
+            theirs = [_relocate(span, place[0]) for i, span in shared if i in freed]
+            kept = [_relocate(span, place[0]) for i, span in shared if i not in freed]
             free = byte_ranges.difference(theirs, kept)
             dropped[buffer] += free
             needed[buffer] += byte_ranges.difference([place], free)
     return [
-        Shift(_droppable(d, n, b.byte_length) if i in movable else [])
+        OffsetMap(_droppable(d, n, b.byte_length) if i in movable else [])
         for i, (d, n, b) in enumerate(zip(dropped, needed, document.buffers, strict=True))
     ]
 
@@ -54,28 +54,28 @@ def is_placeholder(view: Json) -> bool:
     return view.keys() == {"buffer", "byteLength"} and view["byteLength"] == 1
 
 
-def moved_view(view: Json, shift: list[Shift]) -> Json:
+def relocate_view(view: Json, shift: list[OffsetMap]) -> Json:
     """Return a view with its range, and that of its compressed data, where the bytes are now."""
-    moved = _relocated(view, shift[view["buffer"]])
+    moved = _relocate_offsets(view, shift[view["buffer"]])
     compressed = buffer_layout.compression(view)
     if compressed is not None:
-        here = _relocated(compressed, shift[compressed["buffer"]])
+        here = _relocate_offsets(compressed, shift[compressed["buffer"]])
         extensions = {n: here if e is compressed else e for n, e in view["extensions"].items()}
         moved = {**moved, "extensions": extensions}
     return moved
 
 
-def moved_accessor(accessor: Json, views: list[Json], shift: list[Shift]) -> Json:
+def relocate_accessor(accessor: Json, views: list[Json], shift: list[OffsetMap]) -> Json:
     """Return an accessor with its offsets into its views where the bytes are now. views: as they were."""
-    moved = _moved_offset(accessor, views, shift)
+    moved = _relocate_offset(accessor, views, shift)
     if "sparse" in accessor:
-        parts = {part: _moved_offset(accessor["sparse"][part], views, shift) for part in ("indices", "values")}
+        parts = {part: _relocate_offset(accessor["sparse"][part], views, shift) for part in ("indices", "values")}
         if any(parts[part] is not accessor["sparse"][part] for part in parts):
             moved = {**moved, "sparse": {**accessor["sparse"], **parts}}
     return moved
 
 
-def rebuilt(buffer: Buffer, shift: Shift, appended: list[Bytes], where: str) -> Buffer:
+def rebuild_buffer(buffer: Buffer, shift: OffsetMap, appended: list[Bytes], where: str) -> Buffer:
     """Return the buffer without dropped bytes and with `appended` ones, which start on a multiple of four.
 
     One without data gets shorter only.
@@ -95,7 +95,7 @@ def rebuilt(buffer: Buffer, shift: Shift, appended: list[Bytes], where: str) -> 
     return Buffer(total, buffer.uri, load, where=where, replaced=True)
 
 
-def places(view: Json) -> Iterator[tuple[int, Range]]:
+def referenced_ranges(view: Json) -> Iterator[tuple[int, Range]]:
     """Yield (buffer, range) of a view's bytes: decoded, and compressed where it is."""
     yield view["buffer"], _span(view, view["byteLength"])
     compressed = buffer_layout.compression(view)
@@ -105,7 +105,7 @@ def places(view: Json) -> Iterator[tuple[int, Range]]:
 
 def _spans(json: Json, freed: Set[int]) -> dict[int, list[tuple[int, Range]]]:
     """For each view that a freed accessor lies in: (accessor, range) of everything in it, from the view's start."""
-    accessors, views = items(json, "accessors"), items(json, "bufferViews")
+    accessors, views = json_array(json, "accessors"), json_array(json, "bufferViews")
     wanted = {view for number in freed for view in views_of(accessors[number])}
     spans: dict[int, list[tuple[int, Range]]] = {view: [] for view in wanted}
     for i, accessor in enumerate(accessors):
@@ -135,7 +135,7 @@ def _span(place: Json, length: int) -> Range:
     return start, start + length
 
 
-def _moved(span: Range, by: int) -> Range:
+def _relocate(span: Range, by: int) -> Range:
     return span[0] + by, span[1] + by
 
 
@@ -150,7 +150,7 @@ def _droppable(dropped: list[Range], needed: list[Range], length: int) -> list[R
     return byte_ranges.aligned(byte_ranges.union([*free, *padding]))
 
 
-def _relocated(place: Json, shift: Shift) -> Json:
+def _relocate_offsets(place: Json, shift: OffsetMap) -> Json:
     start, end = _span(place, place["byteLength"])
     new_start, new_end = shift(start), shift(end)
     if (new_start, new_end) == (start, end):
@@ -161,7 +161,7 @@ def _relocated(place: Json, shift: Shift) -> Json:
     return moved
 
 
-def _moved_offset(place: Json, views: list[Json], shift: list[Shift]) -> Json:
+def _relocate_offset(place: Json, views: list[Json], shift: list[OffsetMap]) -> Json:
     if "bufferView" not in place:
         return place
     view = views[place["bufferView"]]

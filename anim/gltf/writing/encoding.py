@@ -12,7 +12,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError, ShapeError
 from anim.gltf.document import Json
 from anim.gltf.meshopt import storage
-from anim.gltf.meshopt.storage import Filtered
+from anim.gltf.meshopt.storage import FilteredValues
 from anim.gltf.reading.accessors import DTYPES, FLOAT, denormalized
 from anim.gltf.validation.buffer_layout import COMPONENTS
 from anim.model import AccessorFormat, Interpolation, Track
@@ -26,7 +26,7 @@ DECODED = {
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
+class AccessorData:
     """The content of one accessor: stored bytes and what they are. Equal ones can share an accessor.
 
     filtered: the same as one of meshopt's filters takes it. key_size: bytes of a key, many elements for weights.
@@ -37,7 +37,7 @@ class Numbers:
     element: str
     normalized: bool = False
     bounds: tuple[float, float] | None = None
-    filtered: Filtered | None = field(default=None, compare=False)
+    filtered: FilteredValues | None = field(default=None, compare=False)
     key_size: int = field(default=4, compare=False)
 
     @property
@@ -61,7 +61,7 @@ class Numbers:
         return about
 
 
-def times(track: Track) -> Numbers:
+def times(track: Track) -> AccessorData:
     """Return the key times as float32, with bounds that are exact in float32 and short as text.
 
     Raises RangeError where rounding to float32 makes two keys one.
@@ -70,10 +70,10 @@ def times(track: Track) -> Numbers:
     if len(stored) > 1 and not (np.diff(stored) > 0).all():
         k = int(np.argmax(np.diff(stored) <= 0))
         raise RangeError(f"keys {k} and {k + 1} fall together in float32 (both at {stored[k]} s)")
-    return Numbers(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
+    return AccessorData(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
 
 
-def values(track: Track, filtered: Filtered | None = None) -> Numbers:
+def values(track: Track, filtered: FilteredValues | None = None) -> AccessorData:
     """Return the values, with tangents for CUBICSPLINE as glTF orders them: in, value, out per key.
 
     Integers, as the track's storage asks for, only where they give every value back; float32 otherwise.
@@ -85,15 +85,15 @@ def values(track: Track, filtered: Filtered | None = None) -> Numbers:
         rows = np.stack((track.in_tangents, rows, track.out_tangents), axis=1)
     element = ELEMENTS.get(track.path) or track.storage.element or BY_WIDTH.get(rows.shape[-1], "SCALAR")
     storage = track.storage if filtered is None else DECODED[filtered.name]
-    stored = _stored(rows, storage)
+    stored = _quantize(rows, storage)
     integers = stored.dtype.kind != "f"
     kind, normalized = (storage.component_type, storage.normalized) if integers else (FLOAT, False)
     key_size = stored.itemsize * rows.shape[-1]
-    data = stored.tobytes() if filtered is None else _as_decoded(stored, element, filtered)
-    return Numbers(data, kind, element, normalized, filtered=filtered, key_size=key_size)
+    data = stored.tobytes() if filtered is None else _as_client_decodes(stored, element, filtered)
+    return AccessorData(data, kind, element, normalized, filtered=filtered, key_size=key_size)
 
 
-def _stored(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
+def _quantize(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
     if storage.component_type != FLOAT:
         integers = _integers(rows, np.dtype(DTYPES[storage.component_type]), storage.normalized)
         if integers is not None:
@@ -105,9 +105,9 @@ def _stored(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
     return stored
 
 
-def _as_decoded(stored: NDArray[Any], element: str, filtered: Filtered) -> bytes:
+def _as_client_decodes(stored: NDArray[Any], element: str, filtered: FilteredValues) -> bytes:
     """The bytes that the codes decode to, which differ from `stored` in nothing but the sign of zeros."""
-    decoded = storage.decoded_bytes(filtered)
+    decoded = storage.decompressed_bytes(filtered)
     same = stored.nbytes == len(decoded) and np.array_equal(np.frombuffer(decoded, stored.dtype), stored.ravel())
     if not same or (filtered.name == "QUATERNION") is not (element == "VEC4" and stored.dtype.kind == "i"):
         raise ShapeError(f"values are not what their {filtered.name} codes decode to")

@@ -7,7 +7,7 @@ from collections.abc import Sequence, Set
 from anim.gltf.document import Json
 
 
-class Slots:
+class IndexAllocator:
     """Numbers for new objects in a list: freed ones first, then beyond its end.
 
     named: for each new object, how often its number will be written: the shortest numbers go to those named most.

@@ -4,47 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.meshopt import fallback_buffer
-from anim.gltf.meshopt.storage import PLAIN, Packing
+from anim.gltf.meshopt.storage import UNCOMPRESSED, AccessorStorage
 from anim.gltf.writing import buffer_views, compaction, references
-from anim.gltf.writing.buffers import stored
-from anim.gltf.writing.encoding import Numbers
-from anim.gltf.writing.index_allocator import Slots
+from anim.gltf.writing.buffers import rebuild_buffers
+from anim.gltf.writing.encoding import AccessorData
+from anim.gltf.writing.index_allocator import IndexAllocator
 
 # What stands where a number is left over; on the next write it is free again.
 EMPTY_ACCESSOR: Json = {"componentType": 5121, "count": 1, "type": "SCALAR"}
 
 
-class Place(int):
+class PendingIndex(int):
     """A place among the new contents, where the number of an accessor will stand."""
 
 
-def assemble(
+def insert_accessors(
     document: Document,
     animations: Sequence[Json],
     replaced: Set[int],
-    contents: Sequence[Numbers],
-    packing: Packing = PLAIN,
+    contents: Sequence[AccessorData],
+    packing: AccessorStorage = UNCOMPRESSED,
 ) -> Document:
     """Return the document with these animations, whose samplers name `contents` by Place, else accessors as before.
 
     replaced: numbers of the animations of `document` that are no longer there as they were.
     """
-    outside = references.outside(document.json, replaced)
-    old_views = items(document.json, "bufferViews")
+    outside = references.references_outside(document.json, replaced)
+    old_views = json_array(document.json, "bufferViews")
     freed = _accessors_of(document.json, replaced) | placeholders(document.json)
-    freed = freed - outside.accessors - _still_named(animations)
+    freed = freed - outside.accessors - _is_referenced(animations)
     unused = compaction.unused_views(document, freed, outside) | empty_views(document.json, outside)
-    layout = buffer_views.laid_out(contents, packing, fallback_buffer.overhead(document.json, packing.extension))
-    store = stored(document, freed, unused, outside, layout.views, packing.extension)
+    layout = buffer_views.lay_out_views(contents, packing, fallback_buffer.overhead(document.json, packing.extension))
+    store = rebuild_buffers(document, freed, unused, outside, layout.views, packing.extension)
 
-    view_slots = Slots(len(old_views), unused, [0] * len(store.views))
-    views = [compaction.moved_view(view, store.shift) for view in old_views]
+    view_slots = IndexAllocator(len(old_views), unused, [0] * len(store.views))
+    views = [compaction.relocate_view(view, store.shift) for view in old_views]
     view_slots.fill(views, store.views, {"buffer": store.target, "byteLength": 1})
-    accessor_slots = Slots(len(items(document.json, "accessors")), freed, _naming(animations, len(contents)))
+    accessor_slots = IndexAllocator(
+        len(json_array(document.json, "accessors")), freed, _name_key(animations, len(contents))
+    )
     accessors = [
-        compaction.moved_accessor(about, old_views, store.shift) for about in items(document.json, "accessors")
+        compaction.relocate_accessor(about, old_views, store.shift) for about in json_array(document.json, "accessors")
     ]
     new = [
         each.accessor(view_slots.numbers[view], offset)
@@ -53,7 +55,7 @@ def assemble(
     accessor_slots.fill(accessors, new, EMPTY_ACCESSOR)
 
     json = dict(document.json)
-    _set_list(json, "animations", [_numbered(animation, accessor_slots.numbers) for animation in animations])
+    _set_list(json, "animations", [_number_views(animation, accessor_slots.numbers) for animation in animations])
     _set_list(json, "accessors", accessors)
     _set_list(json, "bufferViews", views)
     _set_list(json, "buffers", store.described)
@@ -62,41 +64,43 @@ def assemble(
 
 
 def _accessors_of(json: Json, animations: Set[int]) -> set[int]:
-    found = items(json, "animations")
+    found = json_array(json, "animations")
     return {sampler[key] for i in animations for sampler in found[i]["samplers"] for key in ("input", "output")}
 
 
 def placeholders(json: Json) -> set[int]:
     """Return the accessors that only hold a number."""
-    return {i for i, accessor in enumerate(items(json, "accessors")) if accessor == EMPTY_ACCESSOR}
+    return {i for i, accessor in enumerate(json_array(json, "accessors")) if accessor == EMPTY_ACCESSOR}
 
 
 def empty_views(json: Json, outside: references.References) -> set[int]:
     """Return the views that only hold a number: of one byte, which nobody names."""
-    named = {view for accessor in items(json, "accessors") for view in references.views_of(accessor)} | outside.views
-    views = enumerate(items(json, "bufferViews"))
+    named = {
+        view for accessor in json_array(json, "accessors") for view in references.views_of(accessor)
+    } | outside.views
+    views = enumerate(json_array(json, "bufferViews"))
     return {i for i, view in views if compaction.is_placeholder(view) and i not in named}
 
 
-def _naming(animations: Sequence[Json], contents: int) -> list[int]:
+def _name_key(animations: Sequence[Json], contents: int) -> list[int]:
     """How often each of the new contents is named by a sampler."""
     named = [0] * contents
     for animation in animations:
         for sampler in animation["samplers"]:
             for key in ("input", "output"):
-                if isinstance(sampler[key], Place):
+                if isinstance(sampler[key], PendingIndex):
                     named[sampler[key]] += 1
     return named
 
 
-def _still_named(animations: Sequence[Json]) -> set[int]:
+def _is_referenced(animations: Sequence[Json]) -> set[int]:
     numbers = (sampler[key] for a in animations for sampler in a["samplers"] for key in ("input", "output"))
-    return {number for number in numbers if not isinstance(number, Place)}
+    return {number for number in numbers if not isinstance(number, PendingIndex)}
 
 
-def _numbered(animation: Json, numbers: list[int]) -> Json:
+def _number_views(animation: Json, numbers: list[int]) -> Json:
     samplers = [
-        {key: numbers[value] if isinstance(value, Place) else value for key, value in sampler.items()}
+        {key: numbers[value] if isinstance(value, PendingIndex) else value for key, value in sampler.items()}
         for sampler in animation["samplers"]
     ]
     return {**animation, "samplers": samplers}

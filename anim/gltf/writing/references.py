@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from anim.gltf.document import Json, items
+from anim.gltf.document import Json, json_array
 
 # Extensions known to hold no number of an accessor or view, other than those collected below. Numbers inside any
 # other extension are taken for both: whatever they might name stays where it is. Extras are the application's own:
@@ -32,7 +32,7 @@ class References:
     views: frozenset[int]
 
 
-def outside(json: Json, replaced: Iterable[int]) -> References:
+def references_outside(json: Json, replaced: Iterable[int]) -> References:
     """Return what everything but the samplers of the animations `replaced` refers to.
 
     Accessors in the result stay with number and bytes. Views in it are named by someone who is not an accessor;
@@ -40,16 +40,16 @@ def outside(json: Json, replaced: Iterable[int]) -> References:
     """
     skipped = set(replaced)
     accessors = set(_of_meshes(json)) | set(_of_skins(json)) | set(_of_instancing(json))
-    for i, animation in enumerate(items(json, "animations")):
+    for i, animation in enumerate(json_array(json, "animations")):
         for sampler in animation["samplers"] if i not in skipped else ():
             accessors |= {sampler["input"], sampler["output"]}
-    views = {image["bufferView"] for image in items(json, "images") if "bufferView" in image}
+    views = {image["bufferView"] for image in json_array(json, "images") if "bufferView" in image}
     views |= set(_of_draco(json))
-    unknown = unknown_numbers(json)
+    unknown = unknown_indices(json)
     return References(frozenset(accessors | unknown), frozenset(views | unknown))
 
 
-def unknown_numbers(json: Json) -> set[int]:
+def unknown_indices(json: Json) -> set[int]:
     """Return all whole numbers in unknown extensions: any of them might name an accessor or a view."""
     return {number for _, part in unknown_extensions(json) for number in _whole_numbers(part)}
 
@@ -65,10 +65,12 @@ def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
 
     As JSON pointers: ["/nodes/3/extensions/ACME_path"].
     """
-    accessors, samplers = items(json, "accessors"), items(json, "animations")
+    accessors, samplers = json_array(json, "accessors"), json_array(json, "animations")
     keys = {s[k] for i in animations for s in samplers[i]["samplers"] for k in ("input", "output")}
     named = keys | {view for number in keys for view in views_of(accessors[number])}
-    buffers = {items(json, "bufferViews")[view]["buffer"] for number in keys for view in views_of(accessors[number])}
+    buffers = {
+        json_array(json, "bufferViews")[view]["buffer"] for number in keys for view in views_of(accessors[number])
+    }
     return [
         place
         for place, part in unknown_extensions(json)
@@ -86,7 +88,7 @@ def views_of(accessor: Json) -> list[int]:
 
 
 def _primitives(json: Json) -> Iterator[Json]:
-    for mesh in items(json, "meshes"):
+    for mesh in json_array(json, "meshes"):
         yield from mesh["primitives"]
 
 
@@ -100,11 +102,11 @@ def _of_meshes(json: Json) -> Iterator[int]:
 
 
 def _of_skins(json: Json) -> Iterator[int]:
-    return (skin["inverseBindMatrices"] for skin in items(json, "skins") if "inverseBindMatrices" in skin)
+    return (skin["inverseBindMatrices"] for skin in json_array(json, "skins") if "inverseBindMatrices" in skin)
 
 
 def _of_instancing(json: Json) -> Iterator[int]:
-    for node in items(json, "nodes"):
+    for node in json_array(json, "nodes"):
         instancing = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
         yield from _whole_numbers(instancing)
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Set
 from typing import Any, TypeAlias
 
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.writing import references
 from anim.gltf.writing.insertion import empty_views, placeholders
 
-Numbers: TypeAlias = list[int]  # by old number, the new one
+IndexMaps: TypeAlias = list[int]  # by old number, the new one
 
 DRACO = "KHR_draco_mesh_compression"
 INSTANCING = "EXT_mesh_gpu_instancing"
 
 
-def compacted(document: Document) -> Document:
+def drop_placeholders(document: Document) -> Document:
     """Return the document without the placeholders that writing clips leaves in the middle of accessors and views.
 
     Meshes, skins, animations, images, sparse accessors, EXT_mesh_gpu_instancing and KHR_draco_mesh_compression follow.
@@ -23,17 +23,17 @@ def compacted(document: Document) -> Document:
     the document itself comes back where there is nothing to do.
     """
     json = document.json
-    named, unknown = references.outside(json, ()), references.unknown_numbers(json)
+    named, unknown = references.references_outside(json, ()), references.unknown_indices(json)
     holes = placeholders(json) - named.accessors
     views = empty_views(json, named)
-    accessor_count, view_count = len(items(json, "accessors")), len(items(json, "bufferViews"))
+    accessor_count, view_count = len(json_array(json, "accessors")), len(json_array(json, "bufferViews"))
     holes = holes if _is_safe(holes, unknown, accessor_count) else set()
     views = views if _is_safe(views, unknown, view_count) else set()
     if not holes and not views:
         return document
-    closed = _closed(json, _numbers(holes, accessor_count), _numbers(views, view_count))
+    closed = _close_over(json, _index_maps(holes, accessor_count), _index_maps(views, view_count))
     for key, gone in (("accessors", holes), ("bufferViews", views)):
-        left = [each for i, each in enumerate(items(closed, key)) if i not in gone]
+        left = [each for i, each in enumerate(json_array(closed, key)) if i not in gone]
         if left:
             closed[key] = left
         else:
@@ -46,7 +46,7 @@ def _is_safe(gone: Set[int], unknown: Set[int], count: int) -> bool:
     return not gone or not any(min(gone) <= number < count for number in unknown)
 
 
-def _numbers(gone: Set[int], count: int) -> Numbers:
+def _index_maps(gone: Set[int], count: int) -> IndexMaps:
     numbers, new = [], 0
     for i in range(count):
         numbers.append(new)
@@ -54,15 +54,15 @@ def _numbers(gone: Set[int], count: int) -> Numbers:
     return numbers
 
 
-def _closed(json: Json, accessors: Numbers, views: Numbers) -> Json:
+def _close_over(json: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
     """The JSON with every reference to the new numbers."""
     closed = dict(json)
     change: dict[str, Callable[[Json], Json]] = {
         "meshes": lambda mesh: _mesh(mesh, accessors, views),
-        "skins": lambda skin: _with(skin, "inverseBindMatrices", accessors),
+        "skins": lambda skin: _replace_references(skin, "inverseBindMatrices", accessors),
         "animations": lambda animation: _animation(animation, accessors),
         "nodes": lambda node: _node(node, accessors),
-        "images": lambda image: _with(image, "bufferView", views),
+        "images": lambda image: _replace_references(image, "bufferView", views),
         "accessors": lambda accessor: _accessor(accessor, views),
     }
     for key, renumbered in change.items():
@@ -71,39 +71,45 @@ def _closed(json: Json, accessors: Numbers, views: Numbers) -> Json:
     return closed
 
 
-def _with(about: Json, key: str, numbers: Numbers) -> Json:
+def _replace_references(about: Json, key: str, numbers: IndexMaps) -> Json:
     return {**about, key: _new(about[key], numbers)} if key in about else about
 
 
-def _mesh(mesh: Json, accessors: Numbers, views: Numbers) -> Json:
+def _mesh(mesh: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
     return {**mesh, "primitives": [_primitive(each, accessors, views) for each in mesh["primitives"]]}
 
 
-def _primitive(primitive: Json, accessors: Numbers, views: Numbers) -> Json:
-    new = {**_with(primitive, "indices", accessors), "attributes": _map(primitive["attributes"], accessors)}
+def _primitive(primitive: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
+    new = {
+        **_replace_references(primitive, "indices", accessors),
+        "attributes": _map(primitive["attributes"], accessors),
+    }
     if "targets" in primitive:
         new["targets"] = [_map(target, accessors) for target in primitive["targets"]]
     draco = primitive.get("extensions", {}).get(DRACO)
     if isinstance(draco, dict):
-        new["extensions"] = {**primitive["extensions"], DRACO: _with(draco, "bufferView", views)}
+        new["extensions"] = {**primitive["extensions"], DRACO: _replace_references(draco, "bufferView", views)}
     return new
 
 
-def _map(attributes: Json, accessors: Numbers) -> Json:
+def _map(attributes: Json, accessors: IndexMaps) -> Json:
     return {name: _new(number, accessors) for name, number in attributes.items()}
 
 
-def _new(number: Any, numbers: Numbers) -> Any:
+def _new(number: Any, numbers: IndexMaps) -> Any:
     """The new number; what names nothing stays, since extensions are not checked when a file is read."""
     return numbers[number] if type(number) is int and 0 <= number < len(numbers) else number
 
 
-def _animation(animation: Json, accessors: Numbers) -> Json:
-    samplers = [_with(_with(each, "input", accessors), "output", accessors) for each in animation["samplers"]]
+def _animation(animation: Json, accessors: IndexMaps) -> Json:
+    samplers = [
+        _replace_references(_replace_references(each, "input", accessors), "output", accessors)
+        for each in animation["samplers"]
+    ]
     return {**animation, "samplers": samplers}
 
 
-def _node(node: Json, accessors: Numbers) -> Json:
+def _node(node: Json, accessors: IndexMaps) -> Json:
     instancing = node.get("extensions", {}).get(INSTANCING)
     if not isinstance(instancing, dict) or not isinstance(instancing.get("attributes"), dict):
         return node
@@ -111,9 +117,11 @@ def _node(node: Json, accessors: Numbers) -> Json:
     return {**node, "extensions": {**node["extensions"], INSTANCING: new}}
 
 
-def _accessor(accessor: Json, views: Numbers) -> Json:
-    new = _with(accessor, "bufferView", views)
+def _accessor(accessor: Json, views: IndexMaps) -> Json:
+    new = _replace_references(accessor, "bufferView", views)
     if "sparse" in accessor:
-        parts = {part: _with(accessor["sparse"][part], "bufferView", views) for part in ("indices", "values")}
+        parts = {
+            part: _replace_references(accessor["sparse"][part], "bufferView", views) for part in ("indices", "values")
+        }
         new = {**new, "sparse": {**accessor["sparse"], **parts}}
     return new

@@ -12,20 +12,22 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
-from anim.gltf.document import Document, Json, items
-from anim.gltf.meshopt.storage import PLAIN, Filtered, Packing
+from anim.gltf.document import Document, Json, json_array
+from anim.gltf.meshopt.storage import UNCOMPRESSED, AccessorStorage, FilteredValues
 from anim.gltf.reading import reader
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import channel_targets
 from anim.gltf.writing import encoding
-from anim.gltf.writing.encoding import Numbers
-from anim.gltf.writing.insertion import Place, assemble
+from anim.gltf.writing.encoding import AccessorData
+from anim.gltf.writing.insertion import PendingIndex, insert_accessors
 from anim.model import Clip, Interpolation, Track
 
 _SAMPLER_KEYS = ("input", "output", "interpolation")
 
 
-def replace_clips(document: Document, clips: Mapping[int, Clip], *, packing: Packing = PLAIN) -> Document:
+def replace_clips(
+    document: Document, clips: Mapping[int, Clip], *, packing: AccessorStorage = UNCOMPRESSED
+) -> Document:
     """Return the document with the animations numbered in `clips` replaced; all others stay as they are.
 
     Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
@@ -38,7 +40,7 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, packing: Pac
     """
     if not clips:
         return document
-    count = len(items(document.json, "animations"))
+    count = len(json_array(document.json, "animations"))
     for number in clips:
         if not isinstance(number, int):
             raise ShapeError(
@@ -50,22 +52,22 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, packing: Pac
     pool = _Pool(packing.filtered)
     animations = [
         _named_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
-        for i, animation in enumerate(items(document.json, "animations"))
+        for i, animation in enumerate(json_array(document.json, "animations"))
     ]
-    written = assemble(document, animations, set(clips), pool.numbers, packing)
+    written = insert_accessors(document, animations, set(clips), pool.numbers, packing)
     return replace(written, json=expand_matrices(written.json)[0])
 
 
 class _Pool:
     """Contents of new accessors, each kept once; numbers are given out later, so samplers hold places in here."""
 
-    def __init__(self, filtered: Mapping[int, Filtered]) -> None:
-        self.numbers: list[Numbers] = []
+    def __init__(self, filtered: Mapping[int, FilteredValues]) -> None:
+        self.numbers: list[AccessorData] = []
         self._filtered = filtered
-        self._places: dict[Numbers, int] = {}
+        self._places: dict[AccessorData, int] = {}
         self._axes: dict[int, int] = {}
 
-    def _place(self, numbers: Numbers) -> int:
+    def _place(self, numbers: AccessorData) -> int:
         place = self._places.get(numbers)
         if place is None:
             place = self._places[numbers] = len(self.numbers)
@@ -92,7 +94,7 @@ def _named_animation(json: Json, animation: Json, clip: Clip, number: int, pool:
             _check_target(json, track)
         return _animation(animation, clip, pool)
     except AnimError as error:
-        raise error.at(reader.label(clip.name, number)) from None
+        raise error.at(reader.clip_label(clip.name, number)) from None
 
 
 def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
@@ -102,7 +104,7 @@ def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
     samplers = _Samplers(animation, pool)
     channels = []
     for channel in animation["channels"]:
-        target = channel_targets.of_channel(channel)
+        target = channel_targets.channel_target(channel)
         if target is None:
             channels.append({**channel, "sampler": samplers.kept(channel["sampler"])})
             continue
@@ -140,7 +142,7 @@ class _Samplers:
         except AnimError as error:
             raise error.at(_label(track)) from None
         own = {} if old is None else {k: v for k, v in self._old[old].items() if k not in _SAMPLER_KEYS}
-        sampler: Json = {"input": Place(times), "output": Place(values), **own}
+        sampler: Json = {"input": PendingIndex(times), "output": PendingIndex(values), **own}
         if track.interpolation is not Interpolation.LINEAR:
             sampler["interpolation"] = str(track.interpolation)
         return self._number((times, values, track.interpolation, old if own else None), sampler)

@@ -16,20 +16,20 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.compare import name_matching
-from anim.measure.error.point_groups import Carried
+from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
 from anim.model import MeshInstance, Scene, Skin
 from anim.sampling import rest_pose as rest
 from anim.sampling.pose import local_by_node
 
-AGREE = 0.01  # of a mesh's size: vertices that are farther apart than this are not the same ones
+SAME_SPACE_TOLERANCE = 0.01  # of a mesh's size: vertices that are farther apart than this are not the same ones
 SINGULAR = 1e-12  # determinants below this, relative to the cube of the size, have no inverse
 SAME_SPACE = 1e-3  # relative; joints whose matrices differ by more have another bind pose, not another mesh space
 NOWHERE = np.eye(4)[:3]
 
 
 @dataclass(frozen=True, slots=True)
-class Pairs:
+class Correspondence:
     """Two scenes as one.
 
     nodes: (N,) for each node of the first scene its number in the second, −1 where it has none.
@@ -38,31 +38,31 @@ class Pairs:
     """
 
     nodes: Ints
-    surfaces: Sequence[tuple[Surface, Carried | None]]
+    surfaces: Sequence[tuple[Surface, Binding | None]]
     by_vertex: bool = True
 
 
-def paired(scene: Scene, other: Scene, surfaces: list[Surface]) -> Pairs:
+def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
     """Return which nodes of two scenes are the same, and what carries the `surfaces` of the first in the second.
 
     What hangs on a node that the second scene doesn't have is carried by the next node above that it has, as it is
     placed there at rest: if the first scene's clip moves it, that shows as an error.
     """
     if other is scene:
-        return Pairs(np.arange(len(scene.skeleton)), [(surface, None) for surface in surfaces])
-    pairing = _Pairing(scene, other, name_matching.nodes(scene, other))
+        return Correspondence(np.arange(len(scene.skeleton)), [(surface, None) for surface in surfaces])
+    pairing = _SceneMatcher(scene, other, name_matching.match_nodes(scene, other))
     instances = [instance for instance in scene.instances if len(instance.mesh.positions)]
     if not instances:
-        return Pairs(pairing.nodes, [(surface, pairing.by_nodes(surface)) for surface in surfaces])
+        return Correspondence(pairing.nodes, [(surface, pairing.by_nodes(surface)) for surface in surfaces])
     partners = [pairing.partner(k, instance) for k, instance in enumerate(instances)]
     found = [
         (surface, pairing.carried(surface, instance, partner))
         for surface, instance, partner in zip(surfaces, instances, partners, strict=True)
     ]
-    return Pairs(pairing.nodes, found, all(partner is not None for partner in partners))
+    return Correspondence(pairing.nodes, found, all(partner is not None for partner in partners))
 
 
-class _Pairing:
+class _SceneMatcher:
     """Two scenes and their nodes, while what carries what is looked for."""
 
     def __init__(self, scene: Scene, other: Scene, nodes: Ints) -> None:
@@ -70,7 +70,7 @@ class _Pairing:
         self._new = [instance for instance in other.instances if len(instance.mesh.positions)]
         self._on_node = {instance.node: instance for instance in self._new}
         old = [instance.mesh.name for instance in scene.instances if len(instance.mesh.positions)]
-        self._named = name_matching.by_name(old, [instance.mesh.name for instance in self._new]).tolist()
+        self._named = name_matching.match_by_name(old, [instance.mesh.name for instance in self._new]).tolist()
         rest_pose = rest(scene.skeleton)
         self._local = local_by_node(scene.skeleton, rest_pose)[:, 0]
 
@@ -81,7 +81,7 @@ class _Pairing:
         choices.append(self._new[number] if len(self._new) == len(self._named) else None)
         return next((each for each in choices if each is not None and _agree(instance, each)), None)
 
-    def carried(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Carried:
+    def carried(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         """What carries an instance's surface in the other scene."""
         if instance.skin is None:
             found = self._rigid(surface, instance, partner)
@@ -92,14 +92,14 @@ class _Pairing:
             return replace(found, owner=int(self.nodes[instance.node]))
         return replace(found, owner=morphing.node, rest_weights=morphing.weights)
 
-    def by_nodes(self, surface: Surface) -> Carried:
+    def by_nodes(self, surface: Surface) -> Binding:
         """What carries a surface where nothing but the nodes is known."""
         places = [self._place(int(node)) for node in surface.nodes]
         joints = np.array([node for node, _ in places], np.int64)
         bind = np.array([matrix.multiply(local, bind) for (_, local), bind in zip(places, surface.bind, strict=True)])
-        return Carried(joints, bind.reshape(-1, 3, 4), -1, surface.rest_weights)
+        return Binding(joints, bind.reshape(-1, 3, 4), -1, surface.rest_weights)
 
-    def _rigid(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Carried:
+    def _rigid(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         node = int(self.nodes[instance.node])
         there = partner or self._on_node.get(node)
         if there is None or there.skin is not None:
@@ -108,9 +108,9 @@ class _Pairing:
         space = _space(points, others) if partner is not None else _space_of_boxes(points, others)
         if space is None:  # merged with others: only what it hangs on can tell
             return self._above(surface)
-        return Carried(np.array([there.node]), space[None], -1, surface.rest_weights)
+        return Binding(np.array([there.node]), space[None], -1, surface.rest_weights)
 
-    def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Carried:
+    def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         """What carries a skinned surface: joints of the skin that has most of them, the others by their nodes."""
         plain = self.by_nodes(surface)
         skins = {id(each.skin): each.skin for each in self._new if each.skin is not None}
@@ -128,19 +128,19 @@ class _Pairing:
         bind[found] = new.inverse_bind[joints[found]]
         if space is not NOWHERE:
             bind[found] = matrix.multiply(bind[found], space)
-        return Carried(nodes, bind, -1, surface.rest_weights)
+        return Binding(nodes, bind, -1, surface.rest_weights)
 
     def _joints(self, old: Skin, new: Skin) -> Ints:
         """For each joint of a skin (J,) its place in another skin's list, −1 where it isn't there."""
         place = {node: i for i, node in enumerate(new.joints.tolist())}
         return np.array([place.get(node, -1) for node in self.nodes[old.joints].tolist()], np.int64)
 
-    def _above(self, surface: Surface) -> Carried:
+    def _above(self, surface: Surface) -> Binding:
         """What carries a surface of one node if that node's own partner doesn't count."""
         node = int(surface.nodes[0])
         parent, local = self._place(int(self._scene.skeleton.parents[node]))
         bind = matrix.multiply(matrix.multiply(local, self._local[node]), surface.bind)
-        return Carried(np.array([parent]), bind, -1, surface.rest_weights)
+        return Binding(np.array([parent]), bind, -1, surface.rest_weights)
 
     def _place(self, node: int) -> tuple[int, Floats]:
         """The other scene's node that stands for a node, −1 for the world, and where this one is on it at rest."""
@@ -165,7 +165,7 @@ def _agree(old: MeshInstance, new: MeshInstance) -> bool:
         return False
     space = _space(a, b)
     rest = np.linalg.norm(matrix.apply(space, a) - b, axis=1).max()
-    return bool(rest <= AGREE * np.linalg.norm(np.ptp(b, axis=0)) and space[0, 0] > 0)
+    return bool(rest <= SAME_SPACE_TOLERANCE * np.linalg.norm(np.ptp(b, axis=0)) and space[0, 0] > 0)
 
 
 def _space(a: Floats, b: Floats) -> Floats:
@@ -182,7 +182,7 @@ def _space_of_boxes(a: Floats, b: Floats) -> Floats | None:
     """b_from_a (3, 4) by the boxes around points a and b, in any order and number; None where their shapes differ."""
     sizes = [np.ptp(each, axis=0) for each in (a, b)]
     middles = [(each.max(axis=0) + each.min(axis=0)) / 2 for each in (a, b)]
-    limit = AGREE * float(np.linalg.norm(sizes[1]))
+    limit = SAME_SPACE_TOLERANCE * float(np.linalg.norm(sizes[1]))
     if max(np.abs(sizes[0] - sizes[1]).max(), np.abs(middles[0] - middles[1]).max()) <= limit:
         return NOWHERE
     longest = int(sizes[0].argmax())

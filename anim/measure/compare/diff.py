@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Ints
 from anim.measure.compare import name_matching
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import FPS, MotionError, Ruler, dense_times
+from anim.measure.error.metric import FPS, ErrorMetric, MotionError, dense_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair
@@ -58,7 +58,7 @@ class Diff:
 
 
 def diff(
-    ruler: Ruler,
+    ruler: ErrorMetric,
     old: Sequence[Clip],
     new: Sequence[Clip],
     *,
@@ -73,11 +73,11 @@ def diff(
     fps: frames per second of the grid that is looked at beside the keys of both.
     Clips are matched by name, then by their order where one has no name or none is in both files.
     """
-    partners = name_matching.by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
+    partners = name_matching.match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     wanted = range(len(old)) if chosen is None else chosen
     prover = Prover(ruler)
     found = [
-        _compared(prover, (i, old[i]), (int(partners[i]), new[partners[i]]), player=player, fps=fps)
+        _compare_clips(prover, (i, old[i]), (int(partners[i]), new[partners[i]]), player=player, fps=fps)
         for i in wanted
         if partners[i] >= 0
     ]
@@ -95,7 +95,9 @@ def diff(
     )
 
 
-def _compared(prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, player: str, fps: float) -> ClipDiff:
+def _compare_clips(
+    prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, player: str, fps: float
+) -> ClipDiff:
     before, after, ruler = old[1], new[1], prover.ruler
     times = dense_times(before, after, fps=fps)
     look = ruler.look(before, after, times, player=player)
@@ -111,7 +113,7 @@ def _compared(prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, p
     return ClipDiff(old[0], new[0], *names, error, bound, found, before.end, after.end, missing, added)
 
 
-def _targets(ruler: Ruler, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:
+def _targets(ruler: ErrorMetric, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:
     """What each track moves: comparable between both scenes, and as people call it."""
     scene = ruler.scene if is_old else ruler.other
     for track in clip.tracks:

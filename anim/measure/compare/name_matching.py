@@ -11,7 +11,7 @@ from anim.arrays import Ints
 from anim.model import Scene, Skeleton
 
 
-def by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
+def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
     """Return for each name of `old` (N,) the number of the same name in `new`, −1 where there is none.
 
     Of names that come several times the first belongs to the first, the second to the second. Empty ones match nothing.
@@ -24,14 +24,14 @@ def by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
     return np.array([waiting[name].pop(0) if waiting.get(name) else -1 for name in old], np.int64)
 
 
-def by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
+def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
     """Return for each name of `old` (N,) its number in `new`, −1 where it has none: by name, then in order.
 
     By order only where one of both has no name, or where no name is in both: two that are called differently beside
     others that are found are two different things.
     by_name_then_order(["walk", ""], ["run", "walk"]) → 1, 0
     """
-    found = by_name(old, new)
+    found = match_by_name(old, new)
     left = [i for i in range(len(new)) if i not in set(found.tolist())]
     nothing_found = not (found >= 0).any()
     for i, name in enumerate(old):
@@ -40,7 +40,7 @@ def by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
     return found
 
 
-def nodes(old: Scene, new: Scene) -> Ints:
+def match_nodes(old: Scene, new: Scene) -> Ints:
     """Return for each node of `old` (N,) its number in `new`, −1 where it has none.
 
     By name; then joints by their order in skins that are of one size; then by order among the children of one parent,
@@ -55,7 +55,7 @@ class _Nodes:
     def __init__(self, old: Skeleton, new: Skeleton) -> None:
         self._old, self._new = old, new
         self._children = _children(old), _children(new)
-        self.found = by_name(old.names, new.names)
+        self.found = match_by_name(old.names, new.names)
         self._taken = set(self.found[self.found >= 0].tolist())
         self._renamed = not self._taken
 

@@ -18,7 +18,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.measure.continuity import knots
-from anim.measure.continuity.knots import FLOAT32, PAIR, Joints, lengths
+from anim.measure.continuity.knots import FLOAT32, PAIR, Knots, lengths
 from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
 
 SAME = 1e-3  # of the track's RMS speed or acceleration, or rad between two directions; jumps below are none
@@ -27,7 +27,7 @@ FRACTIONS = {5120: 1 / 127, 5121: 1 / 255, 5122: 1 / 32767, 5123: 1 / 65535}  # 
 UNITS = {"translation": "m", "rotation": "rad"}
 
 
-class Grade(StrEnum):
+class ContinuityClass(StrEnum):
     """How smooth a track is at a key, the roughest first."""
 
     JUMP = "jump"
@@ -45,14 +45,14 @@ class KeyJumps:
     """
 
     times: Floats
-    grades: tuple[Grade, ...]
+    grades: tuple[ContinuityClass, ...]
     value: Floats
     speed: Floats
     acceleration: Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Largest:
+class MaxJump:
     """The largest jump of one kind, and where it is."""
 
     size: float
@@ -60,10 +60,10 @@ class Largest:
 
 
 @dataclass(frozen=True, slots=True)
-class Seam:
+class LoopGap:
     """From the last key of the clip to its first: `jump` where the track does not close, or steps."""
 
-    grade: Grade
+    grade: ContinuityClass
     value_jump: float
     speed_jump: float
     acceleration_jump: float
@@ -88,10 +88,10 @@ class TrackContinuity:
     g1: int
     c1: int
     c2: int
-    largest_value_jump: Largest | None
-    largest_speed_jump: Largest | None
-    largest_acceleration_jump: Largest | None
-    seam: Seam | None
+    largest_value_jump: MaxJump | None
+    largest_speed_jump: MaxJump | None
+    largest_acceleration_jump: MaxJump | None
+    seam: LoopGap | None
     keys: KeyJumps = field(repr=False)
 
 
@@ -108,7 +108,7 @@ def at_keys(track: Track) -> KeyJumps:
     return _Analysis(track).at_keys()
 
 
-def seam(track: Track, *, start: float, end: float) -> Seam:
+def loop_gap(track: Track, *, start: float, end: float) -> LoopGap:
     """Return what jumps where a clip from `start` to `end`, in seconds, is played again from its start."""
     return _Analysis(track).seam(start, end)
 
@@ -116,7 +116,7 @@ def seam(track: Track, *, start: float, end: float) -> Seam:
 def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
     analysis = _Analysis(track)
     keys = analysis.at_keys()
-    count = {grade: keys.grades.count(grade) for grade in Grade}
+    count = {grade: keys.grades.count(grade) for grade in ContinuityClass}
     target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
     return TrackContinuity(
         target=target or "",
@@ -125,26 +125,26 @@ def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
         unit="rad" if track.kind is ValueKind.ROTATION else UNITS.get(track.path, "1"),
         still=analysis.still,
         interior_keys=len(keys.times),
-        jumps=count[Grade.JUMP],
-        c0=count[Grade.C0],
-        g1=count[Grade.G1],
-        c1=count[Grade.C1],
-        c2=count[Grade.C2],
-        largest_value_jump=_largest(keys, keys.value, {Grade.JUMP}),
-        largest_speed_jump=_largest(keys, keys.speed, {Grade.JUMP, Grade.C0, Grade.G1}),
-        largest_acceleration_jump=_largest(keys, keys.acceleration, set(Grade) - {Grade.C2}),
+        jumps=count[ContinuityClass.JUMP],
+        c0=count[ContinuityClass.C0],
+        g1=count[ContinuityClass.G1],
+        c1=count[ContinuityClass.C1],
+        c2=count[ContinuityClass.C2],
+        largest_value_jump=_max_jump(keys, keys.value, {ContinuityClass.JUMP}),
+        largest_speed_jump=_max_jump(keys, keys.speed, {ContinuityClass.JUMP, ContinuityClass.C0, ContinuityClass.G1}),
+        largest_acceleration_jump=_max_jump(keys, keys.acceleration, set(ContinuityClass) - {ContinuityClass.C2}),
         seam=None if analysis.still else analysis.seam(clip.start, clip.end),
         keys=keys,
     )
 
 
-def _largest(keys: KeyJumps, sizes: Floats, among: set[Grade]) -> Largest | None:
+def _max_jump(keys: KeyJumps, sizes: Floats, among: set[ContinuityClass]) -> MaxJump | None:
     """The largest of the jumps that count: those at keys of these grades."""
     counted = np.where([grade in among for grade in keys.grades], sizes, 0.0)
     if not counted.any():
         return None
     at = int(counted.argmax())
-    return Largest(float(counted[at]), float(keys.times[at]))
+    return MaxJump(float(counted[at]), float(keys.times[at]))
 
 
 class _Analysis:
@@ -163,17 +163,17 @@ class _Analysis:
         """The jumps at the interior keys; two keys that stand for a jump are one, at the time of the second."""
         if self.still:
             none = np.zeros(max(len(self.track.times) - 2, 0))
-            return KeyJumps(self.track.times[1:-1], (Grade.C2,) * len(none), none, none, none)
-        return self._graded(knots.interior(self.track), 0.0)
+            return KeyJumps(self.track.times[1:-1], (ContinuityClass.C2,) * len(none), none, none, none)
+        return self._graded(knots.interior_knots(self.track), 0.0)
 
-    def seam(self, start: float, end: float) -> Seam:
+    def seam(self, start: float, end: float) -> LoopGap:
         """The joint of the clip's end and its start; of a STEP track's two the one that jumps further."""
-        found = self._graded(knots.around(self.track, start=start, end=end), CLOSED * self._range())
+        found = self._graded(knots.loop_knot(self.track, start=start, end=end), CLOSED * self._range())
         worst = int(found.value.argmax())
         sizes = (float(each[worst]) for each in (found.value, found.speed, found.acceleration))
-        return Seam(found.grades[worst], *sizes)
+        return LoopGap(found.grades[worst], *sizes)
 
-    def _graded(self, at: Joints, allowed: float) -> KeyJumps:
+    def _graded(self, at: Knots, allowed: float) -> KeyJumps:
         """The jumps at joints with their grades; values may differ by `allowed` and rounding."""
         speed = lengths(at.rates[1] - at.rates[0])
         acceleration = lengths(at.accelerations[1] - at.accelerations[0])
@@ -182,14 +182,14 @@ class _Analysis:
         else:
             value = lengths(at.values[1] - at.values[0])
         allowed_speed = SAME * self._speed + self._speed_noise(at)
-        grades = np.full(len(value), str(Grade.C2), dtype="U4")
-        grades[acceleration > SAME * self._acceleration + self._acceleration_noise(at)] = Grade.C1
-        grades[speed > allowed_speed] = Grade.C0
-        grades[(speed > allowed_speed) & self._goes_on(at, allowed_speed)] = Grade.G1
-        grades[value > allowed + self._value_noise(at)] = Grade.JUMP
-        return KeyJumps(at.times, tuple(Grade(str(each)) for each in grades), value, speed, acceleration)
+        grades = np.full(len(value), str(ContinuityClass.C2), dtype="U4")
+        grades[acceleration > SAME * self._acceleration + self._acceleration_noise(at)] = ContinuityClass.C1
+        grades[speed > allowed_speed] = ContinuityClass.C0
+        grades[(speed > allowed_speed) & self._goes_on(at, allowed_speed)] = ContinuityClass.G1
+        grades[value > allowed + self._value_noise(at)] = ContinuityClass.JUMP
+        return KeyJumps(at.times, tuple(ContinuityClass(str(each)) for each in grades), value, speed, acceleration)
 
-    def _goes_on(self, at: Joints, allowed_speed: Floats) -> Bools:
+    def _goes_on(self, at: Knots, allowed_speed: Floats) -> Bools:
         """Where the track moves on both sides, in one direction; weights and scalars have speeds but no direction."""
         if self.track.path == "weights" or self.track.values.shape[1] == 1:
             return np.zeros(len(at.times), np.bool_)
@@ -201,12 +201,12 @@ class _Analysis:
         )
         return np.asarray(moving & (lengths(other - one) <= SAME))
 
-    def _value_noise(self, at: Joints) -> Floats:
+    def _value_noise(self, at: Knots) -> Floats:
         """What a value may differ by on both sides of a pair of keys without a jump: rounding, and motion between."""
         going = np.maximum(*(lengths(rates) for rates in at.rates))
         return np.asarray(8 * FLOAT32 * self._size + 2 * (PAIR + 2 * self._late) * going)
 
-    def _speed_noise(self, at: Joints) -> Floats:
+    def _speed_noise(self, at: Knots) -> Floats:
         """How far stored values and times leave the speeds open: chords of LINEAR; tangents are stored themselves."""
         noise = np.zeros(len(at.times))
         for rates, h in zip(at.rates, at.durations, strict=True):
@@ -216,7 +216,7 @@ class _Analysis:
                 noise += (4 * self._step + 2 * self._late * going) / h
         return noise
 
-    def _acceleration_noise(self, at: Joints) -> Floats:
+    def _acceleration_noise(self, at: Knots) -> Floats:
         """How far stored values, tangents and times leave the accelerations of cubics open."""
         noise = np.zeros(len(at.times))
         if self.track.interpolation is not Interpolation.CUBICSPLINE:

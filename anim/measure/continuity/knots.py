@@ -19,7 +19,7 @@ GAUSS_WEIGHTS = (5 / 18, 8 / 18, 5 / 18)
 
 
 @dataclass(frozen=True, slots=True)
-class Joints:
+class Knots:
     """J places where one piece of a track ends and the next begins.
 
     times: (J,) s, of the later key where two stand for a jump. Pairs are before and after: values (J, C), rates and
@@ -33,7 +33,7 @@ class Joints:
     durations: tuple[Floats, Floats]
 
 
-def interior(track: Track) -> Joints:
+def interior_knots(track: Track) -> Knots:
     """Return the joints at the interior keys of a track. At a jump at an end both sides move as the inner one does."""
     keys, steps = track.times, np.append(np.diff(track.times), np.inf)
     borders = np.concatenate(([-1], _pieces(track), [len(keys) - 1]))
@@ -43,7 +43,7 @@ def interior(track: Track) -> Joints:
     left = first - 1
     at_start, at_end = left < 0, last == len(keys) - 1
     stepped = track.interpolation is Interpolation.STEP
-    return Joints(
+    return Knots(
         keys[last],
         (track.values[np.maximum(left, 0) if stepped else first], track.values[last]),
         _one_sided(
@@ -62,7 +62,7 @@ def interior(track: Track) -> Joints:
     )
 
 
-def around(track: Track, *, start: float, end: float) -> Joints:
+def loop_knot(track: Track, *, start: float, end: float) -> Knots:
     """Return the joint of a clip's end and its start, in seconds; outside its keys the track stands still.
 
     Of a STEP track two: a loop shows the value before the last key until the end, a player that stops shows the last.
@@ -72,7 +72,7 @@ def around(track: Track, *, start: float, end: float) -> Joints:
     if track.interpolation is Interpolation.STEP:
         shown = np.array([end - PAIR - 2 * FLOAT32 * end, end])
         ends, starts = np.array([end, end]), np.array([start, start])
-    return Joints(
+    return Knots(
         ends,
         (sample(track, shown), sample(track, starts)),
         (derivatives.rates(track, ends, before=True), derivatives.rates(track, starts, before=False)),

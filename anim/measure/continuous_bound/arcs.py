@@ -20,18 +20,18 @@ def is_divided(player: str) -> bool:
     return PLAYERS[player].normalizes and player != GLTF
 
 
-def _by_arcs(a: Floats, b: Floats) -> tuple[Floats, Bools]:
+def _slerp_arcs(a: Floats, b: Floats) -> tuple[Floats, Bools]:
     minus, plus = b - a, b + a
     theta = 2 * np.arctan2(np.sqrt((minus * minus).sum(axis=0)), np.sqrt((plus * plus).sum(axis=0)))
     return theta, np.zeros(theta.shape, np.bool_)
 
 
-def _by_chords(a: Floats, b: Floats) -> tuple[Floats, Bools]:
+def _nlerp_chords(a: Floats, b: Floats) -> tuple[Floats, Bools]:
     del b
     return np.zeros(a.shape[1:]), np.ones(a.shape[1:], np.bool_)
 
 
-def _by_both(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
+def _both_arcs(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
     """Shoemake's angle of keys of any length, 0 where they are nearer than `short`, and where they are but differ."""
     dot = (a * b).sum(axis=0)
     equal = (a == b).all(axis=0)
@@ -40,20 +40,20 @@ def _by_both(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
 
 
 def _as_three(a: Floats, b: Floats) -> tuple[Floats, Bools]:
-    return _by_both(a, b, SHORT_OF_THREE)
+    return _both_arcs(a, b, SHORT_OF_THREE)
 
 
 def _as_stored(a: Floats, b: Floats) -> tuple[Floats, Bools]:
-    theta, line = _by_both(a, b, SHORT_OF_RAW)
+    theta, line = _both_arcs(a, b, SHORT_OF_RAW)
     return theta, np.zeros(line.shape, np.bool_)
 
 
 # By players' names: for keys a and b (4, ...) on one side, normalized for GLTF, the angle θ (...) in radians, 0 for a
 # line, of (sin((1 − u)θ)·a + sin(uθ)·b) / sin θ, and whether that is divided by its length. Players that do so stand
 # together, so that others need not be looked at for that.
-LAWS: dict[str, Callable[[Floats, Floats], tuple[Floats, Bools]]] = {
-    "spec": _by_arcs,
+ARCS: dict[str, Callable[[Floats, Floats], tuple[Floats, Bools]]] = {
+    "spec": _slerp_arcs,
     "raw": _as_stored,
     "three": _as_three,
-    "nlerp": _by_chords,
+    "nlerp": _nlerp_chords,
 }

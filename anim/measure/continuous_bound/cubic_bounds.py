@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.measure.continuous_bound.quaternion_bounds import LEAST, Flight, directed, mix, nearest
+from anim.measure.continuous_bound.quaternion_bounds import LEAST, QuaternionBounds, arc_mix, directed, nearest
 
 
-def with_cubics(found: Flight, value: Floats, cubic: Floats, is_cubic: Bools, h: Floats) -> Flight:
+def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic: Bools, h: Floats) -> QuaternionBounds:
     """Return the figures with those of cubics in their places.
 
     value, cubic: (2, 4, P, G, U) the mixes at both ends, and (2, 2, 4, P, G, U) their first and second derivatives.
@@ -19,14 +19,14 @@ def with_cubics(found: Flight, value: Floats, cubic: Floats, is_cubic: Bools, h:
     own, most_own, own_rate = np.zeros_like(found.value), np.zeros_like(found.size), np.zeros_like(found.size)
     whole = replace(found, own=own, most_own=most_own, own_rate=own_rate)
     part = on_cubics(value[..., is_cubic], cubic[0][..., is_cubic], cubic[1][..., is_cubic], h)
-    for name in Flight.__slots__:
+    for name in QuaternionBounds.__slots__:
         getattr(whole, name)[..., is_cubic] = getattr(part, name)
     return whole
 
 
-def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Flight:
+def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> QuaternionBounds:
     """Return the figures of cubics with values, slopes and second derivatives (2, 4, P, G, U) at both ends."""
-    of = mix(value, slope)
+    of = arc_mix(value, slope)
     push = np.sqrt((bend * bend).sum(axis=1).max(axis=0))  # no |c″| is larger
     jerk = np.sqrt(((bend[1] - bend[0]) ** 2).sum(axis=0)) / h  # |c‴|, constant
     rate = np.sqrt(of.rate.max(axis=0)) + h * h / 8 * jerk
@@ -42,7 +42,7 @@ def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Flight:
     drag_rate = speed**2 + most_drag**2 + push / least
     size, excess = np.ones_like(speed), np.zeros((3, *speed.shape))
     figures = (size, speed, pull, speed**2, pull_rate, drag, most_drag, drag_rate, excess)
-    return Flight(direction, tilt, *figures, own, most_own, own_rate)
+    return QuaternionBounds(direction, tilt, *figures, own, most_own, own_rate)
 
 
 def _least(value: Floats, h: Floats) -> Floats:

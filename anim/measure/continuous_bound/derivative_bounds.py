@@ -14,7 +14,7 @@ import numpy as np
 from anim.arrays import Floats
 
 
-def majorant(first: Floats, apart: Floats) -> Floats:
+def derivative_bound(first: Floats, apart: Floats) -> Floats:
     """Return the majorant (3, 2, ...) of what is bounded by `first` (3, ...), with another at most `apart` from it."""
     return np.stack((first, first + apart), axis=1)
 

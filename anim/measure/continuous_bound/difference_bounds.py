@@ -14,12 +14,14 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.measure.continuous_bound.quaternion_bounds import Flight, Line
+from anim.measure.continuous_bound.quaternion_bounds import ChordBounds, QuaternionBounds
 
 LEAST = 1e-3  # where less than this of sup|d″| is left on one side, nothing is said
 
 
-def drift(a: Flight, b: Flight, between: tuple[Line, Line, Bools], h: Floats) -> Floats:
+def difference_bounds(
+    a: QuaternionBounds, b: QuaternionBounds, between: tuple[ChordBounds, ChordBounds, Bools], h: Floats
+) -> Floats:
     """Return bounds (3, P, G, U) of |d| and its first two derivatives, for b's quaternions less a's.
 
     between: both as lines, and where (P, G, U) both are lines that are divided by their length. h: (G, 1) s.
@@ -35,7 +37,7 @@ def drift(a: Flight, b: Flight, between: tuple[Line, Line, Bools], h: Floats) ->
     return np.stack((start + h * h / 8 * bend, rate + h / 2 * bend, bend))
 
 
-def _between_lines(a: Line, b: Line, h: Floats) -> tuple[Floats, Floats]:
+def _between_lines(a: ChordBounds, b: ChordBounds, h: Floats) -> tuple[Floats, Floats]:
     """Bounds of |Δλ| and |Δρ| on lines that are divided by their length.
 
     There λ = wedge / |c|⁴ and ρ = c·c′ / |c|²: of a constant, a square of time and a line, and so are differences.
@@ -47,7 +49,7 @@ def _between_lines(a: Line, b: Line, h: Floats) -> tuple[Floats, Floats]:
     return pull, _apart(a.along, b.along) / b.nearest + np.abs(a.along).max(axis=0) * square / both
 
 
-def _own(a: Flight, b: Flight, h: Floats) -> Floats | float:
+def _own(a: QuaternionBounds, b: QuaternionBounds, h: Floats) -> Floats | float:
     if a.own is None and b.own is None:
         return 0.0
     square = _squares(np.zeros_like(a.value) if b.own is None else b.own, 0.0 if a.own is None else a.own)

@@ -9,14 +9,14 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import hermite
-from anim.measure.continuous_bound.derivative_bounds import majorant
-from anim.measure.continuous_bound.intervals import Gaps, Placed
+from anim.measure.continuous_bound.derivative_bounds import derivative_bound
+from anim.measure.continuous_bound.intervals import IntervalKeys, Intervals
 from anim.model import Interpolation
 from anim.sampling.batch import Batch
 
 
 @dataclass(frozen=True, slots=True)
-class Ends:
+class Endpoints:
     """What U vectors of C components do at both ends (2) of G gaps: value, slope per s, bend per s², each
     (2, C, G, U). Within a gap the third derivative is constant: it is a line or a cubic."""
 
@@ -25,13 +25,13 @@ class Ends:
     bend: Floats
 
 
-def ends(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Gaps) -> Ends:
+def endpoints(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals) -> Endpoints:
     """Return what vectors do that are at `rest` (U, C) where no track moves them.
 
     place: for numbers of nodes which of the vectors each is.
     """
     shape = (2, rest.shape[1], len(where), len(rest))
-    found = Ends(np.broadcast_to(rest.T[:, None], shape).copy(), np.zeros(shape), np.zeros(shape))
+    found = Endpoints(np.broadcast_to(rest.T[:, None], shape).copy(), np.zeros(shape), np.zeros(shape))
     for batch in tracks:
         columns = [place[track.node] for track in batch.tracks if track.node is not None]
         for whole, part in zip((found.value, found.slope, found.bend), of_batch(batch, where), strict=True):
@@ -39,7 +39,7 @@ def ends(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where:
     return found
 
 
-def of_batch(batch: Batch, where: Gaps) -> tuple[Floats, Floats, Floats]:
+def of_batch(batch: Batch, where: Intervals) -> tuple[Floats, Floats, Floats]:
     """Return values, slopes and bends (2, C, G, U) of the U tracks of a batch, rotations as they are mixed."""
     at = where.on(batch.times)
     start, end = (np.moveaxis(batch.values[k], -1, 0) for k in (at.left, at.right))  # (C, G, U)
@@ -54,7 +54,7 @@ def of_batch(batch: Batch, where: Gaps) -> tuple[Floats, Floats, Floats]:
     return start + shares * (end - start), slope, np.zeros_like(slope)
 
 
-def swings(of: Ends, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
+def vector_bounds(of: Endpoints, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
     """Return bounds (3, ...) of the sizes of a vector and its first two derivatives in every gap.
 
     lengths: (G,) s. size: of vectors (C, G, U); convex, as norms are.
@@ -66,13 +66,15 @@ def swings(of: Ends, lengths: Floats, size: Callable[[Floats], Floats]) -> Float
     return np.stack((np.maximum(*map(size, of.value)) + h * h / 8 * bend, slope, bend))
 
 
-def slides(first: Ends, second: Ends, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
+def slide_bounds(first: Endpoints, second: Endpoints, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
     """Return the majorant (3, 2, ...) of a vector in two versions. lengths, size: as of `swings`."""
-    apart = Ends(second.value - first.value, second.slope - first.slope, second.bend - first.bend)
-    return majorant(swings(first, lengths, size), swings(apart, lengths, size))
+    apart = Endpoints(second.value - first.value, second.slope - first.slope, second.bend - first.bend)
+    return derivative_bound(vector_bounds(first, lengths, size), vector_bounds(apart, lengths, size))
 
 
-def _cubic(tangents: tuple[Floats, Floats], at: Placed, start: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:
+def _cubic(
+    tangents: tuple[Floats, Floats], at: IntervalKeys, start: Floats, end: Floats
+) -> tuple[Floats, Floats, Floats]:
     arriving, leaving = tangents
     duration = at.duration[:, None]
     out, into = np.moveaxis(leaving[at.left], -1, 0), np.moveaxis(arriving[at.right], -1, 0)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.point_groups import Carried, Measured, Part
-from anim.measure.error.shell_points import Shells
+from anim.measure.error.point_groups import Binding, PointGroups, SkinnedGroups
+from anim.measure.error.shell_points import ShellPoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Morphing:
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class InfluenceRadius:
     """What J joints carry of one surface.
 
     nodes: (J,). arms: (J,) m, no point that a joint carries is farther from it, in its own space; of a morphed surface
@@ -42,13 +42,13 @@ class Reach:
     morphing: Morphing | None = None
 
 
-def reach(part: Measured) -> Reach | None:
+def influence_radius(part: PointGroups) -> InfluenceRadius | None:
     """Return what carries a surface, None where other nodes do so in the second version."""
-    if isinstance(part, Shells):
+    if isinstance(part, ShellPoints):
         arms = np.sqrt((part.points * part.points).sum(axis=-1)).max(axis=-1, initial=0.0)
         same = np.array_equal(part.nodes, part.partners)
-        return Reach(part.nodes, arms, np.zeros_like(arms), np.ones_like(arms), part.reach) if same else None
-    if not isinstance(part, Part) or not np.array_equal(part.old.nodes[part.used], part.new.nodes[part.used]):
+        return InfluenceRadius(part.nodes, arms, np.zeros_like(arms), np.ones_like(arms), part.reach) if same else None
+    if not isinstance(part, SkinnedGroups) or not np.array_equal(part.old.nodes[part.used], part.new.nodes[part.used]):
         return None
     if (part.old.nodes[part.used] < 0).any():
         return None
@@ -56,14 +56,14 @@ def reach(part: Measured) -> Reach | None:
     arms = _arms(part, surface.points, part.old.bind, 1.0)
     apart = _arms(part, surface.points, part.new.bind - part.old.bind, 1.0)
     morphing = _morphing(part, part.old, part.new) if len(surface.targets) else None
-    return Reach(nodes, arms, apart, np.full(len(nodes), part.share), part.reach, morphing)
+    return InfluenceRadius(nodes, arms, apart, np.full(len(nodes), part.share), part.reach, morphing)
 
 
-def joined(reaches: Sequence[Reach]) -> Reach:
+def join_reaches(reaches: Sequence[InfluenceRadius]) -> InfluenceRadius:
     """Return several surfaces that are not morphed as one, their groups in order."""
     firsts = np.cumsum([0, *(len(each.nodes) for each in reaches)])
     groups = [joints + first for each, first in zip(reaches, firsts[:-1], strict=True) for joints in each.groups]
-    return Reach(
+    return InfluenceRadius(
         np.concatenate([each.nodes for each in reaches]),
         np.concatenate([each.arms for each in reaches]),
         np.concatenate([each.apart for each in reaches]),
@@ -72,12 +72,12 @@ def joined(reaches: Sequence[Reach]) -> Reach:
     )
 
 
-def _morphing(part: Part, old: Carried, new: Carried) -> Morphing:
+def _morphing(part: SkinnedGroups, old: Binding, new: Binding) -> Morphing:
     targets = np.array([_arms(part, target, old.bind, 0.0) for target in part.surface.targets])
     return Morphing((old.owner, new.owner), np.array([old.rest_weights, new.rest_weights]), targets.T)
 
 
-def _arms(part: Part, points: Floats, bind: Floats, one: float) -> Floats:
+def _arms(part: SkinnedGroups, points: Floats, bind: Floats, one: float) -> Floats:
     """The longest of the vectors (V, 3) that each used joint carries (J,), in the joint's space by `bind` (J, 3, 4).
 
     one: 1 for points, 0 for what has no place.

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.influence_radius import Reach
-from anim.measure.continuous_bound.intervals import gaps
-from anim.measure.continuous_bound.node_bounds import in_world
-from anim.measure.continuous_bound.second_derivative import bending
-from anim.measure.continuous_bound.track_partition import sides
+from anim.measure.continuous_bound.influence_radius import InfluenceRadius
+from anim.measure.continuous_bound.intervals import merge_intervals
+from anim.measure.continuous_bound.node_bounds import world_bounds
+from anim.measure.continuous_bound.second_derivative import second_derivative_bound
+from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.model import Clip, Scene
 
 
 @dataclass(frozen=True, slots=True)
-class Rises:
+class IntervalRise:
     """Of C groups, between each of F times and the next (C, F − 1), in m; inf where nothing is known.
 
     rise: by how much displacements can exceed the larger one of both ends. jump: by how much the displacement just
@@ -28,25 +28,25 @@ class Rises:
     jump: Floats
 
 
-def rises(
+def interval_rise(
     scenes: tuple[Scene, Scene],
     clips: tuple[Clip, Clip],
     times: Floats,
-    reaches: Sequence[Reach],
+    reaches: Sequence[InfluenceRadius],
     players: Sequence[str],
-) -> Rises:
+) -> IntervalRise:
     """Return how far the displacement of one clip from the other can rise between `times` (F,) in s, two or more.
 
     times: increasing, with all keys of both clips that are between them, and the last moment before each STEP key.
     reaches: of all surfaces, their groups in order. players: keys of `laws.LAWS`; what is returned is true of each.
     Source: |f(t)| ≤ max(|f(0)|, |f(h)|) + h²/8 · sup|f″|, as f less its chord is at most that long.
     """
-    first, second = sides(scenes, clips)
-    where = gaps(times, *clips)
+    first, second = partition_tracks(scenes, clips)
+    where = merge_intervals(times, *clips)
     with np.errstate(all="ignore"):  # what has no bound is inf or nan
-        nodes = in_world(first, second, where, players=players)
-        each = [bending(reach, nodes, first, second, where) for reach in reaches]
+        nodes = world_bounds(first, second, where, players=players)
+        each = [second_derivative_bound(reach, nodes, first, second, where) for reach in reaches]
         number, length = where.number(times[:-1]), np.diff(times)
         rise = np.concatenate([one.bend for one in each])[:, number] * (length * length / 8)
     jump = np.concatenate([one.jump for one in each])[:, number] * (where.ends[number] == times[1:])
-    return Rises(*(np.where(np.isfinite(one), one, np.inf) for one in (rise, jump)))
+    return IntervalRise(*(np.where(np.isfinite(one), one, np.inf) for one in (rise, jump)))

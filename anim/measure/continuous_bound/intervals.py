@@ -12,12 +12,12 @@ from anim.model import Clip
 LONG = 0.05  # s; longer gaps are split at all times looked at: how much a motion bends is bounded gap by gap
 
 
-class Gaps:
+class Intervals:
     """G gaps. edges: (G + 1,) s, increasing."""
 
     def __init__(self, edges: Floats) -> None:
         self.edges = edges
-        self._placed: dict[int, tuple[Floats, Placed]] = {}
+        self._placed: dict[int, tuple[Floats, IntervalKeys]] = {}
 
     @property
     def starts(self) -> Floats:
@@ -38,14 +38,14 @@ class Gaps:
         return len(self.edges) - 1
 
     @property
-    def first(self) -> Gaps:
+    def first(self) -> Intervals:
         """The first of them."""
-        return Gaps(self.edges[:2])
+        return Intervals(self.edges[:2])
 
-    def on(self, keys: Floats) -> Placed:
+    def on(self, keys: Floats) -> IntervalKeys:
         """Return where they lie between keys (K,) in s."""
         if id(keys) not in self._placed:
-            self._placed[id(keys)] = keys, placed(keys, self)
+            self._placed[id(keys)] = keys, interval_keys(keys, self)
         return self._placed[id(keys)][1]
 
     def number(self, at: Floats) -> Ints:
@@ -54,7 +54,7 @@ class Gaps:
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class IntervalKeys:
     """Gaps on the keys of one time axis.
 
     left, right: (G,) the keys of the piece that the gap is in. start, end: (G,) shares of the way between them, both 0
@@ -69,7 +69,7 @@ class Placed:
     inside: Bools
 
 
-def gaps(times: Floats, *clips: Clip) -> Gaps:
+def merge_intervals(times: Floats, *clips: Clip) -> Intervals:
     """Return the gaps between all keys of the clips; long ones split at those of `times` (F,) in s that are in them.
 
     The first starts at the first of the times, the last ends at the last of them. times: increasing, with all keys that
@@ -80,12 +80,12 @@ def gaps(times: Floats, *clips: Clip) -> Gaps:
     keys = keys[(keys >= times[0]) & (keys <= times[-1])]
     lengths = np.diff(keys)
     if not len(lengths):
-        return Gaps(keys)
+        return Intervals(keys)
     within = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(lengths) - 1)
-    return Gaps(unique_sorted(np.concatenate((keys, times[lengths[within] > LONG]))))
+    return Intervals(unique_sorted(np.concatenate((keys, times[lengths[within] > LONG]))))
 
 
-def placed(keys: Floats, where: Gaps) -> Placed:
+def interval_keys(keys: Floats, where: Intervals) -> IntervalKeys:
     """Return where gaps lie between keys (K,) in s."""
     last = len(keys) - 1
     left = np.clip(np.searchsorted(keys, where.starts, side="right") - 1, 0, last)
@@ -95,4 +95,4 @@ def placed(keys: Floats, where: Gaps) -> Placed:
     whole = np.where(inside, duration, 1.0)
     start = np.where(inside, (where.starts - keys[left]) / whole, 0.0)
     end = np.where(inside, np.minimum((where.ends - keys[left]) / whole, 1.0), 0.0)
-    return Placed(left, right, start, end, duration, inside)
+    return IntervalKeys(left, right, start, end, duration, inside)

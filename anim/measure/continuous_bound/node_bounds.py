@@ -9,16 +9,16 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.measure.continuous_bound.derivative_bounds import product, resting
-from anim.measure.continuous_bound.endpoints import ends, slides
-from anim.measure.continuous_bound.intervals import Gaps
-from anim.measure.continuous_bound.rotation_bounds import rotations
-from anim.measure.continuous_bound.rotation_endpoints import turns
-from anim.measure.continuous_bound.track_partition import Side
+from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
+from anim.measure.continuous_bound.intervals import Intervals
+from anim.measure.continuous_bound.rotation_bounds import rotation_bounds
+from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
+from anim.measure.continuous_bound.track_partition import ClipVersion
 from anim.sampling.batch import Batch
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class NodeBounds:
     """Majorants of N nodes in G gaps, without what they hang on or with it: of matrices and of origins, in m,
     (3, 2, N, G). jumps: (1 or 2, N, G), how far both versions' matrices and origins jump where the gap ends.
     """
@@ -28,12 +28,12 @@ class Places:
     jumps: Floats
 
 
-def in_world(first: Side, second: Side, where: Gaps, *, players: Sequence[str]) -> Places:
+def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
     """Return the majorants of all nodes in the world, of what any of the players shows.
 
     Both versions have the same hierarchy. players: keys of `laws.LAWS`.
     """
-    local = in_parents(first, second, where, players=players)
+    local = local_bounds(first, second, where, players=players)
     matrices, origins = np.empty_like(local.matrices), np.empty_like(local.origins)
     jumps = np.zeros((2, *local.jumps.shape[1:]))
     for depth, nodes in enumerate(first.skeleton.levels()):
@@ -48,10 +48,10 @@ def in_world(first: Side, second: Side, where: Gaps, *, players: Sequence[str]) 
         if local.jumps.any():
             jumps[0, nodes] = jumps[0, above] * (own[0, 1] + leap) + parent[0, 1] * leap
             jumps[1, nodes] = jumps[1, above] + jumps[0, above] * origin[0, 1]
-    return Places(matrices, origins, jumps)
+    return NodeBounds(matrices, origins, jumps)
 
 
-def in_parents(first: Side, second: Side, where: Gaps, *, players: Sequence[str]) -> Places:
+def local_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
     """Return the majorants of all nodes in their parents' spaces. Parameters as of `in_world`."""
     matrices, jumps = _rotations(first, second, where, players)
     scales = _vectors(first, second, where, "scale", _most)
@@ -62,10 +62,12 @@ def in_parents(first: Side, second: Side, where: Gaps, *, players: Sequence[str]
         a, b = first.skeleton.sheared_local, second.skeleton.sheared_local
         matrices[:, :, skewed] = resting(_norm(a[..., :3]), _norm((b - a)[..., :3]))[..., None]
         origins[:, :, skewed] = resting(_length(a[..., 3].T), _length((b - a)[..., 3].T))[..., None]
-    return Places(matrices, origins, jumps[None])
+    return NodeBounds(matrices, origins, jumps[None])
 
 
-def _rotations(first: Side, second: Side, where: Gaps, players: Sequence[str]) -> tuple[Floats, Floats]:
+def _rotations(
+    first: ClipVersion, second: ClipVersion, where: Intervals, players: Sequence[str]
+) -> tuple[Floats, Floats]:
     """Majorants (3, 2, N, G) of all nodes' rotations, and jumps (N, G)."""
     a, b = first.skeleton.rotation, second.skeleton.rotation
     square = (a * a).sum(axis=1)
@@ -73,29 +75,31 @@ def _rotations(first: Side, second: Side, where: Gaps, players: Sequence[str]) -
     jumps = np.zeros(found.shape[2:])
     for nodes, tracks, gaps in _groups(first, second, "rotation", where):
         place = {node: i for i, node in enumerate(nodes.tolist())}
-        some, leaps = rotations(
-            turns(a[nodes], tracks[0], place, gaps, players=players),
-            turns(b[nodes], tracks[1], place, gaps, players=players),
+        some, leaps = rotation_bounds(
+            rotation_endpoints(a[nodes], tracks[0], place, gaps, players=players),
+            rotation_endpoints(b[nodes], tracks[1], place, gaps, players=players),
             gaps.lengths,
         )
         found[:, :, nodes], jumps[nodes] = np.swapaxes(some, -1, -2), leaps.T
     return found, jumps
 
 
-def _vectors(first: Side, second: Side, where: Gaps, path: str, size: Callable[[Floats], Floats]) -> Floats:
+def _vectors(
+    first: ClipVersion, second: ClipVersion, where: Intervals, path: str, size: Callable[[Floats], Floats]
+) -> Floats:
     """Majorants (3, 2, N, G) of all nodes' translations or scales."""
     a, b = getattr(first.skeleton, path), getattr(second.skeleton, path)
     found = np.repeat(resting(size(a.T))[..., None], len(where), axis=-1)
     for nodes, tracks, gaps in _groups(first, second, path, where):
         place = {node: i for i, node in enumerate(nodes.tolist())}
-        both = ends(a[nodes], tracks[0], place, gaps), ends(b[nodes], tracks[1], place, gaps)
-        found[:, :, nodes] = np.swapaxes(slides(*both, gaps.lengths, size), -1, -2)
+        both = endpoints(a[nodes], tracks[0], place, gaps), endpoints(b[nodes], tracks[1], place, gaps)
+        found[:, :, nodes] = np.swapaxes(slide_bounds(*both, gaps.lengths, size), -1, -2)
     return found
 
 
 def _groups(
-    first: Side, second: Side, path: str, where: Gaps
-) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Gaps]]:
+    first: ClipVersion, second: ClipVersion, path: str, where: Intervals
+) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Intervals]]:
     """Nodes that move in either version, with their tracks and all gaps; then those that do not, but are held somewhere
     by a track or rest elsewhere in the second version, with one gap, which is like any other."""
     moving = (_of_path(first.moving, path), _of_path(second.moving, path))

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.arcs import LAWS
-from anim.measure.continuous_bound.influence_radius import joined, reach
-from anim.measure.continuous_bound.interval_rise import rises
-from anim.measure.continuous_bound.refinement import Seen, again, cuts
-from anim.measure.error.metric import NOISE, Look, MotionError, Ruler
+from anim.measure.continuous_bound.arcs import ARCS
+from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
+from anim.measure.continuous_bound.interval_rise import interval_rise
+from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
+from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
 from anim.model import Clip
 
-NEAR = 0.01  # of the largest distance: a bound this close to it is as good
-FINEST = 128  # parts that a stretch between two times is cut into at most
+BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is as good
+MIN_INTERVAL_S = 128  # parts that a stretch between two times is cut into at most
 BLOCK = 1_000_000  # players × stretches × groups and nodes at once, each some 100 bytes
 
 
@@ -34,7 +34,7 @@ class Proof:
 
 
 @dataclass(frozen=True, slots=True)
-class Aim:
+class ProofTarget:
     """What to prove. found: m, the largest distance so far. room: m, how far above it the bound may be."""
 
     found: float
@@ -44,12 +44,12 @@ class Aim:
 class Prover:
     """Proves bounds for clips on a ruler's scenes: what depends on no clip is prepared once."""
 
-    def __init__(self, ruler: Ruler) -> None:
+    def __init__(self, ruler: ErrorMetric) -> None:
         self.ruler = ruler
-        found = [(part, reach(part)) for part in ruler.parts if len(part.groups)]
+        found = [(part, influence_radius(part)) for part in ruler.parts if len(part.groups)]
         plain = [(part, each) for part, each in found if each is not None and each.morphing is None]
         others = [(part, each) for part, each in found if each is not None and each.morphing is not None]
-        self._reaches = [joined([each for _, each in plain])] if plain else []
+        self._reaches = [join_reaches([each for _, each in plain])] if plain else []
         self._reaches += [each for _, each in others]
         self._parts = [part for part, _ in (*plain, *others)]
         self._order = [ruler.parts.index(part) for part in self._parts]
@@ -58,7 +58,13 @@ class Prover:
         self._knows_all = same and len(self._parts) == len(found)
 
     def certified(
-        self, before: Clip, after: Clip, times: Floats, looks: Mapping[str, Look], *, enough: float | None = None
+        self,
+        before: Clip,
+        after: Clip,
+        times: Floats,
+        looks: Mapping[str, ErrorSamples],
+        *,
+        enough: float | None = None,
     ) -> Proof:
         """Return a bound on how far any vertex is displaced at any time, whoever of the players shows it.
 
@@ -70,12 +76,12 @@ class Prover:
         where quaternions run through zero or turn too far between two times.
         """
         player, worst = max(((name, look.error) for name, look in looks.items()), key=lambda each: each[1].max_error)
-        if not self._knows_all or not set(looks) <= set(LAWS):
+        if not self._knows_all or not set(looks) <= set(ARCS):
             return Proof(None, worst, player)
         bound = worst.max_error
-        room = max(bound * NEAR, NOISE * self.ruler.diagonal)
-        aim = Aim(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
-        seen = Seen()
+        room = max(bound * BOUND_SLACK, NOISE * self.ruler.diagonal)
+        aim = ProofTarget(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
+        seen = RefinedMaximum()
         for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(looks))):
             stretch = slice(start, start + self._length(len(looks)) + 1)
             closed, other = self._proven((before, after), times[stretch], _limits(looks, self._order, stretch), aim)
@@ -95,11 +101,11 @@ class Prover:
         return max(BLOCK // (players * (groups + len(self.ruler.scene.skeleton)) + 1), 8)
 
     def _proven(
-        self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: Aim
-    ) -> tuple[float, Seen]:
+        self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget
+    ) -> tuple[float, RefinedMaximum]:
         """What bounds all stretches that need no second look, and what that shows of the others."""
         scenes = self.ruler.scene, self.ruler.other
-        risen = rises(scenes, clips, times, self._reaches, list(limits))
+        risen = interval_rise(scenes, clips, times, self._reaches, list(limits))
         closed, asked = 0.0, []
         for player, each in limits.items():
             tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise
@@ -107,15 +113,15 @@ class Prover:
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
                 parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.room))
-                finest = np.clip(parts, 1, FINEST).astype(np.int64)
-                asked.append(cuts(player, times, risen.rise, is_open, finest))
-        return closed, again(self.ruler, clips, asked, self._parts, target=aim.found + aim.room)
+                finest = np.clip(parts, 1, MIN_INTERVAL_S).astype(np.int64)
+                asked.append(subdivide(player, times, risen.rise, is_open, finest))
+        return closed, refine(self.ruler, clips, asked, self._parts, target=aim.found + aim.room)
 
 
-def _limits(looks: Mapping[str, Look], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
+def _limits(looks: Mapping[str, ErrorSamples], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
     """What no displacement of groups exceeds at some times, by player in the order of LAWS."""
     return {
         player: np.concatenate([looks[player].limits[i][:, stretch] for i in order]).astype(np.float64)
-        for player in LAWS
+        for player in ARCS
         if player in looks
     }

@@ -17,7 +17,7 @@ LEAST = 1e-3  # shorter mixes have no direction that could be relied on
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class QuaternionBounds:
     """Quaternions of P players, G gaps and U nodes; every figure (P, G, U) where nothing else is said.
 
     value, slope: (2, 4, P, G, U), q and q′ at both ends. size, speed: neither |q| nor |q′| is larger.
@@ -48,7 +48,7 @@ class Flight:
 
 
 @dataclass(frozen=True, slots=True)
-class Mix:
+class ArcMix:
     """Mixes c that are known at both ends of gaps. value, slope: (2, 4, P, G, U), c and c′.
 
     square, along, rate: (2, P, G, U), |c|², c·c′, |c′|².
@@ -60,13 +60,13 @@ class Mix:
     along: Floats
     rate: Floats
 
-    def part(self, players: slice) -> Mix:
+    def part(self, players: slice) -> ArcMix:
         """Return the same of some players."""
-        return Mix(*(getattr(self, name)[..., players, :, :] for name in Mix.__slots__))
+        return ArcMix(*(getattr(self, name)[..., players, :, :] for name in ArcMix.__slots__))
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ChordBounds:
     """A mix on a line, scaled to length 1 where a gap starts; each (P, G, U), or (2, P, G, U) at both ends.
 
     square: |c|², along: c·c′, rate: |c′|². wedge: (|c|²|q′|)², which is constant. nearest, farthest: the least and
@@ -80,26 +80,26 @@ class Line:
     nearest: Floats
     farthest: Floats
 
-    def part(self, players: slice) -> Line:
+    def part(self, players: slice) -> ChordBounds:
         """Return the same of some players."""
-        return Line(*(getattr(self, name)[..., players, :, :] for name in Line.__slots__))
+        return ChordBounds(*(getattr(self, name)[..., players, :, :] for name in ChordBounds.__slots__))
 
 
-def mix(value: Floats, slope: Floats) -> Mix:
+def arc_mix(value: Floats, slope: Floats) -> ArcMix:
     """Return a mix by its values and slopes (2, 4, P, G, U)."""
-    return Mix(value, slope, *((x * y).sum(axis=1) for x, y in ((value, value), (value, slope), (slope, slope))))
+    return ArcMix(value, slope, *((x * y).sum(axis=1) for x, y in ((value, value), (value, slope), (slope, slope))))
 
 
-def line(of: Mix, h: Floats) -> Line:
+def chord_bounds(of: ArcMix, h: Floats) -> ChordBounds:
     """Return a mix on a line, or the chord of one that isn't. h: (G, 1) s."""
     first, along, rate = of.square[0], of.along[0], of.rate[0]
     least = nearest(first, along, rate, h)
     wedge = np.maximum(first * rate - along**2, 0.0)
     most = of.square.max(axis=0)
-    return Line(of.square / first, of.along / first, rate / first, wedge / first**2, least / first, most / first)
+    return ChordBounds(of.square / first, of.along / first, rate / first, wedge / first**2, least / first, most / first)
 
 
-def on_arcs(of: Mix, turn: Floats, h: Floats) -> Flight:
+def slerp_bounds(of: ArcMix, turn: Floats, h: Floats) -> QuaternionBounds:
     """Return the figures of arcs and lines as they are: q = c. turn: (P, G, U) rad, ν times the gap's length."""
     reach = 1 - turn * turn / 8  # no c is larger than the larger end divided by this, nor is c′, for c″ = −ν²c
     size, speed = (np.sqrt(each.max(axis=0)) / reach for each in (of.square, of.rate))
@@ -107,10 +107,12 @@ def on_arcs(of: Mix, turn: Floats, h: Floats) -> Flight:
     none = [np.zeros_like(turn) for _ in range(3)]
     excess = _excess(of, pull, h)
     both = np.stack((pull, pull))
-    return Flight(of.value.copy(), of.slope, size, speed, both, pull, none[0], 0 * both, none[1], none[2], excess)
+    return QuaternionBounds(
+        of.value.copy(), of.slope, size, speed, both, pull, none[0], 0 * both, none[1], none[2], excess
+    )
 
 
-def on_lines(of: Mix, chord: Line) -> Flight:
+def nlerp_bounds(of: ArcMix, chord: ChordBounds) -> QuaternionBounds:
     """Return the figures of lines that are divided by their length: q = c / |c|. chord: as `line` gives it."""
     drag = chord.along / chord.square
     most_drag = np.abs(chord.along).max(axis=0) / chord.nearest
@@ -118,12 +120,14 @@ def on_lines(of: Mix, chord: Line) -> Flight:
     rates = 4 * most_drag * most_pull, np.maximum(most_pull, most_drag**2)
     value, slope = directed(of, drag)
     size, none = np.ones_like(most_pull), np.zeros((3, *most_pull.shape))
-    return Flight(value, slope, size, np.sqrt(most_pull), pull, most_pull, rates[0], drag, most_drag, rates[1], none)
+    return QuaternionBounds(
+        value, slope, size, np.sqrt(most_pull), pull, most_pull, rates[0], drag, most_drag, rates[1], none
+    )
 
 
-def put(into: Flight, part: Flight, players: slice, where: Bools) -> None:
+def select_bounds(into: QuaternionBounds, part: QuaternionBounds, players: slice, where: Bools) -> None:
     """Write the figures of some players into those of all. where: (P', G, U), which of the part's."""
-    for name in Flight.__slots__[:11]:
+    for name in QuaternionBounds.__slots__[:11]:
         np.copyto(getattr(into, name)[..., players, :, :], getattr(part, name), where=where)
 
 
@@ -134,14 +138,14 @@ def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
     return np.asarray(np.where(least > LEAST**2, least, np.nan))
 
 
-def directed(of: Mix, drag: Floats) -> tuple[Floats, Floats]:
+def directed(of: ArcMix, drag: Floats) -> tuple[Floats, Floats]:
     """Return the direction of a mix, and how fast that changes (2, 4, P, G, U). drag: (2, P, G, U)."""
     over = 1 / np.sqrt(of.square)[:, None]
     value = of.value * over
     return value, of.slope * over - drag[:, None] * value
 
 
-def _excess(of: Mix, pull: Floats, h: Floats) -> Floats:
+def _excess(of: ArcMix, pull: Floats, h: Floats) -> Floats:
     """By how much |c|² is off 1, with two derivatives: it swings about its mean with 2ν, where it is not constant."""
     push = 2 * (of.rate[0] - pull * of.square[0])
     drift = 2 * of.along[0]

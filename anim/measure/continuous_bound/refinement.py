@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.displacement import CHUNK, Field, lengths
-from anim.measure.error.metric import MAX_SEARCHED, Ruler
-from anim.measure.error.point_groups import Measured
+from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
+from anim.measure.error.metric import MAX_SEARCHED, ErrorMetric
+from anim.measure.error.point_groups import PointGroups
 from anim.model import Clip
 
 
 @dataclass(frozen=True, slots=True)
-class Cuts:
+class Subintervals:
     """Stretches between neighboring times of the first look, cut into equal parts, for one player.
 
     times: (T,) s, all ends of all parts; the last of a stretch is the moment before its end. more: (C, T) m, by how
@@ -26,14 +26,14 @@ class Cuts:
     times: Floats
     more: Floats
 
-    def some(self, start: int, end: int) -> Cuts:
+    def some(self, start: int, end: int) -> Subintervals:
         """Return those from number `start` up to `end`."""
         here = slice(max(start, 0), max(end, 0))
-        return Cuts(self.player, self.times[here], self.more[:, here])
+        return Subintervals(self.player, self.times[here], self.more[:, here])
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class RefinedMaximum:
     """What a second look shows.
 
     bound: m, nothing is displaced more in any stretch. largest: m, the longest displacement that was seen. player,
@@ -46,7 +46,7 @@ class Seen:
     time: float = 0.0
 
 
-def cuts(player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints) -> Cuts:
+def subdivide(player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints) -> Subintervals:
     """Return stretches between neighbors among `times` (F,) in s, each cut into some of `parts` (F − 1,).
 
     rise: (C, F − 1) m of groups in whole stretches. asked: (C, F − 1), which of them to look at for which groups.
@@ -57,18 +57,23 @@ def cuts(player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints) ->
     step = np.arange(len(whole)) - np.repeat(np.cumsum(counts) - counts, counts)
     start, end = times[stretch], times[stretch + 1]
     at = np.where(step == whole, np.nextafter(end, start), start + (end - start) * (step / whole))
-    return Cuts(player, at, np.where(asked, rise, np.nan)[:, stretch] / whole**2)
+    return Subintervals(player, at, np.where(asked, rise, np.nan)[:, stretch] / whole**2)
 
 
-def again(
-    ruler: Ruler, clips: tuple[Clip, Clip], asked: Sequence[Cuts], parts: Sequence[Measured], *, target: float
-) -> Seen:
+def refine(
+    ruler: ErrorMetric,
+    clips: tuple[Clip, Clip],
+    asked: Sequence[Subintervals],
+    parts: Sequence[PointGroups],
+    *,
+    target: float,
+) -> RefinedMaximum:
     """Return what a second look shows of the displacement of one clip from the other.
 
     asked: of every player. parts: whose groups they are about, in order. target: m; where nothing can be displaced
     more, no vertex is looked at.
     """
-    seen, left = Seen(), MAX_SEARCHED
+    seen, left = RefinedMaximum(), MAX_SEARCHED
     for chunk in _chunks(asked, ruler.length):
         old, new = ruler.posed(*clips, [(each.player, each.times) for each in chunk])
         more = np.concatenate([each.more for each in chunk], axis=1)
@@ -86,11 +91,11 @@ def again(
             seen = replace(seen, bound=max(seen.bound, bound))
             if largest > seen.largest:
                 players = np.repeat([each.player for each in chunk], [len(each.times) for each in chunk])
-                seen = Seen(seen.bound, largest, str(players[frame]), float(old.pose.times[frame]))
+                seen = RefinedMaximum(seen.bound, largest, str(players[frame]), float(old.pose.times[frame]))
     return seen
 
 
-def _chunks(asked: Sequence[Cuts], length: int) -> Iterator[list[Cuts]]:
+def _chunks(asked: Sequence[Subintervals], length: int) -> Iterator[list[Subintervals]]:
     """Cuts of all players, up to `length` times at once."""
     firsts = np.cumsum([0, *(len(each.times) for each in asked)]).tolist()
     for start in range(0, firsts[-1], length):
@@ -98,7 +103,7 @@ def _chunks(asked: Sequence[Cuts], length: int) -> Iterator[list[Cuts]]:
         yield [each for each in some if len(each.times)]
 
 
-def _searched(field: Field, more: Floats, target: float, most: int) -> tuple[float, float, int, int]:
+def _searched(field: DisplacementField, more: Floats, target: float, most: int) -> tuple[float, float, int, int]:
     """What bounds all groups, the longest vector, its frame, and how many were looked at, of `most` at most."""
     tops = field.limits + more
     found, frame, looked = 0.0, 0, 0

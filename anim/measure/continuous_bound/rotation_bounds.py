@@ -8,13 +8,21 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.measure.continuous_bound.cubic_bounds import with_cubics
-from anim.measure.continuous_bound.derivative_bounds import majorant, product
-from anim.measure.continuous_bound.difference_bounds import drift
-from anim.measure.continuous_bound.quaternion_bounds import Flight, Line, line, mix, on_arcs, on_lines, put
-from anim.measure.continuous_bound.rotation_endpoints import Turns
+from anim.measure.continuous_bound.derivative_bounds import derivative_bound, product
+from anim.measure.continuous_bound.difference_bounds import difference_bounds
+from anim.measure.continuous_bound.quaternion_bounds import (
+    ChordBounds,
+    QuaternionBounds,
+    arc_mix,
+    chord_bounds,
+    nlerp_bounds,
+    select_bounds,
+    slerp_bounds,
+)
+from anim.measure.continuous_bound.rotation_endpoints import RotationEndpoints
 
 
-def rotations(first: Turns, second: Turns, lengths: Floats) -> tuple[Floats, Floats]:
+def rotation_bounds(first: RotationEndpoints, second: RotationEndpoints, lengths: Floats) -> tuple[Floats, Floats]:
     """Return the majorant (3, 2, G, U) of the matrices that players make of quaternions, and how far they jump (G, U).
 
     That is true of each of the players. A matrix is q·x·q* + (1 − |q|²)·x of a vector x, of any quaternion q: a product
@@ -24,24 +32,24 @@ def rotations(first: Turns, second: Turns, lengths: Floats) -> tuple[Floats, Flo
     """
     h = lengths[:, None]
     second = _on_the_side_of(first, second)
-    (a, line_a), (b, line_b) = _flown(first, h), _flown(second, h)
+    (a, line_a), (b, line_b) = _arc_bounds(first, h), _arc_bounds(second, h)
     lines = first.unit & second.unit & ~(first.is_cubic | second.is_cubic)
     other = ~_same(first, second)
-    apart = np.where(other, drift(a, b, (line_a, line_b, lines), h), 0.0)
+    apart = np.where(other, difference_bounds(a, b, (line_a, line_b, lines), h), 0.0)
     # the largest of all players, each by itself: the largest sums would be too near to each other
-    q = majorant(np.stack((a.size, a.speed, a.bend)).max(axis=1), apart.max(axis=1))
-    uneven = majorant(a.excess.max(axis=1), np.where(other, a.excess + b.excess, 0.0).max(axis=1))
+    q = derivative_bound(np.stack((a.size, a.speed, a.bend)).max(axis=1), apart.max(axis=1))
+    uneven = derivative_bound(a.excess.max(axis=1), np.where(other, a.excess + b.excess, 0.0).max(axis=1))
     return product(q, q) + uneven, np.asarray((_jumps(first) + _jumps(second)).max(axis=0))
 
 
-def _on_the_side_of(first: Turns, second: Turns) -> Turns:
+def _on_the_side_of(first: RotationEndpoints, second: RotationEndpoints) -> RotationEndpoints:
     """The second with signs like the first's: q and −q are one rotation."""
     sign = np.where((first.value[0] * second.value[0]).sum(axis=0) < 0, -1.0, 1.0)
     cubic = None if second.cubic is None else second.cubic * sign
     return replace(second, value=second.value * sign, cubic=cubic)
 
 
-def _same(first: Turns, second: Turns) -> Bools:
+def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:
     """Where (P, G, U) both versions are one motion."""
     same: Bools = (first.value == second.value).all(axis=(0, 1)) & (first.turn == second.turn)
     same &= first.unit == second.unit
@@ -52,19 +60,19 @@ def _same(first: Turns, second: Turns) -> Bools:
     return np.asarray(same & (first.cubic == second.cubic).all(axis=(0, 1, 2)) & (first.is_cubic == second.is_cubic))
 
 
-def _flown(of: Turns, h: Floats) -> tuple[Flight, Line]:
+def _arc_bounds(of: RotationEndpoints, h: Floats) -> tuple[QuaternionBounds, ChordBounds]:
     """What quaternions do, and their mixes as lines. h: (G, 1) s."""
     start, end = of.value
     sine, cosine = 1 / (h * np.sinc(of.turn / np.pi)), np.cos(of.turn)
-    mixed = mix(of.value, np.stack(((end - cosine * start) * sine, (cosine * end - start) * sine)))
-    found, chord = on_arcs(mixed, of.turn, h), line(mixed, h)
+    mixed = arc_mix(of.value, np.stack(((end - cosine * start) * sine, (cosine * end - start) * sine)))
+    found, chord = slerp_bounds(mixed, of.turn, h), chord_bounds(mixed, h)
     players = np.flatnonzero((of.unit & ~of.is_cubic).any(axis=(1, 2)))
     if len(players):
         some = slice(int(players[0]), int(players[-1]) + 1)
-        put(found, on_lines(mixed.part(some), chord.part(some)), some, of.unit[some])
+        select_bounds(found, nlerp_bounds(mixed.part(some), chord.part(some)), some, of.unit[some])
     return found if of.cubic is None else with_cubics(found, of.value, of.cubic, of.is_cubic, h), chord
 
 
-def _jumps(of: Turns) -> Floats:
+def _jumps(of: RotationEndpoints) -> Floats:
     square = (of.value[1] * of.value[1]).sum(axis=0)
     return np.where(of.unit != of.next_unit, 2 * np.abs(square - 1), 0.0)

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.measure.continuous_bound.arcs import GLTF, LAWS, is_divided
+from anim.measure.continuous_bound.arcs import ARCS, GLTF, is_divided
 from anim.measure.continuous_bound.endpoints import of_batch
-from anim.measure.continuous_bound.intervals import Gaps
+from anim.measure.continuous_bound.intervals import Intervals
 from anim.model import Interpolation
 from anim.sampling.batch import Batch
 
 
 @dataclass(frozen=True, slots=True)
-class Turns:
+class RotationEndpoints:
     """Mixes of P players, in G gaps, of U nodes.
 
     value: (2, 4, P, G, U), at both ends. turn: (P, G, U) rad, ν times the gap's length; 0 on lines and cubics.
@@ -56,9 +56,9 @@ class _Keys:
     is_cubic: Bools
 
 
-def turns(
-    rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Gaps, *, players: Sequence[str]
-) -> Turns:
+def rotation_endpoints(
+    rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals, *, players: Sequence[str]
+) -> RotationEndpoints:
     """Return the rotations of nodes that are at `rest` (U, 4) where no track moves them.
 
     place: for numbers of nodes which of them each is. players: keys of LAWS.
@@ -68,18 +68,18 @@ def turns(
     b *= np.where((a * b).sum(axis=0) < 0, -1.0, 1.0)
     theta, unit = np.zeros(a.shape[1:]), np.zeros(a.shape[1:], np.bool_)
     for p, player in enumerate(players):
-        angle, divided = LAWS[player](a[:, p], b[:, p])
+        angle, divided = ARCS[player](a[:, p], b[:, p])
         theta[p] = np.where(of.mixed, angle, 0.0)
         unit[p] = np.where(of.mixed, divided, of.tracked & is_divided(player)) | of.is_cubic
-    value = _mixed(a, b, theta, of.shares)
+    value = _blend(a, b, theta, of.shares)
     if of.cubic is not None:
         value[..., of.is_cubic] = of.keys[:, :, None, :, of.is_cubic]
     last = np.where(of.ended, [[is_divided(player)] for player in players] & of.tracked, ~unit[:, -1]) | of.is_cubic
     after = np.concatenate((unit[:, 1:], last[:, None]), axis=1)
-    return Turns(value, theta * (of.shares[1] - of.shares[0]), unit, after, of.cubic, of.is_cubic)
+    return RotationEndpoints(value, theta * (of.shares[1] - of.shares[0]), unit, after, of.cubic, of.is_cubic)
 
 
-def _keys(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Gaps) -> _Keys:
+def _keys(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals) -> _Keys:
     shape = (len(where), len(rest))
     keys = np.broadcast_to(rest.T[:, None], (2, 4, *shape)).copy()
     shares, mixed = np.zeros((2, *shape)), np.zeros(shape, np.bool_)
@@ -115,7 +115,7 @@ def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
     return a, b
 
 
-def _mixed(a: Floats, b: Floats, angle: Floats, shares: Floats) -> Floats:
+def _blend(a: Floats, b: Floats, angle: Floats, shares: Floats) -> Floats:
     """Mixes (2, 4, P, G, U) of quaternions (4, P, G, U) with `angle` (P, G, U) between them, at shares (2, G, U)."""
     angle = angle / np.pi
     whole = np.sinc(angle)

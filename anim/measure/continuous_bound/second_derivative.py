@@ -8,15 +8,15 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.derivative_bounds import product, resting
-from anim.measure.continuous_bound.endpoints import ends, slides
-from anim.measure.continuous_bound.influence_radius import Morphing, Reach
-from anim.measure.continuous_bound.intervals import Gaps
-from anim.measure.continuous_bound.node_bounds import Places
-from anim.measure.continuous_bound.track_partition import Side
+from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
+from anim.measure.continuous_bound.influence_radius import InfluenceRadius, Morphing
+from anim.measure.continuous_bound.intervals import Intervals
+from anim.measure.continuous_bound.node_bounds import NodeBounds
+from anim.measure.continuous_bound.track_partition import ClipVersion
 
 
 @dataclass(frozen=True, slots=True)
-class Bending:
+class SecondDerivativeBound:
     """What no point of C groups exceeds in G gaps, each (C, G).
 
     bend: m/s², the second derivative of the displacement. jump: m, how far the displacement jumps where the gap ends.
@@ -26,27 +26,31 @@ class Bending:
     jump: Floats
 
 
-def bending(of: Reach, nodes: Places, first: Side, second: Side, where: Gaps) -> Bending:
+def second_derivative_bound(
+    of: InfluenceRadius, nodes: NodeBounds, first: ClipVersion, second: ClipVersion, where: Intervals
+) -> SecondDerivativeBound:
     """Return how much displacements bend, and jump, of what is carried as `of` says. nodes: in the world."""
     points = resting(of.arms, of.apart)[..., None]
     if of.morphing is not None:
         points = points + _morphed(of.morphing, first, second, where)
     moved = nodes.origins[:, :, of.nodes] + product(nodes.matrices[:, :, of.nodes], points)
     jump = nodes.jumps[1, of.nodes] + nodes.jumps[0, of.nodes] * points[0, 1]
-    return Bending(*(_by_group(of.share[:, None] * each, of) for each in (moved[2, 1] - moved[2, 0], jump)))
+    return SecondDerivativeBound(
+        *(_by_group(of.share[:, None] * each, of) for each in (moved[2, 1] - moved[2, 0], jump))
+    )
 
 
-def _morphed(of: Morphing, first: Side, second: Side, where: Gaps) -> Floats:
+def _morphed(of: Morphing, first: ClipVersion, second: ClipVersion, where: Intervals) -> Floats:
     """Majorants (3, 2, J, G) of how far weights move points in the spaces of joints."""
     first_ends, second_ends = (
-        ends(rest[None], side.weights(owner, len(rest)), {owner: 0}, where)
+        endpoints(rest[None], side.weights(owner, len(rest)), {owner: 0}, where)
         for side, owner, rest in zip((first, second), of.owners, of.rest, strict=True)
     )
-    weights = slides(first_ends, second_ends, where.lengths, np.abs)[..., 0]  # (3, 2, M, G)
+    weights = slide_bounds(first_ends, second_ends, where.lengths, np.abs)[..., 0]  # (3, 2, M, G)
     return np.asarray(of.targets @ weights)
 
 
-def _by_group(bounds: Floats, of: Reach) -> Floats:
+def _by_group(bounds: Floats, of: InfluenceRadius) -> Floats:
     """Bounds of joints (J, G) as those of groups (C, G): the largest of those that carry some."""
     starts = np.cumsum([0, *map(len, of.groups[:-1])])
     return np.asarray(np.maximum.reduceat(bounds[np.concatenate(of.groups)], starts, axis=0))

@@ -13,7 +13,7 @@ from anim.sampling.batch import Batch, batches
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ClipVersion:
     """One version: nodes at rest, tracks of nodes that move in either version, and tracks of those that don't, of one
     key each; all stacked."""
 
@@ -27,27 +27,27 @@ class Side:
         return batches(track for track in all_ if track.node == node and track.values.shape[1] == count)
 
 
-def sides(scenes: tuple[Scene, Scene], clips: tuple[Clip, Clip]) -> tuple[Side, Side]:
+def partition_tracks(scenes: tuple[Scene, Scene], clips: tuple[Clip, Clip]) -> tuple[ClipVersion, ClipVersion]:
     """Return both versions of a clip, each on its scene."""
-    stacked = [_stacked(scene, clip) for scene, clip in zip(scenes, clips, strict=True)]
+    stacked = [_stack(scene, clip) for scene, clip in zip(scenes, clips, strict=True)]
     moving = {key for side in stacked for batch in side for key in _keys(batch, ~_is_constant(batch))}
-    first, second = (_sorted(scene.skeleton, side, moving) for scene, side in zip(scenes, stacked, strict=True))
+    first, second = (_sort_tracks(scene.skeleton, side, moving) for scene, side in zip(scenes, stacked, strict=True))
     return first, second
 
 
-def _stacked(scene: Scene, clip: Clip) -> list[Batch]:
+def _stack(scene: Scene, clip: Clip) -> list[Batch]:
     count = len(scene.skeleton)
     return batches(track for track in clip.tracks if track.node is not None and track.node < count)
 
 
-def _sorted(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | None, str]]) -> Side:
-    side = Side(skeleton, [], [])
+def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | None, str]]) -> ClipVersion:
+    side = ClipVersion(skeleton, [], [])
     for batch in of:
         moves = np.array([(track.node, track.path) in moving for track in batch.tracks])
         if moves.any():
-            side.moving.append(_picked(batch, moves))
+            side.moving.append(_pick(batch, moves))
         if not moves.all():
-            rest = _picked(batch, ~moves)
+            rest = _pick(batch, ~moves)
             tangents = None if rest.tangents is None else (rest.tangents[0][:1], rest.tangents[1][:1])
             side.still.append(replace(rest, times=rest.times[:1], values=rest.values[:1], tangents=tangents))
     return side
@@ -66,7 +66,7 @@ def _keys(batch: Batch, chosen: Bools) -> Iterable[tuple[int | None, str]]:
     return ((track.node, track.path) for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
 
 
-def _picked(batch: Batch, chosen: Bools) -> Batch:
+def _pick(batch: Batch, chosen: Bools) -> Batch:
     if chosen.all():
         return batch
     tracks = tuple(track for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)

@@ -15,7 +15,7 @@ CHUNK = 1_000_000  # vertices times frames gone through at once: 24 MB
 FIRST = 8  # frames gone through before the bounds of the others are looked at again
 
 
-class Field(Protocol):
+class DisplacementField(Protocol):
     """What a surface's vertices do, in groups."""
 
     @property
@@ -31,13 +31,13 @@ class Field(Protocol):
         """Return which joint of the surface moves a vertex of a group most in a frame; vertex −1: any of them."""
         ...
 
-    def rate(self, step: Floats) -> Field:
+    def rate(self, step: Floats) -> DisplacementField:
         """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Groups:
+class BoundGroups:
     """Vertices in groups, as products that displacements by joints' matrices are linear in.
 
     reach: numbers of the joints that carry some of each group. products: (V_g, J_g · 4) of each group: skin weight
@@ -51,10 +51,10 @@ class Groups:
     share: float = 1.0
 
 
-class Linear:
+class SkinnedDisplacement:
     """Displacements that are linear in the joints' matrices. moved: differences of matrices (J, F, 3, 4)."""
 
-    def __init__(self, groups: Groups, moved: Floats) -> None:
+    def __init__(self, groups: BoundGroups, moved: Floats) -> None:
         self._groups, self._moved = groups, moved
 
     @cached_property
@@ -67,9 +67,9 @@ class Linear:
         """(J, F), nothing that a joint carries some of has a longer vector."""
         return self._groups.share * largest_over(self._groups.corners, self._moved)
 
-    def rate(self, step: Floats) -> Field:
+    def rate(self, step: Floats) -> DisplacementField:
         """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
-        return Linear(self._groups, np.diff(self._moved, axis=1) / step[:, None, None])
+        return SkinnedDisplacement(self._groups, np.diff(self._moved, axis=1) / step[:, None, None])
 
     def vectors(self, group: int, frames: Ints) -> Floats:
         """Return the vectors (V_g, 3, f) of a group's vertices in some frames."""
@@ -87,7 +87,7 @@ class Linear:
         return int(reach[(parts * parts).sum(axis=1).argmax()])
 
 
-class Morphed:
+class MorphedDisplacement:
     """Displacements of morphed vertices.
 
     bounds: (J, F), nothing that a joint carries some of is displaced more. groups: joints that reach each group, and
@@ -109,9 +109,9 @@ class Morphed:
         self._most = max(CHUNK // max(sum(map(len, self._groups)), 1), 1)  # frames that are kept
         self._kept: dict[int, Floats] = {}
 
-    def rate(self, step: Floats) -> Field:
+    def rate(self, step: Floats) -> DisplacementField:
         """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
-        return Rate(self, step, _by_group(self._rates(step), self._reach))
+        return DisplacementRate(self, step, _by_group(self._rates(step), self._reach))
 
     def vectors(self, group: int, frames: Ints) -> Floats:
         """Return the vectors (V_g, 3, f) of a group's vertices in some frames."""
@@ -135,20 +135,20 @@ class Morphed:
         return np.stack([self._kept[frame][self._groups[group]] for frame in frames], axis=-1)
 
 
-class Rate:
+class DisplacementRate:
     """How fast the vectors of any field change from each frame to the next.
 
     step: (F − 1,) s between frames. limits: (G, F − 1), where known; else what the field's own limits give.
     """
 
-    def __init__(self, field: Field, step: Floats, limits: Floats | None = None) -> None:
+    def __init__(self, field: DisplacementField, step: Floats, limits: Floats | None = None) -> None:
         self._field, self._step = field, step
         loose = (field.limits[:, 1:] + field.limits[:, :-1]) / step
         self.limits = loose if limits is None else np.minimum(loose, limits)
 
-    def rate(self, step: Floats) -> Field:
+    def rate(self, step: Floats) -> DisplacementField:
         """Return how fast the rates themselves change."""
-        return Rate(self, step)
+        return DisplacementRate(self, step)
 
     def vectors(self, group: int, frames: Ints) -> Floats:
         """Return the vectors (V_g, 3, f) of a group's vertices in some frames, per second."""
@@ -163,7 +163,7 @@ class Rate:
 
 
 @dataclass(frozen=True, slots=True)
-class Longest:
+class MaxDisplacement:
     """The longest vector of a field. vertex: its number within the group, −1 where only the bound was looked at.
 
     limits: (G, F), the field's own, and where vertices were looked at no more than the longest of them.
@@ -176,14 +176,14 @@ class Longest:
     limits: Floats
 
 
-def lengths(field: Field, group: int, frames: Ints) -> Floats:
+def lengths(field: DisplacementField, group: int, frames: Ints) -> Floats:
     """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
     vectors = field.vectors(group, frames)
     vectors *= vectors
     return np.asarray(np.sqrt(vectors.sum(axis=1)))
 
 
-def longest(field: Field, *, floor: float, slack: float, most: int) -> Longest:
+def max_displacement(field: DisplacementField, *, floor: float, slack: float, most: int) -> MaxDisplacement:
     """Return the longest vector; never shorter than it is, and no more than `slack` times or `floor` above.
 
     floor: nothing is searched where no bound is longer. slack: ≥ 1. most: vertices times frames gone through; beyond,
@@ -191,7 +191,7 @@ def longest(field: Field, *, floor: float, slack: float, most: int) -> Longest:
     """
     tops = field.limits.max(axis=1)
     group = int(tops.argmax())
-    found = Longest(0.0, group, int(field.limits[group].argmax()), -1, field.limits.copy())
+    found = MaxDisplacement(0.0, group, int(field.limits[group].argmax()), -1, field.limits.copy())
     left = 0.0  # the longest bound of what was not looked at
     for group in np.argsort(-tops, kind="stable").tolist():
         limits = field.limits[group]
@@ -208,7 +208,7 @@ def longest(field: Field, *, floor: float, slack: float, most: int) -> Longest:
             vertex, column = np.unravel_index(int(lengths_here.argmax()), lengths_here.shape)
             if lengths_here[vertex, column] > found.length:
                 length = float(lengths_here[vertex, column])
-                found = Longest(length, group, int(frames[column]), int(vertex), found.limits)
+                found = MaxDisplacement(length, group, int(frames[column]), int(vertex), found.limits)
             most -= lengths_here.size
             size = max(min(2 * size, CHUNK // max(len(lengths_here), 1)), 1)
     return found if left <= found.length else replace(found, length=left)

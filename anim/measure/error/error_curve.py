@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.error.displacement import CHUNK, Field, lengths
-from anim.measure.error.metric import FPS, Ruler, dense_times
+from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
+from anim.measure.error.metric import FPS, ErrorMetric, dense_times
 from anim.model import Clip
 
 JOINTS = 4  # the worst ones that are told apart
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class JointErrorCurve:
     """What one joint does: the largest displacement (F,) in m of a vertex that it carries most of."""
 
     joint: str
@@ -23,16 +23,16 @@ class Course:
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class ErrorCurve:
     """One clip. times: (F,) s. error: (F,) m, the largest displacement of any vertex. joints: worst first."""
 
     name: str
     times: Floats
     error: Floats
-    joints: tuple[Course, ...]
+    joints: tuple[JointErrorCurve, ...]
 
 
-def profile(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Profile:
+def error_curve(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> ErrorCurve:
     """Return how far `after` is from `before` at each time that `dense_times` gives, as a player shows them."""
     times = dense_times(before, after, fps=fps)
     courses: dict[int, Floats] = {}
@@ -49,11 +49,11 @@ def profile(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec", fp
         first += len(block.times)
     worst = sorted(courses, key=lambda node: -float(courses[node].max()))[:JOINTS]
     error = np.max(list(courses.values()), axis=0) if courses else np.zeros(len(times))
-    moving = (Course(ruler.called(node), courses[node]) for node in worst if courses[node].any())
-    return Profile(before.name, times, error, tuple(moving))
+    moving = (JointErrorCurve(ruler.called(node), courses[node]) for node in worst if courses[node].any())
+    return ErrorCurve(before.name, times, error, tuple(moving))
 
 
-def _largest(field: Field, group: int, vertices: int, frames: int) -> Floats:
+def _largest(field: DisplacementField, group: int, vertices: int, frames: int) -> Floats:
     """The largest length (F,) of a vector of the group in each frame."""
     size = max(CHUNK // vertices, 1)
     starts = range(0, frames, size)

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anim.arrays import Floats, unique_sorted
-from anim.measure.compare.correspondence import Pairs, paired
-from anim.measure.error.displacement import longest
-from anim.measure.error.point_groups import Measured, Part, Posed
+from anim.measure.compare.correspondence import Correspondence, match_scenes
+from anim.measure.error.displacement import max_displacement
+from anim.measure.error.point_groups import PointGroups, PosedScene, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
-from anim.measure.error.shell_points import Shells, hidden
+from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
 from anim.measure.error.surface import diagonal, has_vertices, surfaces
 from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
 from anim.sampling.players import parse_pair, sampler, sampler_for
@@ -54,7 +54,7 @@ class MotionError:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ErrorSamples:
     """What was seen at some times (F,).
 
     limits: of each part of the ruler (G, F) in m, no vertex of a group is displaced more; 0 of what nothing carries. In
@@ -70,11 +70,11 @@ class Block:
     """Some of the times (F,) in s, both versions posed there."""
 
     times: Floats
-    old: Posed
-    new: Posed
+    old: PosedScene
+    new: PosedScene
 
 
-class Ruler:
+class ErrorMetric:
     """Measures clips on one scene, or on two that show the same thing: what depends on no clip is prepared once.
 
     other: the scene that the second clip is of: another rest pose, other numbers of nodes, another file. What is
@@ -88,15 +88,15 @@ class Ruler:
         self.scene, self.other = scene, other or scene
         self.diagonal = diagonal(scene)
         found = surfaces(scene) if shell is None or has_vertices(scene) else []
-        self.pairs: Pairs = paired(scene, self.other, found)
-        self.parts: list[Measured] = [Part(*each) for each in self.pairs.surfaces]
+        self.pairs: Correspondence = match_scenes(scene, self.other, found)
+        self.parts: list[PointGroups] = [SkinnedGroups(*each) for each in self.pairs.surfaces]
         if shell is not None:
-            nodes = np.flatnonzero(hidden(scene.skeleton, found) & (self.pairs.nodes >= 0))
-            self.parts.append(Shells(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
+            nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, found) & (self.pairs.nodes >= 0))
+            self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
         """Return how far `after` is from `before`: at all keys of both, and half-way between."""
-        return self.error_at(before, after, check_times(before, after), player=player)
+        return self.error_at(before, after, key_and_mid_times(before, after), player=player)
 
     def error_at(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> MotionError:
         """Return how far `after` is from `before` at `times` (F,) in seconds.
@@ -105,10 +105,10 @@ class Ruler:
         """
         return self._looked(before, after, times, player, None)
 
-    def look(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> Look:
+    def look(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> ErrorSamples:
         """Return what `error_at` does, with limits for all times and groups of vertices."""
         limits = [np.zeros((len(part.groups), len(times)), np.float32) for part in self.parts]
-        return Look(self._looked(before, after, times, player, limits), limits)
+        return ErrorSamples(self._looked(before, after, times, player, limits), limits)
 
     def _looked(
         self, before: Clip, after: Clip, times: Floats, player: str, limits: Sequence[NDArray[np.float32]] | None
@@ -121,9 +121,9 @@ class Ruler:
             fields = [(i, field) for i, field in shown if field is not None]
             for i, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
                 part = self.parts[i]
-                found = longest(field, floor=max(size, NOISE * self.diagonal), slack=SLACK, most=MAX_SEARCHED)
+                found = max_displacement(field, floor=max(size, NOISE * self.diagonal), slack=SLACK, most=MAX_SEARCHED)
                 if limits is not None:
-                    limits[i][:, first : first + len(block.times)] = _rounded_up(found.limits)
+                    limits[i][:, first : first + len(block.times)] = _round_up(found.limits)
                 if found.length > size:
                     size, frame, vertex = found.length, first + found.frame, part.vertex(found)
                     joint = part.node(field.joint(found.group, found.frame, found.vertex))
@@ -147,7 +147,7 @@ class Ruler:
         for start in range(0, max(len(times) - overlap, 1), self.length):
             chosen = times[start : start + self.length + overlap]
             poses = old.at(chosen), new.at(chosen)
-            yield Block(chosen, Posed(self.scene.skeleton, poses[0]), Posed(self.other.skeleton, poses[1]))
+            yield Block(chosen, PosedScene(self.scene.skeleton, poses[0]), PosedScene(self.other.skeleton, poses[1]))
 
     @property
     def length(self) -> int:
@@ -155,7 +155,7 @@ class Ruler:
         matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
         return max(BLOCK // max(matrices, 1), 8)
 
-    def posed(self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]) -> tuple[Posed, Posed]:
+    def posed(self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]) -> tuple[PosedScene, PosedScene]:
         """Return both clips posed at some times (F,) in s by one player, at others by the next, all in one.
 
         asked: names in PLAYERS, each with its times; not more times than `length` on the whole.
@@ -167,11 +167,11 @@ class Ruler:
         return (self.scene.skeleton.names[node] or f"node {node}") if node >= 0 else ""
 
 
-def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> Posed:
+def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> PosedScene:
     poses = PoseSampler(skeleton, clip)
     each = [poses.sampled(sampler(player)).at(times) for player, times in asked]
     weights = {node: np.concatenate([one.weights[node] for one in each]) for node in each[0].weights}
-    return Posed(
+    return PosedScene(
         skeleton,
         Pose(
             np.concatenate([one.times for one in each]),
@@ -183,13 +183,13 @@ def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) 
     )
 
 
-def _rounded_up(values: Floats) -> NDArray[np.float32]:
+def _round_up(values: Floats) -> NDArray[np.float32]:
     """The values as float32, none less than it is."""
     near = values.astype(np.float32)
     return np.where(near < values, np.nextafter(near, np.float32(np.inf)), near)
 
 
-def check_times(*clips: Clip) -> Floats:
+def key_and_mid_times(*clips: Clip) -> Floats:
     """Return every key time of the clips and the middle of every gap, in seconds, increasing."""
     axes = [times for clip in clips for times in clip.axes]
     if not axes:
@@ -213,7 +213,7 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     }
     before = [np.nextafter(times[1:], 0) for times in steps.values()]
     end = max((clip.end for clip in clips), default=0.0)
-    keys = check_times(*clips)
+    keys = key_and_mid_times(*clips)
     frames = frame_times(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
     after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
     apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))

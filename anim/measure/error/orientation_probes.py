@@ -11,7 +11,7 @@ PER_NODE = 3
 SPEED_STEP = 1e-4  # s; speeds at an end are taken over this time: what a player shows in the first moment
 
 
-def points(world: Floats) -> Floats:
+def probe_points(world: Floats) -> Floats:
     """Return three points per node (3 N, F, 3) in world space from world matrices (N, F, 3, 4).
 
     The node's place, and one a lever away on each of two axes, so that a node which only turns moves too.
@@ -19,12 +19,12 @@ def points(world: Floats) -> Floats:
     places = world[..., 3]
     two = world[..., :2]
     lengths = np.sqrt((two * two).sum(axis=-2, keepdims=True))
-    axes = LEVER * size(places) * np.swapaxes(two / np.where(lengths > 0, lengths, 1), -1, -2)
+    axes = LEVER * probe_size(places) * np.swapaxes(two / np.where(lengths > 0, lengths, 1), -1, -2)
     joined = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)
     return joined.reshape(-1, world.shape[1], 3)
 
 
-def size(places: Floats) -> float:
+def probe_size(places: Floats) -> float:
     """Return the diagonal of the box around the points (P, F, 3) in the first frame; 1 where it has none."""
     first = places[:, 0]
     return float(np.linalg.norm(first.max(axis=0) - first.min(axis=0))) or 1.0

@@ -16,15 +16,21 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.displacement import Field, Groups, Linear, Longest, Morphed
+from anim.measure.error.displacement import (
+    BoundGroups,
+    DisplacementField,
+    MaxDisplacement,
+    MorphedDisplacement,
+    SkinnedDisplacement,
+)
 from anim.measure.error.morph_bounds import SIDES, Change, MorphBounds
-from anim.measure.error.surface import Surface, morphed, skinned
+from anim.measure.error.surface import Surface, morph_points, skin_points
 from anim.model import Pose, Skeleton
 from anim.sampling.pose import world_by_node
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class Binding:
     """What carries a surface in one version of the scene.
 
     nodes: (J,) the joints, −1 for the world itself. bind: (J, 3, 4) joint_from_mesh.
@@ -44,7 +50,7 @@ class Carried:
         return np.broadcast_to(self.rest_weights, (len(pose.times), len(self.rest_weights)))
 
 
-class Posed:
+class PosedScene:
     """One version at F times: its pose, and world matrices (N, F, 3, 4), worked out where they are asked for."""
 
     def __init__(self, skeleton: Skeleton, pose: Pose) -> None:
@@ -62,7 +68,7 @@ class Posed:
         return found
 
 
-class Measured(Protocol):
+class PointGroups(Protocol):
     """Points that move together: those of a mesh, or shells. name: of the mesh, empty where each group has its own."""
 
     @property
@@ -75,11 +81,11 @@ class Measured(Protocol):
         """Name of the mesh or node, for reports; empty where each group has its own."""
         ...
 
-    def field(self, old: Posed, new: Posed) -> Field | None:
+    def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
         """Return how far every point is displaced at every time, None where there is none."""
         ...
 
-    def weights(self, old: Posed, new: Posed) -> list[tuple[int, Floats, Floats]]:
+    def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
         """Return the nodes whose morph weights count, in the scene before, with the weights (F, M) of both versions."""
         ...
 
@@ -91,12 +97,12 @@ class Measured(Protocol):
         """Return the number of the node that a joint of the field is, in the scene before."""
         ...
 
-    def vertex(self, found: Longest) -> int:
+    def vertex(self, found: MaxDisplacement) -> int:
         """Return the number in the mesh of the vertex that was found, −1 where it is none."""
         ...
 
 
-class Part:
+class SkinnedGroups:
     """A surface, its vertices in groups by the joint that carries most of each, and boxes around what joints carry.
 
     new: what carries the surface in the second version, where that is not the same.
@@ -104,9 +110,9 @@ class Part:
     `used`. share: the largest sum of skin weights of a vertex.
     """
 
-    def __init__(self, surface: Surface, new: Carried | None = None) -> None:
+    def __init__(self, surface: Surface, new: Binding | None = None) -> None:
         self.surface = surface
-        self.old = Carried(surface.nodes, surface.bind, surface.owner, surface.rest_weights)
+        self.old = Binding(surface.nodes, surface.bind, surface.owner, surface.rest_weights)
         self.new = new or self.old
         self.share = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
         carrying = surface.weights > 0
@@ -119,11 +125,11 @@ class Part:
         self.reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
         rest = surface.points + np.tensordot(surface.rest_weights, surface.targets, axes=1)
         products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
-        self._still = Groups(self.reach, products, self._boxes(rest), self.share)
+        self._still = BoundGroups(self.reach, products, self._boxes(rest), self.share)
         corners = self._boxes(surface.points) if len(surface.targets) else self._still.corners
         self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.share)
 
-    def field(self, old: Posed, new: Posed) -> Field | None:
+    def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
         """Return how far every vertex is displaced at every time, None where nothing carries any."""
         if not self.groups or not len(old.pose.times):
             return None
@@ -132,16 +138,16 @@ class Part:
         before_weights, after_weights = self.old.weights(old.pose), self.new.weights(new.pose)
         rest = self.surface.rest_weights
         if (before_weights == rest).all() and (after_weights == rest).all():
-            return Linear(self._still, moved)
+            return SkinnedDisplacement(self._still, moved)
         change = Change(moved, after, before_weights, after_weights)
-        return Morphed(
+        return MorphedDisplacement(
             self._boxed.sizes(change),
             (self._still.reach, self.groups),
             displaced=lambda frames: self._displaced(frames, old, new),
             rates=lambda step: self._boxed.rates(change, step),
         )
 
-    def weights(self, old: Posed, new: Posed) -> list[tuple[int, Floats, Floats]]:
+    def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
         """Return the node whose morph weights count, in the scene before, with the weights (F, M) of both versions."""
         if not len(self.surface.targets):
             return []
@@ -160,7 +166,7 @@ class Part:
         """Return the number of the node that a used joint is, in the scene before."""
         return int(self.old.nodes[self.used[joint]])
 
-    def vertex(self, found: Longest) -> int:
+    def vertex(self, found: MaxDisplacement) -> int:
         """Return the number in the mesh of the vertex that was found, −1 where only a bound was looked at."""
         return int(self.groups[found.group][found.vertex]) if found.vertex >= 0 else -1
 
@@ -193,12 +199,12 @@ class Part:
             result[rows, columns] += np.where(weights > 0, weights, 0)[:, None] * whole
         return result.reshape(len(group), -1)
 
-    def _displaced(self, frames: Ints, old: Posed, new: Posed) -> Floats:
+    def _displaced(self, frames: Ints, old: PosedScene, new: PosedScene) -> Floats:
         """How every vertex is displaced (V, 3, f) in some frames, morphed and skinned one after the other."""
         result = np.zeros((*self.surface.points.shape, len(frames)))
         for carried, posed, sign in ((self.new, new, 1), (self.old, old, -1)):
-            points = morphed(self.surface, carried.weights(posed.pose)[frames])
+            points = morph_points(self.surface, carried.weights(posed.pose)[frames])
             bound = matrix.multiply(posed.of(carried.nodes)[:, frames], carried.bind[:, None])
             for i in range(len(frames)):
-                result[..., i] += sign * skinned(self.surface, points[i], bound[:, i])
+                result[..., i] += sign * skin_points(self.surface, points[i], bound[:, i])
         return result

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.shell_points import shells as shells_of
+from anim.measure.error.shell_points import shell_points as shells_of
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Scene
 
@@ -25,7 +25,7 @@ DENSE = 4_000_000  # numbers; a larger matrix is kept sparse
 
 
 @dataclass(frozen=True, slots=True)
-class Points:
+class PointMatrix:
     """P points on J nodes, each on up to I of them.
 
     nodes: (J,), increasing. joints: (P, I) into `nodes`. factors: (P, I, 4): weight times the point in the joint's own
@@ -39,7 +39,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.joints)
 
-    def rows(self) -> Rows:
+    def rows(self) -> PointRows:
         """Return the matrix (P, 4 J), float32, that turns stacked columns of node matrices into places."""
         width = self.joints.shape[1]
         row = np.repeat(np.arange(len(self)), 4 * width)
@@ -49,10 +49,10 @@ class Points:
         if shape[0] * shape[1] > DENSE:
             from scipy.sparse import csr_array
 
-            return Rows(csr_array((values, (row, column)), shape=shape))
+            return PointRows(csr_array((values, (row, column)), shape=shape))
         dense = np.zeros(shape, np.float32)
         np.add.at(dense, (row, column), values)
-        return Rows(dense)
+        return PointRows(dense)
 
     def places(self, world: Floats) -> Floats:
         """Return where the points are (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
@@ -68,7 +68,7 @@ class Points:
         return np.asarray(share > CARRIED if (share > CARRIED).any() else share > 0)
 
 
-class Rows:
+class PointRows:
     """A matrix (P, 4 J), dense or sparse, in front of stacked columns."""
 
     def __init__(self, matrix: object) -> None:
@@ -80,13 +80,15 @@ class Rows:
         return np.asarray(moved).reshape(len(moved), 3, -1)
 
 
-def stacked(world: Floats, nodes: Ints) -> Floats:
+def stack_points(world: Floats, nodes: Ints) -> Floats:
     """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, then all y, then all z."""
     chosen = world[nodes]
     return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), -1)
 
 
-def of_scene(scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int, int]] = frozenset()) -> Points:
+def sample_points(
+    scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int, int]] = frozenset()
+) -> PointMatrix:
     """Return the vertices of the scene that stick out, and six points around each node in `shells`, `radius` metres
     off in the rest pose.
 
@@ -96,12 +98,12 @@ def of_scene(scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int
     found = surfaces(scene) if has_vertices(scene) else []
     parts = []
     for number, surface in enumerate(found):
-        wanted = extremes(surface) | {vertex for owner, vertex in extra if owner == number}
+        wanted = extreme_vertices(surface) | {vertex for owner, vertex in extra if owner == number}
         parts.append(_of_surface(surface, np.array(sorted(wanted), np.int64)))
     return _joined([*parts, *_shells(scene, shells, radius)])
 
 
-def every(scene: Scene, radius: float) -> Points:
+def all_points(scene: Scene, radius: float) -> PointMatrix:
     """Return all vertices of the scene, surface after surface; where it has none, six points around every node."""
     if has_vertices(scene):
         return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in surfaces(scene)])
@@ -113,17 +115,17 @@ def _shells(scene: Scene, nodes: Set[int], radius: float) -> list[tuple[Ints, Fl
     return [_shell(node, ends) for node, ends in zip(around, shells_of(scene.skeleton, around, radius), strict=True)]
 
 
-def _joined(parts: list[tuple[Ints, Floats]]) -> Points:
+def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
     if not parts:
-        return Points(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
+        return PointMatrix(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
     nodes = np.flatnonzero(np.bincount(np.concatenate([nodes.reshape(-1) for nodes, _ in parts])))
     width = max(nodes.shape[1] for nodes, _ in parts)
     joints = [np.pad(np.searchsorted(nodes, own), ((0, 0), (0, width - own.shape[1]))) for own, _ in parts]
     factors = [np.pad(each, ((0, 0), (0, width - each.shape[1]), (0, 0))) for _, each in parts]
-    return Points(nodes, np.concatenate(joints), np.concatenate(factors))
+    return PointMatrix(nodes, np.concatenate(joints), np.concatenate(factors))
 
 
-def extremes(surface: Surface) -> set[int]:
+def extreme_vertices(surface: Surface) -> set[int]:
     """Return the numbers of the vertices that stick out on any joint's part of a surface."""
     chosen: set[int] = set()
     most = surface.joints[np.arange(len(surface.points)), surface.weights.argmax(axis=1)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.displacement import Field, Groups, Linear, Longest
-from anim.measure.error.point_groups import Posed
+from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
+from anim.measure.error.point_groups import PosedScene
 from anim.measure.error.surface import Surface
 from anim.model import Skeleton
 from anim.sampling import rest_pose, world_matrices
@@ -14,7 +14,7 @@ from anim.sampling import rest_pose, world_matrices
 ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # of the six points, along the node's own axes
 
 
-class Shells:
+class ShellPoints:
     """Six points at `radius` (m, in the rest pose) along the axes of some nodes, each a group of its own.
 
     nodes, partners: (S,) their numbers in the scenes before and after. points: (S, 6, 3) m, in the nodes' spaces.
@@ -23,25 +23,25 @@ class Shells:
 
     def __init__(self, skeleton: Skeleton, nodes: Ints, partners: Ints, radius: float) -> None:
         self.nodes, self.partners = nodes, partners
-        points = shells(skeleton, nodes, radius)
+        points = shell_points(skeleton, nodes, radius)
         whole = np.concatenate((points, np.ones((len(nodes), 6, 1))), axis=-1)
         self.points = points
         self.groups: list[Ints] = [np.arange(6, dtype=np.int64)] * len(nodes)
         self.reach: list[Ints] = [np.array([i]) for i in range(len(nodes))]
-        self._groups = Groups(self.reach, list(whole), points)
+        self._groups = BoundGroups(self.reach, list(whole), points)
 
     @property
     def name(self) -> str:
         """Return nothing: each group is named by its node."""
         return ""
 
-    def field(self, old: Posed, new: Posed) -> Field | None:
+    def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
         """Return how far the points are displaced at every time, None where there are none."""
         if not len(self.nodes) or not len(old.pose.times):
             return None
-        return Linear(self._groups, new.world[self.partners] - old.world[self.nodes])
+        return SkinnedDisplacement(self._groups, new.world[self.partners] - old.world[self.nodes])
 
-    def weights(self, old: Posed, new: Posed) -> list[tuple[int, Floats, Floats]]:
+    def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
         """Return nothing: shells are not morphed."""
         del old, new
         return []
@@ -54,20 +54,20 @@ class Shells:
         """Return the number of the node of a group, in the scene before."""
         return int(self.nodes[joint])
 
-    def vertex(self, found: Longest) -> int:
+    def vertex(self, found: MaxDisplacement) -> int:
         """Return −1, for these points are no vertices."""
         del found
         return -1
 
 
-def shells(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
+def shell_points(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
     """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
     axes = world_matrices(skeleton, rest_pose(skeleton))[0][nodes, :, :3]
     scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
     return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])
 
 
-def hidden(skeleton: Skeleton, surfaces: list[Surface]) -> Bools:
+def nodes_without_vertices(skeleton: Skeleton, surfaces: list[Surface]) -> Bools:
     """Return which nodes (N,) carry no vertex, nor does any node that hangs on them.
 
     A node that holds a skinned mesh is none of them either: where it is does not count.

@@ -9,9 +9,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.displacement import lengths, longest
-from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, Ruler, dense_times
-from anim.measure.error.shell_points import Shells
+from anim.measure.error.displacement import lengths, max_displacement
+from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, ErrorMetric, dense_times
+from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.times import frame_times
 
@@ -50,7 +50,13 @@ class Statistics:
 
 
 def statistics(
-    ruler: Ruler, before: Clip, after: Clip, *, times: Floats | None = None, player: str = "spec", fps: float = FPS
+    ruler: ErrorMetric,
+    before: Clip,
+    after: Clip,
+    *,
+    times: Floats | None = None,
+    player: str = "spec",
+    fps: float = FPS,
 ) -> Statistics:
     """Return how far `after` is from `before` on the whole, on the ruler's scenes.
 
@@ -66,14 +72,14 @@ def statistics(
         found += _distances(ruler, block)
     angle, weight = Peak(), Peak()
     for block in ruler.blocks(before, after, times, player=player):
-        angle = max(angle, _turned(ruler, block), key=lambda each: each.size)
+        angle = max(angle, _rotation_errors(ruler, block), key=lambda each: each.size)
         weight = max(weight, _weighted(ruler, block), key=lambda each: each.size)
     every = np.concatenate(found) if found else np.zeros(1)
     speed = speed_error(ruler, before, after, player=player, fps=fps)
     return Statistics(float(every.mean()), _percentile(every, 0.99), angle, speed, weight)
 
 
-def speed_error(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Peak:
+def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Peak:
     """Return the largest difference in a vertex's velocity, m/s, by differences over a grid of `fps` frames per second.
 
     It is never less than the true one on that grid, and no more than 1 % above. time: the middle of the frame's step.
@@ -90,7 +96,7 @@ def speed_error(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec"
                 continue
             rate = field.rate(step)
             floor = max(worst.size, STILL * ruler.diagonal)
-            top = longest(rate, floor=floor, slack=SLACK, most=MAX_SEARCHED)
+            top = max_displacement(rate, floor=floor, slack=SLACK, most=MAX_SEARCHED)
             if top.length > worst.size:
                 joint = ruler.called(part.node(rate.joint(top.group, top.frame, top.vertex)))
                 time = float(block.times[top.frame] + block.times[top.frame + 1]) / 2
@@ -98,10 +104,10 @@ def speed_error(ruler: Ruler, before: Clip, after: Clip, *, player: str = "spec"
     return worst
 
 
-def _distances(ruler: Ruler, block: Block) -> Iterator[Floats]:
+def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
     """Distances of all vertices at all times of the block; where there are none, of the points of shells."""
     frames = np.arange(len(block.times))
-    surfaces = [part for part in ruler.parts if not isinstance(part, Shells)]
+    surfaces = [part for part in ruler.parts if not isinstance(part, ShellPoints)]
     for part in surfaces or ruler.parts:
         field = part.field(block.old, block.new)
         if field is not None:
@@ -115,7 +121,7 @@ def _percentile(values: Floats, share: float) -> float:
     return float(np.partition(values, place)[place])
 
 
-def _turned(ruler: Ruler, block: Block) -> Peak:
+def _rotation_errors(ruler: ErrorMetric, block: Block) -> Peak:
     """The largest angle between the world rotations of a node in both versions."""
     old = _world_rotations(ruler.scene.skeleton, block.old.pose)
     new = _world_rotations(ruler.other.skeleton, block.new.pose)
@@ -137,7 +143,7 @@ def _world_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     return result
 
 
-def _weighted(ruler: Ruler, block: Block) -> Peak:
+def _weighted(ruler: ErrorMetric, block: Block) -> Peak:
     """The largest difference of a morph weight."""
     worst = Peak()
     for part in ruler.parts:

@@ -40,7 +40,7 @@ def has_vertices(scene: Scene) -> bool:
     return any(len(instance.mesh.positions) for instance in scene.instances)
 
 
-def measured_at(scene: Scene) -> str:
+def is_measured_at(scene: Scene) -> str:
     """Return the word for what errors are measured on: "surface", or "nodes" where no mesh has a vertex."""
     return "surface" if has_vertices(scene) else "nodes"
 
@@ -58,25 +58,27 @@ def diagonal(scene: Scene) -> float:
     """
     world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
     meshes = [_of_instance(scene, i) for i in scene.instances if len(i.mesh.positions)]
-    points = [placed(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [world[:, :, 3]]
+    points = [place_points(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [
+        world[:, :, 3]
+    ]
     every = np.concatenate(points)
     return float(np.linalg.norm(every.max(axis=0) - every.min(axis=0))) if len(every) else 0.0
 
 
-def placed(surface: Surface, world: Floats, weights: Floats) -> Floats:
+def place_points(surface: Surface, world: Floats, weights: Floats) -> Floats:
     """Return the points (V, 3) in world space: morphed by weights (M,), then blended linearly by the joints' world
     matrices (J, 3, 4)."""
-    return skinned(surface, morphed(surface, weights[None])[0], matrix.multiply(world, surface.bind))
+    return skin_points(surface, morph_points(surface, weights[None])[0], matrix.multiply(world, surface.bind))
 
 
-def morphed(surface: Surface, weights: Floats) -> Floats:
+def morph_points(surface: Surface, weights: Floats) -> Floats:
     """Return the points (F, V, 3) in mesh space, morphed by weights (F, M)."""
     moving = np.flatnonzero(weights.any(axis=0))
     moved = weights[:, moving] @ surface.targets[moving].reshape(len(moving), surface.points.size)
     return np.asarray(surface.points + moved.reshape(len(weights), *surface.points.shape))
 
 
-def skinned(surface: Surface, points: Floats, bound: Floats) -> Floats:
+def skin_points(surface: Surface, points: Floats, bound: Floats) -> Floats:
     """Return points (V, 3) of mesh space in world space, blended linearly by the joints' matrices (J, 3, 4)."""
     moved = np.zeros_like(points)
     for i in range(surface.joints.shape[1]):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from anim.gltf.reading import reader
 from anim.measure.inspect.file_findings import Finding, Severity
-from anim.measure.inspect.report import ClipFacts, SkinFacts
+from anim.measure.inspect.report import ClipReport, SkinReport
 
 MANY_INFLUENCES = 4  # what most players evaluate per vertex
 IRREGULAR = 0.9  # share of keys on the grid below which a rate is no rate
@@ -19,20 +19,20 @@ LATE_S = 5e-4  # a start nearer to 0 s is 0: what rounding leaves, and no displa
 USUAL_FPS = 60.0  # the rate that is advised where clips have none of their own
 
 
-def of_clips(clips: Iterable[ClipFacts]) -> Iterator[Finding]:
+def clip_findings(clips: Iterable[ClipReport]) -> Iterator[Finding]:
     """Yield one finding per kind of fault, with the clips that have it."""
     clips = list(clips)
     for rule in _CLIP_RULES:
         bad = [clip for clip in clips if rule.count(clip)]
         if bad:
             problem = rule.problem(bad, sum(map(rule.count, bad)))
-            where = reader.labels([(clip.name, clip.index) for clip in bad])
-            chosen = choosing([clip.index for clip in bad])
+            where = reader.clip_labels([(clip.name, clip.index) for clip in bad])
+            chosen = choose_option([clip.index for clip in bad])
             advice = rule.advice.format(fps=_rate(bad), finer=2 * _rate(bad), clips=chosen)
             yield Finding(rule.name, rule.severity, where, problem, advice)
 
 
-def choosing(numbers: Collection[int]) -> str:
+def choose_option(numbers: Collection[int]) -> str:
     """Return the options that choose clips by their numbers, where they are few: else all clips.
 
     choosing([0, 2]) → " --clip '#0' --clip '#2'"
@@ -40,10 +40,10 @@ def choosing(numbers: Collection[int]) -> str:
     return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= reader.LISTED else ""
 
 
-def of_skins(skins: Iterable[SkinFacts]) -> Iterator[Finding]:
+def skin_findings(skins: Iterable[SkinReport]) -> Iterator[Finding]:
     """Yield what is wrong with each skin."""
     for skin in skins:
-        where = reader.label(skin.name, skin.index, "skin")
+        where = reader.clip_label(skin.name, skin.index, "skin")
         if skin.unused_joints:
             problem = f"{skin.unused_joints} of {skin.joints} joints move no vertex"
             advice = "unless something hangs on them, leave them out where the skin is made"
@@ -66,20 +66,20 @@ class _Rule:
 
     name: str
     severity: Severity
-    count: Callable[[ClipFacts], int]
-    problem: Callable[[list[ClipFacts], int], str]
+    count: Callable[[ClipReport], int]
+    problem: Callable[[list[ClipReport], int], str]
     advice: str
 
 
-def _times(words: str) -> Callable[[list[ClipFacts], int], str]:
+def _times(words: str) -> Callable[[list[ClipReport], int], str]:
     return lambda _, count: f"{count} × {words}"
 
 
-def _late(clips: list[ClipFacts], _: int) -> str:
+def _late(clips: list[ClipReport], _: int) -> str:
     return f"first key at {_range([clip.start_s for clip in clips])} s: players hold the first pose until then"
 
 
-def _irregular(clips: list[ClipFacts], _: int) -> str:
+def _irregular(clips: list[ClipReport], _: int) -> str:
     least = min(clip.frame_rate_regular or 0.0 for clip in clips)
     return f"only {math.floor(100 * least)} % of key times lie on a grid"
 
@@ -89,7 +89,7 @@ def _range(seconds: list[float]) -> str:
     return least if least == most else f"{least} to {most}"
 
 
-def _rate(clips: list[ClipFacts]) -> int:
+def _rate(clips: list[ClipReport]) -> int:
     """Frames per second that put a key at every key of the clips, where those lie on a grid; else a usual rate."""
     rates = [clip.frame_rate_fps or USUAL_FPS for clip in clips]
     return math.ceil(max(rates) - 1e-3)

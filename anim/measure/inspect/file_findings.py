@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from anim.errors import AnimError
-from anim.gltf.document import Document, Json, items, node_label
+from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import reader
 from anim.gltf.validation import buffer_layout, channel_targets, hierarchy
 from anim.gltf.validation.structure import TOP_ARRAYS
@@ -35,7 +35,7 @@ class Finding:
     advice: str
 
 
-def of_faults(faults: Sequence[AnimError]) -> Iterator[Finding]:
+def fault_findings(faults: Sequence[AnimError]) -> Iterator[Finding]:
     """Yield what makes other commands refuse a file; of many faults, the first ones."""
     for fault in faults[:LISTED]:
         advice = fault.help or "mend it where the file was made; other commands refuse it"
@@ -45,7 +45,7 @@ def of_faults(faults: Sequence[AnimError]) -> Iterator[Finding]:
         yield Finding(INVALID, Severity.ERROR, "file", problem, "mend the first ones, and look again")
 
 
-def of_document(document: Document) -> Iterator[Finding]:
+def document_findings(document: Document) -> Iterator[Finding]:
     """Yield faults of the file's structure that leave its meaning clear, so that no command refuses it."""
     json = document.json
     for key in sorted(TOP_ARRAYS):
@@ -85,7 +85,7 @@ _PASSES = "it passes through untouched; check the result in a viewer that knows 
 
 
 def _of_accessors(json: Json) -> Iterator[Finding]:
-    for i, accessor in enumerate(items(json, "accessors")):
+    for i, accessor in enumerate(json_array(json, "accessors")):
         if accessor.get("normalized") and accessor["componentType"] in (5125, 5126):
             where, problem = f"accessor {i}", "floats are marked normalized"
             yield Finding("normalized-float", Severity.ERROR, where, problem, "drop the mark where the file is made")
@@ -101,19 +101,19 @@ def badly_stored(json: Json) -> frozenset[int]:
     Commands that edit clips write those anew, also where no key changes.
     """
     faults = (_unbounded, _strided, _idle)
-    return frozenset(i for i, each in enumerate(items(json, "animations")) if any(f(json, each) for f in faults))
+    return frozenset(i for i, each in enumerate(json_array(json, "animations")) if any(f(json, each) for f in faults))
 
 
 _REWRITE = "to write them anew and change nothing else: gltf-anim retime IN OUT --speed 1"
 
 
 def _of_samplers(json: Json) -> Iterator[Finding]:
-    clips = items(json, "animations")
+    clips = json_array(json, "animations")
     for i, animation in enumerate(clips):
-        where = reader.label(animation.get("name", ""), i)
+        where = reader.clip_label(animation.get("name", ""), i)
         if idle := _idle(json, animation):
             yield Finding("unused-samplers", Severity.INFO, where, f"{len(idle)} samplers in no channel", _REWRITE)
-        ignored = sum(channel_targets.of_channel(channel) is None for channel in animation["channels"])
+        ignored = sum(channel_targets.channel_target(channel) is None for channel in animation["channels"])
         if ignored:
             problem = f"{ignored} channels without a target that is known"
             yield Finding("ignored-channels", Severity.INFO, where, problem, "players skip them; they are kept")
@@ -134,20 +134,20 @@ def _idle(json: Json, animation: Json) -> set[int]:
 
 def _unbounded(json: Json, animation: Json) -> set[int]:
     """Accessors of key times without min and max."""
-    accessors = items(json, "accessors")
+    accessors = json_array(json, "accessors")
     return {n for s in animation["samplers"] if not {"min", "max"} <= accessors[n := s["input"]].keys()}
 
 
 def _strided(json: Json, animation: Json) -> set[int]:
     """Accessors of a clip in views with a byteStride, which only vertices may have."""
-    accessors, views = items(json, "accessors"), items(json, "bufferViews")
+    accessors, views = json_array(json, "accessors"), json_array(json, "bufferViews")
     named = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
     return {n for n in named if _has_stride(accessors[n], views)}
 
 
 def _of_clip_names(json: Json) -> Iterator[Finding]:
     by_name: dict[str, list[int]] = {}
-    for i, animation in enumerate(items(json, "animations")):
+    for i, animation in enumerate(json_array(json, "animations")):
         by_name.setdefault(animation.get("name", ""), []).append(i)
     for name, numbers in by_name.items():
         if name and len(numbers) > 1:
@@ -161,12 +161,12 @@ def _has_stride(accessor: Json, views: list[Json]) -> bool:
 
 
 def _of_skins(json: Json) -> Iterator[Finding]:
-    skins = items(json, "skins")
+    skins = json_array(json, "skins")
     if not skins:
         return
     parents = hierarchy.parents(json)
     for i, skin in enumerate(skins):
-        where = reader.label(skin.get("name", ""), i, "skin")
+        where = reader.clip_label(skin.get("name", ""), i, "skin")
         common = set.intersection(*(set(_ancestors(joint, parents)) for joint in skin["joints"]))
         if not common:
             problem = "joints have no common root"
@@ -176,7 +176,9 @@ def _of_skins(json: Json) -> Iterator[Finding]:
             advice = "players ignore the property; drop it where the skin is made"
             yield Finding("skeleton-hint", Severity.WARNING, where, problem, advice)
         accessor = skin.get("inverseBindMatrices")
-        if accessor is not None and _has_stride(items(json, "accessors")[accessor], items(json, "bufferViews")):
+        if accessor is not None and _has_stride(
+            json_array(json, "accessors")[accessor], json_array(json, "bufferViews")
+        ):
             problem = "inverse bind matrices lie in a view with byteStride"
             yield Finding(
                 "strided-matrices", Severity.ERROR, where, problem, "give them a view of their own where it is made"

@@ -14,14 +14,14 @@ ENOUGH = 0.98  # share of keys that must lie on a rate's grid for it to be the r
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class FrameRate:
     """fps: the estimate. regular: share of the keys that lie on its grid, 0 … 1."""
 
     fps: float
     regular: float
 
 
-def estimate(times: Floats) -> Rate | None:
+def estimate_frame_rate(times: Floats) -> FrameRate | None:
     """Return the frame rate of key times (K,) in seconds, increasing; None where too few keys leave it open.
 
     Keys at one distance give its inverse. Otherwise the slowest usual rate that nearly all keys lie on; failing that,
@@ -35,14 +35,14 @@ def estimate(times: Floats) -> Rate | None:
     if len(times) > 4 and steps[-1] < (1 - ON_GRID) * typical:  # a clip may end between two frames
         times, steps = times[:-1], steps[:-1]
     if (np.abs(steps - typical) < ON_GRID * typical).all():
-        fps = _rounded((len(times) - 1) / float(times[-1] - times[0]))
-        return Rate(fps, float(_regular(times, np.array([fps]))[0]))
+        fps = _round_rate((len(times) - 1) / float(times[-1] - times[0]))
+        return FrameRate(fps, float(_regular(times, np.array([fps]))[0]))
     regular = _regular(times, RATES)
     good = np.flatnonzero(regular >= ENOUGH)
     if len(good):
-        return Rate(float(RATES[good[0]]), float(regular[good[0]]))
-    fps = _rounded(1 / typical)
-    return Rate(fps, float(_regular(times, np.array([fps]))[0]))
+        return FrameRate(float(RATES[good[0]]), float(regular[good[0]]))
+    fps = _round_rate(1 / typical)
+    return FrameRate(fps, float(_regular(times, np.array([fps]))[0]))
 
 
 def _median(values: Floats) -> float:
@@ -57,7 +57,7 @@ def _regular(times: Floats, rates: Floats) -> Floats:
     return share
 
 
-def _rounded(fps: float) -> float:
+def _round_rate(fps: float) -> float:
     """A usual or whole rate where the estimate is within a thousandth of one."""
     near = np.concatenate((RATES, [np.rint(fps)]))
     best = float(near[np.argmin(np.abs(near - fps))])

@@ -10,14 +10,14 @@ import numpy as np
 
 from anim.arrays import Bools, unique_sorted
 from anim.errors import AnimError
-from anim.gltf.document import Document, items
-from anim.gltf.io.lenient import Broken
+from anim.gltf.document import Document, json_array
+from anim.gltf.io.lenient import BrokenFile
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.inspect import clip_findings, file_findings, frame_rate, root_motion, storage_cost
 from anim.measure.inspect.file_findings import Finding
-from anim.measure.inspect.report import ClipFacts, Facts, SkinFacts, TrackFacts
-from anim.measure.inspect.stored_bytes import stored
+from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
+from anim.measure.inspect.stored_bytes import stored_bytes as stored
 from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import Seam, SkinMotion
@@ -32,7 +32,7 @@ def inspect(
     file_bytes: int,
     chosen: Iterable[int] | None = None,
     tracks: bool = False,
-    broken: Broken | None = None,
+    broken: BrokenFile | None = None,
 ) -> Facts:
     """Return the facts of a document.
 
@@ -52,12 +52,12 @@ def inspect(
     groups = concatenate([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
-    ways = root_motion.travels(skeleton, looked_at, groups)
+    ways = root_motion.root_motions(skeleton, looked_at, groups)
     scene, hidden = _scene(document, accessors)
     skin = SkinMotion(scene or Scene(skeleton, ()))
     seams = _seams(skin, looked_at, groups)
     measured_on = "skin" if skin.is_skin else "nodes"
-    costs, cost = storage_cost.footprints(document)
+    costs, cost = storage_cost.storage_costs(document)
     stored_bytes = min(stored(document), cost.data)
     packed = stored_bytes / cost.data if cost.data else 1.0
     clip_facts = tuple(
@@ -76,12 +76,12 @@ def inspect(
         )
         for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
     )
-    skins = tuple(_skin(i, document, scene) for i in range(len(items(json, "skins"))) if i not in lost_skins)
+    skins = tuple(_skin(i, document, scene) for i in range(len(json_array(json, "skins"))) if i not in lost_skins)
     return Facts(
         str(json["asset"].get("generator", "")),
         tuple(json.get("extensionsUsed", ())),
         len(skeleton),
-        len(items(json, "meshes")),
+        len(json_array(json, "meshes")),
         scene.vertex_count if scene is not None else None,
         cost.data,
         stored_bytes,
@@ -89,11 +89,11 @@ def inspect(
         clip_facts,
         skins,
         (
-            *file_findings.of_faults(faults),
-            *file_findings.of_document(document),
+            *file_findings.fault_findings(faults),
+            *file_findings.document_findings(document),
             *hidden,
-            *clip_findings.of_clips(clip_facts),
-            *clip_findings.of_skins(skins),
+            *clip_findings.clip_findings(clip_facts),
+            *clip_findings.skin_findings(skins),
         ),
         faults,
     )
@@ -101,7 +101,7 @@ def inspect(
 
 def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]) -> list[Seam]:
     """The seams of whole clips, as `loop` measures them."""
-    roots = (root_motion.traveling_root(skin.skeleton, clip) for clip in clips)
+    roots = (root_motion.root_motion_node(skin.skeleton, clip) for clip in clips)
     parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
     return skin.seams(parts, groups)
 
@@ -109,22 +109,22 @@ def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]
 def _clip(
     number: int,
     clip: Clip,
-    way: root_motion.Travel,
+    way: root_motion.RootMotion,
     seam: Seam,
     measured_on: str,
     skeleton: Skeleton,
     counted: TrackStats,
-    cost: storage_cost.Footprint,
+    cost: storage_cost.StorageCost,
     packed: float,
     file_bytes: int,
     *,
     tracks: bool,
-) -> ClipFacts:
+) -> ClipReport:
     start, end, axes = clip.start, clip.end, clip.axes
     counted = _with_end(clip, counted)
     stored_bytes = round(packed * cost.data)
-    estimated = frame_rate.estimate(unique_sorted(np.concatenate(axes))) if axes else None
-    return ClipFacts(
+    estimated = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(axes))) if axes else None
+    return ClipReport(
         index=number,
         name=clip.name,
         start_s=start,
@@ -180,9 +180,9 @@ def _repeating(clip: Clip, counted: TrackStats) -> int:
     return max(count - 1, 0) if counted.constant.all() and clip.end > clip.start else count
 
 
-def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackFacts:
+def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackReport:
     target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
-    return TrackFacts(
+    return TrackReport(
         target or "",
         track.path,
         str(track.interpolation),
@@ -207,18 +207,18 @@ def _scene(document: Document, accessors: Accessors) -> tuple[Scene | None, list
         return None, [Finding("vertices-unread", file_findings.Severity.WARNING, "meshes", str(error), advice_text)]
 
 
-def _skin(number: int, document: Document, scene: Scene | None) -> SkinFacts:
-    about = items(document.json, "skins")[number]
+def _skin(number: int, document: Document, scene: Scene | None) -> SkinReport:
+    about = json_array(document.json, "skins")[number]
     name, joints = about.get("name", ""), about["joints"]
-    nodes = items(document.json, "nodes")
+    nodes = json_array(document.json, "nodes")
     using = [i for i in scene.instances if nodes[i.node].get("skin") == number] if scene is not None else []
     if scene is None or not using:
-        return SkinFacts(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
+        return SkinReport(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
     counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
     off = [np.abs(i.mesh.weight_sums - 1) for i in using if i.mesh.weight_sums is not None]
     sums = np.concatenate([np.empty(0), *off])
     unused = len(joints) - len(_useful(using, joints, scene.skeleton))
-    return SkinFacts(
+    return SkinReport(
         number,
         name,
         len(joints),

@@ -14,7 +14,7 @@ TIME = 4  # bytes of a key's time
 SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
 
-def removable(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[Bools]:
+def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[Bools]:
     """Return which keys (K,) of each track can go so that the file gets smaller.
 
     given: by number of a track that moves, which keys (K,) their neighbors give anyway; tracks that it lacks move

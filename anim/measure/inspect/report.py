@@ -9,7 +9,7 @@ from anim.measure.inspect.file_findings import Finding
 
 
 @dataclass(frozen=True, slots=True)
-class TrackFacts:
+class TrackReport:
     """One track: what it moves, its keys, and what they tell (see `measure.tracks`)."""
 
     target: str
@@ -28,7 +28,7 @@ class TrackFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class ClipFacts:
+class ClipReport:
     """One clip. duration_s: from its first to its last key; players count from 0 to end_s.
 
     frame_rate_fps, frame_rate_regular: the estimate and the share of keys on its grid; None where it is open.
@@ -69,11 +69,11 @@ class ClipFacts:
     root: str
     root_distance_m: float
     root_speed_m_per_s: float
-    track_list: tuple[TrackFacts, ...] = field(default=(), repr=False)
+    track_list: tuple[TrackReport, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True, slots=True)
-class SkinFacts:
+class SkinReport:
     """One skin on the meshes that use it; None where their vertices can't be read.
 
     unused_joints: neither carry a vertex nor have a joint below them that does. most_influences: of any vertex.
@@ -106,7 +106,7 @@ class Facts:
     animation_data_bytes: int
     animation_stored_bytes: int
     animation_json_bytes: int
-    clips: tuple[ClipFacts, ...]
-    skins: tuple[SkinFacts, ...]
+    clips: tuple[ClipReport, ...]
+    skins: tuple[SkinReport, ...]
     findings: tuple[Finding, ...]
     faults: tuple[AnimError, ...] = ()

@@ -17,7 +17,7 @@ ONWARD = 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class Travel:
+class RootMotion:
     """The way of a clip's root from start to end.
 
     root: number of the node whose way was taken, −1 where no translation moves. distance: m. speed: m/s.
@@ -28,15 +28,15 @@ class Travel:
     speed: float
 
 
-def travels(
+def root_motions(
     skeleton: Skeleton, clips: Sequence[Clip], groups: Sequence[ConcatenatedTracks] | None = None
-) -> list[Travel]:
+) -> list[RootMotion]:
     """Return one Travel per clip; a clip without time between start and end has none.
 
     groups: the tracks of all clips, `joined`, for callers that have them.
     """
     if not len(skeleton) or not clips:
-        return [Travel(-1, 0.0, 0.0) for _ in clips]
+        return [RootMotion(-1, 0.0, 0.0) for _ in clips]
     times = np.array([[clip.start, clip.end] for clip in clips])
     world = world_by_node(skeleton, poses_of_clips(skeleton, clips, times, groups=groups)[0])
     places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
@@ -44,7 +44,7 @@ def travels(
     return [_travel(clip, places[:, i, 1] - places[:, i, 0], depth) for i, clip in enumerate(clips)]
 
 
-def traveling_root(skeleton: Skeleton, clip: Clip) -> int:
+def root_motion_node(skeleton: Skeleton, clip: Clip) -> int:
     """Return the node whose way carries a character along, −1 where none does.
 
     It is the moved node nearest to the root, if others hang on it and its way leads somewhere: at least ONWARD of the
@@ -64,14 +64,14 @@ def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
     return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length
 
 
-def _travel(clip: Clip, away: Floats, depth: Floats) -> Travel:
+def _travel(clip: Clip, away: Floats, depth: Floats) -> RootMotion:
     """away: (N, 3) from start to end."""
     duration = clip.end - clip.start
     if duration <= 0:
-        return Travel(-1, 0.0, 0.0)
+        return RootMotion(-1, 0.0, 0.0)
     root = _root(clip, depth)
     distance = float(np.linalg.norm(away[root])) if root >= 0 else 0.0
-    return Travel(root, distance, distance / duration)
+    return RootMotion(root, distance, distance / duration)
 
 
 def _root(clip: Clip, depth: Floats) -> int:

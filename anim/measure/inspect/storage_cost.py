@@ -6,13 +6,13 @@ import json as jsonlib
 from collections import Counter
 from dataclasses import dataclass
 
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing.references import views_of
 
 
 @dataclass(frozen=True, slots=True)
-class Footprint:
+class StorageCost:
     """Bytes of stored numbers (decoded size where compressed), and of JSON: channels, samplers, accessors, views."""
 
     data: int
@@ -24,26 +24,26 @@ class Footprint:
         return self.data + self.json
 
 
-def footprints(document: Document) -> tuple[list[Footprint], Footprint]:
+def storage_costs(document: Document) -> tuple[list[StorageCost], StorageCost]:
     """Return what each animation costs alone, and what all cost together: there, what several share counts once."""
     content = document.json
-    accessors, views = items(content, "accessors"), items(content, "bufferViews")
-    alone: list[Footprint] = []
+    accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
+    alone: list[StorageCost] = []
     users_of_accessor: Counter[int] = Counter()
     users_of_view: Counter[int] = Counter()
-    for animation in items(content, "animations"):
+    for animation in json_array(content, "animations"):
         numbers = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
         named = [accessors[i] for i in sorted(numbers)]
         of_views = {view for accessor in named for view in views_of(accessor)}
         described = [[animation], named, [views[i] for i in sorted(of_views)]]
-        alone.append(Footprint(sum(map(_size, named)), sum(len(_text(part)) - 1 for part in described if part)))
+        alone.append(StorageCost(sum(map(_size, named)), sum(len(_text(part)) - 1 for part in described if part)))
         users_of_accessor.update(numbers)
         users_of_view.update(of_views)
     extra = [(accessors[i], count - 1) for i, count in users_of_accessor.items() if count > 1]
     repeated = [(views[i], count - 1) for i, count in users_of_view.items() if count > 1]
     data = sum(part.data for part in alone) - sum(_size(about) * times for about, times in extra)
     text = sum(part.json for part in alone) - sum((len(_text(about)) + 1) * times for about, times in extra + repeated)
-    return alone, Footprint(data, text)
+    return alone, StorageCost(data, text)
 
 
 def _text(part: object) -> str:

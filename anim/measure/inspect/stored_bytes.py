@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from anim.gltf.document import Document, Json, items
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing import byte_ranges
-from anim.gltf.writing.references import outside, views_of
+from anim.gltf.writing.references import references_outside, views_of
 
 
-def stored(document: Document) -> int:
+def stored_bytes(document: Document) -> int:
     """Return the bytes that only animations take in the buffers; of compressed views the compressed ones."""
     content = document.json
-    clips = items(content, "animations")
+    clips = json_array(content, "animations")
     samplers = [sampler for animation in clips for sampler in animation["samplers"]]
-    others = outside(content, range(len(clips))).accessors
+    others = references_outside(content, range(len(clips))).accessors
     mine = {sampler[key] for sampler in samplers for key in ("input", "output")} - others
-    accessors, views = items(content, "accessors"), items(content, "bufferViews")
+    accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
     spans: dict[int, list[byte_ranges.Range]] = {}
     compressed: dict[int, int] = {}
     for number in mine:

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.measure.inspect.redundant_keys import removable
+from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Interpolation, Skeleton, Track, ValueKind
 from anim.sampling.joined import ConcatenatedTracks, concatenate
 
@@ -91,7 +91,7 @@ def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tupl
     for group in groups:
         _count(group, skeleton, result, given)
         tracks.update(zip(group.numbers.tolist(), group.tracks, strict=True))
-    return result, removable([tracks[i] for i in range(count)], given)
+    return result, redundant_keys([tracks[i] for i in range(count)], given)
 
 
 def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, given: dict[int, Bools]) -> None:
@@ -156,11 +156,11 @@ def _redundant(group: ConcatenatedTracks, values: Floats, constant: Bools) -> Bo
     inner = ~constant[of_track]
     inner[group.starts] = inner[group.starts + group.counts - 1] = False
     at = np.flatnonzero(inner)
-    inner[at] = _given(group, values, of_track, at)
+    inner[at] = _is_interpolated(group, values, of_track, at)
     return np.asarray(inner)
 
 
-def _given(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints) -> Bools:
+def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints) -> Bools:
     """For each of the keys `at` (A,), none at an end of its track, whether the keys next to it give it."""
     before, here, after = values[at - 1], values[at], values[at + 1]
     if group.interpolation is Interpolation.STEP:
@@ -170,7 +170,7 @@ def _given(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints) 
     duration = group.times[at + 1] - group.times[at - 1]
     u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
-        return _given_by_cubic(group.tangents, values, at, u[:, None], duration[:, None], allowed)
+        return _is_interpolated_cubic(group.tangents, values, at, u[:, None], duration[:, None], allowed)
     if group.kind is not ValueKind.ROTATION:
         between = before + u[:, None] * (after - before)
         return np.asarray(_widest(here - between) <= allowed)
@@ -187,7 +187,7 @@ def _same_lengths(group: ConcatenatedTracks, of_track: Ints, at: Ints, u: Floats
     return np.asarray(off <= allowed + 2 / steps[of_track[at]])
 
 
-def _given_by_cubic(
+def _is_interpolated_cubic(
     tangents: tuple[Floats, Floats], values: Floats, at: Ints, u: Floats, duration: Floats, allowed: Floats
 ) -> Bools:
     arriving, leaving = tangents

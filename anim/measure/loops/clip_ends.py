@@ -62,16 +62,16 @@ class LoopRange:
 
 
 @dataclass(frozen=True, slots=True)
-class AtEnds:
+class EndPoses:
     """A part at the T times of DIFFERENCES. world: (N, T, 3, 4). weights: (T, M) by node, of meshes that morph."""
 
     world: Floats
     weights: dict[int, Floats]
 
 
-def at_ends(
+def poses_around_ends(
     skeleton: Skeleton, parts: Sequence[LoopRange], groups: Sequence[ConcatenatedTracks] | None = None
-) -> list[AtEnds]:
+) -> list[EndPoses]:
     """Return each range around its ends, the way of its root taken off.
 
     groups: the tracks of all their clips, `joined`, for callers that have them.
@@ -81,8 +81,8 @@ def at_ends(
     world = world_by_node(skeleton, whole)
     world = world.reshape(len(skeleton), *times.shape, 3, 4)
     for i, part in enumerate(parts):
-        take_off(skeleton, world[:, i], part.root)
-    return [AtEnds(world[:, i], weights[i]) for i in range(len(parts))]
+        remove_root_motion(skeleton, world[:, i], part.root)
+    return [EndPoses(world[:, i], weights[i]) for i in range(len(parts))]
 
 
 def poses_of_clips(
@@ -115,7 +115,7 @@ def poses_of_clips(
     return Pose(times.reshape(-1), translation, rotation, scale), weights
 
 
-def take_off(skeleton: Skeleton, world: Floats, root: int) -> None:
+def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:
     """Take the way of node `root` since the first frame off world matrices (N, F, 3, 4), in place; −1: of none."""
     if root >= 0:
         way = world[root, :, :, 3] - world[root, :1, :, 3]

@@ -68,19 +68,19 @@ class Loop:
     joints: tuple[JointGap, ...] = ()
 
 
-def loop(scene: Scene, clip: Clip, *, root: int = -1) -> Loop:
+def analyze_loop(scene: Scene, clip: Clip, *, root: int = -1) -> Loop:
     """Return what kind of loop the clip is.
 
     Closed: no vertex that is seen to jump. Closed except some joints: fewer joints stay open than close while they
     move, and they jump no further than the clip moves from frame to frame. Open by one frame: the seam is about the
     next frame's motion. root: the node whose way does not count, −1 for none.
     """
-    return judge(SkinMotion(scene), clip, root=root)
+    return judge_range(SkinMotion(scene), clip, root=root)
 
 
-def judge(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
+def judge_range(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
     """Return the same of a clip on a skin that is there already: for many clips."""
-    return _judged(skin, clip, clip.start, clip.end, root)
+    return _judge(skin, clip, clip.start, clip.end, root)
 
 
 def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:
@@ -109,12 +109,12 @@ def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float
             break
         if all(abs(a - c) > 2 or abs(b - d) > 2 for c, d in taken):
             taken.append((a, b))
-            found.append(_judged(skin, clip, float(times[a]), float(times[b]), root))
+            found.append(_judge(skin, clip, float(times[a]), float(times[b]), root))
     looping = [each for each in found if each.kind is not LoopKind.NOT_A_LOOP] or found
     return sorted(looping, key=lambda each: (list(LoopKind).index(each.kind), each.seam))
 
 
-def _judged(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> Loop:
+def _judge(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> Loop:
     fps = _fps(clip)
     frame_step = min(1 / fps, (end - start) / 2) if end > start else 0.0
     if not len(skin.points) or frame_step == 0:
@@ -161,7 +161,7 @@ def _some(numbers: Floats) -> Floats:
 
 
 def _fps(clip: Clip) -> float:
-    found = frame_rate.estimate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
+    found = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
     return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
 
 

@@ -16,7 +16,7 @@ _WORDS = {
 }
 
 
-def advice(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
+def recommend(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
     """Yield a line for each kind of whole clips that don't close. found: the clips' numbers, and verdicts.
 
     advice([(0, lacking_its_last_frame)]) → "to add the last frame that is missing: gltf-anim loop IN OUT --clip '#0'"

@@ -11,10 +11,10 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.error import orientation_probes, point_matrix
-from anim.measure.error.point_matrix import Points, Rows
-from anim.measure.error.surface import Surface, has_vertices, morphed, skinned, surfaces
+from anim.measure.error.point_matrix import PointMatrix, PointRows
+from anim.measure.error.surface import Surface, has_vertices, morph_points, skin_points, surfaces
 from anim.measure.loops import clip_ends
-from anim.measure.loops.clip_ends import AtEnds, LoopRange
+from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Pose, Scene
 from anim.sampling.joined import ConcatenatedTracks
 from anim.sampling.pose import rest_pose, sample_pose, world_by_node
@@ -70,26 +70,28 @@ class SkinMotion:
         self._surfaces = surfaces(scene) if self.is_skin else []
         self._rest_world = world_by_node(scene.skeleton, rest_pose(scene.skeleton))
         self._lever = (
-            orientation_probes.LEVER * orientation_probes.size(self._rest_world[..., 3]) if len(scene.skeleton) else 0.0
+            orientation_probes.LEVER * orientation_probes.probe_size(self._rest_world[..., 3])
+            if len(scene.skeleton)
+            else 0.0
         )
 
     @cached_property
-    def points(self) -> Points:
+    def points(self) -> PointMatrix:
         """The points that stick out."""
         nodes = range(0 if self.is_skin else len(self.skeleton))
-        return point_matrix.of_scene(self._scene, frozenset(nodes), self._lever)
+        return point_matrix.sample_points(self._scene, frozenset(nodes), self._lever)
 
     @cached_property
     def size(self) -> float:
         """The diagonal, in metres, of the scene's box in its rest pose; 1 where it has none."""
-        return orientation_probes.size(self.points.places(self._rest_world)) if len(self.points) else 1.0
+        return orientation_probes.probe_size(self.points.places(self._rest_world)) if len(self.points) else 1.0
 
     @cached_property
-    def _every(self) -> Points:
-        return point_matrix.every(self._scene, self._lever)
+    def _every(self) -> PointMatrix:
+        return point_matrix.all_points(self._scene, self._lever)
 
     @cached_property
-    def _rows(self) -> Rows:
+    def _rows(self) -> PointRows:
         return self._every.rows()
 
     @cached_property
@@ -100,7 +102,7 @@ class SkinMotion:
     def places(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
         """Return where the points that stick out are (P, F, 3) at times (F,), the way of node `root` taken off."""
         world = world_by_node(self.skeleton, sample_pose(self.skeleton, clip, times))
-        clip_ends.take_off(self.skeleton, world, root)
+        clip_ends.remove_root_motion(self.skeleton, world, root)
         return self.points.places(world)
 
     def steps(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
@@ -128,7 +130,7 @@ class SkinMotion:
             self.skeleton, [clip], times.reshape(1, -1), held=None if held is None else held.reshape(1, -1)
         )
         world = world_by_node(self.skeleton, poses)
-        clip_ends.take_off(self.skeleton, world, root)
+        clip_ends.remove_root_motion(self.skeleton, world, root)
         world = world.reshape(len(world), stops, frames, 3, 4)
         morphs = {node: each.reshape(stops, frames, -1) for node, each in morphs.items()}
         count = max(AT_ONCE // (3 * stops * len(self._every)), 1)
@@ -149,7 +151,7 @@ class SkinMotion:
             squares[np.isin(self._owners, [mesh.owner for mesh in morphing])] = 0
         most = np.sqrt(squares.max(axis=0)).astype(np.float64)
         for mesh in morphing:
-            seen = AtEnds(world.reshape(size, -1, 3, 4), {mesh.owner: morphs[mesh.owner].reshape(stops * frames, -1)})
+            seen = EndPoses(world.reshape(size, -1, 3, 4), {mesh.owner: morphs[mesh.owner].reshape(stops * frames, -1)})
             moved = np.tensordot(weights, _morphing(mesh, seen).reshape(stops, frames, -1, 3), (0, 0))
             most = np.maximum(most, _longest_each(moved))
         return np.asarray(most)
@@ -161,7 +163,7 @@ class SkinMotion:
         """
         if not parts or not len(self._every):
             return [Seam() for _ in parts]
-        seen = clip_ends.at_ends(self.skeleton, parts, groups)
+        seen = clip_ends.poses_around_ends(self.skeleton, parts, groups)
         count = max(AT_ONCE // (3 * len(clip_ends.DIFFERENCES) * len(self._every)), 1)
         return [
             seam
@@ -169,14 +171,14 @@ class SkinMotion:
             for seam in self._seams(seen[first : first + count], parts[first : first + count])
         ]
 
-    def _seams(self, seen: Sequence[AtEnds], parts: Sequence[LoopRange]) -> list[Seam]:
+    def _seams(self, seen: Sequence[EndPoses], parts: Sequence[LoopRange]) -> list[Seam]:
         differences = np.stack([clip_ends.differences(each.world, 1) for each in seen], axis=1)  # (N, parts, D, 3, 4)
         squares = self._squares(differences.reshape(len(self.skeleton), -1, 3, 4)).reshape(
             len(self._every), len(seen), -1
         )
         return [self._seam(squares[:, i], each, part) for i, (each, part) in enumerate(zip(seen, parts, strict=True))]
 
-    def _seam(self, squares: Floats, seen: AtEnds, part: LoopRange) -> Seam:
+    def _seam(self, squares: Floats, seen: EndPoses, part: LoopRange) -> Seam:
         """squares: (P, D), the squared lengths of all differences, of meshes that morph as they are at rest."""
         morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in seen.weights]
         if morphing:
@@ -193,7 +195,7 @@ class SkinMotion:
 
     def _squares(self, differences: Floats) -> Floats:
         """Squared lengths (P, F) of the moves of all points, by differences of world matrices (N, F, 3, 4)."""
-        moves = self._rows.moves(point_matrix.stacked(differences, self._every.nodes))
+        moves = self._rows.moves(point_matrix.stack_points(differences, self._every.nodes))
         return np.asarray((moves * moves).sum(axis=1))
 
     def _carrier(self, point: int) -> str:
@@ -265,12 +267,12 @@ class SkinMotion:
         return float(np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max())
 
 
-def _morphing(mesh: Surface, seen: AtEnds) -> Floats:
+def _morphing(mesh: Surface, seen: EndPoses) -> Floats:
     """Vertices (T, V, 3) of a mesh that morphs, at the times of the ends."""
     placed = [
-        skinned(mesh, *each)
+        skin_points(mesh, *each)
         for each in zip(
-            morphed(mesh, seen.weights[mesh.owner]),
+            morph_points(mesh, seen.weights[mesh.owner]),
             matrix.multiply(np.swapaxes(seen.world[mesh.nodes], 0, 1), mesh.bind),
             strict=True,
         )

@@ -8,23 +8,23 @@ from typing import TypeAlias
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.optimize.search.segment_errors import Segments, fits
-from anim.optimize.search.source_motion import Truth
-from anim.optimize.search.time_axes import Axis, merged
-from anim.optimize.tracks.key_reduction import jointly_needed, needed
-from anim.optimize.tracks.quantization import Coding
+from anim.optimize.search.segment_errors import SegmentErrors, fits
+from anim.optimize.search.source_motion import SourceMotion
+from anim.optimize.search.time_axes import SharedAxis, merge_axes
+from anim.optimize.tracks.key_reduction import greedy_keys, joint_greedy_keys
+from anim.optimize.tracks.quantization import Encoding
 
 STILL = 0.1  # of the bound: a track that is less off its middle value gets no table
 ASKED = 4.0  # of the bound: larger budgets are hardly ever asked for
 
 
-class Layouts:
+class TimeAxisSearch:
     """Time axes for one clip; what was found for a track and a budget is kept.
 
     bound: m, the largest error of all: tracks that stay far below it by themselves are hardly ever keyed.
     """
 
-    def __init__(self, truth: Truth, coding: Coding, bound: float) -> None:
+    def __init__(self, truth: SourceMotion, coding: Encoding, bound: float) -> None:
         self.grid = truth.grid
         self.own = truth.own
         self.coding = coding
@@ -34,10 +34,10 @@ class Layouts:
         self._tabled = np.flatnonzero(moved > STILL * bound)
         if not fits(len(self._tabled), truth.grid):
             self._tabled = np.empty(0, np.int64)
-        self._segments = Segments(self._scaled[self._tabled], truth.grid, ASKED * bound)
+        self._segments = SegmentErrors(self._scaled[self._tabled], truth.grid, ASKED * bound)
         self._rows: dict[tuple[int, float], Bools] = {}
 
-    def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[Axis]:
+    def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
         """Return the axes of the tracks `keyed` under their budgets (G,) in metres, by the layout of that name."""
         return LAYOUTS[name](self, keyed, budgets) if len(keyed) else []
 
@@ -62,58 +62,58 @@ class Layouts:
         if there.any():
             found[there] = self._segments.needed(rows[there], budgets[keyed[there]])
         if not there.all():
-            found[~there] = needed(self.scaled(keyed[~there], budgets), self.grid)
+            found[~there] = greedy_keys(self.scaled(keyed[~there], budgets), self.grid)
         return found
 
-    def merged(self, keyed: Ints, keep: Bools) -> list[Axis]:
+    def merged(self, keyed: Ints, keep: Bools) -> list[SharedAxis]:
         """Return the axes of fewest bytes for tracks that need the keys `keep` (k, K)."""
         prices, width = self.coding.prices, self.key_bytes[keyed]
-        axes = merged(keep, width, axis_bytes=prices.axis, time_bytes=self.coding.time_bytes)
-        return [Axis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+        axes = merge_axes(keep, width, axis_bytes=prices.axis, time_bytes=self.coding.time_bytes)
+        return [SharedAxis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
 
 
-def _merged(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+def _merge_by_bytes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
     return layouts.merged(keyed, layouts.needed(keyed, budgets))
 
 
-def _own(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+def _own(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
     """Keys that the source has too: players that mix by components cut the same corners."""
     kinds, kind = np.unique(layouts.own[keyed], axis=0, return_inverse=True)
     axes = []
     for number, mask in enumerate(kinds):
         members = keyed[kind.reshape(-1) == number]
         keep = np.zeros((len(members), len(mask)), np.bool_)
-        keep[:, mask] = needed(layouts.scaled(members, budgets)[:, mask], layouts.grid[mask])
+        keep[:, mask] = greedy_keys(layouts.scaled(members, budgets)[:, mask], layouts.grid[mask])
         axes += layouts.merged(members, keep)
     return axes
 
 
-def _joint(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
-    keys = jointly_needed(layouts.scaled(keyed, budgets), layouts.grid)
-    return [Axis(keys, tuple(keyed.tolist()))]
+def _one_axis(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+    keys = joint_greedy_keys(layouts.scaled(keyed, budgets), layouts.grid)
+    return [SharedAxis(keys, tuple(keyed.tolist()))]
 
 
-def _every(nth: int) -> Layout:
-    def layout(layouts: Layouts, keyed: Ints, budgets: Floats) -> list[Axis]:
+def _even_axis(nth: int) -> Layout:
+    def layout(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
         keys = np.zeros(len(layouts.grid), np.bool_)
         keys[::nth] = keys[-1] = True
-        return [Axis(keys, tuple(keyed.tolist()))]
+        return [SharedAxis(keys, tuple(keyed.tolist()))]
 
     return layout
 
 
-Layout: TypeAlias = Callable[[Layouts, Ints, Floats], list[Axis]]
+Layout: TypeAlias = Callable[[TimeAxisSearch, Ints, Floats], list[SharedAxis]]
 LAYOUTS: dict[str, Layout] = {
-    "merged": _merged,
+    "merged": _merge_by_bytes,
     "own": _own,
-    "joint": _joint,
-    "full": _every(1),
-    "second": _every(2),
-    "third": _every(3),
+    "joint": _one_axis,
+    "full": _even_axis(1),
+    "second": _even_axis(2),
+    "third": _even_axis(3),
 }
 
 
-def _scaled(truth: Truth) -> Floats:
+def _scaled(truth: SourceMotion) -> Floats:
     """Values on the grid, in metres, padded to four components (G, K, 4)."""
     scaled = np.zeros((len(truth.moving), len(truth.grid), 4))
     for i, each in enumerate(truth.moving):

@@ -8,22 +8,24 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import matrix, quaternion
-from anim.measure.error.point_matrix import Points, stacked
+from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Skeleton
 from anim.optimize.options import Bounds
-from anim.optimize.search.source_motion import ROTATION, Truth
+from anim.optimize.search.source_motion import ROTATION, SourceMotion
 from anim.optimize.search.world_matrices import local_matrices
 
 LEAST_GAP = 1e-4  # s; speeds are not taken over less
 
 
-class Strains:
+class BoundUsage:
     """Judges a clip shown as translation (N, W, 3), rotation (N, W, 4) and scale (N, W, 3) of all nodes.
 
     allowed: (P,) m that each point may be off.
     """
 
-    def __init__(self, skeleton: Skeleton, truth: Truth, points: Points, allowed: Floats, bounds: Bounds) -> None:
+    def __init__(
+        self, skeleton: Skeleton, truth: SourceMotion, points: PointMatrix, allowed: Floats, bounds: Bounds
+    ) -> None:
         self.bounds = bounds
         self._skeleton = skeleton
         self._truth = truth
@@ -58,7 +60,7 @@ class Strains:
         return own
 
     def _strain(self, shown: Sequence[Floats], columns: Floats) -> Floats:
-        moved = self._rows.moves(stacked(self._world(shown), self.points.nodes) - columns)
+        moved = self._rows.moves(stack_points(self._world(shown), self.points.nodes) - columns)
         strain = _longest(moved) / self._allowed
         if self.bounds.max_speed_error is not None and len(self._truth.at) > 1:
             gaps = np.maximum(np.diff(self._truth.at), LEAST_GAP).astype(np.float32)

@@ -10,12 +10,12 @@ import numpy as np
 from anim.arrays import Floats
 from anim.optimize.options import Packing
 from anim.optimize.search import playback
-from anim.optimize.search.key_fit import Fit
-from anim.optimize.search.source_motion import PATHS, ROTATION, Truth
-from anim.optimize.search.time_axes import Axis
+from anim.optimize.search.key_fit import KeyFit
+from anim.optimize.search.source_motion import PATHS, ROTATION, SourceMotion
+from anim.optimize.search.time_axes import SharedAxis
 from anim.optimize.tracks import quantization
 from anim.optimize.tracks.loop_closure import close_ends
-from anim.optimize.tracks.quantization import Form, Stored
+from anim.optimize.tracks.quantization import EncodedKeys, Form
 from anim.sampling.track import KeyInterval, find_interval
 
 MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
@@ -25,31 +25,31 @@ MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is 
 class Candidate:
     """One track with its keys. shown: (W, C), along arcs or lines, at the times to measure at."""
 
-    stored: Stored
+    stored: EncodedKeys
     shown: Floats
 
 
 class Candidates:
     """Candidates for the tracks of one clip: each made once, and kept for the next trial that asks for it."""
 
-    def __init__(self, truth: Truth, packing: Packing) -> None:
+    def __init__(self, truth: SourceMotion, packing: Packing) -> None:
         self._truth = truth
         self._packing = packing
         self._paths = [PATHS.index(each.path) for each in truth.moving]
         self._closures = np.array([each.closure for each in truth.moving])
         self._places: dict[bytes, KeyInterval] = {}
-        self._fits: dict[bytes, Fit] = {}
+        self._fits: dict[bytes, KeyFit] = {}
         self._keys: dict[tuple[bytes, int], Floats] = {}
         self._made: dict[tuple[bytes, int, Form], Candidate] = {}
         self._kept = 0
 
-    def of(self, axis: Axis, misses: Sequence[float]) -> Iterable[tuple[int, Candidate]]:
+    def of(self, axis: SharedAxis, misses: Sequence[float]) -> Iterable[tuple[int, Candidate]]:
         """Return every member of an axis with its candidate. misses: (G,) what storing may miss, in units of values."""
         self._make_room()
         name = axis.keys.tobytes()
         self._fit(axis, name)
         forms = {
-            i: quantization.form(self._keys[name, i], PATHS[self._paths[i]], misses[i], self._packing)
+            i: quantization.choose_format(self._keys[name, i], PATHS[self._paths[i]], misses[i], self._packing)
             for i in axis.members
         }
         new = [i for i in axis.members if (name, i, forms[i]) not in self._made]
@@ -57,7 +57,7 @@ class Candidates:
             self._make(axis, name, [i for i in new if self._paths[i] == path], forms, rotations=path == ROTATION)
         return [(i, self._made[name, i, forms[i]]) for i in axis.members]
 
-    def aimed(self, axis: Axis, members: Sequence[int], aims: Floats, misses: Sequence[float]) -> list[Candidate]:
+    def aimed(self, axis: SharedAxis, members: Sequence[int], aims: Floats, misses: Sequence[float]) -> list[Candidate]:
         """Return rotations for the `members` of an axis that aim at others (W, G, 4) than the tracks' own."""
         self._make_room()
         place = self._place(axis, axis.keys.tobytes())
@@ -65,23 +65,27 @@ class Candidates:
         if not axis.keys.all():
             keys = self._fit_on(axis, axis.keys.tobytes()).rotations(aims, keys)
         by_track = list(np.moveaxis(close_ends(keys, self._closures[list(members)]), 1, 0))
-        forms = [quantization.form(by_track[k], "rotation", misses[i], self._packing) for k, i in enumerate(members)]
-        return _candidates(quantization.all_stored(by_track, forms), place, rotations=True)
+        forms = [
+            quantization.choose_format(by_track[k], "rotation", misses[i], self._packing) for k, i in enumerate(members)
+        ]
+        return _candidates(quantization.encode_all(by_track, forms), place, rotations=True)
 
-    def by_chords(self, axis: Axis, rotations: Sequence[Stored]) -> Floats:
+    def by_chords(self, axis: SharedAxis, rotations: Sequence[EncodedKeys]) -> Floats:
         """Return what players that mix by components show of rotations on an axis, (W, G, 4)."""
         keys = np.stack([each.values for each in rotations], axis=1)
-        return playback.along_chords(keys, self._place(axis, axis.keys.tobytes()))
+        return playback.nlerp(keys, self._place(axis, axis.keys.tobytes()))
 
-    def _make(self, axis: Axis, name: bytes, members: list[int], forms: dict[int, Form], *, rotations: bool) -> None:
+    def _make(
+        self, axis: SharedAxis, name: bytes, members: list[int], forms: dict[int, Form], *, rotations: bool
+    ) -> None:
         if not members:
             return
-        stored = quantization.all_stored([self._keys[name, i] for i in members], [forms[i] for i in members])
+        stored = quantization.encode_all([self._keys[name, i] for i in members], [forms[i] for i in members])
         made = _candidates(stored, self._place(axis, name), rotations=rotations)
         self._made.update(((name, i, forms[i]), each) for i, each in zip(members, made, strict=True))
         self._kept += sum(each.shown.size + each.stored.values.size for each in made)
 
-    def _fit(self, axis: Axis, name: bytes) -> None:
+    def _fit(self, axis: SharedAxis, name: bytes) -> None:
         """Keys of members that are new on the axis: their own values where it has every key, else fitted ones."""
         at = self._truth.on_grid[axis.keys]
         for path in range(len(PATHS)):
@@ -104,21 +108,21 @@ class Candidates:
             kept.clear()
         self._kept = 0
 
-    def _fit_on(self, axis: Axis, name: bytes) -> Fit:
+    def _fit_on(self, axis: SharedAxis, name: bytes) -> KeyFit:
         if name not in self._fits:
-            self._fits[name] = fit = Fit(self._place(axis, name), int(axis.keys.sum()))
+            self._fits[name] = fit = KeyFit(self._place(axis, name), int(axis.keys.sum()))
             self._kept += fit.numbers
         return self._fits[name]
 
-    def _place(self, axis: Axis, name: bytes) -> KeyInterval:
+    def _place(self, axis: SharedAxis, name: bytes) -> KeyInterval:
         if name not in self._places:
             self._places[name] = find_interval(self._truth.grid[axis.keys], self._truth.at)
             self._kept += 4 * len(self._truth.at)
         return self._places[name]
 
 
-def _candidates(stored: Sequence[Stored], place: KeyInterval, *, rotations: bool) -> list[Candidate]:
+def _candidates(stored: Sequence[EncodedKeys], place: KeyInterval, *, rotations: bool) -> list[Candidate]:
     keys = np.stack([each.values for each in stored], axis=1)
-    way = playback.along_arcs if rotations and len(keys) > 1 else playback.on_lines
+    way = playback.slerp_raw if rotations and len(keys) > 1 else playback.linear_error
     shown = way(keys, place)
     return [Candidate(each, shown[:, k]) for k, each in enumerate(stored)]

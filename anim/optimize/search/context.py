@@ -9,18 +9,18 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.measure.error import point_matrix as points_
-from anim.measure.error.point_matrix import Points
-from anim.measure.error.shell_points import hidden
+from anim.measure.error.point_matrix import PointMatrix
+from anim.measure.error.shell_points import nodes_without_vertices
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton
 from anim.optimize.options import Bounds, Effort, Policy
 from anim.optimize.tracks import morph_weights
-from anim.optimize.tracks.quantization import Coding
+from anim.optimize.tracks.quantization import Encoding
 from anim.sampling.pose import rest_pose, world_by_node
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class Context:
     """All that a clip's optimization needs beside the clip.
 
     size: m, the diagonal of the box around the points at rest. rest_world: (N, 3, 4) world matrices of the rest pose.
@@ -31,13 +31,13 @@ class Setting:
     skeleton: Skeleton
     size: float
     rest_world: Floats
-    points: Points
+    points: PointMatrix
     surfaces: tuple[Surface, ...]
     answering: Mapping[int, Bools]
     unseen: Bools
     bounds: Bounds
     policy: Policy
-    coding: Coding
+    coding: Encoding
     effort: Effort
 
     def morph_reach(self, node: int) -> Floats:
@@ -57,30 +57,30 @@ class Setting:
         return float(np.sqrt((self.rest_world[carriers, :, :3] ** 2).sum(axis=1)).max())
 
 
-def setting(
+def build_context(
     scene: Scene,
     clips: tuple[Clip, ...],
     *,
     bounds: Bounds,
     policy: Policy,
-    coding: Coding,
+    coding: Encoding,
     effort: Effort,
     extra: Set[tuple[int, int]] = frozenset(),
-) -> Setting:
+) -> Context:
     """Return the setting for the clips of a scene.
 
     extra: vertices to measure beside those that stick out, (number of the surface, number of the vertex).
     """
     skeleton = scene.skeleton
-    unseen = hidden(skeleton, surfaces(scene) if has_vertices(scene) else [])
+    unseen = nodes_without_vertices(skeleton, surfaces(scene) if has_vertices(scene) else [])
     shells = set(np.flatnonzero(unseen & _moved(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
     world = world_by_node(skeleton, rest_pose(skeleton))[:, 0]
-    points = points_.of_scene(scene, shells, bounds.shell, extra)
+    points = points_.sample_points(scene, shells, bounds.shell, extra)
     driven = sorted({track.node for clip in clips for track in clip.tracks if track.node is not None})
     places = points.places(world[:, None])[:, 0]
-    return Setting(
+    return Context(
         skeleton,
         float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0,
         world,

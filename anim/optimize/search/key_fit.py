@@ -19,7 +19,7 @@ DENSE = 200_000  # numbers; longer clips are solved by bands
 Solver: TypeAlias = Callable[[Floats], Floats]  # values (W, n) → keys (K, n)
 
 
-class Fit:
+class KeyFit:
     """Least squares on one time axis, prepared once for all tracks that use it."""
 
     def __init__(self, place: KeyInterval, keys: int) -> None:
@@ -41,7 +41,7 @@ class Fit:
         chord's shorter length, by keys that lie beside the motion.
         """
         for _ in range(STEPS):
-            shown = playback.along_arcs(keys, self._place)
+            shown = playback.slerp_raw(keys, self._place)
             near = np.where(quaternion.dot(values, shown)[..., None] < 0, -values, values)
             off = near - shown
             off -= quaternion.dot(off, shown)[..., None] * shown

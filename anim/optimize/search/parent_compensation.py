@@ -14,12 +14,12 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
-from anim.measure.error.point_matrix import Points
+from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Skeleton
 from anim.optimize.search.candidates import Candidate, Candidates
-from anim.optimize.search.source_motion import LEVER_FRAMES, Truth
-from anim.optimize.search.time_axes import Axis
-from anim.optimize.search.world_matrices import worlds
+from anim.optimize.search.source_motion import LEVER_FRAMES, SourceMotion
+from anim.optimize.search.time_axes import SharedAxis
+from anim.optimize.search.world_matrices import level_world_matrices
 
 MOST = 20.0  # times that a lever may seem longer than what is left of it
 
@@ -33,10 +33,10 @@ class _Level:
     tracks: Ints
 
 
-class Aims:
+class ParentCompensation:
     """Finds keys level by level, from the roots on."""
 
-    def __init__(self, skeleton: Skeleton, truth: Truth, candidates: Candidates) -> None:
+    def __init__(self, skeleton: Skeleton, truth: SourceMotion, candidates: Candidates) -> None:
         self._truth = truth
         self._candidates = candidates
         tracks = np.full(len(skeleton), -1)
@@ -49,7 +49,7 @@ class Aims:
             self._true[level.nodes] = quaternion.multiply(above, quaternion.normalize(truth.local[1][level.nodes]))
 
     def follow(
-        self, axes: Sequence[Axis], misses: Sequence[float], rotation: Floats
+        self, axes: Sequence[SharedAxis], misses: Sequence[float], rotation: Floats
     ) -> Iterator[tuple[int, Candidate]]:
         """Return each rotation track on an axis with its candidate, and put what it shows into `rotation` (N, W, 4).
 
@@ -83,14 +83,14 @@ class Aims:
         return np.swapaxes(np.where(quaternion.dot(aims, own)[..., None] < 0, -aims, aims), 0, 1)
 
 
-def leeway(skeleton: Skeleton, truth: Truth, points: Points) -> Floats:
+def budget_gain(skeleton: Skeleton, truth: SourceMotion, points: PointMatrix) -> Floats:
     """Return by how much each track (G,) reaches farther than to where others can make up for it; 1 for no rotation.
 
     Others are the next nodes below that a track turns; nothing makes up for points that hang on none of these.
     """
     turning = {each.node: i for i, each in enumerate(truth.moving) if each.path == "rotation"}
     nth = max(1, -(-len(truth.at) // LEVER_FRAMES))
-    world = worlds(skeleton, [part[:, ::nth] for part in truth.local], truth.levels)
+    world = level_world_matrices(skeleton, [part[:, ::nth] for part in truth.local], truth.levels)
     turner = np.full(len(skeleton) + 1, -1)  # the nearest node that turns each; the last stands for "no parent"
     reach = np.zeros(len(skeleton))
     for level in truth.levels:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from anim.arrays import Bools, Floats, Ints
-from anim.optimize.tracks.quantization import Stored
+from anim.optimize.tracks.quantization import EncodedKeys
 
 
-class Fate(IntEnum):
+class TrackAction(IntEnum):
     """What becomes of a track."""
 
     DROPPED = 0
@@ -18,7 +18,7 @@ class Fate(IntEnum):
     KEYED = 2
 
 
-class Aim(Enum):
+class RotationTarget(Enum):
     """What the keys of rotations are to come near to."""
 
     LOCAL = "the track's own values"
@@ -37,11 +37,11 @@ class Plan:
     threshold: float
     axes: str
     coarser: Floats
-    aim: Aim = Aim.LOCAL
+    aim: RotationTarget = RotationTarget.LOCAL
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TrialResult:
     """What a plan led to.
 
     fates: (G,). keys: by track, as stored; none of dropped ones. on: by keyed track, which times of the grid (K,) it
@@ -51,7 +51,7 @@ class Outcome:
 
     plan: Plan
     fates: Ints
-    keys: Mapping[int, Stored]
+    keys: Mapping[int, EncodedKeys]
     on: Mapping[int, Bools]
     strain: Floats
     own: Floats

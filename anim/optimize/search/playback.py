@@ -9,7 +9,7 @@ from anim.maths import quaternion
 from anim.sampling.track import KeyInterval
 
 
-def along_arcs(keys: Floats, place: KeyInterval) -> Floats:
+def slerp_raw(keys: Floats, place: KeyInterval) -> Floats:
     """Return slerp (W, G, 4) between stored quaternions (K, G, 4), not normalized: what three.js shows."""
     here = np.arange(len(keys) - 1)
     a, b = keys[here], keys[here + 1]
@@ -24,20 +24,20 @@ def along_arcs(keys: Floats, place: KeyInterval) -> Floats:
     return np.asarray(of_a[..., None] * a[left] + of_b[..., None] * b[left])
 
 
-def along_chords(keys: Floats, place: KeyInterval) -> Floats:
+def nlerp(keys: Floats, place: KeyInterval) -> Floats:
     """Return the normalized mix (W, G, 4) of quaternions (K, G, 4) by components: what Unity's glTFast shows."""
     a, b = keys[place.left], keys[place.right]
     b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
     return quaternion.normalize(a + place.u[:, None, None] * (b - a))
 
 
-def on_lines(keys: Floats, place: KeyInterval) -> Floats:
+def linear_error(keys: Floats, place: KeyInterval) -> Floats:
     """Return the mix (W, G, C) of vectors (K, G, C)."""
     a = keys[place.left]
     return np.asarray(a + place.u[:, None, None] * (keys[place.right] - a))
 
 
-def apart(angle: Floats) -> Floats:
+def arc_distance(angle: Floats) -> Floats:
     """Return how far, in radians of turn, chord and arc are from each other at most, for keys `angle` (...) rad apart.
 
     The cubic is within 4 % up to 90°, where the two are 0.92° apart.

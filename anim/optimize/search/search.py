@@ -9,8 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.optimize.options import Effort
-from anim.optimize.search.plan import Aim, Outcome, Plan
-from anim.optimize.search.trial import Bench
+from anim.optimize.search.plan import Plan, RotationTarget, TrialResult
+from anim.optimize.search.trial import TrialRunner
 from anim.optimize.tracks import quantization
 
 START = 1 / 3  # of the bound: the first budget of every track
@@ -27,7 +27,7 @@ STRAYING = 0.3  # share of tracks changed at a time
 LEAST = 1e-6  # of the bound; smaller budgets mean that storage can't do better
 
 
-def search(bench: Bench, bound: float, effort: Effort) -> Outcome | None:
+def search(bench: TrialRunner, bound: float, effort: Effort) -> TrialResult | None:
     """Return the smallest outcome found that keeps all bounds; None where none does.
 
     bound: m, for the size of budgets only; what counts is the outcome's own strain.
@@ -36,13 +36,13 @@ def search(bench: Bench, bound: float, effort: Effort) -> Outcome | None:
 
 
 class _Search:
-    def __init__(self, bench: Bench, bound: float, effort: Effort) -> None:
+    def __init__(self, bench: TrialRunner, bound: float, effort: Effort) -> None:
         self._bench = bench
         self._bound = bound
         self._effort = effort
-        self._best: Outcome | None = None
+        self._best: TrialResult | None = None
 
-    def run(self) -> Outcome | None:
+    def run(self) -> TrialResult | None:
         self._begin()
         for _ in range(self._effort.cycles if self._best else 0):
             before = self._best
@@ -94,12 +94,14 @@ class _Search:
         for share in self._effort.leeways:
             before = self._best
             assert before is not None
-            plan = replace(before.plan, aim=Aim.WORLD, budgets=before.plan.budgets * self._bench.leeway**share)
+            plan = replace(
+                before.plan, aim=RotationTarget.WORLD, budgets=before.plan.budgets * self._bench.leeway**share
+            )
             self._adapt(plan, self._effort.rounds)
             if self._best is before:
                 break
 
-    def _attempt(self, plan: Plan) -> Outcome:
+    def _attempt(self, plan: Plan) -> TrialResult:
         limit = math.inf if self._best is None else self._best.size
         outcome = self._bench.run(plan, smaller_than=limit)
         if outcome.worst <= 1 and (self._best is None or outcome.size < self._best.size):
@@ -113,12 +115,12 @@ class _Search:
             if number + 1 < rounds:
                 plan = replace(plan, budgets=self._followed(plan.budgets, outcome))
 
-    def _followed(self, budgets: Floats, outcome: Outcome) -> Floats:
+    def _followed(self, budgets: Floats, outcome: TrialResult) -> Floats:
         answering = self._bench.truth.answering
         strain = np.where(answering, outcome.strain, 0.0).max(axis=1, initial=0.0)
         strain = np.maximum(strain, outcome.own)
         factor = np.clip((AIM / np.maximum(strain, 1e-9)) ** GAIN, *STEPS)
-        room = self._bench.leeway if outcome.plan.aim is Aim.WORLD else 1.0
+        room = self._bench.leeway if outcome.plan.aim is RotationTarget.WORLD else 1.0
         return np.asarray(np.minimum(budgets * factor, MOST * self._bound * room))
 
     def _shrink(self, plan: Plan) -> None:
@@ -153,7 +155,7 @@ class _Search:
         assert self._best is not None
         truth = self._bench.truth
         used = float(self._best.strain[truth.answering[track]].max(initial=0.0))
-        room = self._bench.leeway[track] if self._best.plan.aim is Aim.WORLD else 1.0
+        room = self._bench.leeway[track] if self._best.plan.aim is RotationTarget.WORLD else 1.0
         miss = self._best.keys[track].miss
         return miss > 0 and used + miss * truth.moving[track].meters / room / 2 / self._bound < FORESEEN
 
@@ -183,5 +185,5 @@ class _Search:
             spread = spread * 1.3 if self._best is not best else max(0.96 * spread, SPREAD[1])
 
 
-def _length(outcome: Outcome | None, track: int) -> int:
+def _length(outcome: TrialResult | None, track: int) -> int:
     return len(outcome.keys[track].values) if outcome and track in outcome.keys else 0

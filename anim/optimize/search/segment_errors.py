@@ -16,7 +16,7 @@ def fits(tracks: int, times: Floats) -> bool:
     return tracks * len(times) * _span(times) <= MOST
 
 
-class Segments:
+class SegmentErrors:
     """What lines between two keys miss of a track, for G tracks and all pairs of their K keys up to a second apart.
 
     values: (G, K, C) in metres. times: (K,) s. limit: m; of segments that miss more it doesn't matter how much.
@@ -30,7 +30,7 @@ class Segments:
         self._missed = np.full((count, tracks, span), np.inf, np.float32)
         bent = np.arange(tracks)
         for n in range(span):
-            missed = _missed(values[bent], times, n + 1)
+            missed = _segment_error(values[bent], times, n + 1)
             self._missed[n + 1 :, bent, n] = missed.T
             bent = bent[(missed <= limit).any(axis=1)]  # if all segments miss by too much, so do nearly all longer ones
 
@@ -49,7 +49,7 @@ class Segments:
             best = ways.argmin(axis=1)
             total[:, end] = ways[every, best]
             came[:, end] = end - 1 - best
-        return _traced(came)
+        return _trace(came)
 
 
 def _span(times: Floats) -> int:
@@ -58,7 +58,7 @@ def _span(times: Floats) -> int:
     return max(min(max(per_second, SPANS[0]), SPANS[1], len(times) - 1), 1)
 
 
-def _missed(values: Floats, times: Floats, length: int) -> Floats:
+def _segment_error(values: Floats, times: Floats, length: int) -> Floats:
     """What segments over `length` gaps miss (G, K - length), 0 for neighbors."""
     starts = values.shape[1] - length
     largest = np.zeros((len(values), starts))
@@ -71,7 +71,7 @@ def _missed(values: Floats, times: Floats, length: int) -> Floats:
     return np.asarray(np.sqrt(largest))
 
 
-def _traced(came: Ints) -> Bools:
+def _trace(came: Ints) -> Bools:
     """Which keys (k, K) lie on the ways that `came` (k, K) leads back along, from the last key to the first."""
     tracks, count = came.shape
     keep = np.zeros((tracks, count), np.bool_)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from anim.model import Clip, Interpolation, Track
-from anim.optimize.tracks.quantization import Coding, Stored
+from anim.optimize.tracks.quantization import EncodedKeys, Encoding
 
 NUMBERS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # for each value of a key
 SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
@@ -19,10 +19,10 @@ class Solution:
     """
 
     clip: Clip
-    stored: tuple[Stored, ...]
+    stored: tuple[EncodedKeys, ...]
     dropped: tuple[int, ...]
 
-    def size(self, coding: Coding) -> float:
+    def size(self, coding: Encoding) -> float:
         """Return about how many bytes the clip takes."""
         tracks, prices = self.clip.tracks, coding.prices
         axes = {id(track.times): len(track.times) for track in tracks}

@@ -10,11 +10,11 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.maths import quaternion
-from anim.measure.error.point_matrix import Points, stacked
+from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimize.options import Reference
 from anim.optimize.search import playback
-from anim.optimize.search.world_matrices import needed_levels, worlds
+from anim.optimize.search.world_matrices import level_world_matrices, needed_levels
 from anim.optimize.tracks.loop_closure import closure_sign
 from anim.sampling import sample_pose, times
 from anim.sampling.track import find_interval
@@ -28,7 +28,7 @@ ROTATION = PATHS.index("rotation")
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class SourceTrack:
     """One track that a search may change, as it truly runs.
 
     number: in its clip. values: (W, C) at the times to measure at; rotations unit, without jumps of sign. rest: (C,),
@@ -50,7 +50,7 @@ class Moving:
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class SourceMotion:
     """A clip on the times where it is measured.
 
     grid: (K,) s, where keys may lie. at: (W,) s, the grid and what lies between. on_grid: (K,) the grid within `at`.
@@ -63,7 +63,7 @@ class Truth:
     grid: Floats
     at: Floats
     on_grid: Ints
-    moving: tuple[Moving, ...]
+    moving: tuple[SourceTrack, ...]
     own: Bools
     answering: Bools
     local: tuple[Floats, Floats, Floats]
@@ -72,16 +72,16 @@ class Truth:
     by_chord: Floats
 
 
-def truth(
+def analyze_source(
     skeleton: Skeleton,
     clip: Clip,
     free: Sequence[int],
-    points: Points,
+    points: PointMatrix,
     below: Mapping[int, Bools],
     *,
     reference: Reference,
     noticed: float,
-) -> Truth:
+) -> SourceMotion:
     """Return what `clip` does to `points`; the tracks numbered in `free` may change, all others stay as they are.
 
     below: by node of a free track, which points (P,) hang on it. noticed: m; where chords and arcs, or both ends of a
@@ -92,7 +92,7 @@ def truth(
     at = grid if reference is Reference.KEYS else moments(grid, clip.tracks)
     local = _local(skeleton, clip, at)
     levels = needed_levels(skeleton, points.nodes)
-    world = worlds(skeleton, local, levels)
+    world = level_world_matrices(skeleton, local, levels)
     nodes = {track.node for track in tracks if track.node is not None}
     reach = _reach(world, points, {node: below[node] for node in nodes})
     widening = _widening(skeleton, world, levels)
@@ -101,11 +101,11 @@ def truth(
         for number, track in zip(free, tracks, strict=True)
     )
     answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
-    columns = stacked(world, points.nodes)
+    columns = stack_points(world, points.nodes)
     by_chord = columns
     if any(each.path == "rotation" and each.meters * _gap(clip.tracks[each.number]) > noticed for each in moving):
-        by_chord = stacked(worlds(skeleton, _by_chords(clip, at, local), levels), points.nodes)
-    return Truth(
+        by_chord = stack_points(level_world_matrices(skeleton, _by_chords(clip, at, local), levels), points.nodes)
+    return SourceMotion(
         grid,
         at,
         np.searchsorted(at, grid),
@@ -154,7 +154,7 @@ def _by_chords(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> 
     for track in clip.tracks:
         if track.path == "rotation" and track.interpolation is Interpolation.LINEAR and track.node is not None:
             keys = quaternion.normalize(track.values)[:, None]
-            rotation[track.node] = playback.along_chords(keys, find_interval(track.times, at))[:, 0]
+            rotation[track.node] = playback.nlerp(keys, find_interval(track.times, at))[:, 0]
     return local[0], rotation, local[2]
 
 
@@ -162,7 +162,7 @@ def _gap(track: Track) -> float:
     """How far chord and arc are apart, as quaternions."""
     if track.interpolation is not Interpolation.LINEAR or len(track.times) < 2:
         return 0.0
-    return float(playback.apart(playback.steps(track.values).max())) / 2
+    return float(playback.arc_distance(playback.steps(track.values).max())) / 2
 
 
 def _own(track: Track, grid: Floats) -> Bools:
@@ -180,7 +180,7 @@ def _moving(
     reach: dict[int, float],
     widening: Floats,
     noticed: float,
-) -> Moving:
+) -> SourceTrack:
     node = track.node
     assert node is not None
     values = local[PATHS.index(track.path)][node]
@@ -196,10 +196,10 @@ def _moving(
         meters = reach[node] / max(float(np.abs(values).min()), 1e-6)
     from_rest, from_middle = (float(np.linalg.norm(values - each, axis=1).max() * meters) for each in (rest, middle))
     closure = closure_sign(values, noticed / meters if meters else 0.0)
-    return Moving(number, node, track.path, values, rest, middle, float(meters), from_rest, from_middle, closure)
+    return SourceTrack(number, node, track.path, values, rest, middle, float(meters), from_rest, from_middle, closure)
 
 
-def _reach(world: Floats, points: Points, answering: dict[int, Bools]) -> dict[int, float]:
+def _reach(world: Floats, points: PointMatrix, answering: dict[int, Bools]) -> dict[int, float]:
     """For each node, how far the points that answer for it are from it at most, times what it carries of them."""
     frames = world[:, :: max(1, -(-world.shape[1] // LEVER_FRAMES))]
     places = points.places(frames)

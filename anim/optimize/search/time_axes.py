@@ -10,14 +10,14 @@ from anim.arrays import Bools, Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class SharedAxis:
     """Keys (K,) of the grid that the tracks `members` all have."""
 
     keys: Bools
     members: tuple[int, ...]
 
 
-def merged(keep: Bools, key_bytes: Floats, *, axis_bytes: float, time_bytes: float) -> list[Axis]:
+def merge_axes(keep: Bools, key_bytes: Floats, *, axis_bytes: float, time_bytes: float) -> list[SharedAxis]:
     """Return the axes of fewest bytes found for tracks that need the keys `keep` (G, K).
 
     key_bytes: (G,) of one key of each track. An axis costs `axis_bytes` and `time_bytes` per key. The pair whose
@@ -50,4 +50,4 @@ def merged(keep: Bools, key_bytes: Floats, *, axis_bytes: float, time_bytes: flo
         row = cost[a] + cost - axis_bytes - union_a * (time_bytes + width[a] + width)
         row[~alive] = row[a] = -np.inf
         gain[a] = gain[:, a] = row
-    return [Axis(sets[a] > 0, tuple(members[a])) for a in np.flatnonzero(alive).tolist()]
+    return [SharedAxis(sets[a] > 0, tuple(members[a])) for a in np.flatnonzero(alive).tolist()]

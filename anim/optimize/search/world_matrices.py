@@ -21,7 +21,7 @@ def needed_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
     return tuple(level[needed[level]] for level in skeleton.levels())
 
 
-def worlds(skeleton: Skeleton, local: Sequence[Floats], levels: Sequence[Ints]) -> Floats:
+def level_world_matrices(skeleton: Skeleton, local: Sequence[Floats], levels: Sequence[Ints]) -> Floats:
     """Return world matrices (N, F, 3, 4) from translation, rotation and scale (N, F, ·); rotations as they are, unit or
     not. Nodes outside `levels` hold no meaning."""
     return matrix.accumulate_world(local_matrices(skeleton, local), skeleton.parents, list(levels))

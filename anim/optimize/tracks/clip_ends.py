@@ -9,7 +9,7 @@ import numpy as np
 from anim.model import Interpolation, Track
 
 
-def held(track: Track) -> Track:
+def single_key(track: Track) -> Track:
     """Return the first value of a track as its only key."""
     return replace(
         track,
@@ -21,7 +21,7 @@ def held(track: Track) -> Track:
     )
 
 
-def stretched(track: Track, start: float, end: float) -> Track:
+def extend(track: Track, start: float, end: float) -> Track:
     """Return the track with its first value held from `start` on, its last up to `end`; a spline by zero tangents."""
     head, tail = bool(track.times[0] > start), bool(track.times[-1] < end)
     inner = slice(1, None) if head and tail and len(track.times) == 1 else slice(None)  # two keys hold one value

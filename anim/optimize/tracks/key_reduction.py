@@ -9,7 +9,7 @@ from anim.arrays import Bools, Floats, Ints
 UNBOUNDED = 1 << 30
 
 
-def needed(values: Floats, times: Floats) -> Bools:
+def greedy_keys(values: Floats, times: Floats) -> Bools:
     """Return which of K values each of G tracks must keep (G, K) so that lines between them miss none by over 1.
 
     values: (G, K, C), scaled so that 1 is what may be missed. times: (K,). The first and the last key always stay.
@@ -49,7 +49,7 @@ def needed(values: Floats, times: Floats) -> Bools:
     return keep
 
 
-def jointly_needed(values: Floats, times: Floats) -> Bools:
+def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
     """Return which keys (K,) all tracks together must keep on one axis; as `needed`, but for the worst track."""
     count = values.shape[1]
     keep = np.zeros(count, np.bool_)

@@ -13,42 +13,42 @@ INT16 = AccessorFormat(5122, normalized=True)
 UNIT = 1e-12  # off the length 1: nothing, in float64
 
 
-def lossless(track: Track) -> Track:
+def reduce_lossless(track: Track) -> Track:
     """Return the track without keys that change nothing, in int16 where that holds every value of a rotation.
 
     A value that is held over several keys keeps the first and the last of them; at the track's ends, where players
     hold the value anyway, one. STEP keeps each key that differs from the one before.
     """
     if track.interpolation is not Interpolation.CUBICSPLINE:
-        kept = _thinned(track)
+        kept = _reduce(track)
     else:
-        kept = _held(track) if _rests(track) else track
+        kept = _single_key_or_none(track) if _rests(track) else track
     return replace(kept, storage=INT16) if _fits_int16(kept) else kept
 
 
-def _thinned(track: Track) -> Track:
+def _reduce(track: Track) -> Track:
     same = (track.values[1:] == track.values[:-1]).all(axis=1)  # as the key before
     if track.interpolation is Interpolation.STEP:
-        return _only(track, np.concatenate(([True], ~same)), track.interpolation)
+        return _select_keys(track, np.concatenate(([True], ~same)), track.interpolation)
     before, after = np.concatenate(([True], same)), np.concatenate((same, [True]))
     keep = ~(before & after)
     if not keep.any():
         keep[0] = True
-    return _only(track, keep, track.interpolation)
+    return _select_keys(track, keep, track.interpolation)
 
 
-def _only(track: Track, keep: Bools, interpolation: Interpolation) -> Track:
+def _select_keys(track: Track, keep: Bools, interpolation: Interpolation) -> Track:
     if keep.all() and interpolation is track.interpolation:
         return track
     times, values = track.times[keep], track.values[keep]
     return replace(track, interpolation=interpolation, times=times, values=values, in_tangents=None, out_tangents=None)
 
 
-def _held(track: Track) -> Track:
+def _single_key_or_none(track: Track) -> Track:
     """One key for a spline that rests. Players normalize splines, but not all of them single keys: rotations that
     float32 left a little too long or too short stay a spline, of two keys."""
     if track.path != "rotation" or len(track.times) == 1 or abs(float(np.linalg.norm(track.values[0])) - 1) < UNIT:
-        return _only(track, np.arange(len(track.times)) == 0, Interpolation.LINEAR)
+        return _select_keys(track, np.arange(len(track.times)) == 0, Interpolation.LINEAR)
     assert track.in_tangents is not None
     assert track.out_tangents is not None
     return replace(

@@ -7,23 +7,23 @@ from dataclasses import replace
 import numpy as np
 
 from anim.model import Interpolation, Track, ValueKind
-from anim.optimize.tracks.key_reduction import needed
-from anim.optimize.tracks.lossless import lossless
+from anim.optimize.tracks.key_reduction import greedy_keys
+from anim.optimize.tracks.lossless import reduce_lossless
 from anim.sampling.track import sample
 
 MARGIN = 0.9  # of the bound: lines are judged between keys, float32 rounds at them
 
 
-def thinned(track: Track, bound: float) -> Track:
+def reduce_pointer_keys(track: Track, bound: float) -> Track:
     """Return a pointer track in fewer keys that is nowhere off by more than `bound`, a share of its range.
 
     Only lines are thinned; jumps and splines keep every key that changes something.
     """
     extent = float(np.ptp(track.values, axis=0).max(initial=0.0))
     if bound <= 0 or extent == 0 or track.interpolation is not Interpolation.LINEAR or track.kind is ValueKind.DISCRETE:
-        return lossless(track)
+        return reduce_lossless(track)
     if track.kind is ValueKind.ROTATION:
         extent = 1.0
     scaled = sample(track, track.times) / (MARGIN * bound * extent)
-    keep = needed(scaled[None], track.times)[0]
-    return lossless(replace(track, times=track.times[keep], values=track.values[keep]))
+    keep = greedy_keys(scaled[None], track.times)[0]
+    return reduce_lossless(replace(track, times=track.times[keep], values=track.values[keep]))

@@ -28,7 +28,7 @@ Form: TypeAlias = tuple[str, int]  # a name of Stored.form, and its bits per com
 
 
 @dataclass(frozen=True, slots=True)
-class Prices:
+class ByteCosts:
     """Bytes of JSON that a search counts with.
 
     track: for a track with an output of its own: channel, sampler and accessor. repeated: for one that has the same
@@ -43,15 +43,15 @@ class Prices:
 
 
 # Mean lengths in minified JSON; after gzip they are a tenth of that (measured on Fox, Robot and Knight).
-PRICES = {Objective.FILE: Prices(175, 56, 95, 120), Objective.GZIP: Prices(18, 6, 14, 14)}
+BYTE_COSTS = {Objective.FILE: ByteCosts(175, 56, 95, 120), Objective.GZIP: ByteCosts(18, 6, 14, 14)}
 
 
 @dataclass(frozen=True, slots=True)
-class Coding:
+class Encoding:
     """How keys are stored, and what that costs."""
 
     packing: Packing
-    prices: Prices
+    prices: ByteCosts
 
     @property
     def time_bytes(self) -> float:
@@ -64,10 +64,10 @@ class Coding:
             return 8.0 if path == "rotation" else 12.0
         return 4.5
 
-    def size(self, keys: Sequence[Stored]) -> float:
+    def size(self, keys: Sequence[EncodedKeys]) -> float:
         """Return the bytes of the keys of several tracks."""
         if self.packing is not Packing.CORE:
-            streams: dict[tuple[str, int], list[Stored]] = {}
+            streams: dict[tuple[str, int], list[EncodedKeys]] = {}
             for each in keys:
                 streams.setdefault((each.form, each.values.shape[1]), []).append(each)
             return compressed_size(list(streams.values()), self.packing)
@@ -75,7 +75,7 @@ class Coding:
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
+class EncodedKeys:
     """Keys as they will be stored.
 
     values: (K, C) as they decode. form: "int16", "float32", "quaternion" or "exponent", the last two meshopt's
@@ -93,7 +93,7 @@ class Stored:
         """What is the same of two tracks that are stored alike."""
         return self.codes or self.values.tobytes()
 
-    def only(self, keep: Bools) -> Stored:
+    def only(self, keep: Bools) -> EncodedKeys:
         """Return the keys of a mask (K,)."""
         rows = np.frombuffer(self.codes, np.uint8).reshape(len(keep), -1)[keep]
         return replace(self, values=self.values[keep], codes=rows.tobytes())
@@ -102,10 +102,10 @@ class Stored:
         """Return the values as meshopt itself decodes them: its filter computes in float32, a search needn't."""
         if self.form != "quaternion":
             return self.values
-        return storage.decoded(storage.Filtered("QUATERNION", self.codes), 4)
+        return storage.decompress_document(storage.FilteredValues("QUATERNION", self.codes), 4)
 
 
-def form(values: Floats, path: str, miss: float, packing: Packing) -> Form:
+def choose_format(values: Floats, path: str, miss: float, packing: Packing) -> Form:
     """Return the smallest form that misses keys (K, C) by about `miss` at most, in units of the values."""
     if packing is Packing.CORE:
         return ("int16", 0) if path == "rotation" and miss >= INT16_MISS and len(values) > FEW else ("float32", 0)
@@ -114,32 +114,32 @@ def form(values: Floats, path: str, miss: float, packing: Packing) -> Form:
     return "exponent", exponent(values, miss)
 
 
-def stored(values: Floats, form: Form) -> Stored:
+def encode(values: Floats, form: Form) -> EncodedKeys:
     """Return keys (K, C) in a form."""
     kind, number = form
     if kind == "int16":
-        return Stored(np.rint(values * INT16) / INT16, kind)
+        return EncodedKeys(np.rint(values * INT16) / INT16, kind)
     if kind == "float32":
-        return Stored(values.astype(np.float32).astype(np.float64), kind)
+        return EncodedKeys(values.astype(np.float32).astype(np.float64), kind)
     if kind == "quaternion":
-        return all_stored([values], [form])[0]
+        return encode_all([values], [form])[0]
     mantissa = np.rint(values * 2.0**-number)
-    return Stored(mantissa * 2.0**number, kind, _exponent_codes(mantissa, number), EXPONENT_STEP * 2.0**number)
+    return EncodedKeys(mantissa * 2.0**number, kind, _exponent_codes(mantissa, number), EXPONENT_STEP * 2.0**number)
 
 
-def all_stored(values: Sequence[Floats], forms: Sequence[Form]) -> list[Stored]:
+def encode_all(values: Sequence[Floats], forms: Sequence[Form]) -> list[EncodedKeys]:
     """Return the keys (K, C) of each track in its form: all quaternions are decoded in one go."""
     filtered = [i for i, (kind, _) in enumerate(forms) if kind == "quaternion"]
     codes = [_quaternion_codes(values[i], forms[i][1]) for i in filtered]
     decoded = np.split(_decoded(b"".join(codes)), np.cumsum([len(each) // 8 for each in codes])[:-1])
     misses = [FILTER_STEP / ((1 << (forms[i][1] - 1)) - 1) for i in filtered]
-    found = dict(zip(filtered, map(Stored, decoded, repeat("quaternion"), codes, misses), strict=True))
-    return [found[i] if i in found else stored(values[i], forms[i]) for i in range(len(forms))]
+    found = dict(zip(filtered, map(EncodedKeys, decoded, repeat("quaternion"), codes, misses), strict=True))
+    return [found[i] if i in found else encode(values[i], forms[i]) for i in range(len(forms))]
 
 
-def held(value: Floats) -> Stored:
+def constant_cost(value: Floats) -> EncodedKeys:
     """Return a single key (1, C) at `value` (C,): float32, whose JSON is shorter than that of integers."""
-    return Stored(value[None].astype(np.float32).astype(np.float64), "float32")
+    return EncodedKeys(value[None].astype(np.float32).astype(np.float64), "float32")
 
 
 def filter_bits(miss: float) -> int:
@@ -154,7 +154,7 @@ def exponent(values: Floats, miss: float) -> int:
     return max(wanted, math.ceil(math.log2(largest)) - MANTISSA_BITS)
 
 
-def compressed_size(streams: Sequence[Sequence[Stored]], packing: Packing) -> int:
+def compressed_size(streams: Sequence[Sequence[EncodedKeys]], packing: Packing) -> int:
     """Return the bytes of keys under meshopt's codec, one stream per list."""
     from meshopt import encode_gltf_buffer
 

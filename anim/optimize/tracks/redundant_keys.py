@@ -12,7 +12,7 @@ from anim.measure.inspect.track_statistics import removable_keys
 from anim.model import Clip, Skeleton, Track
 from anim.optimize.request import Request
 from anim.optimize.search.solution import Solution
-from anim.optimize.tracks.quantization import Stored
+from anim.optimize.tracks.quantization import EncodedKeys
 
 
 def drop_redundant_keys(solutions: Mapping[int, Solution], skeleton: Skeleton, request: Request) -> dict[int, Solution]:
@@ -25,9 +25,9 @@ def drop_redundant_keys(solutions: Mapping[int, Solution], skeleton: Skeleton, r
     places = [(n, k) for n, each in solutions.items() for k in range(len(each.stored))]
     free = [(n, k) for n, k in places if not _is_exact(solutions[n].clip.tracks[k], request)]
     old = [(solutions[n].clip.tracks[k], solutions[n].stored[k]) for n, k in free]
-    new = _without_redundant(old, skeleton)
+    new = _drop_from(old, skeleton)
     changed = {place: pair for place, pair, was in zip(free, new, old, strict=True) if pair[1] is not was[1]}
-    return {n: _changed(solutions[n], n, changed) for n in sorted({n for n, _ in changed})}
+    return {n: _changed_solution(solutions[n], n, changed) for n in sorted({n for n, _ in changed})}
 
 
 def _is_exact(track: Track, request: Request) -> bool:
@@ -36,11 +36,11 @@ def _is_exact(track: Track, request: Request) -> bool:
     return request.bounds.max_error == 0 or track.node in request.policy.keep
 
 
-def _without_redundant(pairs: Sequence[tuple[Track, Stored]], skeleton: Skeleton) -> list[tuple[Track, Stored]]:
+def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -> list[tuple[Track, EncodedKeys]]:
     """The tracks with their keys as stored, without redundant ones; those that lose none keep their `Stored`."""
     axes: dict[bytes, Floats] = {}
     while True:  # a key that goes may make others needed
-        tracks = _with_shared_axes([track for track, _ in pairs], axes)
+        tracks = _share_axes([track for track, _ in pairs], axes)
         masks = [_every_other(mask) for mask in removable_keys(tracks, skeleton)]
         if not any(mask.any() for mask in masks):
             return [(track, stored) for track, (_, stored) in zip(tracks, pairs, strict=True)]
@@ -50,7 +50,7 @@ def _without_redundant(pairs: Sequence[tuple[Track, Stored]], skeleton: Skeleton
         ]
 
 
-def _with_shared_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
+def _share_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
     """The tracks with equal times in one array, as one accessor of the file holds them."""
     shared = [axes.setdefault(track.times.tobytes(), as_key_times(track.times)) for track in tracks]
     return [
@@ -76,7 +76,9 @@ def _only(track: Track, keep: Bools) -> Track:
     )
 
 
-def _changed(solution: Solution, number: int, changed: Mapping[tuple[int, int], tuple[Track, Stored]]) -> Solution:
+def _changed_solution(
+    solution: Solution, number: int, changed: Mapping[tuple[int, int], tuple[Track, EncodedKeys]]
+) -> Solution:
     pairs = zip(solution.clip.tracks, solution.stored, strict=True)
     new = [changed.get((number, k), pair) for k, pair in enumerate(pairs)]
     clip = Clip(solution.clip.name, tuple(track for track, _ in new))

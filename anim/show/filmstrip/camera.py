@@ -46,7 +46,7 @@ class Camera:
         return rays
 
 
-def framed(points: Floats, *, height: int, azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Camera:
+def fit_camera(points: Floats, *, height: int, azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Camera:
     """Return the camera that just has all points (P, 3) in its picture; the picture is as wide as they ask for.
 
     azimuth, elevation: degrees of the eye around the motion, from +Z toward +X, and above the horizon.

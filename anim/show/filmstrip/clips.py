@@ -11,13 +11,13 @@ from anim.arrays import AnyArray, Bools, Floats
 from anim.caches.transforms import resample, up_axis
 from anim.caches.transforms.resample import SAME
 from anim.errors import NotFoundError, RangeError
-from anim.exchange.stick_mesh import sticks
-from anim.gltf.document import Document, items
+from anim.exchange.stick_mesh import stick_mesh
+from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
 from anim.sampling import frame_times
 from anim.show.filmstrip import heat_map, palette, root_path
-from anim.show.filmstrip.filmstrip import MOST_POINTS, Extent, Row
+from anim.show.filmstrip.filmstrip import MOST_POINTS, Extent, Strip
 from anim.show.filmstrip.ground import ground_height
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
@@ -29,7 +29,7 @@ WIDEST = 1.5  # times the middle one: links to helpers far away don't hide the o
 
 
 @dataclass(frozen=True, slots=True)
-class When:
+class FrameSelection:
     """Which frames: at these times; or `count` of them evenly spaced; or `fps` a second. From `begin` to `end` s.
 
     begin, end: None for the clip's own.
@@ -75,7 +75,7 @@ class When:
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class FilmstripClip:
     """One motion. clip, method: what it is, or empty. cache: its chosen frames; path: some frames of all of it.
 
     colors: (T, 3) linear, of the faces. body: (V,) vertices that a skin moves, or None where that is unknown.
@@ -93,10 +93,10 @@ def of_document(
     document: Document,
     clips: Sequence[int],
     methods: Sequence[str],
-    when: When,
+    when: FrameSelection,
     *,
     nodes: Collection[int] | None = None,
-) -> list[Shot]:
+) -> list[FilmstripClip]:
     """Return a shot for each clip by number and each skinning method; without clips one of the rest pose.
 
     nodes: only meshes on these; None for all. A file without a mesh is shown as sticks from joint to joint.
@@ -119,26 +119,28 @@ def of_document(
         for method in methods or ("lbs",):
             cache = bake(scene, clip, times=times, method=method, rigid=True)
             whole = bake(scene, clip, times=path, method=method, rigid=True)
-            colors = palette.of_faces(cache, _materials(document))
-            found.append(Shot(name, method if methods else "", cache, whole, colors, _body(scene, cache)))
+            colors = palette.face_colors(cache, _materials(document))
+            found.append(FilmstripClip(name, method if methods else "", cache, whole, colors, _body(scene, cache)))
     if not found:
         raise RangeError(f"no clip has a frame at {', '.join(f'{time:g} s' for time in when.at)}")
     return found
 
 
-def of_cache(cache: VertexCache, when: When) -> list[Shot]:
+def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
     """Return one shot of a cache. Raises NotFoundError where it has no faces."""
     if not len(cache.faces):
         raise NotFoundError("has no faces to draw", help="put the rest mesh beside it: NAME-rest.ply")
-    cache = up_axis.turned(cache, "y")
+    cache = up_axis.to_up_axis(cache, "y")
     start, end = float(cache.times[0]), float(cache.times[-1])
     when.check(start, end)
-    chosen = resample.at_times(cache, when.times(start, end))
-    whole = resample.at_times(cache, _spread(start, end))
-    return [Shot("", "", chosen, whole, palette.of_faces(cache))]
+    chosen = resample.resample_frames(cache, when.times(start, end))
+    whole = resample.resample_frames(cache, _spread(start, end))
+    return [FilmstripClip("", "", chosen, whole, palette.face_colors(cache))]
 
 
-def rows(shots: Sequence[Shot], *, heated: bool = False, followed: bool | None = None) -> tuple[list[Row], Extent]:
+def build_strips(
+    shots: Sequence[FilmstripClip], *, heated: bool = False, followed: bool | None = None
+) -> tuple[list[Strip], Extent]:
     """Return the rows of a filmstrip, and what its camera has to hold.
 
     heated: color how far vertices are from where the clip's first method has them; from the rest pose where there is
@@ -146,7 +148,7 @@ def rows(shots: Sequence[Shot], *, heated: bool = False, followed: bool | None =
     followed: whether the camera goes with the figure; None for where it leaves its place by more than its own size.
     """
     several_clips = len({shot.clip for shot in shots}) > 1
-    found: list[Row] = []
+    found: list[Strip] = []
     points: list[AnyArray] = []
     first = shots[0]
     reference: AnyArray = np.empty(0)
@@ -155,20 +157,22 @@ def rows(shots: Sequence[Shot], *, heated: bool = False, followed: bool | None =
         if i == 0 or first.clip != shot.clip:
             first, reference = shot, positions
             goes = root_path.travels(shot.path) if followed is None else followed
-            way = root_path.way(shot.path) if goes else None
+            way = root_path.root_path(shot.path) if goes else None
         alone = sum(other.clip == shot.clip for other in shots) == 1
         distances = _distances(shot, positions, reference, alone, shot is first) if heated else None
         heading = (shot.clip or "(no name)") if several_clips else ""
         cache = shot.cache
         found.append(
-            Row(shot.method, cache.times, positions, cache.faces, shot.colors, distances, heading, way, cache.rest)
+            Strip(shot.method, cache.times, positions, cache.faces, shot.colors, distances, heading, way, cache.rest)
         )
         points += [_places(each, way) for each in (shot.path, shot.cache)]
     ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
     return found, Extent(np.concatenate(points), ground)
 
 
-def _distances(shot: Shot, positions: AnyArray, reference: AnyArray, alone: bool, is_first: bool) -> Floats | None:
+def _distances(
+    shot: FilmstripClip, positions: AnyArray, reference: AnyArray, alone: bool, is_first: bool
+) -> Floats | None:
     """Distances (F, V) m from the clip's first method, or from the rest pose of what is alone."""
     if not alone:
         return None if is_first else heat_map.distances(positions, reference)
@@ -196,7 +200,7 @@ def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
         return scene
     if not len(scene.skeleton):
         raise NotFoundError("has neither a mesh nor a node to draw")
-    mesh, skin = sticks(scene.skeleton, _ends(scene.skeleton))
+    mesh, skin = stick_mesh(scene.skeleton, _ends(scene.skeleton))
     if not len(mesh.positions):
         raise NotFoundError("has neither a mesh nor joints to draw")
     return Scene(scene.skeleton, (MeshInstance(0, _thicker(mesh), skin, np.zeros(0)),))
@@ -221,7 +225,7 @@ def _ends(skeleton: Skeleton) -> frozenset[int]:
 
 def _materials(document: Document) -> list[tuple[float, float, float]]:
     found = []
-    for material in items(document.json, "materials"):
+    for material in json_array(document.json, "materials"):
         surface = material.get("pbrMetallicRoughness", {})
         color = (1.0, 1.0, 1.0) if "baseColorTexture" in surface else surface.get("baseColorFactor", (1.0, 1.0, 1.0))
         found.append((float(color[0]), float(color[1]), float(color[2])))
@@ -232,7 +236,7 @@ def _spread(start: float, end: float) -> Floats:
     return np.linspace(start, end, AROUND) if end > start else np.array([start])
 
 
-def _places(cache: VertexCache, way: root_path.Way | None) -> AnyArray:
+def _places(cache: VertexCache, way: root_path.RootPath | None) -> AnyArray:
     """Vertices of all frames as the camera sees them, of frames farther apart where they are too many."""
     step = max(1, -(-cache.frame_count * cache.vertex_count // MOST_POINTS))
     found = []

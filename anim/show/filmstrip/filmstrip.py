@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from anim.arrays import AnyArray, Floats, Ints
 from anim.errors import RangeError
 from anim.show.filmstrip import captions, heat_map
-from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, framed
+from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, fit_camera
 from anim.show.filmstrip.captions import FAINT, LINE
-from anim.show.filmstrip.renderer import Stage, draw, encoded, mark_spacing, moved, stage
-from anim.show.filmstrip.root_path import Way
-from anim.show.filmstrip.surface_pattern import Checker, Marks, edges
+from anim.show.filmstrip.renderer import SceneView, mark_spacing, moved, render_frame, setup_view, to_srgb
+from anim.show.filmstrip.root_path import RootPath
+from anim.show.filmstrip.surface_pattern import Checker, SurfaceMarks, edges
 
 HEIGHT = 240  # pixels of a frame
 GAP, EDGE = 3, 12  # pixels between frames, and around all
@@ -34,7 +34,7 @@ Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class Strip:
     """One strip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
 
     distances: (F, V) m, shown as heat instead of the colors where there are any. label: of the row, "dqs".
@@ -49,7 +49,7 @@ class Row:
     colors: Floats
     distances: AnyArray | None = None
     heading: str = ""
-    way: Way | None = None
+    way: RootPath | None = None
     rest: AnyArray | None = None
 
 
@@ -62,7 +62,7 @@ class Extent:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ViewOptions:
     """height: pixels of a frame. azimuth, elevation: degrees of the camera around the motion.
 
     checker: squares fixed to the rest pose on the surface. wire: the edges of its triangles.
@@ -75,7 +75,7 @@ class Look:
     wire: bool = False
 
 
-def filmstrip(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Look = Look()) -> Image:
+def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: ViewOptions = ViewOptions()) -> Image:
     """Return the picture (H, W, 3) of all rows under each other, clip by clip; long ones go on in a next line.
 
     Rows of one clip stay together in each line, so that methods are compared at the same times.
@@ -83,7 +83,7 @@ def filmstrip(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Loo
     """
     scenery = _scenery(extent, look)
     width, height = scenery.camera.width, scenery.camera.height
-    most, header = _most(rows), _header_height(rows, title)
+    most, header = _max_extent(rows), _header_height(rows, title)
     clips = [list(each) for _, each in groupby(rows, key=lambda row: row.heading)]
     per_line, pitch = _grid(width)
     columns = max(_columns(row, per_line)[0] for row in rows)
@@ -102,7 +102,7 @@ def filmstrip(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Loo
     return sheet
 
 
-def _clip_height(clip: Sequence[Row], per_line: int, height: int) -> int:
+def _clip_height(clip: Sequence[Strip], per_line: int, height: int) -> int:
     lines = max(_columns(row, per_line)[1] for row in clip)
     heading = LINE + APART if clip[0].heading else 0
     return heading + lines * len(clip) * (height + _footer(clip[0]))
@@ -114,19 +114,19 @@ def _grid(width: int) -> tuple[int, int]:
     return max((MAX_WIDTH - 2 * EDGE) // pitch, 1), pitch
 
 
-def _columns(row: Row, per_line: int) -> tuple[int, int]:
+def _columns(row: Strip, per_line: int) -> tuple[int, int]:
     """How many frames a line has, all about equally many, and how many lines there are."""
     lines = -(-len(row.times) // per_line)
     return -(-len(row.times) // lines), lines
 
 
-def _footer(row: Row) -> int:
+def _footer(row: Strip) -> int:
     return GAP + LINE * (1 if row.way is None else 2)
 
 
 def _draw_row(
     sheet: Image,
-    row: Row,
+    row: Strip,
     frames: Iterator[Image],
     top: int,
     place: tuple[int, int],
@@ -140,14 +140,14 @@ def _draw_row(
         y = top + (f // columns * count + r) * (height + _footer(row))
         x = EDGE + f % columns * pitch + (pitch - GAP - width) // 2
         sheet[y : y + height, x : x + width] = frame
-        for i, words in enumerate(_moment(row, f)):
+        for i, words in enumerate(_render_moment(row, f)):
             middle = x + (width - captions.width(words)) // 2
             captions.write(sheet, words, middle, y + height + GAP + i * LINE, color=FAINT)
         if row.label and f % columns == 0:
             captions.write(sheet, row.label, x + INSIDE, y + height - LOW)
 
 
-def _moment(row: Row, frame: int) -> list[str]:
+def _render_moment(row: Strip, frame: int) -> list[str]:
     """When a frame is, and how far the figure has got where the camera goes with it: "0.50 s", "1.2 m"."""
     time = f"{row.times[frame]:.2f} s"
     if row.way is None:
@@ -155,7 +155,9 @@ def _moment(row: Row, frame: int) -> list[str]:
     return [time, f"{row.way.distance(row.times[frame : frame + 1])[0]:.1f} m"]
 
 
-def moving(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Look = Look()) -> Iterator[Image]:
+def animate_frames(
+    rows: Sequence[Strip], extent: Extent, *, title: str = "", look: ViewOptions = ViewOptions()
+) -> Iterator[Image]:
     """Yield the pictures (H, W, 3) of an endless film, the rows side by side; the shorter ones wait for the longest.
 
     Raises RangeError for more pixels than memory should hold.
@@ -169,9 +171,9 @@ def moving(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Look =
     header, cell = _header_height(rows, title), name_lines * LINE + height + APART
     across = max(columns * pitch - GAP, _header_width(rows, title)) + 2 * EDGE
     tall = header + -(-len(rows) // columns) * cell - APART + LINE + EDGE
-    times, most = film_times(rows), _most(rows)
+    times, most = film_times(rows), _max_extent(rows)
     _check_size(tall, across, len(times))
-    frames = [_held(_frames(row, scenery, most, look)) for row in rows]
+    frames = [_repeat_last(_frames(row, scenery, most, look)) for row in rows]
     for time, *pictures in zip(times, *frames, strict=False):
         sheet = _paper(tall, across)
         captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
@@ -185,7 +187,7 @@ def moving(rows: Sequence[Row], extent: Extent, *, title: str = "", look: Look =
         yield sheet
 
 
-def film_times(rows: Sequence[Row]) -> Floats:
+def film_times(rows: Sequence[Strip]) -> Floats:
     """Return the times (F,) s of a film of the rows: of the longest; a loop's last frame, which is its first, is none.
 
     At least one row.
@@ -194,7 +196,7 @@ def film_times(rows: Sequence[Row]) -> Floats:
     return times[:-1] if _is_loop(rows) else times
 
 
-def _held(frames: Iterator[Image]) -> Iterator[Image]:
+def _repeat_last(frames: Iterator[Image]) -> Iterator[Image]:
     """The frames, and the last of them for good."""
     last = next(frames)
     yield last
@@ -204,7 +206,7 @@ def _held(frames: Iterator[Image]) -> Iterator[Image]:
         yield last
 
 
-def _is_loop(rows: Sequence[Row]) -> bool:
+def _is_loop(rows: Sequence[Strip]) -> bool:
     """Whether all rows end together, where they began, and are elsewhere between."""
     if len({len(row.times) for row in rows}) > 1:
         return False
@@ -229,30 +231,30 @@ def _check_size(height: int, width: int, frames: int) -> None:
         )
 
 
-def _scenery(extent: Extent, look: Look) -> Stage:
+def _scenery(extent: Extent, look: ViewOptions) -> SceneView:
     if not 32 <= look.height <= 4096:
         raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
     points = np.asarray(extent.points, np.float64).reshape(-1, 3)
-    camera = framed(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
-    return stage(camera, points, extent.ground)
+    camera = fit_camera(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
+    return setup_view(camera, points, extent.ground)
 
 
-def _frames(row: Row, scenery: Stage, most: float, look: Look) -> Iterator[Image]:
+def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> Iterator[Image]:
     marks = _marks(row, look)
     for f, positions in enumerate(row.positions):
         colors = row.colors
         if row.distances is not None:
-            colors = heat_map.of_faces(row.distances[f], row.faces, most)
+            colors = heat_map.heat_colors(row.distances[f], row.faces, most)
         seen, now = positions.astype(np.float64), scenery
         if row.way is not None:
             place = row.way.at(row.times[f])
             seen[:, [0, 2]] -= place
             now = moved(scenery, place, row.way.milestones(row.times[f], mark_spacing(scenery)))
-        yield encoded(draw(now, seen, row.faces, colors, marks))
+        yield to_srgb(render_frame(now, seen, row.faces, colors, marks))
 
 
-def _marks(row: Row, look: Look) -> list[Marks]:
-    found: list[Marks] = []
+def _marks(row: Strip, look: ViewOptions) -> list[SurfaceMarks]:
+    found: list[SurfaceMarks] = []
     if look.checker:
         found.append(Checker(row.positions[0] if row.rest is None else row.rest, row.faces).brightness)
     if look.wire:
@@ -260,18 +262,18 @@ def _marks(row: Row, look: Look) -> list[Marks]:
     return found
 
 
-def _most(rows: Sequence[Row]) -> float:
+def _max_extent(rows: Sequence[Strip]) -> float:
     return max((float(row.distances.max(initial=0)) for row in rows if row.distances is not None), default=0.0)
 
 
-def _header_height(rows: Sequence[Row], title: str) -> int:
+def _header_height(rows: Sequence[Strip], title: str) -> int:
     return EDGE + (LINE if title or _legend(rows) else 0)
 
 
-def _header_width(rows: Sequence[Row], title: str) -> int:
+def _header_width(rows: Sequence[Strip], title: str) -> int:
     return captions.header_width(title, _legend(rows))
 
 
-def _legend(rows: Sequence[Row]) -> str:
+def _legend(rows: Sequence[Strip]) -> str:
     """What the heat's far end means, empty without heat."""
-    return captions.length(_most(rows)) if any(row.distances is not None for row in rows) else ""
+    return captions.length(_max_extent(rows)) if any(row.distances is not None for row in rows) else ""

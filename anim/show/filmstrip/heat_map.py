@@ -28,7 +28,7 @@ def colors(shares: Floats) -> Floats:
     return found
 
 
-def of_faces(distances: AnyArray, faces: Ints, most: float) -> Floats:
+def heat_colors(distances: AnyArray, faces: Ints, most: float) -> Floats:
     """Return colors (T, 3) of faces from distances (V,) at their corners; `most` is the farthest."""
     return colors(distances[faces].mean(axis=1) / most if most > 0 else np.zeros(len(faces)))
 

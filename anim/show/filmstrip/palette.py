@@ -23,7 +23,7 @@ PARTS = (
 DARKEST = 0.035  # so that black things still have a shape
 
 
-def of_faces(cache: VertexCache, materials: Sequence[tuple[float, float, float]] = ()) -> Floats:
+def face_colors(cache: VertexCache, materials: Sequence[tuple[float, float, float]] = ()) -> Floats:
     """Return a linear color (T, 3) for every face. materials: base colors by number; white counts as none."""
     colors = np.tile(np.array(CLAY), (len(cache.faces), 1))
     for i, part in enumerate(cache.parts):

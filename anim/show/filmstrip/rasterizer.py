@@ -11,7 +11,7 @@ EDGE = 1e-9  # pixels by which a middle may lie outside, so that neighbors leave
 FLAT = 1e-12  # pixels²; triangles of less area are seen from the side
 
 
-def visible(corners: Floats, *, width: int, height: int) -> Ints:
+def visible_faces(corners: Floats, *, width: int, height: int) -> Ints:
     """Return the number of the nearest triangle at each pixel (height, width), −1 where there is none.
 
     corners: (T, 3, 3): x and y in pixels from the top left, and nearness, which grows toward the eye and is linear on

@@ -10,8 +10,8 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.show.filmstrip.camera import Camera
-from anim.show.filmstrip.rasterizer import visible
-from anim.show.filmstrip.surface_pattern import Marks
+from anim.show.filmstrip.rasterizer import visible_faces
+from anim.show.filmstrip.surface_pattern import SurfaceMarks
 
 SAMPLES = 3  # across and down in each pixel
 BAND = 1 << 22  # samples that are drawn at a time, about: they take 60 bytes each
@@ -31,7 +31,7 @@ GAMMA = 2.2
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class SceneView:
     """What all frames share. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m.
 
     background: (H, W, 3) linear, with the grid as it lies while the camera stands where it began.
@@ -44,15 +44,15 @@ class Stage:
     background: Floats
 
 
-def stage(camera: Camera, points: Floats, ground: float) -> Stage:
+def setup_view(camera: Camera, points: Floats, ground: float) -> SceneView:
     """Return the stage for a motion whose vertices are `points` (P, 3), with the ground at a height in m."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low[[0, 2]] + high[[0, 2]]) / 2
     reach = max(float(np.linalg.norm(high - low)) / 2, 1e-6)
-    return Stage(camera, ground, middle, reach, _background(camera, ground, middle, reach, np.zeros(2)))
+    return SceneView(camera, ground, middle, reach, _background(camera, ground, middle, reach, np.zeros(2)))
 
 
-def moved(stage: Stage, place: Floats, milestones: Floats) -> Stage:
+def moved(stage: SceneView, place: Floats, milestones: Floats) -> SceneView:
     """Return the stage under a camera that has gone to a place (2,), m in x and z from where it began.
 
     milestones: (M, 2) m of x and z, shown as dots on the ground.
@@ -67,18 +67,20 @@ def moved(stage: Stage, place: Floats, milestones: Floats) -> Stage:
     return replace(stage, background=background)
 
 
-def mark_spacing(stage: Stage) -> float:
+def mark_spacing(stage: SceneView) -> float:
     """Return the distance in m from mark to mark along the way of a figure that the camera goes with."""
     return nice(stage.reach / 2)
 
 
-def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats, marks: Sequence[Marks] = ()) -> Floats:
+def render_frame(
+    stage: SceneView, positions: Floats, faces: Ints, colors: Floats, marks: Sequence[SurfaceMarks] = ()
+) -> Floats:
     """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces.
 
     marks: drawn on the surface, each over the one before.
     """
     camera = stage.camera
-    corners = _larger(camera, SAMPLES).project(positions)[faces]
+    corners = _enlarge(camera, SAMPLES).project(positions)[faces]
     painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
     picture: Floats = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
     rows = max(BAND // (camera.width * SAMPLES**2), 1)
@@ -87,10 +89,10 @@ def draw(stage: Stage, positions: Floats, faces: Ints, colors: Floats, marks: Se
     return picture
 
 
-def _paint(band: Floats, corners: Floats, painted: Floats, marks: Sequence[Marks]) -> None:
+def _paint(band: Floats, corners: Floats, painted: Floats, marks: Sequence[SurfaceMarks]) -> None:
     """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
     height, width = band.shape[:2]
-    seen = visible(corners, width=width * SAMPLES, height=height * SAMPLES)
+    seen = visible_faces(corners, width=width * SAMPLES, height=height * SAMPLES)
     shape = (height, SAMPLES, width, SAMPLES)
     cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
     colors = painted[seen]
@@ -104,12 +106,12 @@ def _paint(band: Floats, corners: Floats, painted: Floats, marks: Sequence[Marks
     band += colors.reshape(*shape, 3).mean(axis=(1, 3))
 
 
-def encoded(image: Floats) -> np.ndarray:
+def to_srgb(image: Floats) -> np.ndarray:
     """Return linear light as bytes of sRGB (nearly: one power for all)."""
     return np.rint(np.clip(image, 0, 1) ** (1 / GAMMA) * 255).astype(np.uint8)
 
 
-def _larger(camera: Camera, times: int) -> Camera:
+def _enlarge(camera: Camera, times: int) -> Camera:
     return Camera(camera.eye, camera.axes, camera.scale * times, camera.width * times, camera.height * times)
 
 
@@ -172,7 +174,7 @@ def nice(length: float) -> float:
     return max(factor * power for factor in (1, 2, 5) if factor * power <= length * 1.0001)
 
 
-def _shadow(stage: Stage, positions: Floats, faces: Ints) -> Floats:
+def _shadow(stage: SceneView, positions: Floats, faces: Ints) -> Floats:
     """How dark (H, W) the ground is: what the key light finds in its way, made soft."""
     camera = stage.camera
     if camera.eye[1] <= stage.ground:
@@ -182,7 +184,7 @@ def _shadow(stage: Stage, positions: Floats, faces: Ints) -> Floats:
     above = np.maximum(positions[:, 1] - stage.ground, 0)
     fallen = positions - (above / light[1])[:, None] * light
     fallen[:, 1] = stage.ground
-    mask = visible(camera.project(fallen)[faces], width=camera.width, height=camera.height) >= 0
+    mask = visible_faces(camera.project(fallen)[faces], width=camera.width, height=camera.height) >= 0
     return SHADOW_DEPTH * _blur(mask, max(round(SHADOW_BLUR * camera.height), 1))
 
 

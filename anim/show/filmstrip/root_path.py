@@ -14,7 +14,7 @@ SMOOTH = 5  # frames before and after that a place is the mean of: the camera do
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class RootPath:
     """Where a figure has got to. times: (P,) s. places: (P, 2) m of x and z, from where it began: start (2,)."""
 
     times: Floats
@@ -46,11 +46,11 @@ def travels(cache: VertexCache) -> bool:
     return _extent(_centers(cache)) > FAR * _size(cache)
 
 
-def way(cache: VertexCache) -> Way:
+def root_path(cache: VertexCache) -> RootPath:
     """Return the way of the middle of all vertices over the ground, without the sway of single steps."""
     centers = _centers(cache)
     smooth = _smoothed(centers)
-    return Way(cache.times, smooth - smooth[0], smooth[0])
+    return RootPath(cache.times, smooth - smooth[0], smooth[0])
 
 
 def _centers(cache: VertexCache) -> Floats:

@@ -16,7 +16,7 @@ FINE, COARSE = 3.0, 9.0  # pixels; edges of triangles smaller than the first har
 LEAST = 0.12  # share of the darkness that is left to edges of the smallest triangles
 
 # (corners (S, 3, 3) on the screen, x and y of samples (S, 2), their faces (S,)) → brightness (S,)
-Marks = Callable[[Floats, Floats, Ints], Floats]
+SurfaceMarks = Callable[[Floats, Floats, Ints], Floats]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from anim.arrays import Floats
-from anim.show.plots.figure import ACCENT, COLORS, HAIR, LINE, SMALL, SOFT, TITLE, Sheet, spread, style
-from anim.skinning.analysis.collapse import LOW
+from anim.show.plots.figure import ACCENT, COLORS, HAIR, LINE, SMALL, SOFT, TITLE, Figure, separate_labels, style
+from anim.skinning.analysis.collapse import LOW_INDEX
 from anim.skinning.analysis.recommendations import Found
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ TOP, TALL = 0.62, 1.15
 ROOM = 0.04  # of the scale, above and below
 
 
-def collapse(found: Sequence[Found], *, title: str, kind: str) -> bytes:
+def collapse_plot(found: Sequence[Found], *, title: str, kind: str) -> bytes:
     """Return a picture of clips as the bytes of a PNG or SVG file: of many the worst twelve, in their own order,
     without those of one frame.
 
@@ -36,7 +36,7 @@ def collapse(found: Sequence[Found], *, title: str, kind: str) -> bytes:
         width = WIDE if columns == 1 else COLUMN
         rows = [shown[i : i + columns] for i in range(0, len(shown), columns)]
         height = HEAD + 2 * TALL + CAPTION + FOOT
-        sheet = Sheet(columns * width + 2 * MARGIN, TOP + len(rows) * height)
+        sheet = Figure(columns * width + 2 * MARGIN, TOP + len(rows) * height)
         sheet.text(MARGIN + 0.1, 0.33, title, fontsize=TITLE + 2, weight="bold")
         words = f"the worst {len(shown)} of {len(found)} clips" if len(found) > len(shown) else ""
         sheet.text(sheet.width - MARGIN - 0.1, 0.33, words, fontsize=SMALL, color=SOFT, ha="right")
@@ -47,7 +47,7 @@ def collapse(found: Sequence[Found], *, title: str, kind: str) -> bytes:
         return sheet.render(kind)
 
 
-def _cell(sheet: Sheet, found: Found, x: float, y: float, width: float, scale: tuple[float, float]) -> None:
+def _cell(sheet: Figure, found: Found, x: float, y: float, width: float, scale: tuple[float, float]) -> None:
     """One clip. scale: least and greatest volume of all clips, %."""
     mesh, left, across = found.mesh, x + LEFT, width - LEFT - RIGHT
     at = left + 0.14 + sheet.text(left, y + 0.2, found.clip, fontsize=TITLE, weight="bold")
@@ -64,9 +64,11 @@ def _cell(sheet: Sheet, found: Found, x: float, y: float, width: float, scale: t
 
 def _draw_index(axes: Axes, times: Floats, indices: Floats) -> None:
     axes.set_ylim(-ROOM, 1 + ROOM)
-    axes.set_yticks([0, 0.5, LOW, 1])
-    axes.axhline(LOW, color=COLORS[0], linewidth=0.8, linestyle=(0, (4, 3)))
-    axes.fill_between(times, indices, LOW, where=indices < LOW, interpolate=True, color=COLORS[0], alpha=0.25)
+    axes.set_yticks([0, 0.5, LOW_INDEX, 1])
+    axes.axhline(LOW_INDEX, color=COLORS[0], linewidth=0.8, linestyle=(0, (4, 3)))
+    axes.fill_between(
+        times, indices, LOW_INDEX, where=indices < LOW_INDEX, interpolate=True, color=COLORS[0], alpha=0.25
+    )
     axes.plot(times, indices, color=ACCENT, linewidth=LINE, marker="o" if len(times) == 1 else None)
     _fit(axes, times)
     axes.set_xticklabels([])
@@ -86,7 +88,7 @@ def _draw_volumes(axes: Axes, times: Floats, volumes: dict[str, Floats], scale: 
     axes.set_ylim(low - room, high + room)
     axes.axhline(100, color=HAIR, linewidth=0.8)
     ends = [100 * float(each[-1]) for each in volumes.values()]
-    places = spread(ends, (high - low) * 0.13, low, high)
+    places = separate_labels(ends, (high - low) * 0.13, low, high)
     for i, (method, volume) in enumerate(volumes.items()):
         axes.plot(times, 100 * volume, color=COLORS[i], linewidth=LINE)
         axes.annotate(

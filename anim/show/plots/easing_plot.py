@@ -23,8 +23,8 @@ from anim.show.plots.figure import (
     SOFT,
     SPEED,
     TITLE,
-    Sheet,
-    short,
+    Figure,
+    format_number,
     style,
     text_width,
 )
@@ -44,7 +44,7 @@ CELL, MARGIN, LEFT, RIGHT = 2.75, 0.25, 0.5, 0.2  # inches
 TOP, HEAD, CURVE, SLOPE, TEMPO, CAPTION, FOOT = 0.15, 0.54, 2.05, 0.8, 0.3, 0.42, 0.3
 
 
-def eases(easings: Sequence[Easing], *, kind: str) -> bytes:
+def easing_plot(easings: Sequence[Easing], *, kind: str) -> bytes:
     """Return a picture of eases as the bytes of a PNG or SVG file, four in a row, all to one scale.
 
     Each: f(t), its overshoot filled; f′(t), 1 being constant speed; and a row of dots, one for each twentieth of the
@@ -57,7 +57,7 @@ def eases(easings: Sequence[Easing], *, kind: str) -> bytes:
     with style(kind):
         rows = [easings[i : i + PER_ROW] for i in range(0, len(easings), PER_ROW)]
         height = HEAD + CURVE + CAPTION + SLOPE + CAPTION + TEMPO + FOOT
-        sheet = Sheet(len(rows[0]) * CELL + 2 * MARGIN, TOP + len(rows) * height)
+        sheet = Figure(len(rows[0]) * CELL + 2 * MARGIN, TOP + len(rows) * height)
         low = min(easing.extent[0] for easing in easings)
         high = max(easing.extent[1] for easing in easings)
         slopes = [_slopes(easing) for easing in easings]
@@ -93,7 +93,7 @@ def _jumps(easing: Easing) -> list[float]:
 
 
 class _Cell:
-    def __init__(self, sheet: Sheet, easing: Easing, x: float, y: float, *, first: bool) -> None:
+    def __init__(self, sheet: Figure, easing: Easing, x: float, y: float, *, first: bool) -> None:
         self.sheet, self.easing, self.first = sheet, easing, first
         self.x, self.y, self.across = x + LEFT, y, CELL - LEFT - RIGHT
 
@@ -137,9 +137,9 @@ class _Cell:
         axes.spines["bottom"].set_visible(False)
         low, high = self.easing.extent
         if high > 1:
-            _over(axes, float(u[f.argmax()]), high, f"+{short(100 * (high - 1))} %", 4)
+            _over(axes, float(u[f.argmax()]), high, f"+{format_number(100 * (high - 1))} %", 4)
         if low < 0:
-            _over(axes, float(u[f.argmin()]), low, f"{short(100 * low)} %", -10)
+            _over(axes, float(u[f.argmin()]), low, f"{format_number(100 * low)} %", -10)
 
     def _slope(self, axes: Axes, slopes: Floats, steep: tuple[float, float]) -> str:
         from matplotlib.ticker import MaxNLocator
@@ -158,7 +158,7 @@ class _Cell:
             return "only jumps" if self.easing.stepped else "and jumps"
         with np.errstate(all="ignore"):
             most = float(np.nanmax(np.abs(self.easing.derivative(u))))
-        return f"at most {short(most)}×" if most < 1e3 else "vertical in places"
+        return f"at most {format_number(most)}×" if most < 1e3 else "vertical in places"
 
     def _tempo(self, axes: Axes, values: tuple[float, float]) -> None:
         """Dots on a track with marks at 0 and 1; values: the least and the greatest of all eases on the sheet."""

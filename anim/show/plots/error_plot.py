@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from anim.arrays import Floats
-from anim.measure.error.error_curve import Profile
-from anim.show.plots.figure import COLORS, HAIR, INK, SMALL, SOFT, TITLE, Sheet, short, style, text_width
+from anim.measure.error.error_curve import ErrorCurve
+from anim.show.plots.figure import COLORS, HAIR, INK, SMALL, SOFT, TITLE, Figure, format_number, style, text_width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,9 @@ LONGEST = 22  # letters of a joint's name; the end of a longer one
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"))  # from so many m on
 
 
-def diff(profiles: Sequence[Profile], *, title: str, kind: str, limit: float | None = None, note: str = "") -> bytes:
+def error_plot(
+    profiles: Sequence[ErrorCurve], *, title: str, kind: str, limit: float | None = None, note: str = ""
+) -> bytes:
     """Return a picture of clips as the bytes of a PNG or SVG file, the first twelve that differ.
 
     Each: the largest distance of any vertex over time, filled, and over it that of the worst joints' own vertices, by
@@ -31,13 +33,13 @@ def diff(profiles: Sequence[Profile], *, title: str, kind: str, limit: float | N
     limit: m, drawn as a line. note: words for the head of the sheet.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
-    shown = differing(profiles)[:LIMIT]
+    shown = changed_tracks(profiles)[:LIMIT]
     with style(kind):
         columns = 1 if len(shown) < 2 else 2
         width = WIDE if columns == 1 else COLUMN
         rows = [shown[i : i + columns] for i in range(0, len(shown), columns)]
         height = HEAD + TALL + FOOT
-        sheet = Sheet(columns * width + 2 * MARGIN, TOP + (len(rows) * height if rows else FOOT))
+        sheet = Figure(columns * width + 2 * MARGIN, TOP + (len(rows) * height if rows else FOOT))
         sheet.text(MARGIN + 0.1, 0.33, title, fontsize=TITLE + 2, weight="bold")
         sheet.text(sheet.width - MARGIN - 0.1, 0.33, note, fontsize=SMALL, color=SOFT, ha="right")
         if not shown:
@@ -48,18 +50,22 @@ def diff(profiles: Sequence[Profile], *, title: str, kind: str, limit: float | N
         return sheet.render(kind)
 
 
-def differing(profiles: Sequence[Profile]) -> list[Profile]:
+def changed_tracks(profiles: Sequence[ErrorCurve]) -> list[ErrorCurve]:
     """Return those of clips that are apart at any time."""
     return [each for each in profiles if each.error.any()]
 
 
-def _cell(sheet: Sheet, profile: Profile, x: float, y: float, width: float, limit: float | None) -> None:
+def _cell(sheet: Figure, profile: ErrorCurve, x: float, y: float, width: float, limit: float | None) -> None:
     left = x + LEFT
     top = float(profile.error.max(initial=0.0))
     factor, unit = next((factor, unit) for least, factor, unit in UNITS if top >= least) if top else (1e3, "mm")
     at = left + 0.14 + sheet.text(left, y + 0.2, profile.name or "(no name)", fontsize=TITLE, weight="bold")
     sheet.text(
-        at, y + 0.2, f"largest distance, {unit} over s  ·  max {short(top * factor)} {unit}", fontsize=SMALL, color=SOFT
+        at,
+        y + 0.2,
+        f"largest distance, {unit} over s  ·  max {format_number(top * factor)} {unit}",
+        fontsize=SMALL,
+        color=SOFT,
     )
     names = [_tail(course.joint) for course in profile.joints]
     right = min(max([RIGHT, *(text_width(name, SMALL) + 0.2 for name in names)]), MOST_RIGHT)
@@ -67,7 +73,7 @@ def _cell(sheet: Sheet, profile: Profile, x: float, y: float, width: float, limi
     _draw(axes, profile, names, factor, limit)
 
 
-def _draw(axes: Axes, profile: Profile, names: Sequence[str], factor: float, limit: float | None) -> None:
+def _draw(axes: Axes, profile: ErrorCurve, names: Sequence[str], factor: float, limit: float | None) -> None:
     times, error = profile.times, factor * profile.error
     high = (1 + ROOM) * float(error.max(initial=0.0)) or 1.0
     axes.set_ylim(0, high)

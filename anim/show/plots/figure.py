@@ -45,7 +45,7 @@ _STYLE: dict[str, Any] = {
 INSTALL = "pip install 'gltf-anim[plot]'"
 
 
-class Sheet:
+class Figure:
     """A figure of fixed size in inches; x and y count from its top left corner."""
 
     def __init__(self, width: float, height: float) -> None:
@@ -117,12 +117,12 @@ def text_width(words: str, points: float, weight: str = "normal") -> float:
     return float(width) / POINTS
 
 
-def short(number: float) -> str:
+def format_number(number: float) -> str:
     """Return a number with three digits, never in the form 1e+02: "0.0123", "12.3", "1230"."""
     return f"{float(f'{number:.3g}'):.12f}".rstrip("0").rstrip(".").replace("-", "−")
 
 
-def spread(places: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+def separate_labels(places: Sequence[float], gap: float, low: float, high: float) -> list[float]:
     """Return places moved apart to at least `gap`, as little as that takes, within low … high where they fit.
 
     spread([1, 1, 5], 2, 0, 9) → [0, 2, 5]

@@ -11,10 +11,17 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import Interpolation, Track, ValueKind
 from anim.show.plots import polylines
-from anim.show.plots.figure import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, short, spread
-from anim.show.plots.polylines import Line
-from anim.show.plots.rotations import COMPONENTS, FROM_REST, NEAR_LOCK_DEG, Curve, lock_line, rotation_curve
-from anim.show.plots.track_selection import Shown
+from anim.show.plots.figure import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, format_number, separate_labels
+from anim.show.plots.polylines import Polyline
+from anim.show.plots.rotations import (
+    COMPONENTS,
+    FROM_REST,
+    NEAR_LOCK_DEG,
+    RotationCurve,
+    gimbal_distance_line,
+    rotation_curve,
+)
+from anim.show.plots.track_selection import PlotTrack
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +37,7 @@ DEGREES = 180 / math.pi
 UNITS = ((1e6, "µm", 1e-4), (1e3, "mm", 5e-2))  # factor, name, and the length in m below which it is used
 
 
-def kinds(each: Shown) -> list[str]:
+def kinds(each: PlotTrack) -> list[str]:
     """Return what a track is drawn as, from top to bottom: names of DRAW."""
     names = ["value"]
     if each.track.kind is ValueKind.ROTATION:
@@ -42,17 +49,17 @@ def kinds(each: Shown) -> list[str]:
     return names
 
 
-def labels(each: Shown) -> list[str]:
+def labels(each: PlotTrack) -> list[str]:
     """Return the names of the components that are drawn in color."""
     return [each.labels[c] for c in _colored(each)]
 
 
-def span(each: Shown) -> tuple[float, float]:
+def span(each: PlotTrack) -> tuple[float, float]:
     """Return the first and last time that are drawn, in seconds: those of the clip."""
     return (each.start, each.end) if each.end > each.start else (each.start - 0.5, each.start + 0.5)
 
 
-def time_axis(axes: Axes, each: Shown, *, labeled: bool) -> None:
+def time_axis(axes: Axes, each: PlotTrack, *, labeled: bool) -> None:
     """Mark seconds below the last panel, with a fine tick for every frame where there is room."""
     from matplotlib.ticker import FixedLocator, MaxNLocator
 
@@ -64,7 +71,9 @@ def time_axis(axes: Axes, each: Shown, *, labeled: bool) -> None:
         axes.tick_params(axis="x", labelbottom=False)
         return
     ticks = [t for t in axes.get_xticks() if low - 1e-9 <= t <= high + 1e-9]
-    axes.set_xticks(ticks, [f"{short(t)} s" if i == len(ticks) - 1 else short(t) for i, t in enumerate(ticks)])
+    axes.set_xticks(
+        ticks, [f"{format_number(t)} s" if i == len(ticks) - 1 else format_number(t) for i, t in enumerate(ticks)]
+    )
     axes.tick_params(axis="x", which="major", length=4, width=0.6, color=SOFT)
     frames = (high - low) * each.fps if each.fps is not None else 0.0
     if each.fps is not None and 2 <= frames <= width / 3:
@@ -72,7 +81,7 @@ def time_axis(axes: Axes, each: Shown, *, labeled: bool) -> None:
         axes.tick_params(axis="x", which="minor", length=2.2, width=0.5, color=HAIR)
 
 
-def _value(axes: Axes, each: Shown) -> str:
+def _value(axes: Axes, each: PlotTrack) -> str:
     """The values: those of the second file over those of the first, keys and handles of the one on top."""
     front = each.other or each.track
     curves = [_curve(each, track) for track in _tracks(each)]
@@ -94,15 +103,15 @@ def _value(axes: Axes, each: Shown) -> str:
     return ", from its first key" if origin.any() else ""
 
 
-def _angle(axes: Axes, each: Shown) -> str:
+def _angle(axes: Axes, each: PlotTrack) -> str:
     start = each.rest if each.is_in_degrees else each.track.values[0]
     _single(axes, [polylines.angle_line(track, start) for track in _tracks(each)], DEGREES, INK, steps=ROUND_ANGLES)
     return "angle from rest, °" if each.is_in_degrees else "angle from the first key, °"
 
 
-def _lock(axes: Axes, each: Shown) -> str:
+def _lock(axes: Axes, each: PlotTrack) -> str:
     """How far an order of Euler angles is from gimbal lock, 90° at best; what is nearer than 5° is filled."""
-    found = [lock_line(track, order=each.view) for track in _tracks(each)]
+    found = [gimbal_distance_line(track, order=each.view) for track in _tracks(each)]
     for i, line in enumerate(found):
         behind = len(found) > 1 and i == 0
         look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
@@ -114,10 +123,10 @@ def _lock(axes: Axes, each: Shown) -> str:
     at = int(np.nanargmin(line.values[:, 0]))
     least, time = float(line.values[at, 0]) * DEGREES, float(line.times[at])
     axes.plot(time, least, "o", color=COLORS[0], markersize=3.4, clip_on=False, zorder=3)
-    return f"distance to gimbal lock of {each.view}: at least {short(least)}° at {short(time)} s"
+    return f"distance to gimbal lock of {each.view}: at least {format_number(least)}° at {format_number(time)} s"
 
 
-def _speed(axes: Axes, each: Shown) -> str:
+def _speed(axes: Axes, each: PlotTrack) -> str:
     found = [polylines.speed_line(track) for track in _tracks(each)]
     factor, unit = _unit(each, max(float(np.nanmax(line.values)) for line in found if len(line.times)))
     _single(axes, found, factor, SPEED)
@@ -126,7 +135,7 @@ def _speed(axes: Axes, each: Shown) -> str:
     return f"speed, {unit}/s" if unit else "speed, per second"
 
 
-def _difference(axes: Axes, each: Shown) -> str:
+def _difference(axes: Axes, each: PlotTrack) -> str:
     assert each.other is not None
     line = polylines.difference_line(each.track, each.other)
     at = int(line.values[:, 0].argmax())
@@ -137,14 +146,14 @@ def _difference(axes: Axes, each: Shown) -> str:
         return "difference: none"
     axes.plot(line.times[at], most * factor, "o", color=COLORS[0], markersize=3.4, clip_on=False)
     unit = unit if unit in ("°", "") else f" {unit}"
-    return f"difference: at most {short(most * factor)}{unit} at {short(float(line.times[at]))} s"
+    return f"difference: at most {format_number(most * factor)}{unit} at {format_number(float(line.times[at]))} s"
 
 
-def _mark_lock(axes: Axes, each: Shown) -> None:
+def _mark_lock(axes: Axes, each: PlotTrack) -> None:
     """Shade the times at which Euler angles are near gimbal lock, with a line at the nearest."""
     if not each.is_in_degrees or each.view == FROM_REST:
         return
-    line = lock_line(each.other or each.track, order=each.view)
+    line = gimbal_distance_line(each.other or each.track, order=each.view)
     distance = np.nan_to_num(line.values[:, 0], nan=np.inf) * DEGREES
     is_near = np.concatenate(([False], distance < NEAR_LOCK_DEG, [False]))
     starts, ends = np.flatnonzero(is_near[1:] & ~is_near[:-1]), np.flatnonzero(is_near[:-1] & ~is_near[1:]) - 1
@@ -158,7 +167,7 @@ def _mark_lock(axes: Axes, each: Shown) -> None:
         )  # fmt: skip
 
 
-DRAW: dict[str, Callable[[Axes, Shown], str]] = {
+DRAW: dict[str, Callable[[Axes, PlotTrack], str]] = {
     "value": _value,
     "angle": _angle,
     "lock": _lock,
@@ -167,25 +176,25 @@ DRAW: dict[str, Callable[[Axes, Shown], str]] = {
 }
 
 
-def _tracks(each: Shown) -> list[Track]:
+def _tracks(each: PlotTrack) -> list[Track]:
     return [each.track] if each.other is None else [each.track, each.other]
 
 
-def _curve(each: Shown, track: Track) -> Curve:
+def _curve(each: PlotTrack, track: Track) -> RotationCurve:
     """A track as numbers that are drawn."""
     if each.is_in_degrees:
         return rotation_curve(track, view=each.view, rest=each.rest)
-    risers = polylines.risers(track) if track.interpolation is Interpolation.STEP else None
-    return Curve(polylines.value_line(track), track.values, risers)
+    risers = polylines.step_edges(track) if track.interpolation is Interpolation.STEP else None
+    return RotationCurve(polylines.value_line(track), track.values, risers)
 
 
-def _colored(each: Shown) -> list[int]:
+def _colored(each: PlotTrack) -> list[int]:
     """Numbers of the components that move most."""
     ranges = np.ptp(_curve(each, each.track).keys, axis=0)
     return sorted(np.argsort(-ranges, kind="stable")[:COLORED].tolist())
 
 
-def _color(each: Shown, component: int) -> str:
+def _color(each: PlotTrack, component: int) -> str:
     """Red, green and blue for turns about x, y and z; else the next color for each component that moves most."""
     if each.is_in_degrees:
         is_twice = len({label[0] for label in each.labels}) < len(each.labels)
@@ -194,7 +203,7 @@ def _color(each: Shown, component: int) -> str:
     return COLORS[colored.index(component)] if component in colored else HAIR
 
 
-def _origin(each: Shown, curve: Curve) -> Floats:
+def _origin(each: PlotTrack, curve: RotationCurve) -> Floats:
     """What values are drawn from (C,): 0, or the first key where curves far apart would hide how they move."""
     values = curve.keys
     width = float(np.ptp(values, axis=0).max())
@@ -202,7 +211,7 @@ def _origin(each: Shown, curve: Curve) -> Floats:
     return values[0] if far and each.track.kind is not ValueKind.ROTATION else np.zeros(values.shape[1])
 
 
-def _unit(each: Shown, most: float) -> tuple[float, str]:
+def _unit(each: PlotTrack, most: float) -> tuple[float, str]:
     """Factor and name of the unit in which values up to `most` are easy to read."""
     if each.track.kind is ValueKind.ROTATION:
         return DEGREES, "°"
@@ -211,7 +220,7 @@ def _unit(each: Shown, most: float) -> tuple[float, str]:
     return next(((factor, unit) for factor, unit, limit in UNITS if most < limit), (1.0, "m"))
 
 
-def _draw_lines(axes: Axes, each: Shown, line: Line, origin: Floats, **look: Any) -> None:
+def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **look: Any) -> None:
     """Draw components, those in color over the others, and of those the ones that move least first."""
     if not len(line.times):
         return
@@ -223,7 +232,7 @@ def _draw_lines(axes: Axes, each: Shown, line: Line, origin: Floats, **look: Any
         axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **chosen)
 
 
-def _limits(axes: Axes, each: Shown, curves: Sequence[Curve], origin: Floats, *, handles: bool) -> None:
+def _limits(axes: Axes, each: PlotTrack, curves: Sequence[RotationCurve], origin: Floats, *, handles: bool) -> None:
     """Room for all values, and for handles as far as they don't press the curve flat."""
     from matplotlib.ticker import MaxNLocator
 
@@ -242,7 +251,7 @@ def _limits(axes: Axes, each: Shown, curves: Sequence[Curve], origin: Floats, *,
     plain(axes)
 
 
-def _handles(axes: Axes, each: Shown, front: Track, origin: Floats) -> None:
+def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:
     colored = _colored(each)
     times, values = polylines.handles(front)
     for c in colored:
@@ -255,7 +264,7 @@ def _handles(axes: Axes, each: Shown, front: Track, origin: Floats) -> None:
         axes.plot(times[bent, 1], places[:, 1], "o", **ring)
 
 
-def _keys(axes: Axes, each: Shown, times: Floats, values: Floats) -> None:
+def _keys(axes: Axes, each: PlotTrack, times: Floats, values: Floats) -> None:
     """Keys as dots, or as a row of fine ticks at the foot where they are too close."""
     spacing = _spacing(axes, each)
     if spacing < DOTS:
@@ -270,13 +279,13 @@ def _keys(axes: Axes, each: Shown, times: Floats, values: Floats) -> None:
         axes.plot(times, values[:, c], "o", zorder=3, clip_on=False, **dot)
 
 
-def _component_names(axes: Axes, each: Shown, last: Floats) -> None:
+def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
     """Names of components at the right ends of their curves; of equal ones the first is on top."""
     colored = _colored(each)
     low, high = axes.get_ylim()
     gap = GAP / _size(axes)[1] * (high - low)
     upwards = colored[::-1]
-    places = spread([float(last[c]) for c in upwards], gap, low + gap / 2, high - gap / 2)
+    places = separate_labels([float(last[c]) for c in upwards], gap, low + gap / 2, high - gap / 2)
     beside = {"xycoords": ("axes fraction", "data"), "xytext": (6, 0), "textcoords": "offset points", "va": "center"}
     for c, place in zip(upwards, places, strict=True):
         color = _color(each, c)
@@ -287,7 +296,7 @@ def _component_names(axes: Axes, each: Shown, last: Floats) -> None:
         axes.annotate(f"+ {rest} more, gray", (1, 1), color=SOFT, fontsize=SMALL, **above)
 
 
-def _single(axes: Axes, found: list[Line], factor: float, color: str, *, steps: Sequence[float] = ROUND) -> None:
+def _single(axes: Axes, found: list[Polyline], factor: float, color: str, *, steps: Sequence[float] = ROUND) -> None:
     """One filled curve from 0 up, or two lines where a second file is compared."""
     from matplotlib.ticker import MaxNLocator
 
@@ -325,7 +334,7 @@ def _size(axes: Axes) -> tuple[float, float]:
     return float(box.width), float(box.height)
 
 
-def _spacing(axes: Axes, each: Shown) -> float:
+def _spacing(axes: Axes, each: PlotTrack) -> float:
     """Pixels from key to key, the mean."""
     times = (each.other or each.track).times
     low, high = span(each)

@@ -18,38 +18,38 @@ MOST, LEAST = 40, 2  # points of one piece
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class Polyline:
     """Points (P,) s and (P, C); NaN where it breaks."""
 
     times: Floats
     values: Floats
 
 
-def value_line(track: Track) -> Line:
+def value_line(track: Track) -> Polyline:
     """Return the values of a track; STEP breaks at every key."""
     if track.interpolation is Interpolation.STEP:
         return _holds(track)
     if track.interpolation is Interpolation.LINEAR and track.kind is not ValueKind.ROTATION:
-        return Line(track.times, track.values)
+        return Polyline(track.times, track.values)
     times = _points(track, pieces_only=False)[0].reshape(-1)
-    return Line(times, sample(track, times))
+    return Polyline(times, sample(track, times))
 
 
-def risers(track: Track) -> Line:
+def step_edges(track: Track) -> Polyline:
     """Return the jumps of a STEP track as upright lines, each its own piece."""
     keys = np.flatnonzero((np.diff(track.values, axis=0) != 0).any(axis=1)) + 1
     blank = np.full((len(keys), 1, track.values.shape[1]), np.nan)
     values = np.concatenate((track.values[keys - 1][:, None], track.values[keys][:, None], blank), axis=1)
-    return Line(np.repeat(track.times[keys], 3), values.reshape(-1, track.values.shape[1]))
+    return Polyline(np.repeat(track.times[keys], 3), values.reshape(-1, track.values.shape[1]))
 
 
-def speed_line(track: Track) -> Line:
+def speed_line(track: Track) -> Polyline:
     """Return the speed of a track (P, 1) per second, rad/s for rotations, true on both sides of every key.
 
     It breaks where the value jumps; a STEP track has none.
     """
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
-        return Line(np.zeros(0), np.zeros((0, 1)))
+        return Polyline(np.zeros(0), np.zeros((0, 1)))
     times, jumps = _points(track, pieces_only=True)
     speeds = np.empty(times.shape)
     speeds[:, :-1] = lengths(derivatives.rates(track, times[:, :-1].reshape(-1), before=False)).reshape(len(times), -1)
@@ -57,27 +57,27 @@ def speed_line(track: Track) -> Line:
     blank = np.full((len(times), 1), np.nan)
     times = np.concatenate((times, times[:, -1:]), axis=1)
     speeds = np.concatenate((speeds, np.where(jumps[:, None], blank, speeds[:, -1:])), axis=1)
-    return Line(times.reshape(-1), speeds.reshape(-1, 1))
+    return Polyline(times.reshape(-1), speeds.reshape(-1, 1))
 
 
-def angle_line(track: Track, start: Floats) -> Line:
+def angle_line(track: Track, start: Floats) -> Polyline:
     """Return the angle (P, 1) in rad, 0 … π, of a rotation from another: start (4,)."""
     line = value_line(track)
     first = quaternion.normalize(start[None])
     broken: Bools = np.isnan(line.values[:, 0])
     whole = quaternion.normalize(np.where(broken[:, None], first, line.values))
     angle = quaternion.angle_between(np.broadcast_to(first, whole.shape), whole)
-    return Line(line.times, np.where(broken, np.nan, angle)[:, None])
+    return Polyline(line.times, np.where(broken, np.nan, angle)[:, None])
 
 
-def difference_line(track: Track, other: Track) -> Line:
+def difference_line(track: Track, other: Track) -> Polyline:
     """Return how far two tracks of one target are apart (P, 1), rad for rotations, over the time of both."""
     start, end = min(track.times[0], other.times[0]), max(track.times[-1], other.times[-1])
     keys = np.concatenate((track.times, other.times, np.linspace(start, end, POINTS)))
     times = unique_sorted(keys)
     a, b = sample(track, times), sample(other, times)
     off = quaternion.angle_between(a, b) if track.kind is ValueKind.ROTATION else lengths(a - b)
-    return Line(times, off[:, None])
+    return Polyline(times, off[:, None])
 
 
 def handles(track: Track) -> tuple[Floats, Floats]:
@@ -105,11 +105,11 @@ def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
     return times, np.append(~real, True)[np.minimum(chosen + 1, len(steps))]
 
 
-def _holds(track: Track) -> Line:
+def _holds(track: Track) -> Polyline:
     keys, width = len(track.times), track.values.shape[1]
     if keys == 1:
-        return Line(track.times, track.values)
+        return Polyline(track.times, track.values)
     times = np.stack((track.times[:-1], track.times[1:], track.times[1:]), axis=1)
     values = np.full((keys - 1, 3, width), np.nan)
     values[:, :2] = track.values[:-1, None]
-    return Line(times.reshape(-1), values.reshape(-1, width))
+    return Polyline(times.reshape(-1), values.reshape(-1, width))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from anim.optimize.rate_distortion import Sized
-from anim.show.plots.figure import ACCENT, HAIR, INK, SMALL, SOFT, TITLE, Sheet, short, spread, style
+from anim.optimize.rate_distortion import RatePoint
+from anim.show.plots.figure import ACCENT, HAIR, INK, SMALL, SOFT, TITLE, Figure, format_number, separate_labels, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,9 @@ CLOSE = 4.0  # times the least; ticks of axes that go no further are evenly spac
 UNITS = ((1e6, "MB"), (1e3, "kB"), (1, "B"))
 
 
-def tradeoff(sizes: Sequence[Sized], diagonal: float, *, title: str, kind: str, source: int | None = None) -> bytes:
+def rate_distortion_plot(
+    sizes: Sequence[RatePoint], diagonal: float, *, title: str, kind: str, source: int | None = None
+) -> bytes:
     """Return a picture of bounds at sizes as the bytes of a PNG or SVG file: % of the diagonal over animation bytes.
 
     Both are logarithmic. Upright lines are the source, what is kept without loss (a bound of 0), and the smallest
@@ -32,7 +34,7 @@ def tradeoff(sizes: Sequence[Sized], diagonal: float, *, title: str, kind: str, 
     is not installed.
     """
     with style(kind):
-        sheet = Sheet(WIDTH, HEIGHT)
+        sheet = Figure(WIDTH, HEIGHT)
         sheet.text(LEFT, 0.35, title, fontsize=TITLE + 2, weight="bold")
         words = "error bound, % of the diagonal, over bytes of animation: keys and their JSON"
         sheet.text(LEFT, 0.58, words, fontsize=SMALL, color=SOFT)
@@ -45,7 +47,7 @@ def tradeoff(sizes: Sequence[Sized], diagonal: float, *, title: str, kind: str, 
         return sheet.render(kind)
 
 
-def _marks(sizes: Sequence[Sized], source: int | None) -> dict[str, int]:
+def _marks(sizes: Sequence[RatePoint], source: int | None) -> dict[str, int]:
     """Animation bytes by what they are called."""
     marks = {} if source is None else {"source": source}
     without_loss = [each.animation for each in sizes if each.max_error == 0]
@@ -75,7 +77,7 @@ def _scale(axes: Axes, counts: Sequence[int]) -> None:
     axes.tick_params(axis="x", which="major", length=4, width=0.6, color=SOFT)
 
 
-def _draw(axes: Axes, sizes: Sequence[Sized], diagonal: float) -> None:
+def _draw(axes: Axes, sizes: Sequence[RatePoint], diagonal: float) -> None:
     percents = [100 * each.max_error / diagonal for each in sizes]
     counts = [each.animation for each in sizes]
     axes.set_yscale("log")
@@ -85,17 +87,17 @@ def _draw(axes: Axes, sizes: Sequence[Sized], diagonal: float) -> None:
             _bytes(count), (count, percent), xytext=(7, 2), textcoords="offset points", fontsize=SMALL, color=INK,
             annotation_clip=False,
         )  # fmt: skip
-    axes.set_yticks(percents, [f"{short(percent)} %" for percent in percents])
+    axes.set_yticks(percents, [f"{format_number(percent)} %" for percent in percents])
     axes.minorticks_off()
 
 
-def _draw_marks(sheet: Sheet, axes: Axes, marks: dict[str, int]) -> None:
+def _draw_marks(sheet: Figure, axes: Axes, marks: dict[str, int]) -> None:
     """Upright lines with words above them, in two lines where they are near each other."""
     first, last = np.log10(axes.get_xlim())
     width = WIDTH - LEFT - RIGHT
     names = list(marks)
     places = [LEFT + width * (np.log10(max(marks[name], 1)) - first) / (last - first) for name in names]
-    words = spread(places, APART, LEFT + APART / 2, WIDTH - RIGHT - APART / 2)
+    words = separate_labels(places, APART, LEFT + APART / 2, WIDTH - RIGHT - APART / 2)
     for name, place, at in zip(names, places, words, strict=True):
         axes.axvline(marks[name], color=HAIR if name == "floor" else SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
         sheet.line((place, at), (TOP, TOP - ABOVE[0] + 0.04), color=HAIR, linewidth=0.8)
@@ -104,4 +106,4 @@ def _draw_marks(sheet: Sheet, axes: Axes, marks: dict[str, int]) -> None:
 
 def _bytes(count: float) -> str:
     factor, unit = next(((factor, unit) for factor, unit in UNITS if count >= factor), UNITS[-1])
-    return f"{short(count / factor)} {unit}"
+    return f"{format_number(count / factor)} {unit}"

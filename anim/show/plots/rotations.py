@@ -11,7 +11,7 @@ from anim.maths import euler, quaternion
 from anim.model import Interpolation, Track
 from anim.sampling.track import sample
 from anim.show.plots import polylines
-from anim.show.plots.polylines import Line
+from anim.show.plots.polylines import Polyline
 
 FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the twelve orders of Euler angles
 FLOAT32 = 1e-6  # rad from lock, below which rotations stored as float32 don't tell first and third angle apart
@@ -20,15 +20,15 @@ TURN = 360.0
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class RotationCurve:
     """A track as it is drawn. line: its values over time. keys: (K, C). risers: the jumps of a STEP track, or None."""
 
-    line: Line
+    line: Polyline
     keys: Floats
-    risers: Line | None
+    risers: Polyline | None
 
 
-def rotation_curve(track: Track, *, view: str, rest: Floats) -> Curve:
+def rotation_curve(track: Track, *, view: str, rest: Floats) -> RotationCurve:
     """Return a rotation track as degrees (…, 3): about the joint's own axes from rest, or as Euler angles.
 
     view: FROM_REST, or an order such as "ZXY", intrinsic. rest: (4,). Values run on without jumps of whole turns.
@@ -36,11 +36,11 @@ def rotation_curve(track: Track, *, view: str, rest: Floats) -> Curve:
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
         keys = degrees(track.values, view=view, rest=rest)
         held = replace(track, path="translation", values=keys, interpolation=Interpolation.STEP)
-        return Curve(polylines.value_line(held), keys, polylines.risers(held))
+        return RotationCurve(polylines.value_line(held), keys, polylines.step_edges(held))
     dense = polylines.value_line(track)
     values = degrees(dense.values, view=view, rest=rest)
     at = np.searchsorted(dense.times, track.times).clip(max=len(values) - 1)
-    return Curve(Line(dense.times, values), values[at], None)
+    return RotationCurve(Polyline(dense.times, values), values[at], None)
 
 
 def degrees(q: Floats, *, view: str, rest: Floats) -> Floats:
@@ -51,7 +51,7 @@ def degrees(q: Floats, *, view: str, rest: Floats) -> Floats:
     return np.degrees(euler.unwrap(unit, order=view, lock=FLOAT32))
 
 
-def lock_line(track: Track, *, order: str) -> Line:
+def gimbal_distance_line(track: Track, *, order: str) -> Polyline:
     """Return the distance (P, 1) in rad, 0 … π/2, of a rotation from the gimbal lock of an order."""
     keys = track.times
     times = polylines.value_line(track).times if len(keys) > 1 else keys
@@ -59,9 +59,9 @@ def lock_line(track: Track, *, order: str) -> Line:
         line = polylines.value_line(track)
         held = np.isnan(line.values[:, 0])
         q = quaternion.normalize(np.where(held[:, None], track.values[:1], line.values))
-        return Line(line.times, np.where(held, np.nan, euler.gimbal_distance(q, order=order))[:, None])
+        return Polyline(line.times, np.where(held, np.nan, euler.gimbal_distance(q, order=order))[:, None])
     q = quaternion.normalize(sample(track, times))
-    return Line(times, euler.gimbal_distance(q, order=order)[:, None])
+    return Polyline(times, euler.gimbal_distance(q, order=order)[:, None])
 
 
 def _continuous(q: Floats) -> Floats:

@@ -15,9 +15,9 @@ from anim.arrays import Floats
 from anim.curves.tangents import table
 from anim.errors import RangeError, ShapeError
 from anim.maths import hermite
-from anim.measure.continuity.continuity import Grade, KeyJumps, at_keys
+from anim.measure.continuity.continuity import ContinuityClass, KeyJumps, at_keys
 from anim.model import Interpolation, Track
-from anim.show.plots.figure import COLORS, FAINT, INK, PAPER, SMALL, SOFT, TEXT, TITLE, Sheet, short, style
+from anim.show.plots.figure import COLORS, FAINT, INK, PAPER, SMALL, SOFT, TEXT, TITLE, Figure, format_number, style
 from anim.show.plots.panels import plain
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ MARGIN, LEFT, TOP, CAPTION, FOOT, WORDS = 0.25, 0.55, 0.62, 0.32, 0.45, 2.75
 ENTRY = 0.56
 
 
-def through(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, kind: str) -> bytes:
+def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, kind: str) -> bytes:
     """Return a picture of the curves that tangent rules put through keys, as the bytes of a PNG or SVG file.
 
     Curve, speed and acceleration of every rule are drawn over each other; what lies outside the two keys around it is
@@ -53,9 +53,9 @@ def through(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, kind: 
     curves = [_curve(t, v, rule) for rule in rules]
     with style(kind):
         height = TOP + CURVE + 2 * (SPEED + CAPTION) + FOOT
-        sheet = Sheet(MARGIN + LEFT + ACROSS + 0.35 + WORDS, height)
+        sheet = Figure(MARGIN + LEFT + ACROSS + 0.35 + WORDS, height)
         x, y = MARGIN + LEFT, TOP
-        listed = ", ".join(short(float(each)) for each in v[:12]) + (", …" if len(v) > 12 else "")
+        listed = ", ".join(format_number(float(each)) for each in v[:12]) + (", …" if len(v) > 12 else "")
         sheet.text(MARGIN + 0.05, 0.33, f"Through {listed}", fontsize=TITLE + 2, weight="bold")
         _values(sheet.panel(x, y, ACROSS, CURVE), curves, t, v)
         y += CURVE + CAPTION
@@ -173,7 +173,7 @@ def _values(axes: Axes, curves: Sequence[_Curve], times: Floats, values: Floats)
         for k in range(len(times)):
             around = values[max(k - 1, 0) : k + 2]
             up = values[k] >= around.mean()
-            axes.annotate(short(float(values[k])), (times[k], values[k]), xytext=(0, 8 if up else -14), **side)
+            axes.annotate(format_number(float(values[k])), (times[k], values[k]), xytext=(0, 8 if up else -14), **side)
 
 
 def _rates(axes: Axes, curves: Sequence[_Curve], which: int) -> None:
@@ -195,21 +195,21 @@ def _rates(axes: Axes, curves: Sequence[_Curve], which: int) -> None:
 
 def _seconds(axes: Axes, times: Floats) -> None:
     ticks = times if len(times) <= 12 else np.linspace(times[0], times[-1], 6)
-    names = [f"{short(float(t))} s" if t == ticks[-1] else short(float(t)) for t in ticks]
+    names = [f"{format_number(float(t))} s" if t == ticks[-1] else format_number(float(t)) for t in ticks]
     axes.set_xticks(ticks.tolist(), names)
     axes.set_xlim(float(times[0]), float(times[-1]))
     axes.grid(axis="x", color=FAINT, linewidth=0.8)
     axes.tick_params(axis="x", labelbottom=True)
 
 
-def _entry(sheet: Sheet, curve: _Curve, color: str, x: float, y: float) -> None:
+def _entry(sheet: Figure, curve: _Curve, color: str, x: float, y: float) -> None:
     """One rule in words: name, smoothness, overshoot."""
     sheet.line((x, x + 0.22), (y - 0.045, y - 0.045), color=color, linewidth=2.4)
     sheet.text(x + 0.32, y, curve.name, fontsize=TEXT + 1, weight="bold", color=color)
     sheet.text(x + 0.32, y + 0.18, f"{_smoothness(curve.jumps)}; {_overshoot(curve)}", fontsize=SMALL, color=SOFT)
 
 
-def _lens(sheet: Sheet, curves: Sequence[_Curve], widest: _Curve, x: float, y: float) -> None:
+def _lens(sheet: Figure, curves: Sequence[_Curve], widest: _Curve, x: float, y: float) -> None:
     """The place where one curve overshoots most, magnified."""
     off = np.nan_to_num(widest.points[:, 0] - widest.bounds) * np.sign(widest.worst)
     at = int(off.argmax())
@@ -226,8 +226,8 @@ def _lens(sheet: Sheet, curves: Sequence[_Curve], widest: _Curve, x: float, y: f
     axes.set_xlim(start - 0.7 * (end - start), end + 0.7 * (end - start))
     low, high = (level - 1.5 * size, level + 1.5 * size)
     axes.set_ylim(low, high)
-    axes.set_yticks([level, level + widest.worst], [short(level), f"{level + widest.worst:.4g}"])
-    axes.set_xticks([float(widest.times[at])], [f"{short(float(widest.times[at]))} s"])
+    axes.set_yticks([level, level + widest.worst], [format_number(level), f"{level + widest.worst:.4g}"])
+    axes.set_xticks([float(widest.times[at])], [f"{format_number(float(widest.times[at]))} s"])
     axes.tick_params(axis="x", length=3, width=0.6, color=SOFT)
     sheet.text(x, y - 0.08, "overshoot, magnified", fontsize=SMALL, color=SOFT)
 
@@ -239,13 +239,15 @@ def _smoothness(jumps: KeyJumps) -> str:
         return "one piece"
     if len(counts) == 1:
         grade = jumps.grades[0]
-        return "jumps at every key" if grade is Grade.JUMP else f"{grade} at every key"
-    return ", ".join(f"{grade} at {counts[grade]} key{'s' * (counts[grade] > 1)}" for grade in Grade if counts[grade])
+        return "jumps at every key" if grade is ContinuityClass.JUMP else f"{grade} at every key"
+    return ", ".join(
+        f"{grade} at {counts[grade]} key{'s' * (counts[grade] > 1)}" for grade in ContinuityClass if counts[grade]
+    )
 
 
 def _overshoot(curve: _Curve) -> str:
     if curve.departure > 0:
-        return f"up to {short(curve.departure)} off the keys"
+        return f"up to {format_number(curve.departure)} off the keys"
     if curve.worst == 0:
         return "no overshoot"
-    return f"overshoots by {short(abs(curve.worst))}"
+    return f"overshoots by {format_number(abs(curve.worst))}"

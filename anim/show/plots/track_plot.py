@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from anim.show.plots import panels
-from anim.show.plots.figure import INK, SMALL, SOFT, TITLE, Sheet, short, style, text_width
+from anim.show.plots.figure import INK, SMALL, SOFT, TITLE, Figure, format_number, style, text_width
 from anim.show.plots.rotations import FROM_REST
-from anim.show.plots.track_selection import Shown
+from anim.show.plots.track_selection import PlotTrack
 
 LIMIT = 12  # tracks on one sheet
 
@@ -28,7 +28,9 @@ class Names:
     other: str
 
 
-def plot(shown: Sequence[Shown], *, title: str, kind: str, names: Names | None = None, note: str = "") -> bytes:
+def track_plot(
+    shown: Sequence[PlotTrack], *, title: str, kind: str, names: Names | None = None, note: str = ""
+) -> bytes:
     """Return a picture of tracks as the bytes of a PNG or SVG file.
 
     Each track has a panel of its values, with keys and CUBICSPLINE handles (Bézier points, a third of the way), and
@@ -47,7 +49,7 @@ def plot(shown: Sequence[Shown], *, title: str, kind: str, names: Names | None =
         rows = [shown[i : i + columns] for i in range(0, len(shown), columns)]
         heights = [max(_height(each) for each in row) for row in rows]
         y = TOP if names is None else TOP_OF_TWO
-        sheet = Sheet(columns * width + 2 * MARGIN, y + sum(heights))
+        sheet = Figure(columns * width + 2 * MARGIN, y + sum(heights))
         _head(sheet, shown, title, note, names)
         many = len({each.clip for each in shown}) > 1
         for row, height in zip(rows, heights, strict=True):
@@ -57,12 +59,12 @@ def plot(shown: Sequence[Shown], *, title: str, kind: str, names: Names | None =
         return sheet.render(kind)
 
 
-def _head(sheet: Sheet, shown: Sequence[Shown], title: str, note: str, names: Names | None) -> None:
+def _head(sheet: Figure, shown: Sequence[PlotTrack], title: str, note: str, names: Names | None) -> None:
     x = MARGIN + 0.1
     sheet.text(x, 0.33, title, fontsize=TITLE + 2, weight="bold")
     rates = {each.fps for each in shown}
     fps = rates.pop() if len(rates) == 1 else None
-    words = [note, f"fine ticks: frames at {short(fps)} fps" if fps else ""]
+    words = [note, f"fine ticks: frames at {format_number(fps)} fps" if fps else ""]
     line = "  ·  ".join(word for word in words if word)
     sheet.text(sheet.width - MARGIN - 0.1, 0.33, line, fontsize=SMALL, color=SOFT, ha="right")
     if names is not None:
@@ -73,12 +75,12 @@ def _head(sheet: Sheet, shown: Sequence[Shown], title: str, note: str, names: Na
         sheet.text(x + 0.45, 0.57, names.other, fontsize=SMALL)
 
 
-def _height(each: Shown) -> float:
+def _height(each: PlotTrack) -> float:
     count = len(panels.kinds(each))
     return HEAD + TALL + (LOW + CAPTION) * (count - 1) + FOOT
 
 
-def _cell(sheet: Sheet, each: Shown, x: float, y: float, width: float, slack: float, *, many_clips: bool) -> None:
+def _cell(sheet: Figure, each: PlotTrack, x: float, y: float, width: float, slack: float, *, many_clips: bool) -> None:
     """One track. slack: inches that a neighbor in the row needs more; the first panel takes them."""
     left = x + LEFT
     names = max(text_width(label, panels.LABEL) for label in panels.labels(each))
@@ -98,7 +100,7 @@ def _cell(sheet: Sheet, each: Shown, x: float, y: float, width: float, slack: fl
         at += tall + CAPTION
 
 
-def _title(sheet: Sheet, each: Shown, x: float, y: float, caption: str, *, many_clips: bool) -> None:
+def _title(sheet: Figure, each: PlotTrack, x: float, y: float, caption: str, *, many_clips: bool) -> None:
     x += 0.14 + sheet.text(x, y, _tail(each.target, 36), fontsize=TITLE, weight="bold")
     words = [_what(each) + caption, _keys(each)]
     if many_clips:
@@ -106,14 +108,14 @@ def _title(sheet: Sheet, each: Shown, x: float, y: float, caption: str, *, many_
     sheet.text(x, y, "  ·  ".join(word for word in words if word), fontsize=SMALL, color=SOFT)
 
 
-def _what(each: Shown) -> str:
+def _what(each: PlotTrack) -> str:
     """What the values are: "rotation from rest, °", "Euler angles ZXY, °", "scale, factor"."""
     if not each.is_in_degrees:
         return WORDS.get(each.track.path, each.track.path)
     return "rotation from rest, °" if each.view == FROM_REST else f"Euler angles {each.view}, °"
 
 
-def _keys(each: Shown) -> str:
+def _keys(each: PlotTrack) -> str:
     """Interpolation and number of keys, "linear, 48 keys", of two files "linear, 48 → 21 keys"."""
     how, count = str(each.track.interpolation).lower(), f"{len(each.track.times)}"
     if each.other is not None:

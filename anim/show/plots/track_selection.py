@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError
-from anim.gltf.document import Document, items
+from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.inspect import frame_rate
@@ -27,7 +27,7 @@ REGULAR = 0.98  # share of keys on a rate's grid from which on frames are worth 
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class PlotTrack:
     """One track to draw.
 
     clip, target: names. labels: of its components. start, end: of its clip, s. fps: of its clip, None where unknown.
@@ -58,35 +58,35 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class TrackSelection:
     """Tracks to draw, in the file's order, and how many more were meant: still ones, and those above the limit."""
 
-    shown: tuple[Shown, ...]
+    shown: tuple[PlotTrack, ...]
     still: int = 0
     more: int = 0
 
 
-def choose(document: Document, selection: Selection, *, limit: int, view: str = FROM_REST) -> Chosen:
+def select_tracks(document: Document, selection: Selection, *, limit: int, view: str = FROM_REST) -> TrackSelection:
     """Return the selected tracks that move, at most `limit`; still ones only where nothing else is meant.
 
     view: what rotations are drawn as; with an order of Euler angles only rotations are selected.
     Raises NotFoundError where no track is selected.
     """
-    found = _selected(document, selection, view)
+    found = _select(document, selection, view)
     if view not in (FROM_REST, COMPONENTS):
         found = [each for each in found if each.track.kind is ValueKind.ROTATION]
     if not found:
         raise NotFoundError("no track is selected", help="gltf-anim inspect IN --tracks lists them")
-    moving = [each for each in found if _moves(each.track)] or found
-    return Chosen(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
+    moving = [each for each in found if _is_moving(each.track)] or found
+    return TrackSelection(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
 
 
-def compare(chosen: Chosen, other: Document) -> tuple[Chosen, int]:
+def compare(chosen: TrackSelection, other: Document) -> tuple[TrackSelection, int]:
     """Return the tracks with their partners in another file, by clip, node and path, and how many have none.
 
     Raises NotFoundError where none has.
     """
-    partners = {each.key: each for each in reversed(_selected(other, Selection(), FROM_REST))}
+    partners = {each.key: each for each in reversed(_select(other, Selection(), FROM_REST))}
     shown = tuple(_with(each, partners.get(each.key)) for each in chosen.shown)
     alone = sum(each.other is None for each in shown)
     if alone == len(shown):
@@ -99,18 +99,18 @@ def compare(chosen: Chosen, other: Document) -> tuple[Chosen, int]:
     return replace(chosen, shown=shown), alone
 
 
-def _with(each: Shown, partner: Shown | None) -> Shown:
+def _with(each: PlotTrack, partner: PlotTrack | None) -> PlotTrack:
     if partner is None or partner.track.values.shape[1] != each.track.values.shape[1]:
         return each
     track = partner.track
     if track.kind is ValueKind.ROTATION and quaternion.dot(track.values[0], each.track.values[0]) < 0:
-        track = _scaled(track, np.full((len(track.times), 1), -1.0))
+        track = _scale(track, np.full((len(track.times), 1), -1.0))
     return replace(
         each, other=track, start=min(each.start, partner.start), end=max(each.end, partner.end), fps=each.fps
     )
 
 
-def _selected(document: Document, selection: Selection, view: str) -> list[Shown]:
+def _select(document: Document, selection: Selection, view: str) -> list[PlotTrack]:
     clips, skeleton = reader.clips(document), reader.skeleton(document)
     targets = _morph_targets(document)
     found = []
@@ -118,15 +118,15 @@ def _selected(document: Document, selection: Selection, view: str) -> list[Shown
         clip = clips[number]
         fps = _rate(clip)
         for i in sorted(selection.chosen_tracks(clip, skeleton)):
-            track = _aligned(clip.tracks[i])
+            track = _align(clip.tracks[i])
             labels = _labels(track, targets, view)
-            name, target = _shown(reader.clip_name(clip.name, number)), _shown(_target(track, skeleton))
+            name, target = _plot_track(reader.clip_name(clip.name, number)), _plot_track(_target(track, skeleton))
             rest = NO_TURN if track.node is None else skeleton.rotation[track.node]
-            found.append(Shown(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
+            found.append(PlotTrack(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
     return found
 
 
-def _aligned(track: Track) -> Track:
+def _align(track: Track) -> Track:
     """The track with the signs of its quaternions such that curves don't jump where the rotation doesn't.
 
     CUBICSPLINE stays: there a sign is part of the way.
@@ -134,17 +134,17 @@ def _aligned(track: Track) -> Track:
     if track.kind is not ValueKind.ROTATION or track.interpolation is Interpolation.CUBICSPLINE:
         return track
     signs = np.where(quaternion.dot(quaternion.align_signs(track.values), track.values) < 0, -1.0, 1.0)
-    return track if (signs > 0).all() else _scaled(track, signs[:, None])
+    return track if (signs > 0).all() else _scale(track, signs[:, None])
 
 
-def _scaled(track: Track, signs: Floats) -> Track:
+def _scale(track: Track, signs: Floats) -> Track:
     before = None if track.in_tangents is None else track.in_tangents * signs
     after = None if track.out_tangents is None else track.out_tangents * signs
     return replace(track, values=track.values * signs, in_tangents=before, out_tangents=after)
 
 
 def _rate(clip: Clip) -> float | None:
-    estimated = frame_rate.estimate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
+    estimated = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
     if estimated is None or estimated.regular < REGULAR or estimated.fps < SLOWEST:
         return None
     return estimated.fps
@@ -185,20 +185,20 @@ def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[s
     names, count = targets.get(whole[1], ()), track.values.shape[1]
     if whole[2] is not None:
         number = int(whole[2])
-        return (_shown(names[number]) if number < len(names) else f"target {number}",)
+        return (_plot_track(names[number]) if number < len(names) else f"target {number}",)
     if len(names) == count:
-        return _shortened([_shown(name) for name in names])
+        return _shorten([_plot_track(name) for name in names])
     return tuple(f"target {i}" for i in range(count))
 
 
 def _morph_targets(document: Document) -> dict[str, tuple[str, ...]]:
     """Names of morph targets by the pointer to their weights, where a mesh has any in `extras.targetNames`."""
     result: dict[str, tuple[str, ...]] = {}
-    for i, mesh in enumerate(items(document.json, "meshes")):
+    for i, mesh in enumerate(json_array(document.json, "meshes")):
         names = _target_names(mesh) or _target_names(mesh["primitives"][0])
         if names:
             result[f"/meshes/{i}/weights"] = names
-    for i, node in enumerate(items(document.json, "nodes")):
+    for i, node in enumerate(json_array(document.json, "nodes")):
         pointer = f"/meshes/{node.get('mesh')}/weights"
         if pointer in result:
             result[f"/nodes/{i}/weights"] = result[pointer]
@@ -211,12 +211,12 @@ def _target_names(owner: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
 
 
-def _shown(name: str) -> str:
+def _plot_track(name: str) -> str:
     """A name as a picture can hold it: XML has no place for control characters."""
     return "".join(c if c.isprintable() else "�" for c in name)
 
 
-def _shortened(names: Sequence[str]) -> tuple[str, ...]:
+def _shorten(names: Sequence[str]) -> tuple[str, ...]:
     """Names without what all of them begin with, up to the last separator: "face_a", "face_b" → "a", "b"."""
     first, last = min(names), max(names)  # what these two share, all share
     same = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
@@ -225,7 +225,7 @@ def _shortened(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names) if any(not name or name.isdecimal() for name in short) else tuple(short)
 
 
-def _moves(track: Track) -> bool:
+def _is_moving(track: Track) -> bool:
     values = track.values
     tangents = (track.in_tangents, track.out_tangents)
     tolerance = STILL * (1 if track.kind is ValueKind.ROTATION else max(float(np.abs(values).max()), 1e-30))

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from anim.arrays import Floats
 from anim.errors import NotFoundError, RangeError
 from anim.model import Clip, Scene
-from anim.skinning.analysis.collapse_index import Narrow, indices
-from anim.skinning.analysis.method_scores import Fared, fared, subject
-from anim.skinning.bake import baker
+from anim.skinning.analysis.collapse_index import CollapsePoint, collapse_indices
+from anim.skinning.analysis.method_scores import MethodScore, bind_measures, score_method
+from anim.skinning.bake import prepare_bake
 
-LOW = 0.7  # collapse index below which skin looks pinched: what a quarter turn between two joints makes
+LOW_INDEX = 0.7  # collapse index below which skin looks pinched: what a quarter turn between two joints makes
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +29,11 @@ class MeshCollapse:
     vertices: int
     times: Floats
     indices: Floats
-    worst: Narrow
+    worst: CollapsePoint
     low: float
     inverted: float
     closed: float
-    methods: tuple[Fared, ...]
+    methods: tuple[MethodScore, ...]
 
 
 def collapse(
@@ -77,11 +77,11 @@ class Comparison:
             raise RangeError("bulge clamp needs another method than lbs (expected dqs or cor)")
         self._scene = scene
         self._bakers = {
-            method: baker(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)
+            method: prepare_bake(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)
             for method in methods
         }
-        self._linear = self._bakers.get("lbs") or baker(scene, nodes=skinned)
-        self._subjects = [subject(layer, scene.skeleton) for layer in next(iter(self._bakers.values())).layers]
+        self._linear = self._bakers.get("lbs") or prepare_bake(scene, nodes=skinned)
+        self._subjects = [bind_measures(layer, scene.skeleton) for layer in next(iter(self._bakers.values())).layers]
         self.meshes = len(self._subjects)
 
     def of(
@@ -90,12 +90,12 @@ class Comparison:
         """Return what happens to each mesh while a clip plays. progress: called with the methods done."""
         by_method = []
         for i, (method, made) in enumerate(self._bakers.items()):
-            by_method.append(list(fared(made, self._linear, method, self._subjects, clip, times)))
+            by_method.append(list(score_method(made, self._linear, method, self._subjects, clip, times)))
             progress(i + 1)
         found = []
         for each, methods in zip(self._subjects, zip(*by_method, strict=True), strict=True):
             instance, rig = each.layer.instance, each.layer.rig
-            seen = indices(self._scene, each.layer, clip, times)
+            seen = collapse_indices(self._scene, each.layer, clip, times)
             found.append(
                 MeshCollapse(
                     instance.mesh.name or self._scene.skeleton.names[instance.node] or f"node {instance.node}",
@@ -104,7 +104,7 @@ class Comparison:
                     times,
                     seen.by_frame,
                     seen.worst,
-                    float((seen.least < LOW).mean()),
+                    float((seen.least < LOW_INDEX).mean()),
                     float(seen.inverted.mean()),
                     len(each.faces) / max(len(rig.faces), 1),
                     methods,

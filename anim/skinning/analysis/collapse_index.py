@@ -9,18 +9,18 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.model import Clip, Scene, Skeleton
-from anim.skinning.binding import Rig
-from anim.skinning.bound_mesh import Layer
-from anim.skinning.kernels.layout import LANES, Singles, group_influences
-from anim.skinning.methods.skinner import filled, lanes
-from anim.skinning.polar_decomposition import pivots, split
-from anim.skinning.pose_blocks import Playback, at_rest
+from anim.skinning.binding import SkinBinding
+from anim.skinning.bound_mesh import BoundMesh
+from anim.skinning.kernels.layout import LANES, FloatArray, group_influences
+from anim.skinning.methods.skinner import fill_lanes, lanes
+from anim.skinning.polar_decomposition import decompose, joint_origins
+from anim.skinning.pose_blocks import PosePlayback, rest_block
 
 TWIST = 0.7  # cosine between the axis of a turn and the link, above which the turn is a twist
 
 
 @dataclass(frozen=True, slots=True)
-class Narrow:
+class CollapsePoint:
     """The vertex and time where linear blending is narrowest.
 
     index: √ of the volume factor: 1 rigid, 0 flat or inside out; the radius of a twisted ring against that at rest.
@@ -38,7 +38,7 @@ class Narrow:
 
 
 @dataclass(frozen=True, slots=True)
-class Indices:
+class CollapseIndices:
     """Collapse indices of one mesh in one clip.
 
     least: (V,) of each vertex at its worst time. by_frame: (F,) of the worst vertex. inverted: (V,) whether it is ever
@@ -48,10 +48,10 @@ class Indices:
     least: Floats
     by_frame: Floats
     inverted: Bools
-    worst: Narrow
+    worst: CollapsePoint
 
 
-def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
+def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) -> CollapseIndices:
     """Return the collapse indices of a skinned mesh at `times` (F,) s while a clip plays.
 
     √D with D = ±det(Σ w A) / Π |det A|^w, A the linear parts of the joints' matrices and w the skin weights: scales
@@ -61,14 +61,14 @@ def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     from anim.skinning.kernels.volume_ratio import volume_ratio
 
     rig = layer.rig
-    playback = Playback(scene.skeleton, clip)
-    held, sides = group_influences(rig.held), _sides(rig, layer.matrices(at_rest(scene.skeleton), slice(None))[0])
+    playback = PosePlayback(scene.skeleton, clip)
+    held, sides = group_influences(rig.held), _sides(rig, layer.matrices(rest_block(scene.skeleton), slice(None))[0])
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
     by_frame = np.zeros(len(times))
     for first in range(0, len(times), LANES):
         matrices = layer.matrices(playback.at(times[first : first + LANES]), slice(None))
-        factors: Singles = np.empty((len(rig.points), len(matrices)), np.float32)
+        factors: FloatArray = np.empty((len(rig.points), len(matrices)), np.float32)
         volume_ratio(held, lanes(matrices), _logs(matrices), factors)
         factors *= sides[:, None]
         factors[~np.isfinite(factors) | (np.diff(rig.start) == 0)[:, None]] = 1
@@ -81,10 +81,10 @@ def indices(scene: Scene, layer: Layer, clip: Clip, times: Floats) -> Indices:
     worst = int(least.argmin())
     time = float(times[when[worst]])
     narrow = _narrow(scene.skeleton, layer, playback, worst, time, float(root[worst]))
-    return Indices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
+    return CollapseIndices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
 
 
-def _sides(rig: Rig, still: Floats) -> Singles:
+def _sides(rig: SkinBinding, still: Floats) -> FloatArray:
     """−1 for each vertex (V,) whose joints are all mirrored in matrices (J, 3, 4) at rest, 1 for the others."""
     signs, size = np.sign(np.linalg.det(still[..., :3]))[rig.joint], len(rig.points)
     vertex = np.repeat(np.arange(size), np.diff(rig.start))
@@ -92,26 +92,28 @@ def _sides(rig: Rig, still: Floats) -> Singles:
     return np.where((mirrored > 0) & (others == 0), -1, 1).astype(np.float32)
 
 
-def _logs(matrices: Floats) -> Singles:
+def _logs(matrices: Floats) -> FloatArray:
     """log |det A| (J, LANES); NaN for a flat joint."""
     sizes = np.abs(np.linalg.det(matrices[..., :3]))
-    return filled(np.log(np.where(sizes > 0, sizes, np.nan)).T)
+    return fill_lanes(np.log(np.where(sizes > 0, sizes, np.nan)).T)
 
 
-def _narrow(names: Skeleton, layer: Layer, playback: Playback, vertex: int, time: float, index: float) -> Narrow:
+def _narrow(
+    names: Skeleton, layer: BoundMesh, playback: PosePlayback, vertex: int, time: float, index: float
+) -> CollapsePoint:
     rig = layer.rig
     held = rig.joint[rig.start[vertex] : rig.start[vertex + 1]].tolist()
     if not held:
-        return Narrow(index, vertex, "", "", time, 0.0, False)
+        return CollapsePoint(index, vertex, "", "", time, 0.0, False)
     a, b = held[0], held[1] if len(held) > 1 else held[0]
     matrices = layer.matrices(playback.at(np.array([time])), slice(None))
-    places = pivots(rig)[[a, b]]
-    first, second = split(matrices[:, [a, b]], places).rotation[0]
+    places = joint_origins(rig)[[a, b]]
+    first, second = decompose(matrices[:, [a, b]], places).rotation[0]
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(first), second))
     angle, link = float(np.linalg.norm(turn)), places[1] - places[0]
     along = abs(float(turn @ link))
     is_twist = along > TWIST * angle * float(np.linalg.norm(link)) and along > 0
-    return Narrow(index, vertex, _name(names, rig.nodes[a]), _name(names, rig.nodes[b]), time, angle, is_twist)
+    return CollapsePoint(index, vertex, _name(names, rig.nodes[a]), _name(names, rig.nodes[b]), time, angle, is_twist)
 
 
 def _name(skeleton: Skeleton, node: int) -> str:

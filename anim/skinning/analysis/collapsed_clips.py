@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.skinning.analysis.collapse import LOW, MeshCollapse
-from anim.skinning.analysis.method_scores import Fared
-from anim.skinning.analysis.ranking import ALIKE
+from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
+from anim.skinning.analysis.method_scores import MethodScore
+from anim.skinning.analysis.ranking import SAME_VOLUME_FRACTION
 
-KEPT = 0.9  # of the volume: 1 − ⅔ f sin²(θ/2) of a quarter turn that is blended over f = 30 % of a tube
+MIN_VOLUME_FRACTION = 0.9  # of the volume: 1 − ⅔ f sin²(θ/2) of a quarter turn that is blended over f = 30 % of a tube
 
 
-def pinches(mesh: MeshCollapse) -> bool:
+def is_collapsed(mesh: MeshCollapse) -> bool:
     """Return whether skin looks pinched: a vertex's collapse index is ever below 0.7, or less than 90 % of the volume
     that bind pose encloses is ever left by linear blending.
 
@@ -22,10 +22,10 @@ def pinches(mesh: MeshCollapse) -> bool:
     what every method loses (a joint that shrinks, a fold) is no fault of blending.
     Source: halves of two rotations that differ by θ leave cos(θ/2) of a radius at right angles to the axis.
     """
-    if mesh.worst.index < LOW:
+    if mesh.worst.index < LOW_INDEX:
         return True
     linear = linear_volume(mesh)
-    return linear is not None and bool(((linear < KEPT) & _avoidable(mesh, linear)).any())
+    return linear is not None and bool(((linear < MIN_VOLUME_FRACTION) & _avoidable(mesh, linear)).any())
 
 
 def linear_volume(mesh: MeshCollapse) -> Floats | None:
@@ -36,8 +36,10 @@ def linear_volume(mesh: MeshCollapse) -> Floats | None:
 def _avoidable(mesh: MeshCollapse, linear: Floats) -> Bools:
     """At which times (F,) another method keeps more, or whether there is no other to tell."""
     others = [each.volume for each in mesh.methods if _helps(each) and each.volume is not None]
-    return np.asarray(np.max(others, axis=0) > linear + ALIKE) if others else np.ones(len(linear), np.bool_)
+    return (
+        np.asarray(np.max(others, axis=0) > linear + SAME_VOLUME_FRACTION) if others else np.ones(len(linear), np.bool_)
+    )
 
 
-def _helps(fared: Fared) -> bool:
+def _helps(fared: MethodScore) -> bool:
     return fared.method != "lbs" and not fared.unusable

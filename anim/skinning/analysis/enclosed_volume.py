@@ -9,7 +9,7 @@ import numpy as np
 from anim.arrays import AnyArray, Bools, Floats, Ints
 
 
-def closed_faces(points: Floats, faces: Ints) -> Bools:
+def watertight_faces(points: Floats, faces: Ints) -> Bools:
     """Return which faces (T,) belong to closed parts: after equal points count as one, every edge has two sides.
 
     Points are equal where they agree to trimesh's tolerance (1e-8 m). A part whose faces don't all turn the same way

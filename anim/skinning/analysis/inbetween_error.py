@@ -13,23 +13,23 @@ from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
 
-WIDE = 0.05  # s; frames closer than this are as close as most clips are made
-MOST = 16  # gaps that are looked into, the widest
+WIDE_ANGLE_DEG = 0.05  # s; frames closer than this are as close as most clips are made
+MAX_SAMPLES = 16  # gaps that are looked into, the widest
 
 
-class Missed(NamedTuple):
+class InbetweenError(NamedTuple):
     """How far (m) a vertex is from the middle of its places in the frames before and after, and when (s)."""
 
     distance: float
     time: float
 
 
-def between(baker: Baker, clip: Clip, times: Floats) -> Missed:
+def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
     """Return the most that is missed half-way between frames at `times` (F,) s, increasing, in the widest gaps."""
     gaps = np.diff(times)
-    chosen = np.sort(np.argsort(-gaps, kind="stable")[:MOST])
-    chosen = chosen[gaps[chosen] > WIDE]
-    most = Missed(0.0, 0.0)
+    chosen = np.sort(np.argsort(-gaps, kind="stable")[:MAX_SAMPLES])
+    chosen = chosen[gaps[chosen] > WIDE_ANGLE_DEG]
+    most = InbetweenError(0.0, 0.0)
     if not len(chosen):
         return most
     before, after = times[chosen], times[chosen + 1]
@@ -39,5 +39,5 @@ def between(baker: Baker, clip: Clip, times: Floats) -> Missed:
         off = half.positions - (low.positions + high.positions) / 2
         squared = np.einsum("fvi,fvi->fv", off, off).max(axis=1)
         at = int(squared.argmax())
-        most = max(most, Missed(float(np.sqrt(squared[at])), float(middle[half.first + at])))
+        most = max(most, InbetweenError(float(np.sqrt(squared[at])), float(middle[half.first + at])))
     return most

@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.model import Clip
-from anim.skinning.bake import Baker, baker
+from anim.skinning.bake import Baker, prepare_bake
 
 
 class Deviation(NamedTuple):
@@ -22,7 +22,7 @@ class Deviation(NamedTuple):
 def linear_baker(made: Baker, *, space: str) -> Baker:
     """Return what bakes the same meshes by linear blending, positions only. space: as `made` has it."""
     nodes = sorted({layer.instance.node for layer in made.layers})
-    return baker(made.scene, space=space, rigid=True, nodes=nodes, threads=made.threads)
+    return prepare_bake(made.scene, space=space, rigid=True, nodes=nodes, threads=made.threads)
 
 
 def deviation(made: Baker, linear: Baker, clip: Clip, times: Floats) -> Deviation:
@@ -31,13 +31,13 @@ def deviation(made: Baker, linear: Baker, clip: Clip, times: Floats) -> Deviatio
     most = Deviation(0.0, 0.0, size)
     both = (each.bake(clip, times=times).chunks() for each in (made, linear))
     for ours, theirs in zip(*both, strict=True):
-        found = farthest(ours.positions, theirs.positions)
+        found = max_distance(ours.positions, theirs.positions)
         at = int(found.argmax())
         most = max(most, Deviation(float(found[at]), float(times[ours.first + at]), size))
     return most
 
 
-def farthest(positions: AnyArray, others: AnyArray) -> Floats:
+def max_distance(positions: AnyArray, others: AnyArray) -> Floats:
     """Return the largest distance (F,) in each frame between positions and others (F, V, 3)."""
     apart = positions - others
     return np.asarray(np.sqrt(np.einsum("fvi,fvi->fv", apart, apart).max(axis=1, initial=0.0)), float)

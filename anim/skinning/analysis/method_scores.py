@@ -9,13 +9,13 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.model import Clip, FrameChunk, Skeleton
-from anim.skinning.analysis.enclosed_volume import closed_faces, volumes
-from anim.skinning.analysis.method_deviation import farthest, model_size
+from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces
+from anim.skinning.analysis.method_deviation import max_distance, model_size
 from anim.skinning.bake import Baker
-from anim.skinning.binding import Rig
-from anim.skinning.bound_mesh import Layer
-from anim.skinning.methods.bulge_clamp import Links, links, placed
-from anim.skinning.pose_blocks import Frames, Playback, at_rest
+from anim.skinning.binding import SkinBinding
+from anim.skinning.bound_mesh import BoundMesh
+from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, place_clamped
+from anim.skinning.pose_blocks import PoseBlock, PosePlayback, rest_block
 from anim.skinning.weighted_joints import is_above
 
 BULGE = 1.05  # distance from the links, against that in bind pose, above which a vertex bulges
@@ -23,7 +23,7 @@ NEAR = 0.25  # of the middle distance: what lies nearer to a link has no ratio w
 
 
 @dataclass(frozen=True, slots=True)
-class Fared:
+class MethodScore:
     """How one method fared on one mesh.
 
     volume: (F,) enclosed against bind pose, None where no part of the mesh is closed.
@@ -46,39 +46,39 @@ class Fared:
 
 
 @dataclass(frozen=True, slots=True)
-class Subject:
+class BindMeasures:
     """What of a mesh in bind pose later poses are held against.
 
     faces: (C, 3) of closed parts. volume: m³ that they enclose, below 0 where the skeleton mirrors the mesh at rest.
     watched: (W,) vertices whose bulge counts.
     """
 
-    layer: Layer
+    layer: BoundMesh
     faces: Ints
     volume: float
-    links: Links
+    links: BoneSegments
     watched: Ints
 
 
-def subject(layer: Layer, skeleton: Skeleton) -> Subject:
+def bind_measures(layer: BoundMesh, skeleton: Skeleton) -> BindMeasures:
     """Return the measures of a mesh in bind pose, which a skeleton moves."""
     rig = layer.rig
-    faces = rig.faces[closed_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
+    faces = rig.faces[watertight_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
-    volume *= np.sign(_common_volume(rig, layer.matrices(at_rest(skeleton), slice(None)))[0])
-    of = links(rig)
+    volume *= np.sign(_common_volume(rig, layer.matrices(rest_block(skeleton), slice(None)))[0])
+    of = bone_segments(rig)
     shared = of.share > 0
     middle = float(np.median(of.distance[shared])) if shared.any() else 0.0
     watched = np.flatnonzero(shared & (of.distance > NEAR * middle))
-    return Subject(layer, faces if volume else faces[:0], volume, of, watched)
+    return BindMeasures(layer, faces if volume else faces[:0], volume, of, watched)
 
 
-def fared(
-    baker: Baker, linear: Baker, method: str, subjects: list[Subject], clip: Clip, times: Floats
-) -> Iterator[Fared]:
+def score_method(
+    baker: Baker, linear: Baker, method: str, subjects: list[BindMeasures], clip: Clip, times: Floats
+) -> Iterator[MethodScore]:
     """Yield how each of the baker's meshes fares at `times` (F,) s while a clip plays. linear: the same by lbs."""
-    seen = [_Seen(each, len(times)) for each in subjects]
-    playback, limit = Playback(baker.scene.skeleton, clip), model_size(baker)
+    seen = [_Extremes(each, len(times)) for each in subjects]
+    playback, limit = PosePlayback(baker.scene.skeleton, clip), model_size(baker)
     chunks = baker.bake(clip, times=times).chunks()
     alone = ((chunk, chunk) for chunk in chunks)
     for chunk, other in alone if baker is linear else zip(chunks, linear.bake(clip, times=times).chunks(), strict=True):
@@ -89,23 +89,23 @@ def fared(
         yield each.summed(method, baker.scene.skeleton, times, limit)
 
 
-class _Seen:
+class _Extremes:
     """What was seen of one mesh up to now."""
 
-    def __init__(self, of: Subject, frames: int) -> None:
+    def __init__(self, of: BindMeasures, frames: int) -> None:
         self._of = of
         self._volume = np.zeros(frames)
         self._bulge = np.zeros(len(of.watched), np.float32)
         self._when = np.zeros(len(of.watched), np.int64)
         self._off = np.zeros(frames)
 
-    def add(self, chunk: FrameChunk, linear: FrameChunk, frames: Frames) -> None:
+    def add(self, chunk: FrameChunk, linear: FrameChunk, frames: PoseBlock) -> None:
         """Look at some frames. linear: the same frames by linear blending."""
         of, rig = self._of, self._of.layer.rig
         matrices = of.layer.matrices(frames, slice(None))
         span = slice(of.layer.at, of.layer.at + len(rig.points))
         if chunk is not linear:
-            off = farthest(chunk.positions[:, span], linear.positions[:, span])
+            off = max_distance(chunk.positions[:, span], linear.positions[:, span])
             self._off[chunk.first : chunk.first + len(off)] = off
         if len(of.faces):
             enclosed = volumes(chunk.positions[:, span], of.faces)
@@ -118,7 +118,7 @@ class _Seen:
         from anim.skinning.kernels.bone_distance import squared_bone_distance
 
         of, rig, links = self._of, self._of.layer.rig, self._of.links
-        joints, scales = placed(of.links, matrices)
+        joints, scales = place_clamped(of.links, matrices)
         squared = np.empty((len(positions), len(rig.points)), np.float32)
         at = of.layer.at
         squared_bone_distance(positions, at, rig.start, rig.joint, links.start, links.tips, joints, squared)
@@ -130,23 +130,23 @@ class _Seen:
         self._when[most > self._bulge] = first + at[most > self._bulge]
         self._bulge = np.maximum(self._bulge, most)
 
-    def summed(self, method: str, skeleton: Skeleton, times: Floats, limit: float) -> Fared:
+    def summed(self, method: str, skeleton: Skeleton, times: Floats, limit: float) -> MethodScore:
         """Return what came of it. limit: m from linear blending above which a method is unusable."""
         of, rig = self._of, self._of.layer.rig
         volume = self._volume if len(of.faces) else None
         most_off = float(self._off.max(initial=0.0))
         away = (most_off, float(times[self._off.argmax()]) if len(times) else 0.0, most_off > limit)
         if not len(of.watched):
-            return Fared(method, volume, 1.0, 0.0, 0, "", 0.0, *away)
+            return MethodScore(method, volume, 1.0, 0.0, 0, "", 0.0, *away)
         most = int(self._bulge.argmax())
         vertex = int(of.watched[most])
         node = int(rig.nodes[rig.joint[rig.start[vertex]]])
         bulging = float((self._bulge > BULGE).sum()) / len(rig.points)
         where = (vertex, skeleton.names[node] or f"node {node}", float(times[self._when[most]]))
-        return Fared(method, volume, float(self._bulge[most]), bulging, *where, *away)
+        return MethodScore(method, volume, float(self._bulge[most]), bulging, *where, *away)
 
 
-def _common_volume(rig: Rig, matrices: Floats) -> Floats:
+def _common_volume(rig: SkinBinding, matrices: Floats) -> Floats:
     """How much larger (n,) matrices (n, J, 3, 4) make a volume: the rig's unit, or a scaled root; < 0 if it mirrors.
 
     The middle over joints with weight, each counted with all the weight that hangs on it or on joints below it, for

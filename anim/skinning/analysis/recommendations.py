@@ -9,11 +9,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from anim.measure.inspect.clip_findings import choosing
-from anim.skinning.analysis.collapse import LOW, MeshCollapse
-from anim.skinning.analysis.collapsed_clips import KEPT, linear_volume, pinches
-from anim.skinning.analysis.method_scores import Fared
-from anim.skinning.analysis.ranking import ALIKE, Standing, best, standings
+from anim.measure.inspect.clip_findings import choose_option
+from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
+from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed, linear_volume
+from anim.skinning.analysis.method_scores import MethodScore
+from anim.skinning.analysis.ranking import SAME_VOLUME_FRACTION, RankedMethod, best_method, rank_methods
 from anim.skinning.methods.registry import SKINNING_METHODS
 
 GOOD = 0.95  # of a ring's radius: what twist joints should leave
@@ -32,14 +32,14 @@ class Found:
     mesh: MeshCollapse
 
 
-def advice(found: Sequence[Found], *, clamped: bool = False) -> Iterator[str]:
+def recommend(found: Sequence[Found], *, clamped: bool = False) -> Iterator[str]:
     """Yield what to do, a line each, the worst of all first; one line that all is well, or that there is no clip.
 
     Methods that were measured are recommended by what they did, others only to be measured. clamped: whether methods
     other than lbs were measured with the bulge clamp.
     """
     yield from _unusable(found)
-    pinched = sorted((each for each in found if pinches(each.mesh)), key=lambda each: each.mesh.worst.index)
+    pinched = sorted((each for each in found if is_collapsed(each.mesh)), key=lambda each: each.mesh.worst.index)
     if pinched:
         yield from _against_pinching(pinched, clamped=clamped)
     elif found:
@@ -70,9 +70,9 @@ def twist_joints(angle: float) -> int:
 def _all_is_well(found: Sequence[Found], *, clamped: bool) -> str:
     meshes = [each.mesh for each in found]
     index = min(each.worst.index for each in meshes)
-    told = f"no vertex falls below {LOW} (least {index:.3f})"
+    told = f"no vertex falls below {LOW_INDEX} (least {index:.3f})"
     left = _left(meshes)
-    if left is not None and left < KEPT:
+    if left is not None and left < MIN_VOLUME_FRACTION:
         return f"{told}; {_percent(left)} of the volume is left at worst, and no method that was measured keeps more"
     if left is not None:
         return f"linear blending is good enough: {told}, {_percent(left)} or more of the volume is left"
@@ -90,8 +90,8 @@ def _left(meshes: list[MeshCollapse]) -> float | None:
 
 def _against_pinching(pinched: list[Found], *, clamped: bool) -> Iterator[str]:
     yield _worst(pinched)
-    found = standings([each.mesh for each in pinched])
-    chosen = best(found)
+    found = rank_methods([each.mesh for each in pinched])
+    chosen = best_method(found)
     worse = chosen is not None and _keeps_less(found, chosen)
     yield _no_gain(found) if worse else _bake(found, chosen, pinched, clamped=clamped)
     yield from _sharing_the_twist(pinched)
@@ -104,11 +104,11 @@ def _worst(pinched: list[Found]) -> str:
     worst, left = first.mesh.worst, _left([first.mesh])
     told = "1 clip pinches" if clips == 1 else f"{clips} clips pinch"
     places = f"'{worst.joint}' against '{worst.other}', {math.degrees(worst.angle):.0f}° at {worst.time:.2f} s"
-    loss = f"; {_percent(left)} of the volume is left" if left is not None and left < KEPT else ""
+    loss = f"; {_percent(left)} of the volume is left" if left is not None and left < MIN_VOLUME_FRACTION else ""
     return f"{told}; worst {worst.index:.2f} in '{first.clip}': {places}{loss}"
 
 
-def _bake(found: Sequence[Standing], chosen: Standing | None, pinched: list[Found], *, clamped: bool) -> str:
+def _bake(found: Sequence[RankedMethod], chosen: RankedMethod | None, pinched: list[Found], *, clamped: bool) -> str:
     if chosen is None and any(each.unusable for each in found):
         return "no other method that was measured can be used"
     if chosen is None:
@@ -116,23 +116,23 @@ def _bake(found: Sequence[Standing], chosen: Standing | None, pinched: list[Foun
         line = _measuring(pinched, others, clamped=False)
         return f"bake it with another method; to see first what {' and '.join(others)} would keep: {line}"
     numbers = _numbers(pinched)
-    clips, output = choosing(numbers), "OUT" if len(numbers) == 1 else "'OUT-{clip}.glb'"
+    clips, output = choose_option(numbers), "OUT" if len(numbers) == 1 else "'OUT-{clip}.glb'"
     keeps = f" ({_keeps(found)} of the volume)" if chosen.volume is not None else ""
     method = f"--method {chosen.method}{CLAMP if clamped else ''}"
     return f"to bake it with {chosen.method}{keeps}: gltf-anim bake IN {output} {method}{clips}"
 
 
-def _no_gain(found: Sequence[Standing]) -> str:
+def _no_gain(found: Sequence[RankedMethod]) -> str:
     return f"no other method that was measured keeps more of the volume than lbs ({_keeps(found)})"
 
 
-def _keeps_less(found: Sequence[Standing], chosen: Standing) -> bool:
+def _keeps_less(found: Sequence[RankedMethod], chosen: RankedMethod) -> bool:
     """Whether even the best method loses volume that linear blending keeps."""
     linear = next((each.volume for each in found if each.method == "lbs"), None)
-    return linear is not None and chosen.volume is not None and chosen.volume + ALIKE < min(linear, 1.0)
+    return linear is not None and chosen.volume is not None and chosen.volume + SAME_VOLUME_FRACTION < min(linear, 1.0)
 
 
-def _keeps(found: Sequence[Standing]) -> str:
+def _keeps(found: Sequence[RankedMethod]) -> str:
     return ", ".join(
         f"{each.method} keeps {_percent(each.volume)}"
         for each in found
@@ -151,7 +151,7 @@ def _sharing_the_twist(pinched: list[Found]) -> Iterator[str]:
 
 
 def _against_bulging(pinched: list[Found], method: str, *, clamped: bool) -> Iterator[str]:
-    swollen: list[tuple[Fared, Found]] = []
+    swollen: list[tuple[MethodScore, Found]] = []
     for each in pinched:
         linear = max((fared.bulge for fared in each.mesh.methods if fared.method == "lbs"), default=1.0)
         swollen += [(fared, each) for fared in each.mesh.methods if fared.method == method and _swells(fared, linear)]
@@ -165,7 +165,7 @@ def _against_bulging(pinched: list[Found], method: str, *, clamped: bool) -> Ite
             yield f"to see what {names} makes of it: {_measuring([each], others, clamped=clamped)}"
 
 
-def _swells(fared: Fared, linear: float) -> bool:
+def _swells(fared: MethodScore, linear: float) -> bool:
     """Whether a method bulges so that it is seen, and more than linear blending does."""
     return fared.bulge > max(MUCH, linear + MORE) and fared.bulging > SOME
 
@@ -181,7 +181,7 @@ def _measuring(found: Sequence[Found], others: Sequence[str], *, clamped: bool) 
     lost = {fared.method for each in found for fared in each.mesh.methods if fared.unusable}
     known = [fared.method for each in found for fared in each.mesh.methods if fared.method not in lost]
     methods = "".join(f" --method {name}" for name in dict.fromkeys([*known, *others]))
-    return f"gltf-anim collapse IN{methods}{CLAMP if clamped else ''}{choosing(_numbers(found))}"
+    return f"gltf-anim collapse IN{methods}{CLAMP if clamped else ''}{choose_option(_numbers(found))}"
 
 
 def _numbers(found: Sequence[Found]) -> list[int]:

@@ -9,7 +9,7 @@ from anim.model import MeshInstance
 
 
 @dataclass(frozen=True, slots=True)
-class BadSums:
+class WeightSums:
     """Vertices of one mesh whose weights don't add up to 1 in the file. mesh: its name, or the number of its node.
 
     count: how many. none: how many of them have no weight at all.
@@ -33,12 +33,12 @@ class BadSums:
             yield f"{start} {_vertices(self.none)} are all 0; they follow the first joint listed, as in three.js"
 
 
-def bad_sums(instances: Iterable[MeshInstance]) -> list[BadSums]:
+def unnormalized_weights(instances: Iterable[MeshInstance]) -> list[WeightSums]:
     """Return the skinned meshes with vertices whose weights don't add up to 1, each mesh once.
 
     Sums that only rounding moved off 1 don't count: 8 bits leave up to 4/255 of four weights.
     """
-    found: dict[int, BadSums] = {}
+    found: dict[int, WeightSums] = {}
     for instance in instances:
         mesh = instance.mesh
         sums = mesh.weight_sums
@@ -47,7 +47,7 @@ def bad_sums(instances: Iterable[MeshInstance]) -> list[BadSums]:
         some = sums[(sums != 1) & (sums > 0)]
         least, most = (float(some.min()), float(some.max())) if len(some) else (0.0, 0.0)
         name = mesh.name or f"node {instance.node}"
-        found[id(mesh)] = BadSums(name, int((sums != 1).sum()), int((sums == 0).sum()), least, most)
+        found[id(mesh)] = WeightSums(name, int((sums != 1).sum()), int((sums == 0).sum()), least, most)
     return list(found.values())
 
 

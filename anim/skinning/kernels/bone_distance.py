@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 
 from anim.arrays import Ints
 from anim.skinning.kernels.jit import jit
-from anim.skinning.kernels.layout import Singles
+from anim.skinning.kernels.layout import FloatArray
 
 
 @jit
 def squared_bone_distance(
-    positions: Singles,
+    positions: FloatArray,
     at: int,
     start: Ints,
     joint: NDArray[np.int32],
     link_start: Ints,
     tips: Ints,
-    joints: Singles,
-    squared: Singles,
+    joints: FloatArray,
+    squared: FloatArray,
 ) -> None:
     """Write the squared distance (n, V) of vertices, columns `at` + v of positions, from the nearest of their links."""
     for f in range(len(positions)):
@@ -32,16 +32,16 @@ def squared_bone_distance(
 
 @jit
 def clamp_to_bones(
-    positions: Singles,
+    positions: FloatArray,
     at: int,
     start: Ints,
     joint: NDArray[np.int32],
     link_start: Ints,
     tips: Ints,
-    joints: Singles,
-    scales: Singles,
-    distance: Singles,
-    share: Singles,
+    joints: FloatArray,
+    scales: FloatArray,
+    distance: FloatArray,
+    share: FloatArray,
     first: int,
     last: int,
 ) -> None:
@@ -63,7 +63,7 @@ def clamp_to_bones(
 
 @jit
 def _nearest(
-    p: Singles, joints: Singles, joint: NDArray[np.int32], begin: int, end: int, link_start: Ints, tips: Ints
+    p: FloatArray, joints: FloatArray, joint: NDArray[np.int32], begin: int, end: int, link_start: Ints, tips: Ints
 ) -> tuple[Any, Any, Any, Any]:
     """Squared distance to the nearest link of influences begin … end, and the point on it."""
     best = np.float32(np.inf)

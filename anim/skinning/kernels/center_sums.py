@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints
 from anim.skinning.kernels.jit import jit
-from anim.skinning.kernels.layout import Singles
+from anim.skinning.kernels.layout import FloatArray
 
 
 @jit
 def accumulate_centers(
     start: Ints,
     joint: NDArray[np.int32],
-    weight: Singles,
+    weight: FloatArray,
     joints: int,
     key: Ints,
     row_start: Ints,

@@ -7,24 +7,24 @@ import numpy as np
 from anim.skinning.kernels.directions import rotate_normal, rotate_tangent
 from anim.skinning.kernels.jit import inline, jit
 from anim.skinning.kernels.lane_math import add_scaled, load, rotate, store, transform
-from anim.skinning.kernels.layout import LANES, TILE, Held, Singles, Stretches, Wanted
+from anim.skinning.kernels.layout import LANES, TILE, FloatArray, Influences, OptionalArray, ScaleShear
 from anim.skinning.kernels.weighted_sum import blend, blend_quaternions
 
 
 @jit
 def skin_centers(
-    points: Singles,
-    normals: Wanted,
-    tangents: Wanted,
-    centers: Singles,
-    held: Held,
-    rotations: Singles,
-    rigids: Singles,
-    stretches: Stretches | None,
+    points: FloatArray,
+    normals: OptionalArray,
+    tangents: OptionalArray,
+    centers: FloatArray,
+    held: Influences,
+    rotations: FloatArray,
+    rigids: FloatArray,
+    stretches: ScaleShear | None,
     first: int,
     last: int,
     at: int,
-    out: tuple[Singles, Wanted, Wanted],
+    out: tuple[FloatArray, OptionalArray, OptionalArray],
 ) -> None:
     """Write points rotated about centers (V, 3, 1), which move by linear blending; NaN: the point is its own center.
 
@@ -33,7 +33,7 @@ def skin_centers(
     """
     tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((held.most, LANES), np.float32)
     rotation, matrix = np.empty((4, LANES), np.float32), np.empty((15, LANES), np.float32)
-    stretch: Wanted = None if stretches is None else np.empty((15, LANES), np.float32)
+    stretch: OptionalArray = None if stretches is None else np.empty((15, LANES), np.float32)
     center, scale = np.empty((3, LANES), np.float32), np.empty((1, LANES), np.float32)
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
@@ -68,7 +68,7 @@ def skin_centers(
 
 
 @inline
-def _move_about(p: Singles, center: Singles, rotation: Singles, matrix: Singles) -> None:
+def _move_about(p: FloatArray, center: FloatArray, rotation: FloatArray, matrix: FloatArray) -> None:
     """Rotate points about a center that moves by matrices."""
     for i in range(3):
         for f in range(LANES):

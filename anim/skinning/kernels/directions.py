@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from anim.skinning.kernels.jit import inline
 from anim.skinning.kernels.lane_math import load, make_unit, rotate, transform_normal, transform_tangent
-from anim.skinning.kernels.layout import Singles, Wanted
+from anim.skinning.kernels.layout import FloatArray, OptionalArray
 
 
 @inline
-def move_normal(normal: Singles, source: Singles, matrix: Singles) -> None:
+def move_normal(normal: FloatArray, source: FloatArray, matrix: FloatArray) -> None:
     """Set normal (3, L) to a vertex's own (3, m), moved by matrices (12, L)."""
     load(normal, source)
     transform_normal(normal, matrix)
@@ -16,7 +16,7 @@ def move_normal(normal: Singles, source: Singles, matrix: Singles) -> None:
 
 
 @inline
-def move_tangent(tangent: Singles, source: Singles, matrix: Singles) -> None:
+def move_tangent(tangent: FloatArray, source: FloatArray, matrix: FloatArray) -> None:
     """Set tangent (3, L) to a vertex's own (3, m), moved by matrices (12, L)."""
     load(tangent, source)
     transform_tangent(tangent, matrix)
@@ -24,7 +24,7 @@ def move_tangent(tangent: Singles, source: Singles, matrix: Singles) -> None:
 
 
 @inline
-def rotate_normal(normal: Singles, source: Singles, stretch: Wanted, rotation: Singles) -> None:
+def rotate_normal(normal: FloatArray, source: FloatArray, stretch: OptionalArray, rotation: FloatArray) -> None:
     """Set normal (3, L) to a vertex's own (3, m), after a stretch (12, L) if there is one, rotated by (4, L)."""
     load(normal, source)
     if stretch is not None:
@@ -34,7 +34,7 @@ def rotate_normal(normal: Singles, source: Singles, stretch: Wanted, rotation: S
 
 
 @inline
-def rotate_tangent(tangent: Singles, source: Singles, stretch: Wanted, rotation: Singles) -> None:
+def rotate_tangent(tangent: FloatArray, source: FloatArray, stretch: OptionalArray, rotation: FloatArray) -> None:
     """Set tangent (3, L) to a vertex's own (3, m), after a stretch (12, L) if there is one, rotated by (4, L)."""
     load(tangent, source)
     if stretch is not None:

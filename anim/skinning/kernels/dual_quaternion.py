@@ -7,22 +7,22 @@ import numpy as np
 from anim.skinning.kernels.directions import rotate_normal, rotate_tangent
 from anim.skinning.kernels.jit import inline, jit
 from anim.skinning.kernels.lane_math import TWO, add_scaled, load, store, transform
-from anim.skinning.kernels.layout import LANES, TILE, Held, Singles, Stretches, Wanted
+from anim.skinning.kernels.layout import LANES, TILE, FloatArray, Influences, OptionalArray, ScaleShear
 from anim.skinning.kernels.weighted_sum import blend, blend_quaternions
 
 
 @jit
 def skin_dual_quaternion(
-    points: Singles,
-    normals: Wanted,
-    tangents: Wanted,
-    held: Held,
-    duals: Singles,
-    stretches: Stretches | None,
+    points: FloatArray,
+    normals: OptionalArray,
+    tangents: OptionalArray,
+    held: Influences,
+    duals: FloatArray,
+    stretches: ScaleShear | None,
     first: int,
     last: int,
     at: int,
-    out: tuple[Singles, Wanted, Wanted],
+    out: tuple[FloatArray, OptionalArray, OptionalArray],
 ) -> None:
     """Write points moved by blended dual quaternions (J, 8, L); with stretches (J, 12, L).
 
@@ -31,7 +31,7 @@ def skin_dual_quaternion(
     """
     tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((held.most, LANES), np.float32)
     dual = np.empty((12, LANES), np.float32)
-    stretch: Wanted = None if stretches is None else np.empty((15, LANES), np.float32)
+    stretch: OptionalArray = None if stretches is None else np.empty((15, LANES), np.float32)
     scale = np.empty((1, LANES), np.float32)
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
@@ -61,7 +61,7 @@ def skin_dual_quaternion(
 
 
 @inline
-def _move(p: Singles, b: Singles) -> None:
+def _move(p: FloatArray, b: FloatArray) -> None:
     """Move points by dual quaternions (8, L) of any length but 0."""
     for f in range(LANES):
         x, y, z, w = b[0, f], b[1, f], b[2, f], b[3, f]

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from anim.skinning.kernels.jit import inline
-from anim.skinning.kernels.layout import LANES, Singles
+from anim.skinning.kernels.layout import LANES, FloatArray
 
 TINY = np.float32(1e-30)
 ONE, TWO = np.float32(1), np.float32(2)
 
 
 @inline
-def load(row: Singles, source: Singles) -> None:
+def load(row: FloatArray, source: FloatArray) -> None:
     """Copy (3, m) into (3, L), the one column into all where m = 1."""
     alone = source.shape[1] == 1
     for i in range(3):
@@ -21,7 +21,7 @@ def load(row: Singles, source: Singles) -> None:
 
 
 @inline
-def add_scaled(p: Singles, q: Singles, scale: Singles) -> None:
+def add_scaled(p: FloatArray, q: FloatArray, scale: FloatArray) -> None:
     """Add rows q times scale (1, L) to p, as many as p has."""
     for i in range(p.shape[0]):
         for f in range(LANES):
@@ -29,7 +29,7 @@ def add_scaled(p: Singles, q: Singles, scale: Singles) -> None:
 
 
 @inline
-def transform(p: Singles, m: Singles) -> None:
+def transform(p: FloatArray, m: FloatArray) -> None:
     """Move points by matrices."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
@@ -39,7 +39,7 @@ def transform(p: Singles, m: Singles) -> None:
 
 
 @inline
-def transform_tangent(p: Singles, m: Singles) -> None:
+def transform_tangent(p: FloatArray, m: FloatArray) -> None:
     """Move directions that lie in the surface."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
@@ -49,7 +49,7 @@ def transform_tangent(p: Singles, m: Singles) -> None:
 
 
 @inline
-def transform_normal(p: Singles, m: Singles) -> None:
+def transform_normal(p: FloatArray, m: FloatArray) -> None:
     """By the cofactors: the inverse transpose times the determinant, without a division; outside stays outside."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
@@ -71,7 +71,7 @@ def transform_normal(p: Singles, m: Singles) -> None:
 
 
 @inline
-def rotate(p: Singles, b: Singles) -> None:
+def rotate(p: FloatArray, b: FloatArray) -> None:
     """Rotate by quaternions of any length but 0."""
     for f in range(LANES):
         x, y, z, w = b[0, f], b[1, f], b[2, f], b[3, f]
@@ -86,7 +86,7 @@ def rotate(p: Singles, b: Singles) -> None:
 
 
 @inline
-def make_unit(p: Singles) -> None:
+def make_unit(p: FloatArray) -> None:
     """Scale to length 1; what has none stays 0."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
@@ -97,7 +97,7 @@ def make_unit(p: Singles) -> None:
 
 
 @inline
-def store(tile: Singles, count: int, at: int, out: Singles) -> None:
+def store(tile: FloatArray, count: int, at: int, out: FloatArray) -> None:
     """Write `count` vertices of a tile into columns from `at` on of out (n, all, 3); frames beyond n are padding."""
     for f in range(len(out)):
         frame = out[f]

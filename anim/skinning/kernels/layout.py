@@ -10,81 +10,81 @@ from numpy.typing import NDArray
 
 from anim.arrays import Ints
 
-Singles: TypeAlias = NDArray[np.float32]
-Wanted: TypeAlias = Any  # Singles, or None where it is not wanted: a kernel is compiled without it
+FloatArray: TypeAlias = NDArray[np.float32]
+OptionalArray: TypeAlias = Any  # Singles, or None where it is not wanted: a kernel is compiled without it
 
 GROUP = 4  # influences that `weighted_sum` takes at a time; vertices with fewer get some of weight 0
 LANES = 32  # frames that a kernel takes at a time; a constant, so that the compiler sees what lies where
 TILE = 32  # vertices between two transpositions to frame-major order
-LINE = 64  # bytes that memory hands out together: rows that start there are read a third faster
+CACHE_LINE_BYTES = 64  # bytes that memory hands out together: rows that start there are read a third faster
 
 
-class Shape(NamedTuple):
+class VertexBlock(NamedTuple):
     """Vertices in mesh space for up to LANES frames, frames innermost, float32.
 
     points: (V, 3, m) m, m = 1 where no frame differs, else LANES. normals, tangents: the same, (0, 3, 1) where not
     wanted.
     """
 
-    points: Singles
-    normals: Singles
-    tangents: Singles
+    points: FloatArray
+    normals: FloatArray
+    tangents: FloatArray
 
 
-class Held(NamedTuple):
+class Influences(NamedTuple):
     """Influences start[v] … start[v + 1] of vertex v, strongest first: weight (E,) and joint (E,); start (V + 1,).
 
     most: how many a vertex has at most.
     """
 
-    weight: Singles
+    weight: FloatArray
     joint: NDArray[np.int32]
     start: Ints
     most: int
 
 
-class Target(NamedTuple):
+class OutputSlice(NamedTuple):
     """Where the results of n frames go: columns `at` … `at` + V of positions (n, all, 3).
 
     normals, tangents: the same, or (0, 0, 3) where not wanted.
     """
 
     at: int
-    positions: Singles
-    normals: Singles
-    tangents: Singles
+    positions: FloatArray
+    normals: FloatArray
+    tangents: FloatArray
 
 
-class Stretches(NamedTuple):
+class ScaleShear(NamedTuple):
     """What points go through before they are rotated: matrices (J, 15, L), a stretch (12, L) and the joint's place.
 
     scales: (J, 1, L). ruling: influences by which scales make up the one of a vertex.
     """
 
-    matrices: Singles
-    scales: Singles
-    ruling: Held
+    matrices: FloatArray
+    scales: FloatArray
+    ruling: Influences
 
 
-def vertices(shape: Shape) -> tuple[Singles, Wanted, Wanted]:
+def vertices(shape: VertexBlock) -> tuple[FloatArray, OptionalArray, OptionalArray]:
     """Return points, normals and tangents, None for those that are not wanted: kernels are compiled without them."""
     return shape.points, _or_none(shape.normals), _or_none(shape.tangents)
 
 
-def output(target: Target) -> tuple[int, tuple[Singles, Wanted, Wanted]]:
+def output(target: OutputSlice) -> tuple[int, tuple[FloatArray, OptionalArray, OptionalArray]]:
     """Return the first column and the arrays of a target, None for those that are not wanted."""
     return target.at, (target.positions, _or_none(target.normals), _or_none(target.tangents))
 
 
-def aligned(*shape: int) -> Singles:
+def aligned(*shape: int) -> FloatArray:
     """Return an array (shape) with anything in it that starts at a cache line."""
     size = math.prod(shape)
-    memory: Singles = np.empty(size + LINE // 4, np.float32)
-    first = -memory.ctypes.data % LINE // 4
+    memory: FloatArray = np.empty(size + CACHE_LINE_BYTES // 4, np.float32)
+    first = -memory.ctypes.data % CACHE_LINE_BYTES // 4
     return memory[first : first + size].reshape(shape)
 
 
-def group_influences(held: Held) -> Held:
+def group_influences(held: Influences) -> Influences:
     """Return the same influences, the last GROUP of each vertex filled up by its first joint with weight 0.
 
     group_influences([0.7, 0.3], [4, 7], start [0, 2]) → [0.7, 0.3, 0, 0], [4, 7, 4, 4], start [0, 4]
@@ -96,11 +96,11 @@ def group_influences(held: Held) -> Held:
     is_own = k < counts[owner]
     source = held.start[owner] + np.where(is_own, k, 0)
     weight = np.where(is_own, held.weight[source], np.float32(0))
-    return Held(weight, held.joint[source], start, -(-held.most // GROUP) * GROUP)
+    return Influences(weight, held.joint[source], start, -(-held.most // GROUP) * GROUP)
 
 
-def _or_none(values: Singles) -> Singles | None:
+def _or_none(values: FloatArray) -> FloatArray | None:
     return values if len(values) else None
 
 
-NOTHING: Singles = np.empty((0, 0, 3), np.float32)  # the normals or tangents of a Target that wants none
+NOTHING: FloatArray = np.empty((0, 0, 3), np.float32)  # the normals or tangents of a Target that wants none

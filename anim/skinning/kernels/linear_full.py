@@ -7,21 +7,21 @@ import numpy as np
 from anim.skinning.kernels.directions import move_normal, move_tangent
 from anim.skinning.kernels.jit import jit
 from anim.skinning.kernels.lane_math import load, store, transform
-from anim.skinning.kernels.layout import LANES, TILE, Held, Singles, Wanted
+from anim.skinning.kernels.layout import LANES, TILE, FloatArray, Influences, OptionalArray
 from anim.skinning.kernels.weighted_sum import blend
 
 
 @jit
 def skin_linear(
-    points: Singles,
-    normals: Wanted,
-    tangents: Wanted,
-    held: Held,
-    matrices: Singles,
+    points: FloatArray,
+    normals: OptionalArray,
+    tangents: OptionalArray,
+    held: Influences,
+    matrices: FloatArray,
     first: int,
     last: int,
     at: int,
-    out: tuple[Singles, Wanted, Wanted],
+    out: tuple[FloatArray, OptionalArray, OptionalArray],
 ) -> None:
     """Write (Σ w M) p, normals by the inverse transpose of Σ w M and tangents by it; matrices (J, 12, L).
 

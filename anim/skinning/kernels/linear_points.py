@@ -5,12 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from anim.skinning.kernels.jit import jit
-from anim.skinning.kernels.layout import LANES, TILE, Held, Singles
+from anim.skinning.kernels.layout import LANES, TILE, FloatArray, Influences
 
 
 @jit
 def skin_linear_points(
-    coefficients: Singles, held: Held, matrices: Singles, first: int, last: int, at: int, positions: Singles
+    coefficients: FloatArray,
+    held: Influences,
+    matrices: FloatArray,
+    first: int,
+    last: int,
+    at: int,
+    positions: FloatArray,
 ) -> None:
     """Write Σ w M p of vertices first … last into columns at + v of positions (n, all, 3).
 

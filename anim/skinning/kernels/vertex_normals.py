@@ -6,11 +6,11 @@ import numpy as np
 
 from anim.arrays import Ints
 from anim.skinning.kernels.jit import jit
-from anim.skinning.kernels.layout import Singles
+from anim.skinning.kernels.layout import FloatArray
 
 
 @jit
-def vertex_normals(faces: Ints, positions: Singles, normals: Singles) -> None:
+def vertex_normals(faces: Ints, positions: FloatArray, normals: FloatArray) -> None:
     """Write unit normals of positions (n, V, 3): the sum of the faces' normals, each as long as its area."""
     for f in range(len(positions)):
         p, n = positions[f], normals[f]

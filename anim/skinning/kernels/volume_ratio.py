@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from anim.skinning.kernels.jit import jit
-from anim.skinning.kernels.layout import LANES, Held, Singles
+from anim.skinning.kernels.layout import LANES, FloatArray, Influences
 from anim.skinning.kernels.weighted_sum import blend
 
 
 @jit
-def volume_ratio(held: Held, matrices: Singles, logs: Singles, factors: Singles) -> None:
+def volume_ratio(held: Influences, matrices: FloatArray, logs: FloatArray, factors: FloatArray) -> None:
     """Write det(Σ w A) / Π |det A|^w of vertices into factors (V, n); matrices (J, 12, L), logs (J, L) of |det A|."""
     m, found, size = np.empty((12, LANES), np.float32), np.empty(LANES, np.float32), np.empty(LANES, np.float32)
     for v in range(len(factors)):

@@ -7,11 +7,11 @@ term by term: half the time, since writing is what costs (measured).
 from __future__ import annotations
 
 from anim.skinning.kernels.jit import inline
-from anim.skinning.kernels.layout import GROUP, LANES, Held, Singles
+from anim.skinning.kernels.layout import GROUP, LANES, FloatArray, Influences
 
 
 @inline
-def blend(total: Singles, terms: Singles, held: Held, v: int, rows: int) -> None:
+def blend(total: FloatArray, terms: FloatArray, held: Influences, v: int, rows: int) -> None:
     """Set the first C rows of `total` to the sum of a vertex's matrices (J, C, L), by weight; 0 without influences."""
     begin, end = held.start[v], held.start[v + 1]
     if begin == end:
@@ -29,7 +29,9 @@ def blend(total: Singles, terms: Singles, held: Held, v: int, rows: int) -> None
 
 
 @inline
-def blend_quaternions(total: Singles, terms: Singles, held: Held, v: int, rows: int, signed: Singles) -> None:
+def blend_quaternions(
+    total: FloatArray, terms: FloatArray, held: Influences, v: int, rows: int, signed: FloatArray
+) -> None:
     """Set the first C rows of `total` to the sum of a vertex's quaternions, or dual ones, in the first's hemisphere.
 
     A vertex has at least one. The first is the strongest, and per frame the others are negated where they are in the

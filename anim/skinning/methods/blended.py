@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.skinning.kernels.layout import Shape, Singles, Target
+from anim.skinning.kernels.layout import FloatArray, OutputSlice, VertexBlock
 from anim.skinning.methods.skinner import Skinner
 
 
 @dataclass(frozen=True)
-class Mixed:
+class BlendedMethod:
     """Positions (1 − share) · first + share · second; normals and tangents the same, made unit again."""
 
     first: Skinner
@@ -24,10 +24,10 @@ class Mixed:
         """Return what both kernels read."""
         return self.first.pack(matrices), self.second.pack(matrices)
 
-    def place(self, packed: tuple[Any, Any], shape: Shape, target: Target, first: int, last: int) -> None:
+    def place(self, packed: tuple[Any, Any], shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         self.first.place(packed[0], shape, target, first, last)
-        aside = Target(target.at, *(np.empty_like(each) for each in target[1:]))
+        aside = OutputSlice(target.at, *(np.empty_like(each) for each in target[1:]))
         self.second.place(packed[1], shape, aside, first, last)
         span = slice(target.at + first, target.at + last)
         _mix(target.positions[:, span], aside.positions[:, span], self.share)
@@ -38,6 +38,6 @@ class Mixed:
                 ours[:, span] /= np.where(length > 0, length, 1)
 
 
-def _mix(into: Singles, other: Singles, share: float) -> None:
+def _mix(into: FloatArray, other: FloatArray, share: float) -> None:
     into *= np.float32(1 - share)
     into += np.float32(share) * other

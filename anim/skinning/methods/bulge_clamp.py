@@ -9,14 +9,14 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.skinning.binding import Rig
-from anim.skinning.kernels.layout import Shape, Singles, Target
+from anim.skinning.binding import SkinBinding
+from anim.skinning.kernels.layout import FloatArray, OutputSlice, VertexBlock
 from anim.skinning.methods.skinner import Skinner
-from anim.skinning.polar_decomposition import pivots
+from anim.skinning.polar_decomposition import joint_origins
 
 
 @dataclass(frozen=True, slots=True)
-class Links:
+class BoneSegments:
     """The links of a skin: from each joint to those below it, or the joint's own place where none is below.
 
     start: (J + 1,) into tips (B,): joint numbers at the far ends. distance: (V,) m from each vertex to the nearest link
@@ -26,28 +26,30 @@ class Links:
 
     start: Ints
     tips: Ints
-    distance: Singles
-    share: Singles
+    distance: FloatArray
+    share: FloatArray
     joints: Floats
 
 
-def links(rig: Rig) -> Links:
+def bone_segments(rig: SkinBinding) -> BoneSegments:
     """Return the links of a rig and how far its vertices are from them."""
     count = len(rig.nodes)
     below = [np.flatnonzero(rig.above == j) for j in range(count)]
     tips = [each if len(each) else np.array([j]) for j, each in enumerate(below)]
     start = np.cumsum([0, *map(len, tips)])
-    found = Links(start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _share(rig), pivots(rig))
+    found = BoneSegments(
+        start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _share(rig), joint_origins(rig)
+    )
     points, at = rig.points[None].astype(np.float32), found.joints[None].astype(np.float32)
     squared = np.zeros((1, len(rig.points)), np.float32)
     from anim.skinning.kernels.bone_distance import squared_bone_distance
 
     squared_bone_distance(points, 0, rig.start, rig.joint, start, found.tips, at, squared)
-    return Links(start, found.tips, np.sqrt(squared[0]), found.share, found.joints)
+    return BoneSegments(start, found.tips, np.sqrt(squared[0]), found.share, found.joints)
 
 
 @dataclass(frozen=True)
-class Clamped:
+class BulgeClamp:
     """A method whose vertices are pulled back to the distance from their links that they have in bind pose.
 
     As much as two joints share a vertex: what one joint holds alone stays. Distances grow with the pivot's scale.
@@ -55,17 +57,19 @@ class Clamped:
     """
 
     inner: Skinner
-    rig: Rig
-    links: Links = field(init=False, repr=False)
+    rig: SkinBinding
+    links: BoneSegments = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "links", links(self.rig))
+        object.__setattr__(self, "links", bone_segments(self.rig))
 
-    def pack(self, matrices: Floats) -> tuple[Any, Singles, Singles]:
+    def pack(self, matrices: Floats) -> tuple[Any, FloatArray, FloatArray]:
         """Return what the inner method needs, where joints are (n, J, 3), and their scales (n, J)."""
-        return self.inner.pack(matrices), *placed(self.links, matrices)
+        return self.inner.pack(matrices), *place_clamped(self.links, matrices)
 
-    def place(self, packed: tuple[Any, Singles, Singles], shape: Shape, target: Target, first: int, last: int) -> None:
+    def place(
+        self, packed: tuple[Any, FloatArray, FloatArray], shape: VertexBlock, target: OutputSlice, first: int, last: int
+    ) -> None:
         """Write vertices first … last of all frames."""
         from anim.skinning.kernels.bone_distance import clamp_to_bones
 
@@ -76,14 +80,14 @@ class Clamped:
         clamp_to_bones(target.positions, target.at, start, joint, links.start, links.tips, *moved)
 
 
-def placed(of: Links, matrices: Floats) -> tuple[Singles, Singles]:
+def place_clamped(of: BoneSegments, matrices: Floats) -> tuple[FloatArray, FloatArray]:
     """Return where joints stand (n, J, 3) under matrices (n, J, 3, 4), and how much they scale (n, J)."""
     at = matrix.apply(matrices, of.joints[:, None])[..., 0, :]
     scales = np.cbrt(np.abs(np.linalg.det(matrices[..., :3])))
     return at.astype(np.float32), scales.astype(np.float32)
 
 
-def _share(rig: Rig) -> Singles:
+def _share(rig: SkinBinding) -> FloatArray:
     """1 − (w₁ − w₂)² of the two strongest weights, as shares of the two; 0 where there is one."""
     counts = np.diff(rig.start)
     two = counts > 1

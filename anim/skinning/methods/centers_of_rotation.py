@@ -8,11 +8,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.skinning.binding import Rig
-from anim.skinning.kernels.layout import Shape, Singles, Stretches, Target, output, vertices
-from anim.skinning.methods.rotation_centers import centers
+from anim.skinning.binding import SkinBinding
+from anim.skinning.kernels.layout import FloatArray, OutputSlice, ScaleShear, VertexBlock, output, vertices
+from anim.skinning.methods.rotation_centers import find_centers
 from anim.skinning.methods.skinner import lanes
-from anim.skinning.weighted_joints import Carriers
+from anim.skinning.weighted_joints import WeightedJoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class Packed:
     The last three are what is added to the translation for each unit of scale.
     """
 
-    turns: Singles
-    rigids: Singles
-    stretches: Stretches | None
+    turns: FloatArray
+    rigids: FloatArray
+    stretches: ScaleShear | None
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class CentersOfRotation:
     Source: Le & Hodgins 2016, "Real-time Skeletal Skinning with Optimized Centers of Rotation", algorithm 1.
     """
 
-    rig: Rig
-    carriers: Carriers = field(init=False, repr=False)
-    centers: Singles = field(init=False, repr=False)
+    rig: SkinBinding
+    carriers: WeightedJoints = field(init=False, repr=False)
+    centers: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "carriers", Carriers(self.rig))
-        object.__setattr__(self, "centers", centers(self.rig).astype(np.float32)[:, :, None])
+        object.__setattr__(self, "carriers", WeightedJoints(self.rig))
+        object.__setattr__(self, "centers", find_centers(self.rig).astype(np.float32)[:, :, None])
 
     def pack(self, matrices: Floats) -> Packed:
         """Return the matrices (n, J, 3, 4) as the kernel reads them."""
@@ -52,7 +52,7 @@ class CentersOfRotation:
             rigid = np.concatenate((rigid, -quaternion.rotate(parts.rotation, self.carriers.pivots)), axis=-1)
         return Packed(lanes(parts.rotation), lanes(rigid), self.carriers.stretches(parts))
 
-    def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
+    def place(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         from anim.skinning.kernels.centers import skin_centers
 

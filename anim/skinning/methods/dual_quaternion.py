@@ -9,10 +9,10 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import dual_quaternion as duals
 from anim.maths import quaternion
-from anim.skinning.binding import Rig
-from anim.skinning.kernels.layout import Shape, Singles, Stretches, Target, output, vertices
+from anim.skinning.binding import SkinBinding
+from anim.skinning.kernels.layout import FloatArray, OutputSlice, ScaleShear, VertexBlock, output, vertices
 from anim.skinning.methods.skinner import lanes
-from anim.skinning.weighted_joints import Carriers
+from anim.skinning.weighted_joints import WeightedJoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +22,8 @@ class Packed:
     The last four are what is added to the dual part for each unit of scale.
     """
 
-    duals: Singles
-    stretches: Stretches | None
+    duals: FloatArray
+    stretches: ScaleShear | None
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class DualQuaternion:
     sections 3 and 4; the pivot is the strongest influence, and stretches lie about the joints' own places.
     """
 
-    rig: Rig
-    carriers: Carriers = field(init=False, repr=False)
+    rig: SkinBinding
+    carriers: WeightedJoints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "carriers", Carriers(self.rig))
+        object.__setattr__(self, "carriers", WeightedJoints(self.rig))
 
     def pack(self, matrices: Floats) -> Packed:
         """Return the matrices (n, J, 3, 4) as the kernel reads them."""
@@ -50,7 +50,7 @@ class DualQuaternion:
             rigid = np.concatenate((rigid, duals.from_rigid(parts.rotation, -turned)[..., 4:]), axis=-1)
         return Packed(lanes(rigid), self.carriers.stretches(parts))
 
-    def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
+    def place(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         from anim.skinning.kernels.dual_quaternion import skin_dual_quaternion
 

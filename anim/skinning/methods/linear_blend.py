@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim.arrays import Floats
-from anim.skinning.binding import Rig
+from anim.skinning.binding import SkinBinding
 from anim.skinning.kernels.layout import (
     LANES,
-    Held,
-    Shape,
-    Singles,
-    Target,
+    FloatArray,
+    Influences,
+    OutputSlice,
+    VertexBlock,
     aligned,
     group_influences,
     output,
@@ -26,8 +26,8 @@ from anim.skinning.methods.skinner import lanes
 class Packed:
     """The same matrices in two orders. columns: (J, 4, 3L). rows: (J, 12, L)."""
 
-    columns: Singles | None
-    rows: Singles | None
+    columns: FloatArray | None
+    rows: FloatArray | None
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class LinearBlend:
     Source: glTF 2.0, 3.7.3.1; Magnenat-Thalmann et al. 1988.
     """
 
-    rig: Rig
+    rig: SkinBinding
     plain: bool
-    held: Held = field(init=False, repr=False)
-    coefficients: Singles = field(init=False, repr=False)
+    held: Influences = field(init=False, repr=False)
+    coefficients: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         owner = np.repeat(np.arange(len(self.rig.points)), np.diff(self.rig.start))
@@ -60,7 +60,7 @@ class LinearBlend:
         columns[:, :, frames:] = 0
         return Packed(columns.reshape(joints, 4, 3 * LANES), None)
 
-    def place(self, packed: Packed, shape: Shape, target: Target, first: int, last: int) -> None:
+    def place(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         if packed.columns is not None:
             from anim.skinning.kernels.linear_points import skin_linear_points

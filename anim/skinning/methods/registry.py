@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from anim.skinning.binding import Rig
+from anim.skinning.binding import SkinBinding
 from anim.skinning.methods.centers_of_rotation import CentersOfRotation
 from anim.skinning.methods.dual_quaternion import DualQuaternion
 from anim.skinning.methods.linear_blend import LinearBlend
@@ -17,7 +17,7 @@ class Method:
     """One method. about: for --help. skinner: gets a rig, and whether its points never change and need no normals."""
 
     about: str
-    skinner: Callable[[Rig, bool], Skinner]
+    skinner: Callable[[SkinBinding, bool], Skinner]
 
 
 SKINNING_METHODS: dict[str, Method] = {

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.skinning.binding import Rig
+from anim.skinning.binding import SkinBinding
 
 WIDTH = 0.1  # σ of the paper: how alike weights must be to count
-LEAST = 1e-8  # a pair of weights of which the product is below can't matter
+MIN_WEIGHT = 1e-8  # a pair of weights of which the product is below can't matter
 
 
 @dataclass(frozen=True, slots=True)
-class Pairs:
+class WeightPairs:
     """Triangles by the pairs of joints (a < b) that both hold them.
 
     key: (P,) a · J + b, increasing. start: (P + 1,) into the rows. weights: (R, 2) of a and b, means of corners.
@@ -28,7 +28,7 @@ class Pairs:
     moment: Floats
 
 
-def centers(rig: Rig) -> Floats:
+def find_centers(rig: SkinBinding) -> Floats:
     """Return the center of rotation of each vertex (V, 3) in mesh space; NaN where only one joint holds it.
 
     The area-weighted mean of triangle centroids with the similarity Σ wa wb ta tb exp(−(wa tb − wb ta)² / σ²) over
@@ -50,7 +50,7 @@ def centers(rig: Rig) -> Floats:
     return found
 
 
-def _pairs(rig: Rig) -> Pairs:
+def _pairs(rig: SkinBinding) -> WeightPairs:
     corners = rig.points[rig.faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.sqrt((across * across).sum(axis=1)) / 2
@@ -59,20 +59,22 @@ def _pairs(rig: Rig) -> Pairs:
     keys, rows, held = [], [], []
     for i in range(joint.shape[1]):
         for k in range(i + 1, joint.shape[1]):
-            r = np.flatnonzero(weight[:, i] * weight[:, k] > LEAST)
+            r = np.flatnonzero(weight[:, i] * weight[:, k] > MIN_WEIGHT)
             keys.append(joint[r, i] * len(rig.nodes) + joint[r, k])
             rows.append(r)
             held.append(weight[r][:, [i, k]])
     if not keys:
-        return Pairs(*(np.empty(0, np.int64), np.zeros(1, np.int64)), np.empty((0, 2)), np.empty(0), np.empty((0, 3)))
+        return WeightPairs(
+            *(np.empty(0, np.int64), np.zeros(1, np.int64)), np.empty((0, 2)), np.empty(0), np.empty((0, 3))
+        )
     key, row = np.concatenate(keys), np.concatenate(rows)
     order = np.lexsort((row, key))
     distinct, first = np.unique(key[order], return_index=True)
     row = row[order]
-    return Pairs(distinct, np.append(first, len(row)), np.concatenate(held)[order], area[row], moment[row])
+    return WeightPairs(distinct, np.append(first, len(row)), np.concatenate(held)[order], area[row], moment[row])
 
 
-def _of_faces(rig: Rig) -> tuple[Ints, Floats]:
+def _of_faces(rig: SkinBinding) -> tuple[Ints, Floats]:
     """Joints and mean weights (T, I) of the faces, joints increasing, each once; weight 0 fills up."""
     counts = np.diff(rig.start)
     most = int(counts.max(initial=0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from anim.arrays import Floats
-from anim.skinning.kernels.layout import LANES, Shape, Singles, Target, aligned
+from anim.skinning.kernels.layout import LANES, FloatArray, OutputSlice, VertexBlock, aligned
 
 
 class Skinner(Protocol):
@@ -14,17 +14,17 @@ class Skinner(Protocol):
     def pack(self, matrices: Floats) -> Any:
         """Return what the kernel reads of the joints' matrices (n, J, 3, 4), world_from_mesh."""
 
-    def place(self, packed: Any, shape: Shape, target: Target, first: int, last: int) -> None:
+    def place(self, packed: Any, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all n frames into the target."""
 
 
-def lanes(values: Floats) -> Singles:
+def lanes(values: Floats) -> FloatArray:
     """Return (n, J, ...) as float32 (J, C, LANES): a row of frames per joint and number, the last frame filling up."""
     frames, joints = values.shape[:2]
-    return filled(values.reshape(frames, joints, -1).transpose(1, 2, 0))
+    return fill_lanes(values.reshape(frames, joints, -1).transpose(1, 2, 0))
 
 
-def filled(values: Floats) -> Singles:
+def fill_lanes(values: Floats) -> FloatArray:
     """Return (..., n) as float32 (..., LANES), the last of the n filling up."""
     frames = values.shape[-1]
     rows = aligned(*values.shape[:-1], LANES)

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from anim.arrays import AnyArray
-from anim.caches.options import Reading, Writing, Written
+from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.registry import reader_for, writer_for
 from anim.caches.storage import Memory
 from anim.model import FrameChunk, MeshPart, VertexCache
@@ -62,16 +62,16 @@ def smooth(frames: int = 40, vertices: int = 60) -> VertexCache:
     return VertexCache(np.arange(frames) / 24, vertices, faces, lambda: iter((FrameChunk(0, positions),)))
 
 
-def written(cache: VertexCache, name: str, writing: Writing | None = None) -> tuple[Memory, Written]:
+def written(cache: VertexCache, name: str, writing: WriteOptions | None = None) -> tuple[Memory, WriteResult]:
     """Return the files that a cache becomes under this name, and what the writer said."""
     files = Memory(name)
     ending = name[name.rindex(".") :]
-    return files, writer_for(ending)(cache, files, writing or Writing())
+    return files, writer_for(ending)(cache, files, writing or WriteOptions())
 
 
-def opened(files: Memory, reading: Reading | None = None) -> VertexCache:
+def opened(files: Memory, reading: ReadOptions | None = None) -> VertexCache:
     """Return the cache in files."""
-    return reader_for(files.main[files.main.rindex(".") :])(files, reading or Reading())
+    return reader_for(files.main[files.main.rindex(".") :])(files, reading or ReadOptions())
 
 
 def off(one: VertexCache, other: VertexCache) -> float:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.caches.options import Reading, Writing
+from anim.caches.options import ReadOptions, WriteOptions
 from anim.caches.storage import Memory
-from anim.caches.transforms.resample import at_times
-from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.resample import resample_frames
+from anim.caches.transforms.up_axis import to_up_axis
 from anim.model import VertexCache
 from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import FACES, cache, opened, written
@@ -20,11 +20,11 @@ def read(files: Memory, main: str = "a.pc2") -> tuple[VertexCache, list[str]]:
     """The cache that a reader finds, and what it says."""
     files.main = main
     notes: list[str] = []
-    return opened(files, Reading(note=notes.append)), notes
+    return opened(files, ReadOptions(note=notes.append)), notes
 
 
 def test_caches_of_one_stem_keep_their_own() -> None:
-    files = written(turned(cache(), "z"), "a.pc2")[0]
+    files = written(to_up_axis(cache(), "z"), "a.pc2")[0]
     files.files |= written(LARGER, "a.mdd")[0].files
     files.files |= written(cache(), "a.png")[0].files | written(LARGER, "a.exr")[0].files
     for name, up, faces in (("a.pc2", "z", 4), ("a.mdd", "y", 1), ("a.png", "y", 4), ("a.exr", "y", 1)):
@@ -35,21 +35,21 @@ def test_caches_of_one_stem_keep_their_own() -> None:
 @pytest.mark.parametrize(
     ("later", "words"),
     [
-        (turned(cache(), "z"), "'a.pc2-rest.ply' is the rest mesh of another cache: left out"),
-        (at_times(cache(), np.arange(4) / 15), "'a.pc2-rest.ply' is the rest mesh of another cache: left out"),
+        (to_up_axis(cache(), "z"), "'a.pc2-rest.ply' is the rest mesh of another cache: left out"),
+        (resample_frames(cache(), np.arange(4) / 15), "'a.pc2-rest.ply' is the rest mesh of another cache: left out"),
         (LARGER, "'a.pc2-rest.ply' has 9 vertices, the cache 12: left out"),
     ],
 )
 def test_what_an_earlier_cache_left_is_not_taken(later: VertexCache, words: str) -> None:
     files = written(cache(), "a.pc2")[0]
-    files.files |= written(later, "a.pc2", Writing(rest=""))[0].files
+    files.files |= written(later, "a.pc2", WriteOptions(rest=""))[0].files
     found, notes = read(files)
     assert (len(found.faces), found.rest, notes) == (0, None, [words])
 
 
 def test_a_newer_obj_goes_before_an_older_ply() -> None:
     files = written(cache(), "a.mdd")[0]
-    files.files |= written(turned(cache(), "z"), "a.mdd", Writing(rest=".obj"))[0].files
+    files.files |= written(to_up_axis(cache(), "z"), "a.mdd", WriteOptions(rest=".obj"))[0].files
     found, notes = read(files, "a.mdd")
     assert (found.up, len(found.faces)) == ("z", 4)
     assert notes == ["'a.mdd-rest.ply' is the rest mesh of another cache: left out"]
@@ -57,7 +57,7 @@ def test_a_newer_obj_goes_before_an_older_ply() -> None:
 
 @pytest.mark.parametrize("name", ["a-rest.ply", "a-rest.obj", "a.ply", "a.obj"])
 def test_meshes_that_only_their_name_speaks_for_are_said(name: str) -> None:
-    files = written(turned(cache(), "z"), "a.pc2", Writing(rest=name[-4:]))[0]
+    files = written(to_up_axis(cache(), "z"), "a.pc2", WriteOptions(rest=name[-4:]))[0]
     data = files.files.pop(f"a.pc2-rest{name[-4:]}")
     at = data.index(b" of=")
     files.files[name] = data[:at] + data[at + len(" of=01234567") :]  # as earlier versions wrote it

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from anim.caches import frame_blocks
-from anim.caches.options import Reading, Writing
+from anim.caches.options import ReadOptions, WriteOptions
 from anim.caches.registry import reader_for, writer_for
 from anim.caches.storage import Memory
 from anim.caches.transforms.resample import at_rate
-from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.up_axis import to_up_axis
 from anim.model import FrameChunk, VertexCache
 
 FRAMES, VERTICES = 1200, 4000
@@ -62,12 +62,12 @@ SOURCE = VertexCache(np.arange(FRAMES) / 30, VERTICES, np.arange(3999).reshape(-
 
 @pytest.mark.parametrize("name", ["a.pc2", "a.mdd", "a.npz", "a.ply"])
 def test_writers_hold_a_chunk(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("raw", "npz"):
-        monkeypatch.setattr(f"anim.caches.{module}.PIECE", 1 << 20)
-    writer_for(".ply")(SOURCE, Sink("warm.ply"), Writing())  # imports are not what is measured
+    for module in ("frame_blocks", "formats.npz"):
+        monkeypatch.setattr(f"anim.caches.{module}.COPY_BYTES", 1 << 20)
+    writer_for(".ply")(SOURCE, Sink("warm.ply"), WriteOptions())  # imports are not what is measured
     sink = Sink(name)
     tracemalloc.start()
-    writer_for(name[1:])(turned(at_rate(SOURCE, 15), "z"), sink, Writing())
+    writer_for(name[1:])(to_up_axis(at_rate(SOURCE, 15), "z"), sink, WriteOptions())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert sum(file.size for file in sink.files.values()) >= WHOLE / 2
@@ -76,12 +76,12 @@ def test_writers_hold_a_chunk(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("name", ["a.pc2", "a.mdd", "a.npz"])
 def test_readers_hold_a_chunk(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("raw", "npz"):
-        monkeypatch.setattr(f"anim.caches.{module}.PIECE", 1 << 20)
+    for module in ("frame_blocks", "formats.npz"):
+        monkeypatch.setattr(f"anim.caches.{module}.COPY_BYTES", 1 << 20)
     assert frame_blocks.per_chunk(VERTICES) == 21
     files = Memory(name)
-    writer_for(name[1:])(SOURCE, files, Writing())
-    cache = reader_for(name[1:])(files, Reading())
+    writer_for(name[1:])(SOURCE, files, WriteOptions())
+    cache = reader_for(name[1:])(files, ReadOptions())
     tracemalloc.start()
     count = sum(len(chunk.positions) for chunk in cache.chunks())
     peak = tracemalloc.get_traced_memory()[1]

@@ -11,11 +11,11 @@ import pytest
 from pygltflib import GLTF2
 
 from anim.arrays import AnyArray
-from anim.caches.options import Writing
+from anim.caches.options import WriteOptions
 from anim.caches.registry import CACHE_FORMATS
 from anim.caches.transforms.resample import at_time
-from anim.caches.transforms.up_axis import turned
-from anim.caches.transforms.vertex_order import ordered
+from anim.caches.transforms.up_axis import to_up_axis
+from anim.caches.transforms.vertex_order import reorder
 from anim.errors import FormatError
 from anim.model import VertexCache
 from tests.anim.caches.making import cache, opened, written
@@ -89,7 +89,7 @@ def rows(gltf: Any, number: int, width: int) -> AnyArray:
 def test_morph_targets_turn_them() -> None:
     """With a target per frame the sum of base and target points along each frame's own tangents."""
     source = cache(8, tangents=True)
-    files, _ = written(source, "a.glb", Writing(max_error=1e-6))
+    files, _ = written(source, "a.glb", WriteOptions(max_error=1e-6))
     gltf: Any = GLTF2().load_from_bytes(files.files["a.glb"])
     (primitive,) = gltf.meshes[0].primitives
     base = rows(gltf, primitive.attributes.TANGENT, 4)
@@ -103,7 +103,7 @@ def test_morph_targets_turn_them() -> None:
 
 @pytest.mark.parametrize("layout", ["flip-visibility", "flip-scale"])
 def test_pages_of_a_flip_book_keep_them(layout: str) -> None:
-    files, _ = written(SOURCE, "a.glb", Writing(layout=layout))
+    files, _ = written(SOURCE, "a.glb", WriteOptions(layout=layout))
     back = opened(files)
     assert (tangents_of(back) == tangents_of(SOURCE)).all()
     assert np.array_equal(back.handedness, SOURCE.handedness)  # type: ignore[arg-type]
@@ -112,15 +112,15 @@ def test_pages_of_a_flip_book_keep_them(layout: str) -> None:
 @needs_validator
 def test_the_validator_takes_them() -> None:
     layouts = ("morph", "flip-visibility", "flip-scale")
-    files = [written(SOURCE, "a.glb", Writing(layout=each))[0].files["a.glb"] for each in layouts]
+    files = [written(SOURCE, "a.glb", WriteOptions(layout=each))[0].files["a.glb"] for each in layouts]
     assert [errors(report) for report in validate_many(files)] == [[]] * len(files)
 
 
 def test_they_turn_and_go_with_their_vertices() -> None:
-    up = turned(SOURCE, "z")
+    up = to_up_axis(SOURCE, "z")
     x, y, z = np.moveaxis(tangents_of(SOURCE), -1, 0)
     assert (tangents_of(up) == np.stack([x, -z, y], axis=-1)).all()
-    fewer = ordered(SOURCE, "blender")
+    fewer = reorder(SOURCE, "blender")
     assert (tangents_of(fewer) == tangents_of(SOURCE)[:, :8]).all()
     assert fewer.handedness is not None
     assert len(fewer.handedness) == 8

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.euler.evaluate import extent, skeleton
-from anim.exchange.euler.from_euler import Converted, from_euler
-from anim.exchange.euler.motion import scaled
+from anim.exchange.euler.evaluate import bounding_size, skeleton
+from anim.exchange.euler.from_euler import ImportedMotion, from_euler
+from anim.exchange.euler.motion import scale_motion
 from anim.exchange.euler.unit_guess import guess_unit
 from anim.exchange.formats import bvh_reader
-from anim.exchange.retarget.apply import Onto, onto
-from anim.exchange.retarget.retarget import Floor
+from anim.exchange.retarget.apply import CharacterClip, apply_to_character
+from anim.exchange.retarget.retarget import GroundMode
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Skeleton
@@ -23,10 +23,12 @@ from tests.files import opened_fixture, opened_path
 Find = Callable[[str], Path]
 
 
-def recorded(name: str, asset: Find) -> Converted:
+def recorded(name: str, asset: Find) -> ImportedMotion:
     """Return the motion of a recording in meters."""
     motion = bvh_reader.read(asset(f"bvh/{name}").read_bytes())
-    return from_euler(scaled(motion, guess_unit(extent(skeleton(motion))).scale), tolerance=1e-3, name="cmu")
+    return from_euler(
+        scale_motion(motion, guess_unit(bounding_size(skeleton(motion))).scale), tolerance=1e-3, name="cmu"
+    )
 
 
 def character(name: str, asset: Find) -> Document:
@@ -34,9 +36,11 @@ def character(name: str, asset: Find) -> Document:
     return opened_fixture("biped") if name == "biped" else opened_path(asset(name))
 
 
-def put_on(document: Document, source: Converted, aliases: dict[str, str], floor: Floor = Floor.CONTACT) -> Onto:
+def put_on(
+    document: Document, source: ImportedMotion, aliases: dict[str, str], floor: GroundMode = GroundMode.CONTACT
+) -> CharacterClip:
     """Return a motion as a clip of the character."""
-    return onto(source, reader.scene(document), aliases=aliases, nested=True, floor=floor)
+    return apply_to_character(source, reader.scene(document), aliases=aliases, nested=True, floor=floor)
 
 
 def tail(turn: Floats) -> Skeleton:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.exchange.split_skins import trees
-from anim.exchange.stick_mesh import sticks
+from anim.exchange.split_skins import split_by_root
+from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf import authoring
 from anim.gltf.reading import reader
 from anim.model import Skeleton
@@ -23,7 +23,7 @@ ARM = Skeleton(
 
 
 def test_a_stick_to_each_child_that_is_apart() -> None:
-    mesh, skin = sticks(ARM, frozenset({3}))
+    mesh, skin = stick_mesh(ARM, frozenset({3}))
     assert skin.joints.tolist() == [0, 1, 2]
     knobs = 1  # of the arm, whose only child stands where it stands
     assert len(mesh.faces) == 8 * (2 + knobs)
@@ -33,7 +33,7 @@ def test_a_stick_to_each_child_that_is_apart() -> None:
 
 
 def test_each_is_closed_with_normals_outward() -> None:
-    mesh, _ = sticks(ARM, frozenset({3}))
+    mesh, _ = stick_mesh(ARM, frozenset({3}))
     assert mesh.normals is not None
     triangles = mesh.positions[mesh.faces]
     for first in range(0, len(triangles), 8):
@@ -47,7 +47,7 @@ def test_each_is_closed_with_normals_outward() -> None:
 
 
 def test_the_skin_holds_it_where_it_is_at_rest() -> None:
-    written = opened(glb_of(authoring.author(ARM, [], [sticks(ARM, frozenset({3}))])))
+    written = opened(glb_of(authoring.build_document(ARM, [], [stick_mesh(ARM, frozenset({3}))])))
     instance = reader.scene(written).instances[0]
     assert instance.skin is not None
     places = np.array([[0, 1, 0], [0, 1, 0], [0, 3, 0]])
@@ -63,8 +63,8 @@ def test_each_tree_gets_a_body_of_its_own() -> None:
         np.concatenate((ARM.rotation, np.tile((0, 0, 0, 1.0), (2, 1)))),
         np.ones((6, 3)),
     )
-    whole, skin = sticks(two, frozenset({3}))
-    bodies = trees(two, whole, skin)
+    whole, skin = stick_mesh(two, frozenset({3}))
+    bodies = split_by_root(two, whole, skin)
     assert [own.joints.tolist() for _, own in bodies] == [[0, 1, 2], [4, 5]]
     assert [mesh.name for mesh, _ in bodies] == ["sticks 1", "sticks 2"]
     drawn = np.concatenate([mesh.positions[mesh.faces] for mesh, _ in bodies])
@@ -73,9 +73,9 @@ def test_each_tree_gets_a_body_of_its_own() -> None:
         for corner, joint in zip(mesh.positions, own.joints[mesh.joints[:, 0]], strict=True):
             same = (whole.positions == corner).all(axis=1)
             assert joint in skin.joints[whole.joints[same, 0]]
-    assert trees(ARM, *sticks(ARM))[0][0].name == "sticks"
+    assert split_by_root(ARM, *stick_mesh(ARM))[0][0].name == "sticks"
 
 
 def test_a_single_joint_shows_too() -> None:
     point = Skeleton(("a",), np.array([-1]), np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.ones((1, 3)))
-    assert len(sticks(point)[0].faces) == 8
+    assert len(stick_mesh(point)[0].faces) == 8

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pygltflib import GLTF2
 
-from anim.exchange.split_skins import trees
-from anim.exchange.stick_mesh import sticks
+from anim.exchange.split_skins import split_by_root
+from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf import authoring
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -53,7 +53,7 @@ def _written(document: Document) -> Document:
 
 def test_the_skeleton_is_read_back() -> None:
     bones = _skeleton()
-    document = _written(authoring.author(bones, [_clip()]))
+    document = _written(authoring.build_document(bones, [_clip()]))
     found = reader.skeleton(document)
     assert found.names == bones.names
     np.testing.assert_array_equal(found.parents, bones.parents)
@@ -65,7 +65,7 @@ def test_the_skeleton_is_read_back() -> None:
 
 
 def test_the_clip_is_read_back() -> None:
-    clip = reader.clips(_written(authoring.author(_skeleton(), [_clip()])))[0]
+    clip = reader.clips(_written(authoring.build_document(_skeleton(), [_clip()])))[0]
     assert clip.name == "move"
     for one, two in zip(clip.tracks, _clip().tracks, strict=True):
         assert (one.node, one.path, one.interpolation) == (two.node, two.path, two.interpolation)
@@ -77,8 +77,8 @@ def test_the_clip_is_read_back() -> None:
 def test_a_body_hangs_on_the_skeleton(count: int) -> None:
     """More than 256 joints need two bytes for each."""
     bones = _skeleton(count)
-    mesh, skin = trees(bones, *sticks(bones))[0]
-    document = _written(authoring.author(bones, [], [(mesh, skin)]))
+    mesh, skin = split_by_root(bones, *stick_mesh(bones))[0]
+    document = _written(authoring.build_document(bones, [], [(mesh, skin)]))
     instance = reader.scene(document).instances[0]
     assert instance.skin is not None
     np.testing.assert_array_equal(instance.skin.joints, skin.joints)
@@ -99,7 +99,7 @@ def test_a_large_body_has_wide_indices() -> None:
     joints, weights = np.zeros((count, 4), np.int64), np.tile((1.0, 0, 0, 0), (count, 1))
     mesh = Mesh("cloud", points, faces, joints, weights, np.zeros((0, count, 3)), np.zeros(0), None)
     skin = Skin(np.array([0]), np.eye(4)[None, :3])
-    document = opened(glb_of(authoring.author(_skeleton(), [], [(mesh, skin)])))
+    document = opened(glb_of(authoring.build_document(_skeleton(), [], [(mesh, skin)])))
     found = reader.scene(document).instances[0].mesh
     np.testing.assert_array_equal(found.faces, faces)
     np.testing.assert_allclose(found.positions, points, atol=1e-6)
@@ -121,6 +121,6 @@ def test_nothing_to_add_changes_nothing() -> None:
 
 
 def test_a_skeleton_alone_needs_no_buffer() -> None:
-    document = _written(authoring.author(_skeleton(), []))
+    document = _written(authoring.build_document(_skeleton(), []))
     assert "buffers" not in document.json
     assert document.json["asset"]["generator"].startswith("gltf-anim ")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from anim.gltf.overlap import inside
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.gltf.writing.encoding import Numbers
+from anim.gltf.writing.encoding import AccessorData
 from anim.model import Clip
 from fixtures.broken.pieces import animated, text
 from tests.anim.gltf.writing.documents import check_same
@@ -20,12 +20,12 @@ from tests.files import glb_of, opened
 FLOAT = 5126
 
 
-def _axis(*times: float) -> Numbers:
+def _axis(*times: float) -> AccessorData:
     return _bits(np.array(times, "<f4"), bounds=(0.0, 1.0))
 
 
-def _bits(numbers: ArrayLike, bounds: tuple[float, float] | None = None) -> Numbers:
-    return Numbers(np.asarray(numbers).tobytes(), FLOAT, "SCALAR", bounds=bounds)
+def _bits(numbers: ArrayLike, bounds: tuple[float, float] | None = None) -> AccessorData:
+    return AccessorData(np.asarray(numbers).tobytes(), FLOAT, "SCALAR", bounds=bounds)
 
 
 def test_prefixes_and_parts_lie_in_the_longest() -> None:

@@ -10,9 +10,9 @@ from anim.curves.tangents.table import TANGENTS
 from anim.errors import RangeError
 from anim.gltf.reading import reader
 from anim.maths import quaternion
-from anim.measure.inspect.root_motion import traveling_root
+from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import LoopKind, best_ranges
-from anim.measure.loops.loop_analysis import loop as judged
+from anim.measure.loops.loop_analysis import analyze_loop as judged
 from anim.measure.loops.seam import SkinMotion
 from anim.model import Clip, Scene, Track
 from anim.ops.loop import append_first_frame, loop
@@ -117,13 +117,13 @@ def test_the_best_part_of_two_walks_is_one_walk() -> None:
 
 
 def test_a_root_that_walks_on_travels_and_one_that_sways_does_not() -> None:
-    assert traveling_root(SKELETON, WALK) == -1
+    assert root_motion_node(SKELETON, WALK) == -1
     hips = next(i for i, t in enumerate(WALK.tracks) if t.path == "translation")
     track = WALK.tracks[hips]
     on = track.values + np.array([0, 0, 1.4]) * track.times[:, None]
     moved = Track(track.node, track.path, track.interpolation, track.times, on)
     walking = Clip("", (*WALK.tracks[:hips], moved, *WALK.tracks[hips + 1 :]))
-    root = traveling_root(SKELETON, walking)
+    root = root_motion_node(SKELETON, walking)
     assert root == track.node
     found = judged(SCENE, walking, root=root)
     assert found.kind is LoopKind.CLOSED

@@ -14,7 +14,7 @@ import fixtures
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip
 from anim.ops.resample import resample
 from tests.files import REAL, glb_of, opened, opened_fixture, opened_path
@@ -59,7 +59,7 @@ def test_every_fixture_takes_every_goal(name: str, interpolation: str) -> None:
 
 
 def _check_playback(document: Document, multiple: int, *, every: int) -> None:
-    ruler = Ruler(reader.scene(document))
+    ruler = ErrorMetric(reader.scene(document))
     for number, before in list(enumerate(reader.clips(document)))[::every]:
         after = resample(before, fps=multiple * _source_rate(before))
         written = reader.clips(writer.replace_clips(document, {number: after}))[number]

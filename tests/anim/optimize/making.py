@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.error.point_matrix import Points, of_scene
+from anim.measure.error.point_matrix import PointMatrix, sample_points
 from anim.model import Clip, Scene
 from anim.optimize.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
-from anim.optimize.search.context import Setting, setting
-from anim.optimize.search.source_motion import Truth, truth
-from anim.optimize.tracks.quantization import PRICES, Coding
+from anim.optimize.search.context import Context, build_context
+from anim.optimize.search.source_motion import SourceMotion, analyze_source
+from anim.optimize.tracks.quantization import BYTE_COSTS, Encoding
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import clip, track
 
-CORE = Coding(Packing.CORE, PRICES[Objective.FILE])
+CORE = Encoding(Packing.CORE, BYTE_COSTS[Objective.FILE])
 JOINTS = 5
 TIMES = np.linspace(0, 2, 25)  # s
 
@@ -47,16 +47,16 @@ def waving(name: str = "wave") -> Clip:
     )
 
 
-def every_point(of: Scene) -> Points:
+def every_point(of: Scene) -> PointMatrix:
     """All vertices of a scene as measured points."""
     count = len(of.instances[0].mesh.positions)
-    return of_scene(of, frozenset(), 0.01, frozenset((0, v) for v in range(count)))
+    return sample_points(of, frozenset(), 0.01, frozenset((0, v) for v in range(count)))
 
 
-def truth_of(of: Scene, what: Clip, points: Points, reference: Reference = Reference.CURVE) -> Truth:
+def truth_of(of: Scene, what: Clip, points: PointMatrix, reference: Reference = Reference.CURVE) -> SourceMotion:
     """What a clip does to points, all of its tracks free."""
     below = {track.node: points.on(of.skeleton.below(track.node)) for track in what.tracks if track.node is not None}
-    return truth(of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, noticed=1e-6)
+    return analyze_source(of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, noticed=1e-6)
 
 
 def setting_of(
@@ -67,13 +67,13 @@ def setting_of(
     policy: Policy | None = None,
     effort: str = "fast",
     packing: Packing = Packing.CORE,
-) -> Setting:
+) -> Context:
     """The setting for clips of a scene."""
-    return setting(
+    return build_context(
         of,
         tuple(clips),
         bounds=Bounds(max_error, 0.02),
         policy=policy or Policy(),
-        coding=Coding(packing, PRICES[Objective.FILE]),
+        coding=Encoding(packing, BYTE_COSTS[Objective.FILE]),
         effort=EFFORTS[effort],
     )

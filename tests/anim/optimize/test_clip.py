@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anim.measure.error.metric import Ruler, dense_times
+from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.optimize.clip import Task, solve
 from anim.optimize.options import Drop, Packing, Policy
@@ -50,7 +50,7 @@ def test_the_bound_holds(packing: Packing, max_error: float) -> None:
     what = waving()
     found = _solved(what, packing=packing, max_error=max_error)
     for player in ("spec", "three", "raw", "nlerp"):
-        error = Ruler(OF).error_at(what, found.clip, dense_times(what, found.clip), player=player)
+        error = ErrorMetric(OF).error_at(what, found.clip, dense_times(what, found.clip), player=player)
         assert error.max_error <= 1.1 * max_error  # the middles of gaps were looked at; the written file is verified
     assert sum(len(t.times) for t in found.clip.tracks) < 0.7 * sum(len(t.times) for t in what.tracks)
 

@@ -10,10 +10,10 @@ import pytest
 from anim.model import Clip
 from anim.optimize import clip_optimizer as site_
 from anim.optimize.clip import Task, solve
-from anim.optimize.clip_optimizer import Site, finished
+from anim.optimize.clip_optimizer import ClipOptimizer, optimize_clip
 from anim.optimize.options import Bounds
 from anim.optimize.request import Request
-from anim.optimize.search.context import Setting
+from anim.optimize.search.context import Context
 from anim.optimize.search.solution import Solution
 from tests.anim.optimize.making import scene, waving
 from tests.clips import about, clip, track
@@ -22,8 +22,8 @@ OF = scene()
 BOUND = 0.05
 
 
-def _site(max_error: float = BOUND) -> Site:
-    return Site(Request(Bounds(max_error, 0.02), effort="fast"), OF, OF, (waving(),))
+def _site(max_error: float = BOUND) -> ClipOptimizer:
+    return ClipOptimizer(Request(Bounds(max_error, 0.02), effort="fast"), OF, OF, (waving(),))
 
 
 def _task(bound: float) -> Task:
@@ -36,7 +36,7 @@ def _keys(clip: Clip) -> int:
 
 
 def test_what_holds_at_once_is_kept() -> None:
-    found = finished(_site(), (0, _task(0.9 * BOUND)))
+    found = optimize_clip(_site(), (0, _task(0.9 * BOUND)))
     assert found.verdict.holds
     assert found.verdict.error.max_error <= BOUND
     assert _keys(found.solution.clip) < _keys(waving())
@@ -46,13 +46,13 @@ def test_a_search_that_was_given_too_much_is_tightened(monkeypatch: pytest.Monke
     """Three times the bound: the first result fails, a later one holds, with the worst vertices measured."""
     asked: list[tuple[float, int]] = []
 
-    def watched(setting: Setting, task: Task) -> Solution | None:
+    def watched(setting: Context, task: Task) -> Solution | None:
         if setting.bounds.max_error > 0:
             asked.append((task.bound, len(setting.points)))
         return solve(setting, task)
 
     monkeypatch.setattr(site_, "solve", watched)
-    found = finished(_site(), (0, _task(3 * BOUND)))
+    found = optimize_clip(_site(), (0, _task(3 * BOUND)))
     assert found.verdict.holds
     assert len(asked) > 1
     assert [bound for bound, _ in asked] == sorted((bound for bound, _ in asked), reverse=True)
@@ -60,17 +60,17 @@ def test_a_search_that_was_given_too_much_is_tightened(monkeypatch: pytest.Monke
 
 
 def test_what_never_holds_is_kept_without_loss(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stubborn(setting: Setting, task: Task) -> Solution | None:
+    def stubborn(setting: Context, task: Task) -> Solution | None:
         return solve(setting, task if setting.bounds.max_error == 0 else replace(task, bound=100.0))
 
     monkeypatch.setattr(site_, "solve", stubborn)
-    found = finished(_site(), (0, _task(BOUND)))
+    found = optimize_clip(_site(), (0, _task(BOUND)))
     assert found.verdict.holds
     assert found.verdict.error.max_error <= 1e-9
 
 
 def test_below_float32_nothing_is_lost() -> None:
-    found = finished(_site(1e-13), (0, _task(1e-13)))
+    found = optimize_clip(_site(1e-13), (0, _task(1e-13)))
     assert found.verdict.strain <= 1
     by_target = {track.target: track for track in found.solution.clip.tracks}
     for each in waving().tracks:
@@ -85,7 +85,7 @@ def test_large_turns_on_one_of_two_axes() -> None:
     snap = track("rotation", times, about("z", [0, 150] * 10 + [0]), node=1)
     sway = track("translation", np.linspace(0, 2, 17), np.outer(np.sin(np.arange(17)), [1.0, 0, 0]), node=0)
     what = clip(snap, sway)
-    site = Site(Request(Bounds(0.02, 0.02), effort="fast"), OF, OF, (what,))
-    found = finished(site, (0, Task(what, ((), ()), (False, False), 0.0197)))
+    site = ClipOptimizer(Request(Bounds(0.02, 0.02), effort="fast"), OF, OF, (what,))
+    found = optimize_clip(site, (0, Task(what, ((), ()), (False, False), 0.0197)))
     assert found.verdict.holds
     assert not found.without_loss

@@ -11,7 +11,7 @@ import pytest
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.measure.error.metric import Ruler, dense_times
+from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.measure.error.statistics import statistics
 from anim.model import Clip, Interpolation
 from anim.optimize.optimize import Optimized, optimize
@@ -28,7 +28,7 @@ SMALL = ("arm", "interpolations", "morph_cube", "accessors", "pointer", "noop")
 
 
 def _request(document: Document, share: float, **more: Any) -> Request:
-    diagonal = Ruler(reader.scene(document)).diagonal
+    diagonal = ErrorMetric(reader.scene(document)).diagonal
     bounds = replace(more.pop("bounds", Bounds(0.0, 0.0)), max_error=share * diagonal, shell=0.01 * diagonal)
     return Request(bounds, **{"effort": "fast", **more})
 
@@ -42,7 +42,7 @@ def _optimized(document: Document, request: Request, **more: Any) -> tuple[Optim
 def _error(before: Document, after: Document, players: Sequence[str] = EVERY) -> float:
     """The largest distance in any clip for any player, as a share of the diagonal; all clips must be there."""
     old, new = reader.clips(before), reader.clips(after)
-    ruler = Ruler(reader.scene(before), reader.scene(after), shell=0.01)
+    ruler = ErrorMetric(reader.scene(before), reader.scene(after), shell=0.01)
     worst = 0.0
     assert [each.name for each in new] == [each.name for each in old]
     for a, b in zip(old, new, strict=True):
@@ -69,7 +69,7 @@ def test_the_bound_is_true_on_what_was_written(name: str, share: float) -> None:
     assert all(each.holds for each in found.verdicts.values())
     worst = max(each.error.max_error for each in found.verdicts.values())
     assert worst == pytest.approx(
-        _error(document, written) * Ruler(reader.scene(document)).diagonal, rel=5e-3, abs=1e-12
+        _error(document, written) * ErrorMetric(reader.scene(document)).diagonal, rel=5e-3, abs=1e-12
     )
 
 
@@ -205,7 +205,7 @@ def test_further_bounds() -> None:
     for bounds in (Bounds(0.0, 0.0, max_angle=angle), Bounds(0.0, 0.0, max_speed_error=speed)):
         request = _request(document, 1e-2, bounds=bounds)
         _, written = _optimized(document, request)
-        ruler = Ruler(reader.scene(document))
+        ruler = ErrorMetric(reader.scene(document))
         for a, b in zip(reader.clips(document), reader.clips(written), strict=True):
             about = statistics(ruler, a, b)
             if bounds.max_angle is not None:

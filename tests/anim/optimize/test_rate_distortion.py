@@ -6,14 +6,14 @@ import math
 
 import pytest
 
-from anim.optimize.rate_distortion import LEAST, MOST, SHARES, Sized, curve, fitting
+from anim.optimize.rate_distortion import LEAST, MOST, SHARES, RatePoint, curve, smallest_error
 
 DIAGONAL = 3.0
 
 
-def _sized(max_error: float) -> Sized:
+def _sized(max_error: float) -> RatePoint:
     """A file of 1000 bytes and 500 more for every factor of 10 below the diagonal."""
-    return Sized(max_error, round(1000 - 500 * math.log10(max(max_error, 1e-9) / DIAGONAL)), max_error)
+    return RatePoint(max_error, round(1000 - 500 * math.log10(max(max_error, 1e-9) / DIAGONAL)), max_error)
 
 
 def test_a_curve_goes_from_small_bounds_to_large() -> None:
@@ -28,7 +28,7 @@ def test_a_curve_goes_from_small_bounds_to_large() -> None:
 @pytest.mark.parametrize("share", [3e-6, 1e-4, 0.02])
 def test_the_smallest_bound_that_fits(share: float) -> None:
     limit = _sized(share * DIAGONAL).size
-    found = fitting(limit, DIAGONAL, _sized)
+    found = smallest_error(limit, DIAGONAL, _sized)
     assert found is not None
     assert found.size <= limit
     assert share * 0.995 <= found.max_error / DIAGONAL <= 1.03 * share
@@ -37,29 +37,29 @@ def test_the_smallest_bound_that_fits(share: float) -> None:
 def test_without_error_where_that_fits() -> None:
     asked: list[float] = []
 
-    def tried(max_error: float) -> Sized:
+    def tried(max_error: float) -> RatePoint:
         asked.append(max_error)
         return _sized(max_error)
 
-    found = fitting(10**6, DIAGONAL, tried)
+    found = smallest_error(10**6, DIAGONAL, tried)
     assert (found, asked) == (_sized(0.0), [0.0])
 
 
 def test_nothing_fits_too_few_bytes() -> None:
-    assert fitting(_sized(MOST * DIAGONAL).size - 1, DIAGONAL, _sized) is None
-    assert fitting(_sized(MOST * DIAGONAL).size, DIAGONAL, _sized) is not None
+    assert smallest_error(_sized(MOST * DIAGONAL).size - 1, DIAGONAL, _sized) is None
+    assert smallest_error(_sized(MOST * DIAGONAL).size, DIAGONAL, _sized) is not None
     assert SHARES[0] > LEAST
 
 
 def test_what_is_given_back_was_tried_and_fits_though_sizes_are_noisy() -> None:
-    tried: list[Sized] = []
+    tried: list[RatePoint] = []
 
-    def noisy(max_error: float) -> Sized:
+    def noisy(max_error: float) -> RatePoint:
         plain = _sized(max_error)
-        tried.append(Sized(max_error, plain.size + (37 * len(tried)) % 90, max_error))
+        tried.append(RatePoint(max_error, plain.size + (37 * len(tried)) % 90, max_error))
         return tried[-1]
 
-    found = fitting(2400, DIAGONAL, noisy)
+    found = smallest_error(2400, DIAGONAL, noisy)
     assert found in tried
     assert found is not None
     assert found.size <= 2400

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from anim.gltf.document import Document
-from anim.measure.error.metric import Ruler
-from anim.optimize.rest_pose import Rebased, rebase
+from anim.measure.error.metric import ErrorMetric
+from anim.optimize.rest_pose import RebasedDocument, rebase
 from tests.anim.optimize.making import TIMES, scene, turning
 from tests.clips import about, clip, track
 
@@ -21,7 +21,7 @@ MOVING = track("rotation", TIMES, turning(1.0), node=1)
 OTHER = track("scale", TIMES, np.ones((25, 3)), node=2)
 
 
-def _rebased(*clips: tuple[object, ...], document: Document = DOCUMENT) -> Rebased:
+def _rebased(*clips: tuple[object, ...], document: Document = DOCUMENT) -> RebasedDocument:
     return rebase(document, OF, [clip(*tracks) for tracks in clips])  # type: ignore[arg-type]
 
 
@@ -42,7 +42,7 @@ def test_what_one_clip_leaves_alone_stays() -> None:
 def test_nothing_moves_in_any_clip() -> None:
     clips = [clip(HELD, OTHER), clip(MOVING), clip(HELD)]
     found = rebase(DOCUMENT, OF, clips)
-    ruler = Ruler(OF, found.scene)
+    ruler = ErrorMetric(OF, found.scene)
     assert found.moved
     for each in clips:
         assert ruler.error(each, each).max_error < 1e-7

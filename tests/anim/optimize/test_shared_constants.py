@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from anim.model import Clip
-from anim.optimize.shared_constants import Known, known
+from anim.optimize.shared_constants import Constants, find_constants
 from tests.anim.optimize.making import TIMES, scene, setting_of, turning
 from tests.clips import CUBICSPLINE, about, clip, track
 
 OF = scene()
 
 
-def _known(*clips: Clip, max_error: float = 1e-3) -> Known:
-    return known(setting_of(OF, clips, max_error=max_error), clips)
+def _known(*clips: Clip, max_error: float = 1e-3) -> Constants:
+    return find_constants(setting_of(OF, clips, max_error=max_error), clips)
 
 
 def _held(path: str, value: object, node: int = 2) -> Clip:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
 from anim.optimize.options import Bounds, Reference
-from anim.optimize.verification import PLAYERS, Verdict, verdict
+from anim.optimize.verification import PLAYERS, Verification, verify
 from anim.sampling import players
 from tests.clips import STEP, about, clip, skeleton, track
 
-RULER = Ruler(Scene(skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]]), ()))  # cubes of 2 cm around both nodes
+RULER = ErrorMetric(Scene(skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]]), ()))  # cubes of 2 cm around both nodes
 TURN = clip(track("rotation", [0, 1], about("z", [0, 90])))
 SLIDE = clip(track("translation", [0, 0.5, 1], [[0, 0, 0], [0, 1, 0], [0, 0, 0]]))
 
@@ -27,8 +27,8 @@ def _verdict(
     bounds: Bounds,
     reference: Reference = Reference.CURVE,
     asked: tuple[str, ...] = PLAYERS,
-) -> Verdict:
-    return verdict(RULER, before, after, bounds=bounds, reference=reference, players=asked)
+) -> Verification:
+    return verify(RULER, before, after, bounds=bounds, reference=reference, players=asked)
 
 
 def _lifted(height: float) -> Clip:
@@ -98,7 +98,7 @@ def test_a_bound_for_every_time() -> None:
     many = np.linspace(0, 1, 65)
     fine = clip(track("rotation", many, about("z", 90 * many)))
     plain, proven = (
-        verdict(RULER, TURN, fine, bounds=Bounds(1.0, 0.0), reference=Reference.CURVE, prover=prover)
+        verify(RULER, TURN, fine, bounds=Bounds(1.0, 0.0), reference=Reference.CURVE, prover=prover)
         for prover in (None, Prover(RULER))
     )
     assert plain.certified is None
@@ -111,7 +111,7 @@ def test_nothing_is_proven_where_the_bound_is_broken_or_only_keys_count() -> Non
     prover = Prover(RULER)
     for bound, reference in ((0.001, Reference.CURVE), (1.0, Reference.KEYS)):
         bounds = Bounds(bound, 0.0)
-        assert verdict(RULER, SLIDE, _lifted(0.01), bounds=bounds, reference=reference, prover=prover).certified is None
+        assert verify(RULER, SLIDE, _lifted(0.01), bounds=bounds, reference=reference, prover=prover).certified is None
 
 
 def test_what_a_proof_comes_across_counts() -> None:
@@ -121,14 +121,14 @@ def test_what_a_proof_comes_across_counts() -> None:
     before, after = (clip(track("rotation", times, keys * long)) for long in (1, np.array([[1], [1.001], [1]])))
     bounds = Bounds(0.0025, 0.0)
     plain, found = (
-        verdict(RULER, before, after, bounds=bounds, reference=Reference.CURVE, players=("three",), prover=prover)
+        verify(RULER, before, after, bounds=bounds, reference=Reference.CURVE, players=("three",), prover=prover)
         for prover in (None, Prover(RULER))
     )
     assert plain.error.max_error < found.error.max_error
     assert found.error.time == np.nextafter(1, 0)
     tight = replace(bounds, max_error=(plain.error.max_error + found.error.max_error) / 2)
     assert plain.error.max_error < tight.max_error
-    again = verdict(
+    again = verify(
         RULER, before, after, bounds=tight, reference=Reference.CURVE, players=("three",), prover=Prover(RULER)
     )
     assert not again.holds

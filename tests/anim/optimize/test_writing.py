@@ -11,7 +11,7 @@ from anim.gltf.reading import reader
 from anim.optimize.clip import Task, solve
 from anim.optimize.options import Packing
 from anim.optimize.search.solution import Solution
-from anim.optimize.writing import differing, written
+from anim.optimize.writing import changed_clips, write_solutions
 from tests.anim.optimize.making import setting_of
 from tests.files import glb_of, opened, opened_fixture
 
@@ -33,8 +33,8 @@ def _solutions(name: str, packing: Packing) -> dict[int, Solution]:
 def test_every_number_is_read_back_as_it_was_solved(name: str, packing: Packing) -> None:
     document = opened_fixture(name)
     solutions = _solutions(name, packing)
-    new = opened(glb_of(written(document, solutions, packing)))
-    assert differing(reader.clips(new), solutions) == []
+    new = opened(glb_of(write_solutions(document, solutions, packing)))
+    assert changed_clips(reader.clips(new), solutions) == []
     for i, clip in enumerate(reader.clips(new)):
         for a, b in zip(solutions[i].clip.tracks, clip.tracks, strict=True):
             assert (a.target, a.interpolation) == (b.target, b.interpolation)
@@ -45,7 +45,7 @@ def test_every_number_is_read_back_as_it_was_solved(name: str, packing: Packing)
 def test_clips_that_differ_are_found() -> None:
     document = opened_fixture("noop")
     solutions = _solutions("noop", Packing.CORE)
-    new = written(document, solutions, Packing.CORE)
+    new = write_solutions(document, solutions, Packing.CORE)
     number, solution = next((i, each) for i, each in solutions.items() if len(each.clip.tracks[0].times) > 1)
     track, *others = solution.clip.tracks
     changes = (
@@ -55,16 +55,16 @@ def test_clips_that_differ_are_found() -> None:
     )
     for change in changes:
         clip = replace(solution.clip, tracks=(replace(track, **change), *others))
-        assert differing(reader.clips(new), {**solutions, number: replace(solution, clip=clip)}) == [number]
+        assert changed_clips(reader.clips(new), {**solutions, number: replace(solution, clip=clip)}) == [number]
     fewer = replace(solution, clip=replace(solution.clip, tracks=solution.clip.tracks[1:]))
-    assert differing(reader.clips(new), {number: fewer}) == [number]
+    assert changed_clips(reader.clips(new), {number: fewer}) == [number]
 
 
 def test_only_solved_clips_are_replaced() -> None:
     document = opened_fixture("noop")
     solutions = _solutions("noop", Packing.CORE)
     last = max(solutions)
-    new = written(document, {last: solutions[last]}, Packing.CORE)
+    new = write_solutions(document, {last: solutions[last]}, Packing.CORE)
     for i, (a, b) in enumerate(zip(reader.clips(document), reader.clips(new), strict=True)):
         same = len(a.tracks) == len(b.tracks) and all(
             np.array_equal(x.values, y.values) for x, y in zip(a.tracks, b.tracks, strict=True)

@@ -13,7 +13,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.maths import matrix, quaternion
-from anim.measure.error.metric import Ruler, dense_times
+from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.model import AccessorFormat, Clip, Interpolation, Track
 from anim.sampling import sample_pose
 from anim.sampling.players import PLAYERS, sampler_for
@@ -119,7 +119,7 @@ def test_three_plays_quantized_rotations_so(storage: AccessorFormat, tmp_path: P
     truth, other = _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", coarse)
     verdict = next(each for each in judge(truth, other).clips if each.name == "walk")
     after = reader.clips(coarse)[number]
-    ruler, times = Ruler(reader.scene(document)), dense_times(before, after)
+    ruler, times = ErrorMetric(reader.scene(document)), dense_times(before, after)
     found = {player: ruler.error_at(before, after, times, player=player).max_error for player in NAMES}
     assert found["three"] == pytest.approx(verdict.max_error, rel=0.01)
     assert abs(found["spec"] / found["three"] - 1) > 0.02  # the two can be told apart

@@ -12,13 +12,15 @@ from anim.curves.easing.table import EASINGS, parse
 from anim.curves.fitting.easing_fit import fit_segments
 from anim.curves.tangents.table import TANGENTS
 from anim.errors import RangeError, ShapeError, UnsupportedError
-from anim.show.plots.easing_plot import LIMIT, eases
-from anim.show.plots.tangent_plot import through
+from anim.show.plots.easing_plot import LIMIT, easing_plot
+from anim.show.plots.tangent_plot import tangent_plot
 from tests.anim.show.reading import png_size, words
 
 
 def test_eases_say_what_they_are() -> None:
-    said = words(eases([parse("smoothstep"), parse("back-out"), parse("steps(4)"), parse("sine-in-out")], kind="svg"))
+    said = words(
+        easing_plot([parse("smoothstep"), parse("back-out"), parse("steps(4)"), parse("sine-in-out")], kind="svg")
+    )
     count = len(fit_segments(parse("sine-in-out"), tolerance=1e-3))
     for expected in (
         "smoothstep", "exact as 1 cubic", "back-out", "+10 %", "exact as STEP keys", f"{count} cubics within 0.1 %",
@@ -29,13 +31,13 @@ def test_eases_say_what_they_are() -> None:
 
 @pytest.mark.parametrize("kind", ["png", "svg"])
 def test_same_bytes_every_time(kind: str) -> None:
-    pictures = {eases([parse("bounce-out"), parse("elastic-in")], kind=kind) for _ in range(2)}
+    pictures = {easing_plot([parse("bounce-out"), parse("elastic-in")], kind=kind) for _ in range(2)}
     assert len(pictures) == 1
-    assert len({through(range(4), [0, 0.9, 0.2, 1], ["natural"], kind=kind) for _ in range(2)}) == 1
+    assert len({tangent_plot(range(4), [0, 0.9, 0.2, 1], ["natural"], kind=kind) for _ in range(2)}) == 1
 
 
 def test_a_sheet_is_as_wide_as_its_row() -> None:
-    one, three = (png_size(eases([parse("linear")] * count, kind="png")) for count in (1, 3))
+    one, three = (png_size(easing_plot([parse("linear")] * count, kind="png")) for count in (1, 3))
     assert three[0] > 2 * one[0] > 0
     assert three[1] == one[1]
 
@@ -44,19 +46,19 @@ def test_all_eases_can_be_drawn() -> None:
     names = [*EASINGS, "spring(100, 10)", "steps(3, jump-both)", "cubic-bezier(1, 0, 0, 1)", "hermite(-9, 40)"]
     for i in range(0, len(names), LIMIT):
         part = names[i : i + LIMIT]
-        said = words(eases([parse(name) for name in part], kind="svg"))
+        said = words(easing_plot([parse(name) for name in part], kind="svg"))
         assert {parse(name).name for name in part} <= set(said)
 
 
 @pytest.mark.parametrize("count", [0, LIMIT + 1])
 def test_too_few_and_too_many_eases(count: int) -> None:
     with pytest.raises(RangeError, match=f"{count} eases"):
-        eases([parse("linear")] * count, kind="png")
+        easing_plot([parse("linear")] * count, kind="png")
 
 
 def test_through_names_the_smoothness_of_each_rule() -> None:
     rules = ["catmull-rom", "natural", "linear", "step", "monotone", "bspline"]
-    said = words(through(range(4), [0, 0.9, 0.2, 1], rules, kind="svg"))
+    said = words(tangent_plot(range(4), [0, 0.9, 0.2, 1], rules, kind="svg"))
     assert set(rules) <= set(said)
     assert "Through 0, 0.9, 0.2, 1" in said
     # Catmull-Rom leaves 0.9 with 0.1 and reaches 0.2 with 0.05: its top is 0.90108 at 1.022 s
@@ -82,48 +84,48 @@ def test_overshoot_by_hand() -> None:
 def test_all_rules_can_be_drawn() -> None:
     names = [*(name for name in TANGENTS if name != "periodic"), "cardinal(0.5)", "tcb(0, 1, 0)"]
     for i in range(0, len(names), 6):
-        said = words(through([0, 0.2, 1, 1.5, 4], [1, 0, 2, 2, 1], names[i : i + 6], kind="svg"))
+        said = words(tangent_plot([0, 0.2, 1, 1.5, 4], [1, 0, 2, 2, 1], names[i : i + 6], kind="svg"))
         assert set(names[i : i + 6]) <= set(said)
-    assert "periodic" in words(through(range(3), [0, 1, 0], ["periodic"], kind="svg"))
+    assert "periodic" in words(tangent_plot(range(3), [0, 1, 0], ["periodic"], kind="svg"))
 
 
 def test_two_values_are_one_piece() -> None:
-    assert "one piece; no overshoot" in words(through([0, 1], [0, 1], ["natural"], kind="svg"))
+    assert "one piece; no overshoot" in words(tangent_plot([0, 1], [0, 1], ["natural"], kind="svg"))
 
 
 def test_equal_values() -> None:
-    assert "C2 at every key; no overshoot" in words(through(range(3), [1, 1, 1], ["natural"], kind="svg"))
+    assert "C2 at every key; no overshoot" in words(tangent_plot(range(3), [1, 1, 1], ["natural"], kind="svg"))
 
 
 def test_refusals() -> None:
     with pytest.raises(RangeError, match="tangent rule"):
-        through(range(3), [0, 1, 0], ["catmul"], kind="svg")
+        tangent_plot(range(3), [0, 1, 0], ["catmul"], kind="svg")
     with pytest.raises(RangeError, match="7 tangent rules"):
-        through(range(3), [0, 1, 0], ["flat"] * 7, kind="svg")
+        tangent_plot(range(3), [0, 1, 0], ["flat"] * 7, kind="svg")
     with pytest.raises(RangeError, match="not increasing"):
-        through([0, 1, 1], [0, 1, 0], ["flat"], kind="svg")
+        tangent_plot([0, 1, 1], [0, 1, 0], ["flat"], kind="svg")
     with pytest.raises(ShapeError):
-        through([0, 1], [0, 1, 0], ["flat"], kind="svg")
+        tangent_plot([0, 1], [0, 1, 0], ["flat"], kind="svg")
     with pytest.raises(RangeError, match="format is 'pdf'"):
-        eases([parse("linear")], kind="pdf")
+        easing_plot([parse("linear")], kind="pdf")
 
 
 def test_the_users_style_does_not_count() -> None:
     import matplotlib
 
-    plain = eases([parse("linear")], kind="svg")
+    plain = easing_plot([parse("linear")], kind="svg")
     with matplotlib.rc_context({"lines.linewidth": 9, "font.size": 40, "svg.fonttype": "path", "axes.grid": True}):
-        assert eases([parse("linear")], kind="svg") == plain
+        assert easing_plot([parse("linear")], kind="svg") == plain
         assert matplotlib.rcParams["font.size"] == 40
 
 
 def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(UnsupportedError, match="need matplotlib") as caught:
-        eases([parse("linear")], kind="png")
+        easing_plot([parse("linear")], kind="png")
     assert caught.value.help == "pip install 'gltf-anim[plot]'"
 
 
 def test_keys_of_each_grade_are_counted_as_keys() -> None:
-    said = words(through(range(5), [0, 1, 1, 1, 3], ["linear"], kind="svg"))
+    said = words(tangent_plot(range(5), [0, 1, 1, 1, 3], ["linear"], kind="svg"))
     assert "C0 at 2 keys, C2 at 1 key; no overshoot" in said

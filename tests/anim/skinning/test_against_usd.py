@@ -16,9 +16,9 @@ from anim.model import Clip, Scene
 from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import frame_times
-from anim.skinning.bake import baker
-from anim.skinning.bound_mesh import Layer
-from anim.skinning.pose_blocks import Frames
+from anim.skinning.bake import prepare_bake
+from anim.skinning.bound_mesh import BoundMesh
+from anim.skinning.pose_blocks import PoseBlock
 from tests.anim.skinning.odd_rigs import with_root_without_weight
 from tests.files import opened_path
 
@@ -41,13 +41,13 @@ def test_usd_agrees_under_a_joint_without_weight_and_in_another_unit(method: str
 
 def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
     """How many frames were compared of skinned meshes, all of them alike."""
-    made = baker(of, method=method)
+    made = prepare_bake(of, method=method)
     compared = 0
     for played in clips:
         times = frame_times(played.start, played.end, fps=6)
         whole = made.bake(played, times=times).whole().positions
         local = sample_pose(of.skeleton, played, times)
-        frames = Frames(times, world_by_node(of.skeleton, local), local.weights)
+        frames = PoseBlock(times, world_by_node(of.skeleton, local), local.weights)
         for layer in made.layers:
             if layer.instance.skin is None:
                 continue
@@ -58,7 +58,7 @@ def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
     return compared
 
 
-def _skinned(layer: Layer, matrices: Floats, method: str) -> Floats:
+def _skinned(layer: BoundMesh, matrices: Floats, method: str) -> Floats:
     """Points (F, V, 3) as UsdSkel.SkinPoints has them."""
     from pxr import Gf, UsdSkel, Vt
 

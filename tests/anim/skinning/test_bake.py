@@ -11,12 +11,12 @@ from anim.errors import FormatError, NotFoundError, RangeError
 from anim.gltf.document import Json
 from anim.gltf.reading import reader
 from anim.maths import matrix
-from anim.measure.error.surface import placed, surfaces
+from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, MeshInstance, Scene
 from anim.sampling import sample_pose, world_matrices
 from anim.skinning import chunk_pipeline
-from anim.skinning.analysis.weight_sums import bad_sums
-from anim.skinning.bake import bake, baker
+from anim.skinning.analysis.weight_sums import unnormalized_weights
+from anim.skinning.bake import bake, prepare_bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 from fixtures.broken.pieces import buffered, text
 from tests.anim.skinning.methods.test_linear_blend import TIMES, moving
@@ -37,7 +37,7 @@ def test_every_mesh_in_order_as_the_ruler_places_it(name: str) -> None:
         whole = cache.whole().positions
         for surface in surfaces(of):
             weights = local.weights.get(surface.owner, np.tile(surface.rest_weights, (len(times), 1)))
-            frames = [placed(surface, world[f][surface.nodes], weights[f]) for f in range(len(times))]
+            frames = [place_points(surface, world[f][surface.nodes], weights[f]) for f in range(len(times))]
             span = slice(at, at + len(surface.points))
             assert np.abs(whole[:, span] - np.stack(frames)).max() < 1e-6 * max(1, np.abs(frames).max())
             at += len(surface.points)
@@ -165,7 +165,7 @@ def test_nothing_is_computed_before_it_is_asked_for(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
     of = random_scene(7)
     done: list[int] = []
-    made = baker(of)
+    made = prepare_bake(of)
     frames = made.bake(moving(of, 3), times=np.arange(10_000_000) / 1000.0, progress=done.append)
     chunks = frames.chunks()
     assert done == []
@@ -254,9 +254,9 @@ def test_files_that_cant_be_skinned() -> None:
 def test_bad_sums_are_told() -> None:
     body = mesh([[0, 0, 0]] * 4, [[0]] * 4, [[1]] * 4, weight_sums=np.array([1, 0.9, 1.25, 0]))
     of = scene(body, [-1])
-    (bad,) = bad_sums([*of.instances, *of.instances])
+    (bad,) = unnormalized_weights([*of.instances, *of.instances])
     assert (bad.mesh, bad.count, bad.none, bad.least, bad.most) == ("mesh", 3, 1, 0.9, 1.25)
-    assert bad_sums(random_scene(1).instances) == []
+    assert unnormalized_weights(random_scene(1).instances) == []
 
 
 def test_a_mesh_on_two_nodes_is_baked_twice() -> None:

@@ -12,9 +12,9 @@ import pytest
 from anim.arrays import AnyArray
 from anim.model import Clip, MeshInstance, Scene
 from anim.skinning import chunk_pipeline
-from anim.skinning.bake import bake, baker
+from anim.skinning.bake import bake, prepare_bake
 from anim.skinning.methods.registry import SKINNING_METHODS
-from anim.skinning.pose_blocks import Playback
+from anim.skinning.pose_blocks import PosePlayback
 from tests.anim.skinning.methods.test_linear_blend import moving
 from tests.anim.skinning.scenes import TRIANGLE, mesh, random_scene
 from tests.clips import clip, track
@@ -56,7 +56,7 @@ def test_same_bytes_for_any_chunk_and_number_of_threads(
 
 def test_parts_of_frames_are_the_frames_at_those_times() -> None:
     of, played = _scene("lbs")
-    playback, times = Playback(of.skeleton, played), np.linspace(0, 2, 9)
+    playback, times = PosePlayback(of.skeleton, played), np.linspace(0, 2, 9)
     part, wanted = playback.at(times).part(slice(3, 7)), playback.at(times[3:7])
     assert np.array_equal(part.times, wanted.times)
     assert np.array_equal(part.world, wanted.world)
@@ -70,7 +70,7 @@ def test_chunks_that_are_kept_stay_as_they_were(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
     of, played = _scene("lbs")
     chunks, copies = [], []
-    for chunk in baker(of, rigid=True).bake(played, times=np.linspace(0, 2, FRAMES)).chunks():
+    for chunk in prepare_bake(of, rigid=True).bake(played, times=np.linspace(0, 2, FRAMES)).chunks():
         chunks.append(chunk)
         copies.append(chunk.positions.copy())
     assert len(chunks) == 8
@@ -80,7 +80,7 @@ def test_chunks_that_are_kept_stay_as_they_were(monkeypatch: pytest.MonkeyPatch)
 def test_memory_does_not_grow_with_the_number_of_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     """The caller's chunk, the one that is skinned and the one that follows, with what they are made of."""
     monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
-    made = baker(random_scene(2, vertices=3000))
+    made = prepare_bake(random_scene(2, vertices=3000))
     for _ in made.bake(Clip("", ()), times=np.zeros(1)).chunks():  # what is made once
         pass
     tracemalloc.start()
@@ -97,14 +97,14 @@ def test_what_is_packed_at_a_time_is_bounded_for_shapes_too(monkeypatch: pytest.
     """Morphed points are as many as those that come out: packed for a whole clip they would take as much."""
     of, played = _scene("lbs")
     seen: list[int] = []
-    usual = Playback.at
+    usual = PosePlayback.at
 
-    def counted(self: Playback, times: Any) -> Any:
+    def counted(self: PosePlayback, times: Any) -> Any:
         seen.append(len(times))
         return usual(self, times)
 
-    made = baker(of, rigid=True)
-    monkeypatch.setattr(Playback, "at", counted)
+    made = prepare_bake(of, rigid=True)
+    monkeypatch.setattr(PosePlayback, "at", counted)
     monkeypatch.setattr(chunk_pipeline, "PACKED_BYTES", 64 * 36 * 150 + 64 * 96 * 40)
     for _ in made.bake(played, times=np.linspace(0, 2, FRAMES)).chunks():
         pass

@@ -13,7 +13,7 @@ import pytest
 
 from anim import __version__
 from anim.skinning.kernels.dual_quaternion import skin_dual_quaternion
-from anim.skinning.kernels.layout import LANES, Held, Stretches, group_influences
+from anim.skinning.kernels.layout import LANES, Influences, ScaleShear, group_influences
 from anim.skinning.kernels.vertex_normals import vertex_normals
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -42,9 +42,9 @@ def test_machine_code_is_the_python_it_came_from(stretched: bool) -> None:
 
     points, normals, tangents = values(5, 3, 1), values(5, 3, 1), values(5, 3, 1)
     joint, start = np.array([0, 1, 2, 3, 1, 2], np.int32), np.array([0, 2, 3, 3, 5, 6])
-    held = group_influences(Held(np.array([0.7, 0.3, 1, 0.6, 0.4, 1], np.float32), joint, start, 2))
+    held = group_influences(Influences(np.array([0.7, 0.3, 1, 0.6, 0.4, 1], np.float32), joint, start, 2))
     duals = values(4, 12 if stretched else 8, LANES)
-    stretches = Stretches(values(4, 15, LANES), values(4, 1, LANES), held) if stretched else None
+    stretches = ScaleShear(values(4, 15, LANES), values(4, 1, LANES), held) if stretched else None
     results = []
     for kernel in (_python(skin_dual_quaternion), skin_dual_quaternion):
         out = (np.full((2, 7, 3), np.float32(9)), np.full((2, 7, 3), np.float32(9)), np.full((2, 7, 3), np.float32(9)))
@@ -69,7 +69,7 @@ def test_views_are_written_through() -> None:
 
 def test_influences_come_in_groups_of_four() -> None:
     weight, joint = np.array([0.7, 0.3, 1, 0.2, 0.2, 0.2, 0.2, 0.2], np.float32), np.arange(8, dtype=np.int32)
-    found = group_influences(Held(weight, joint, np.array([0, 2, 2, 3, 8]), 5))
+    found = group_influences(Influences(weight, joint, np.array([0, 2, 2, 3, 8]), 5))
     assert found.start.tolist() == [0, 4, 4, 8, 16]
     assert found.weight.round(6).tolist() == pytest.approx([0.7, 0.3, 0, 0, 1, 0, 0, 0, *[0.2] * 5, 0, 0, 0])
     assert found.joint.tolist() == [0, 1, 0, 0, 2, 2, 2, 2, 3, 4, 5, 6, 7, 3, 3, 3]

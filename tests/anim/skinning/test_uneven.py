@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.skinning.bake import baker
+from anim.skinning.bake import prepare_bake
 from anim.skinning.uneven import uneven_joints
 from tests.clips import about, clip, track
 from tests.files import opened_fixture
@@ -24,10 +24,10 @@ def test_a_joint_with_another_factor_along_one_axis(scale: list[float], expected
         track("scale", [0, 1], np.array([first, scale]), node=1),
         track("rotation", [0, 1], about("x", [0, 90]), node=1),
     )
-    made = baker(reader.scene(opened_fixture("tube")), method="dqs")
+    made = prepare_bake(reader.scene(opened_fixture("tube")), method="dqs")
     assert uneven_joints(made, played, TIMES) == expected
 
 
 def test_below_a_parent_that_scales_unevenly_a_joint_shears() -> None:
     played = clip(track("scale", [0], [[1, 1, 3]], node=0), track("rotation", [0, 1], about("x", [0, 45]), node=1))
-    assert uneven_joints(baker(reader.scene(opened_fixture("tube"))), played, TIMES) == (0, 1)
+    assert uneven_joints(prepare_bake(reader.scene(opened_fixture("tube"))), played, TIMES) == (0, 1)

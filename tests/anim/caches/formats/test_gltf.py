@@ -10,11 +10,11 @@ import pytest
 from pygltflib import GLTF2
 
 from anim.arrays import AnyArray, Floats
-from anim.caches.options import Writing
+from anim.caches.options import WriteOptions
 from anim.caches.storage import Memory
-from anim.caches.transforms.frame_reduction import kept_frames
-from anim.caches.transforms.pca import basis
-from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.frame_reduction import reduce_frames
+from anim.caches.transforms.pca import fit_basis
+from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 from anim.model.vertex_cache import from_arrays
@@ -60,7 +60,7 @@ def played(data: bytes, times: Floats) -> AnyArray:
 @pytest.mark.parametrize("limit", [0.3, 0.01, 1e-4])
 @pytest.mark.parametrize("source", [smooth(), cache(20), cache(1)], ids=["smooth", "noise", "still"])
 def test_every_frame_is_within_the_limit(source: VertexCache, limit: float, quantize: bool) -> None:
-    files, said = written(source, "a.glb", Writing(max_error=limit, quantize=quantize))
+    files, said = written(source, "a.glb", WriteOptions(max_error=limit, quantize=quantize))
     placed = played(files.files["a.glb"], source.times)
     worst = np.linalg.norm(placed - positions_of(source), axis=-1).max()
     assert worst <= limit * (1 + 1e-5)
@@ -69,7 +69,7 @@ def test_every_frame_is_within_the_limit(source: VertexCache, limit: float, quan
 
 def test_between_frames_vertices_go_in_straight_lines() -> None:
     source = smooth()
-    files, said = written(source, "a.glb", Writing(max_error=1e-3))
+    files, said = written(source, "a.glb", WriteOptions(max_error=1e-3))
     middle = (source.times[:-1] + source.times[1:]) / 2
     expected = (positions_of(source)[:-1] + positions_of(source)[1:]) / 2
     assert said.max_error is not None
@@ -77,7 +77,7 @@ def test_between_frames_vertices_go_in_straight_lines() -> None:
 
 
 def test_few_shapes_beat_many_frames_where_the_motion_is_smooth() -> None:
-    files, said = written(smooth(), "a.glb", Writing(max_error=1e-4))
+    files, said = written(smooth(), "a.glb", WriteOptions(max_error=1e-4))
     assert said.notes[0].startswith("2 morph targets (shapes and weights)")  # sine and cosine
     assert len(files.files["a.glb"]) < 40 * 60 * 12 / 5
 
@@ -87,26 +87,26 @@ def test_frames_that_lines_give_have_no_target() -> None:
     moved[0, 3] = 2
     shares = np.array([0, 0.5, 1, 1.5, 2, 1, 0])[:, None, None]
     source = from_arrays(np.arange(7.0), still * (1 - shares) + moved * shares, FACES)
-    _, said = written(source, "a.glb", Writing(max_error=1e-5))
+    _, said = written(source, "a.glb", WriteOptions(max_error=1e-5))
     assert said.notes[0] in (
         "1 morph targets (shapes and weights), 7 keys for 7 frames",
         "1 morph targets (shapes of kept frames), 3 keys for 7 frames",
     )
-    assert kept_frames(positions_of(source), source.times, 1e-5).tolist() == [0, 4, 6]
+    assert reduce_frames(positions_of(source), source.times, 1e-5).tolist() == [0, 4, 6]
 
 
 def test_noise_keeps_every_frame() -> None:
     source = cache(12)
-    assert kept_frames(positions_of(source), source.times, 1e-3).tolist() == list(range(12))
-    assert basis(positions_of(source), 1e-3, most=3) is None
-    found = basis(positions_of(source), 0.0, most=12)
+    assert reduce_frames(positions_of(source), source.times, 1e-3).tolist() == list(range(12))
+    assert fit_basis(positions_of(source), 1e-3, most=3) is None
+    found = fit_basis(positions_of(source), 0.0, most=12)
     assert found is None or len(found.shapes) == 11  # a mean and eleven
 
 
 @pytest.mark.parametrize("quantize", [False, True])
 def test_normals_follow(quantize: bool) -> None:
     source = cache(6)
-    files, _ = written(source, "a.glb", Writing(max_error=1e-3, quantize=quantize))
+    files, _ = written(source, "a.glb", WriteOptions(max_error=1e-3, quantize=quantize))
     gltf: Any = GLTF2().load_from_bytes(files.files["a.glb"])
     primitive = gltf.meshes[0].primitives[0]
     weights = rows(gltf, gltf.animations[0].samplers[0].output).reshape(6, -1)
@@ -121,8 +121,8 @@ def test_normals_follow(quantize: bool) -> None:
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_back_again(layout: str, up: str) -> None:
-    source = turned(cache(), up)
-    files, _ = written(source, "a.glb", Writing(layout=layout, max_error=1e-5))
+    source = to_up_axis(cache(), up)
+    files, _ = written(source, "a.glb", WriteOptions(layout=layout, max_error=1e-5))
     back = opened(files)
     assert back.times == pytest.approx(source.times, abs=1e-7)
     assert off(back, source) < 1e-5
@@ -135,7 +135,7 @@ def test_back_again(layout: str, up: str) -> None:
 
 @pytest.mark.parametrize("layout", ["flip-visibility", "flip-scale"])
 def test_one_page_is_shown_at_a_time(layout: str) -> None:
-    gltf: Any = GLTF2().load_from_bytes(written(cache(), "a.glb", Writing(layout=layout))[0].files["a.glb"])
+    gltf: Any = GLTF2().load_from_bytes(written(cache(), "a.glb", WriteOptions(layout=layout))[0].files["a.glb"])
     for f, time in enumerate(np.arange(7) / 30):
         for when in (time + 1e-4, time + 0.03):
             shown = []
@@ -157,7 +157,7 @@ def test_one_page_is_shown_at_a_time(layout: str) -> None:
 @needs_validator
 def test_the_validator_finds_no_error() -> None:
     files = [
-        written(source, "a.glb", Writing(layout=layout, quantize=quantize))[0].files["a.glb"]
+        written(source, "a.glb", WriteOptions(layout=layout, quantize=quantize))[0].files["a.glb"]
         for source in (cache(), cache(1), cache(2), smooth(), cache(normals=False))
         for layout in LAYOUTS
         for quantize in ((False, True) if layout == "morph" else (False,))
@@ -169,13 +169,13 @@ def test_the_validator_finds_no_error() -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_the_same_cache_gives_the_same_bytes(layout: str) -> None:
-    one, other = (written(cache(step=step), "a.glb", Writing(layout=layout))[0].files for step in (3, 7))
+    one, other = (written(cache(step=step), "a.glb", WriteOptions(layout=layout))[0].files for step in (3, 7))
     assert one == other
 
 
 def test_an_unknown_layout_is_refused() -> None:
     with pytest.raises(RangeError, match="expected morph"):
-        written(cache(), "a.glb", Writing(layout="flip"))
+        written(cache(), "a.glb", WriteOptions(layout="flip"))
 
 
 def test_a_flip_book_of_others_is_refused() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from anim.caches.options import Reading
+from anim.caches.options import ReadOptions
 from anim.caches.storage import Memory
-from anim.caches.transforms.resample import at_time, at_times
+from anim.caches.transforms.resample import at_time, resample_frames
 from anim.errors import FormatError
 from tests.anim.caches.making import FACES, by_trimesh, cache, normals_of, opened, positions_of, written
 
@@ -59,7 +59,7 @@ def test_back_again(ending: str) -> None:
 def test_what_a_longer_sequence_left_behind_is_no_part_of_a_shorter_one(ending: str) -> None:
     source = cache()
     files, _ = written(source, f"walk{ending}")
-    shorter, _ = written(at_times(source, source.times[:3]), f"walk{ending}")
+    shorter, _ = written(resample_frames(source, source.times[:3]), f"walk{ending}")
     files.files |= shorter.files
     assert len(files.files) == 7
     back = opened(files)
@@ -86,7 +86,7 @@ def test_frames_of_others_have_a_rate() -> None:
     mesh: Any = trimesh.Trimesh(np.eye(3), [[0, 1, 2]], process=False)
     files = Memory("a.ply", {f"a_{i}.ply": mesh.export(file_type="ply") for i in (9, 10, 11)})
     assert opened(files).times == pytest.approx(np.arange(3) / 24)
-    assert opened(files, Reading(fps=10)).times == pytest.approx(np.arange(3) / 10)
+    assert opened(files, ReadOptions(fps=10)).times == pytest.approx(np.arange(3) / 10)
 
 
 def test_quads_of_others_are_cut() -> None:

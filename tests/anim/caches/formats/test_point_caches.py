@@ -7,9 +7,9 @@ import struct
 import numpy as np
 import pytest
 
-from anim.caches.options import Reading, Writing
+from anim.caches.options import ReadOptions, WriteOptions
 from anim.caches.storage import Memory
-from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import FormatError, RangeError
 from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import FACES, by_trimesh, cache, normals_of, opened, positions_of, written
@@ -18,7 +18,7 @@ TWO = from_arrays(np.array([0.0, 0.5]), np.array([[[1, 2, 3]], [[-1, 0.5, 4]]], 
 
 
 def test_pc2_by_hand() -> None:
-    data = written(TWO, "a.pc2", Writing(rest=""))[0].files["a.pc2"]
+    data = written(TWO, "a.pc2", WriteOptions(rest=""))[0].files["a.pc2"]
     assert data == (
         b"POINTCACHE2\0" + bytes.fromhex("01000000 01000000 00000000 0000803f 02000000")  # 1, 1 point, 0.0, 1.0, 2
         + bytes.fromhex("0000803f 00000040 00004040  000080bf 0000003f 00008040")
@@ -26,7 +26,7 @@ def test_pc2_by_hand() -> None:
 
 
 def test_mdd_by_hand() -> None:
-    data = written(TWO, "a.mdd", Writing(rest=""))[0].files["a.mdd"]
+    data = written(TWO, "a.mdd", WriteOptions(rest=""))[0].files["a.mdd"]
     assert data == bytes.fromhex(
         "00000002 00000001 00000000 3f000000  3f800000 40000000 40400000  bf800000 3f000000 40800000"
     )
@@ -55,7 +55,7 @@ def test_mdd_by_numpy() -> None:
 @pytest.mark.parametrize("ending", [".ply", ".obj"])
 def test_the_rest_mesh_has_the_same_order(name: str, ending: str) -> None:
     source = cache()
-    files, _ = written(source, name, Writing(rest=ending))
+    files, _ = written(source, name, WriteOptions(rest=ending))
     assert sorted(files.files) == sorted([name, f"{name}-rest{ending}"])
     mesh = by_trimesh(files.files[f"{name}-rest{ending}"], ending)
     assert mesh.vertices == pytest.approx(source.rest, abs=1e-6)
@@ -77,7 +77,7 @@ def test_back_again(name: str) -> None:
 def test_a_pc2_without_its_rest_mesh() -> None:
     files = Memory("a.pc2", {"a.pc2": written(cache(), "a.pc2")[0].files["a.pc2"]})
     assert opened(files).times[1] == pytest.approx(1 / 24)
-    assert opened(files, Reading(fps=10)).times[1] == pytest.approx(0.1)
+    assert opened(files, ReadOptions(fps=10)).times[1] == pytest.approx(0.1)
     assert len(opened(files).faces) == 0
 
 
@@ -99,13 +99,13 @@ def test_pc2_refuses_uneven_steps_but_takes_a_short_last_one() -> None:
 
 def test_blenders_axes() -> None:
     source = cache()
-    turned_back = turned(turned(source, "z"), "y")
+    turned_back = to_up_axis(to_up_axis(source, "z"), "y")
     x, y, z = np.moveaxis(positions_of(source), -1, 0)
-    data = written(turned(source, "z"), "a.pc2")[0].files["a.pc2"]
+    data = written(to_up_axis(source, "z"), "a.pc2")[0].files["a.pc2"]
     assert (np.frombuffer(data[32:], "<f4").reshape(7, 9, 3) == np.stack((x, -z, y), axis=-1)).all()
     assert (positions_of(turned_back) == positions_of(source)).all()
     assert (normals_of(turned_back) == normals_of(source)).all()
-    assert opened(written(turned(source, "z"), "a.pc2")[0]).up == "z"
+    assert opened(written(to_up_axis(source, "z"), "a.pc2")[0]).up == "z"
 
 
 @pytest.mark.parametrize("name", ["a.pc2", "a.mdd"])

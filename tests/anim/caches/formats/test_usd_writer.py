@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anim.caches.storage import Memory
-from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import FormatError
 from tests.anim.caches.making import FACES, PARTS, cache, normals_of, opened, positions_of, written
 
@@ -58,7 +58,7 @@ def test_back_again(ending: str) -> None:
     assert (positions_of(back) == positions_of(source)).all()
     assert normals_of(back) == pytest.approx(normals_of(source), abs=1e-6)
     assert back.parts == PARTS
-    assert opened(written(turned(source, "z"), f"a{ending}")[0]).up == "z"
+    assert opened(written(to_up_axis(source, "z"), f"a{ending}")[0]).up == "z"
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from anim.caches.registry import CACHE_FORMATS, reader_for
-from anim.caches.sniffing import ending_of
+from anim.caches.sniffing import sniff_format
 from anim.caches.transforms import bounds
-from anim.caches.transforms.resample import at_rate, at_time, at_times
-from anim.caches.transforms.vertex_order import ordered
+from anim.caches.transforms.resample import at_rate, at_time, resample_frames
+from anim.caches.transforms.vertex_order import reorder
 from anim.errors import FormatError, RangeError, UnsupportedError
 from anim.model import MeshPart
 from tests.anim.caches.making import cache, positions_of, written
@@ -17,7 +17,7 @@ from tests.anim.caches.making import cache, positions_of, written
 
 def test_between_frames_lie_straight_lines() -> None:
     source = cache()
-    found = at_times(source, np.array([0.0, 1.5 / 30, 5.25 / 30, 9.0, 10.0]))
+    found = resample_frames(source, np.array([0.0, 1.5 / 30, 5.25 / 30, 9.0, 10.0]))
     p = positions_of(source)
     expected = np.stack((p[0], (p[1] + p[2]) / 2, 0.75 * p[5] + 0.25 * p[6], p[6], p[6]))
     assert positions_of(found) == pytest.approx(expected, abs=1e-6)
@@ -48,11 +48,11 @@ def test_one_frame() -> None:
 
 def test_blenders_order_leaves_unused_vertices_out() -> None:
     source = cache()  # vertex 8 is in no face, and part two has it
-    found = ordered(source, "blender")
+    found = reorder(source, "blender")
     assert found.vertex_count == 8
     assert (positions_of(found) == positions_of(source)[:, :8]).all()
     assert found.parts == (source.parts[0], MeshPart("two", (4, 8), (2, 4), 5, 1))
-    assert ordered(source, "file") is source
+    assert reorder(source, "file") is source
 
 
 def test_blenders_order_keeps_points() -> None:
@@ -60,7 +60,7 @@ def test_blenders_order_keeps_points() -> None:
     points = source.__class__(
         source.times, 9, source.faces[:2], source.chunks, parts=(source.parts[0], MeshPart("points", (4, 9), (2, 2)))
     )
-    assert ordered(points, "blender").vertex_count == 9
+    assert reorder(points, "blender").vertex_count == 9
 
 
 def test_bounds() -> None:
@@ -72,13 +72,13 @@ def test_bounds() -> None:
 @pytest.mark.parametrize("ending", [".npz", ".pc2", ".mdd", ".usdc", ".usda", ".glb"])
 def test_formats_are_known_by_their_first_bytes(ending: str) -> None:
     data = written(cache(), f"a{ending}")[0].files[f"a{ending}"]
-    assert ending_of(data[:64], len(data)) == ending
+    assert sniff_format(data[:64], len(data)) == ending
 
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"\0" * 40])
 def test_other_bytes_are_refused(data: bytes) -> None:
     with pytest.raises(FormatError):
-        ending_of(data, len(data))
+        sniff_format(data, len(data))
 
 
 def test_other_endings_are_refused() -> None:

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from anim.caches.formats import png
-from anim.caches.options import Writing
+from anim.caches.options import WriteOptions
 from anim.caches.storage import Memory
 from anim.caches.vat.presets import PRESETS
 from anim.errors import FormatError, RangeError, UnsupportedError
@@ -39,7 +39,7 @@ def wide() -> Any:
 @pytest.mark.parametrize(("preset", "ending", "depth"), WAYS)
 def test_back_again(preset: str, ending: str, depth: str) -> None:
     source = cache()
-    files, said = written(source, f"a{ending}", Writing(preset=preset, depth=depth))
+    files, said = written(source, f"a{ending}", WriteOptions(preset=preset, depth=depth))
     back = opened(files)
     assert back.times == pytest.approx(source.times)
     assert (back.faces == FACES).all()
@@ -101,7 +101,7 @@ def test_pillow_sees_the_high_bytes() -> None:
 
 def test_a_png_means_what_its_json_says() -> None:
     source = cache()
-    files, _ = written(source, "a.png", Writing(preset="unreal"))
+    files, _ = written(source, "a.png", WriteOptions(preset="unreal"))
     about = json.loads(files.files["a.png.json"])
     pixels = png.read(files.files["a.png"]).reshape(7, 9, 3) / 65535
     moved = np.array(about["position"]["offset"]) + np.array(about["position"]["scale"]) * pixels
@@ -117,7 +117,7 @@ def test_a_png_means_what_its_json_says() -> None:
 def test_openexr_reads_it(depth: str, dtype: type, tmp_path: Path) -> None:
     package = pytest.importorskip("OpenEXR", reason="OpenEXR is not installed")
     source = cache()
-    files, _ = written(source, "a.exr", Writing(preset="unity", depth=depth))
+    files, _ = written(source, "a.exr", WriteOptions(preset="unity", depth=depth))
     (tmp_path / "a.exr").write_bytes(files.files["a.exr"])
     with package.File(str(tmp_path / "a.exr")) as file:
         pixels = np.array(file.channels()["RGB"].pixels)
@@ -135,7 +135,7 @@ def test_the_mesh_beside_finds_its_pixels() -> None:
 
     every = []
     for preset in ("godot", "three"):
-        files, _ = written(wide(), "a.exr", Writing(preset=preset))
+        files, _ = written(wide(), "a.exr", WriteOptions(preset=preset))
         every.append(files.files["a.exr-mesh.glb"])
         gltf: Any = GLTF2().load_from_bytes(every[-1])
         accessor = gltf.accessors[gltf.meshes[0].primitives[0].attributes.TEXCOORD_1]
@@ -156,7 +156,7 @@ def test_the_same_cache_gives_the_same_bytes(ending: str) -> None:
 @pytest.mark.parametrize("preset", ["godot", "three"])
 def test_engines_that_cut_png_are_refused(preset: str) -> None:
     with pytest.raises(RangeError, match="cuts 16-bit PNG"):
-        written(cache(), "a.png", Writing(preset=preset))
+        written(cache(), "a.png", WriteOptions(preset=preset))
 
 
 def test_too_many_frames_are_refused() -> None:

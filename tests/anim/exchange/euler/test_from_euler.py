@@ -9,9 +9,9 @@ import pytest
 
 from anim.arrays import Floats
 from anim.errors import RangeError
-from anim.exchange.euler.baked_keys import Keys
+from anim.exchange.euler.baked_keys import KeyPlacement
 from anim.exchange.euler.curve import Curve, Mode, constant, evaluate, linear, uniform_modes
-from anim.exchange.euler.evaluate import rotation_at, translation_at
+from anim.exchange.euler.evaluate import evaluate_rotation, evaluate_translation
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import OFFSETS, EulerMotion, EulerNode, Pivots
 from anim.maths import euler, quaternion
@@ -30,7 +30,9 @@ def _node(
     return EulerNode("a", -1, np.zeros(3), order, frame, np.zeros(3), tuple(curves))
 
 
-def _track(node: EulerNode, tolerance: float = TOLERANCE, keys: Keys = Keys.AUTO, path: str = "rotation") -> Track:
+def _track(
+    node: EulerNode, tolerance: float = TOLERANCE, keys: KeyPlacement = KeyPlacement.AUTO, path: str = "rotation"
+) -> Track:
     clip = from_euler(EulerMotion((node,)), tolerance=tolerance, keys=keys).clip
     return next(track for track in clip.tracks if track.path == path)
 
@@ -79,7 +81,9 @@ def test_slerp_follows_the_euler_motion(order: str, frame: AxesConvention, seed:
 
 def test_a_quarter_about_two_axes_takes_17_keys_at_most() -> None:
     node = _node(_straight((0, 90), (0, 90), (0, 0)))
-    ends = Track(0, "rotation", Interpolation.LINEAR, np.array((0.0, 1.0)), rotation_at(node, np.array((0.0, 1.0))))
+    ends = Track(
+        0, "rotation", Interpolation.LINEAR, np.array((0.0, 1.0)), evaluate_rotation(node, np.array((0.0, 1.0)))
+    )
     at = np.linspace(0, 1, 4001)
     assert np.degrees(_error(ends, node, at).max()) == pytest.approx(19.47, abs=0.05)
     track = _track(node, np.radians(0.1))
@@ -138,7 +142,7 @@ def test_recordings_keep_their_grid_and_wrap() -> None:
     assert len(track.times) == 30
     assert quaternion.angle_between(track.values[1:], track.values[:-1]).max() == pytest.approx(np.radians(20))
     assert (quaternion.dot(track.values[1:], track.values[:-1]) > 0).all()
-    assert len(_track(node, keys=Keys.ADAPTIVE).times) > 30
+    assert len(_track(node, keys=KeyPlacement.ADAPTIVE).times) > 30
 
 
 def test_few_even_keys_are_no_recording() -> None:
@@ -150,7 +154,7 @@ def test_few_even_keys_are_no_recording() -> None:
 
 def test_keys_that_fall_together_in_float32_are_one() -> None:
     times = np.array((0.0, 1.0, 1.0 + 1e-9, 2.0))
-    track = _track(_node([linear(times, np.array((0.0, 0.1, 0.2, 0.2))), None, None]), keys=Keys.GRID)
+    track = _track(_node([linear(times, np.array((0.0, 0.1, 0.2, 0.2))), None, None]), keys=KeyPlacement.GRID)
     assert track.times.tolist() == [0, 1, 2]
     assert quaternion.rotation_vector(track.values)[1, 0] == pytest.approx(0.2)
 
@@ -188,7 +192,11 @@ def test_pre_and_post_rotation_and_pivots_are_fbxs() -> None:
         at = np.array([t])
         found = _moved(sample(place, at)[0]) @ _turned(sample(turn, at)[0]) @ np.diag([*node.scale, 1.0])
         np.testing.assert_allclose(found, expected, atol=2e-3)
-        exact = _moved(translation_at(node, at)[0]) @ _turned(rotation_at(node, at)[0]) @ np.diag([*node.scale, 1.0])
+        exact = (
+            _moved(evaluate_translation(node, at)[0])
+            @ _turned(evaluate_rotation(node, at)[0])
+            @ np.diag([*node.scale, 1.0])
+        )
         np.testing.assert_allclose(exact, expected, atol=1e-12)
 
 

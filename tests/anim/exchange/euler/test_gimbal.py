@@ -7,8 +7,8 @@ import pytest
 
 from anim.exchange.euler.curve import linear
 from anim.exchange.euler.from_euler import from_euler
-from anim.exchange.euler.gimbal import GimbalRow, gimbal
-from anim.exchange.euler.motion import PLAIN, EulerMotion, EulerNode, Pivots
+from anim.exchange.euler.gimbal import GimbalStats, gimbal_stats
+from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode, Pivots
 from anim.maths import quaternion
 from anim.maths.euler import ORDERS, AxesConvention, is_proper
 
@@ -19,11 +19,11 @@ def _row(
     angles: tuple[float, float, float],
     order: str = "ZXY",
     frame: AxesConvention = AxesConvention.INTRINSIC,
-    pivots: Pivots = PLAIN,
-) -> GimbalRow:
+    pivots: Pivots = NO_PIVOTS,
+) -> GimbalStats:
     curves = tuple(linear(TIMES, np.linspace(0, np.radians(a), len(TIMES))) for a in angles)
     motion = EulerMotion((EulerNode("a", -1, np.zeros(3), order, frame, np.zeros(3), curves, pivots=pivots),))
-    return gimbal(motion, from_euler(motion, tolerance=1e-3).clip)[0]
+    return gimbal_stats(motion, from_euler(motion, tolerance=1e-3).clip)[0]
 
 
 def test_a_motion_up_to_two_degrees_from_lock() -> None:
@@ -55,7 +55,7 @@ def test_lock_between_few_keys_is_found() -> None:
     motion = EulerMotion((EulerNode("a", -1, np.zeros(3), "XYZ", AxesConvention.INTRINSIC, np.zeros(3), curves),))
     clip = from_euler(motion, tolerance=1e-3).clip
     assert len(clip.tracks[0].times) == 2
-    row = gimbal(motion, clip)[0]
+    row = gimbal_stats(motion, clip)[0]
     assert row.nearest_deg < 2.1
     assert row.at_s == pytest.approx(0.75, abs=0.02)
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.euler.curve import linear
-from anim.exchange.euler.evaluate import rotation_at, scale_at, translation_at
-from anim.exchange.euler.motion import EulerMotion, EulerNode, Pivots, scaled, turned_up
+from anim.exchange.euler.evaluate import evaluate_rotation, evaluate_scale, evaluate_translation
+from anim.exchange.euler.motion import EulerMotion, EulerNode, Pivots, scale_motion, z_up_to_y_up
 from anim.maths import matrix, quaternion
 from anim.maths.euler import AxesConvention
 
@@ -32,17 +32,17 @@ def _pivoted() -> EulerNode:
 
 def _matrices(motion: EulerMotion) -> Floats:
     node = motion.nodes[0]
-    return matrix.from_trs(translation_at(node, AT), rotation_at(node, AT), scale_at(node, AT))
+    return matrix.from_trs(evaluate_translation(node, AT), evaluate_rotation(node, AT), evaluate_scale(node, AT))
 
 
 def test_scaled_makes_every_length_longer_and_nothing_else() -> None:
     motion = EulerMotion((_pivoted(),))
     expected = _matrices(motion) * [1, 1, 1, 0.01]
-    np.testing.assert_allclose(_matrices(scaled(motion, 0.01)), expected, atol=1e-12)
+    np.testing.assert_allclose(_matrices(scale_motion(motion, 0.01)), expected, atol=1e-12)
 
 
 def test_turned_up_is_a_change_of_axes() -> None:
     motion = EulerMotion((_pivoted(),))
     before = _matrices(motion)
     expected = np.concatenate((UP @ before[..., :3] @ UP.T, UP @ before[..., 3:]), axis=-1)
-    np.testing.assert_allclose(_matrices(turned_up(motion)), expected, atol=1e-12)
+    np.testing.assert_allclose(_matrices(z_up_to_y_up(motion)), expected, atol=1e-12)

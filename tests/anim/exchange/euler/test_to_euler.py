@@ -12,9 +12,9 @@ import pytest
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.exchange.euler.curve import Mode
-from anim.exchange.euler.evaluate import rest_positions, rotation_at
+from anim.exchange.euler.evaluate import evaluate_rotation, rest_positions
 from anim.exchange.euler.from_euler import from_euler
-from anim.exchange.euler.motion import Convention, EulerMotion, Unit, scaled
+from anim.exchange.euler.motion import Convention, EulerMotion, Unit, scale_motion
 from anim.exchange.euler.to_bvh_motion import to_bvh
 from anim.exchange.euler.to_euler import to_euler
 from anim.exchange.formats import bvh_reader
@@ -48,7 +48,7 @@ def _turning(seed: int = 3) -> Clip:
 def test_curves_are_the_rotation_at_every_key(order: str, frame: AxesConvention) -> None:
     clip = _turning()
     found = to_euler(ONE, clip, order=order, frame=frame)
-    made = rotation_at(found.motion.nodes[0], clip.tracks[0].times)
+    made = evaluate_rotation(found.motion.nodes[0], clip.tracks[0].times)
     assert quaternion.angle_between(made, clip.tracks[0].values).max() < 1e-6
     assert np.abs(np.diff(_values(found.motion), axis=0)).max() < 1.5 * np.pi
 
@@ -68,7 +68,7 @@ def test_keys_are_added_until_straight_curves_follow() -> None:
     clip = _turning()
     coarse, fine = to_euler(ONE, clip, order="XYZ"), to_euler(ONE, clip, order="XYZ", tolerance=0.01)
     at = np.linspace(0, 19, 5001)
-    off = quaternion.angle_between(rotation_at(fine.motion.nodes[0], at), sample(clip.tracks[0], at)).max()
+    off = quaternion.angle_between(evaluate_rotation(fine.motion.nodes[0], at), sample(clip.tracks[0], at)).max()
     assert off < 0.0101
     assert fine.deviation <= 0.01 < coarse.deviation
 
@@ -98,8 +98,8 @@ def test_there_and_back_is_the_same_clip() -> None:
 def test_bvh_there_and_back(name: str, asset: Callable[[str], Path]) -> None:
     """Angles within 1e-4° of the source's, as rotations always, as numbers (up to whole turns) away from lock."""
     first = bvh_reader.read(asset(f"bvh/{name}").read_bytes())
-    converted = from_euler(scaled(first, 0.05), tolerance=1e-3)
-    document = opened(glb_of(authoring.author(converted.skeleton, [converted.clip])))
+    converted = from_euler(scale_motion(first, 0.05), tolerance=1e-3)
+    document = opened(glb_of(authoring.build_document(converted.skeleton, [converted.clip])))
     order = first.nodes[0].order
     motion = to_bvh(reader.skeleton(document), reader.clips(document)[0], order=order, meters_per_unit=0.05)
     second = bvh_reader.read(bvh_reader.write(motion, BVH))
@@ -110,7 +110,7 @@ def test_bvh_there_and_back(name: str, asset: Callable[[str], Path]) -> None:
         if one.end:
             continue
         times = one.rotation[0].times if one.rotation[0] is not None else np.zeros(1)
-        q, p = rotation_at(one, times), rotation_at(two, times)
+        q, p = evaluate_rotation(one, times), evaluate_rotation(two, times)
         assert np.degrees(quaternion.angle_between(q, p).max()) < 1e-4
         a, b = (np.degrees(np.stack([c.values for c in n.rotation if c is not None], axis=-1)) for n in (one, two))
         free = np.degrees(euler.gimbal_distance(q, order=order)) > 10

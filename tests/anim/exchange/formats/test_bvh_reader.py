@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from anim.errors import FormatError
-from anim.exchange.euler.evaluate import extent, skeleton
+from anim.exchange.euler.evaluate import bounding_size, skeleton
 from anim.exchange.euler.from_euler import from_euler
-from anim.exchange.euler.motion import scaled, turned_up
+from anim.exchange.euler.motion import scale_motion, z_up_to_y_up
 from anim.exchange.formats import bvh_reader
 from anim.exchange.formats.bvh_reader import BvhPosition
-from anim.exchange.stick_mesh import sticks
+from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf import authoring
 from anim.gltf.reading import reader
 from anim.sampling import sample_pose, world_matrices
@@ -62,15 +62,17 @@ def test_joints_stand_where_a_plain_loop_puts_them(name: str, asset: Find) -> No
     text = asset(f"bvh/{name}").read_text()
     names, expected = world_positions(text)
     motion = bvh_reader.read(text.encode())
-    converted = from_euler(scaled(motion, 0.01), tolerance=TOLERANCE, name="clip")
-    document = authoring.author(converted.skeleton, [converted.clip], [sticks(converted.skeleton, converted.ends)])
+    converted = from_euler(scale_motion(motion, 0.01), tolerance=TOLERANCE, name="clip")
+    document = authoring.build_document(
+        converted.skeleton, [converted.clip], [stick_mesh(converted.skeleton, converted.ends)]
+    )
     written = opened(glb_of(document))
     bones, clip = reader.skeleton(written), reader.clips(written)[0]
     assert list(bones.names[: len(names)]) == names
     times = next(track.times for track in clip.tracks if track.path == "translation")
     assert len(times) == len(expected)
     found = world_matrices(bones, sample_pose(bones, clip, times))[:, : len(names), :, 3] * 100
-    height = extent(skeleton(motion))
+    height = bounding_size(skeleton(motion))
     assert np.abs(found - expected).max() < 1e-5 * height
 
 
@@ -90,7 +92,7 @@ def test_joints_stand_where_bvhio_puts_them(name: str, asset: Find, tmp_path: Pa
         root.loadPose(frame)
         for joint, _, _ in root.layout():
             found = world[frame, converted.skeleton.names.index(joint.Name)]
-            np.testing.assert_allclose(found, tuple(joint.PositionWorld), atol=1e-5 * extent(converted.skeleton))
+            np.testing.assert_allclose(found, tuple(joint.PositionWorld), atol=1e-5 * bounding_size(converted.skeleton))
 
 
 def test_frames_stand_on_their_grid(asset: Find) -> None:
@@ -175,7 +177,7 @@ def test_channels_of_any_subset_in_any_order() -> None:
 def test_z_up_becomes_y_up() -> None:
     motion = bvh_reader.read(SMALL.encode())
     times = np.array([0.0, 0.05, 0.1])
-    plain, turned = (from_euler(each, tolerance=TOLERANCE) for each in (motion, turned_up(motion)))
+    plain, turned = (from_euler(each, tolerance=TOLERANCE) for each in (motion, z_up_to_y_up(motion)))
     places = [world_matrices(c.skeleton, sample_pose(c.skeleton, c.clip, times))[..., 3] for c in (plain, turned)]
     np.testing.assert_allclose(places[1], places[0][..., [0, 2, 1]] * [1, 1, -1], atol=1e-12)
 

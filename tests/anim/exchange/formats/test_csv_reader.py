@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from anim.errors import FormatError, RangeError
-from anim.exchange.euler.convention import NOTHING, Stated
+from anim.exchange.euler.convention import UNSPECIFIED, PartialConvention
 from anim.exchange.euler.curve import Curve, Mode
 from anim.exchange.euler.motion import Convention, EulerNode, Unit
 from anim.exchange.formats import csv_reader
 from anim.maths.euler import AxesConvention
 
-XYZ = Stated("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)
+XYZ = PartialConvention("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)
 
 FRAMES = """# order=ZXY frame=intrinsic unit=deg meters_per_unit=0.01
 #node,hips,,0,90,0
@@ -34,7 +34,7 @@ arm,rx,2,0,,-90,,,
 """
 
 
-def _node(data: str, name: str, options: Stated = NOTHING) -> EulerNode:
+def _node(data: str, name: str, options: PartialConvention = UNSPECIFIED) -> EulerNode:
     return next(node for node in csv_reader.read(data.encode(), options).nodes if node.name == name)
 
 
@@ -70,7 +70,7 @@ def test_keys_with_modes_and_tangents() -> None:
 
 
 def test_keys_before_zero_come_later_all_by_as_much() -> None:
-    frames = csv_reader.read(FRAMES.replace("\n0,90", "\n-0.25,90").encode(), NOTHING)
+    frames = csv_reader.read(FRAMES.replace("\n0,90", "\n-0.25,90").encode(), UNSPECIFIED)
     np.testing.assert_allclose(_curve(frames.nodes[0].rotation[0]).times, (0, 0.75, 1.25))
     np.testing.assert_allclose(_curve(frames.nodes[1].rotation[2]).times, (0, 1.25))
     keys = csv_reader.read(KEYS.replace("arm,rx,0", "arm,rx,-2").encode(), XYZ)
@@ -80,17 +80,19 @@ def test_keys_before_zero_come_later_all_by_as_much() -> None:
 
 
 def test_proper_orders_number_their_angles() -> None:
-    arm = _node("time,a.r1,a.r2,a.r3\n0,1,2,3\n1,4,5,6\n", "a", Stated("ZXZ", AxesConvention.INTRINSIC, Unit.RAD))
+    arm = _node(
+        "time,a.r1,a.r2,a.r3\n0,1,2,3\n1,4,5,6\n", "a", PartialConvention("ZXZ", AxesConvention.INTRINSIC, Unit.RAD)
+    )
     assert [_curve(c).values[0] for c in arm.rotation] == [1, 2, 3]
     with pytest.raises(FormatError, match="line 1: axis 'z' has no single place in order ZXZ"):
-        csv_reader.read(b"time,a.rz\n0,1\n", Stated("ZXZ", AxesConvention.INTRINSIC, Unit.RAD))
+        csv_reader.read(b"time,a.rz\n0,1\n", PartialConvention("ZXZ", AxesConvention.INTRINSIC, Unit.RAD))
 
 
 @pytest.mark.parametrize("text", [FRAMES, KEYS])
 def test_what_is_written_is_read_as_the_same(text: str) -> None:
-    motion = csv_reader.read(text.encode(), XYZ if text is KEYS else NOTHING)
+    motion = csv_reader.read(text.encode(), XYZ if text is KEYS else UNSPECIFIED)
     node = motion.nodes[0]
-    again = csv_reader.read(csv_reader.write(motion, Convention(node.order, node.frame, Unit.RAD)), NOTHING)
+    again = csv_reader.read(csv_reader.write(motion, Convention(node.order, node.frame, Unit.RAD)), UNSPECIFIED)
     for one, two in zip(motion.nodes, again.nodes, strict=True):
         assert (one.name, one.parent, one.order, one.frame) == (two.name, two.parent, two.order, two.frame)
         np.testing.assert_allclose(two.translation, one.translation, atol=1e-9)
@@ -107,7 +109,8 @@ def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
     motion = csv_reader.read(KEYS.encode(), XYZ)
     nodes = (replace(motion.nodes[0], name="#1"), *motion.nodes[1:])
     again = csv_reader.read(
-        csv_reader.write(replace(motion, nodes=nodes), Convention("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)), NOTHING
+        csv_reader.write(replace(motion, nodes=nodes), Convention("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)),
+        UNSPECIFIED,
     )
     assert again.nodes[0].name == "#1"
     curves = [[curve is not None for curve in each.nodes[0].rotation] for each in (motion, again)]
@@ -118,13 +121,13 @@ def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
 @pytest.mark.parametrize(
     ("stated", "problem"),
     [
-        (NOTHING, "nobody says the order"),
-        (Stated("XYZ"), "nobody says the frame"),
-        (Stated("XYZ", AxesConvention.INTRINSIC), "nobody says the unit"),
-        (Stated("XXZ", AxesConvention.INTRINSIC, Unit.DEG), "order is 'XXZ'"),
+        (UNSPECIFIED, "nobody says the order"),
+        (PartialConvention("XYZ"), "nobody says the frame"),
+        (PartialConvention("XYZ", AxesConvention.INTRINSIC), "nobody says the unit"),
+        (PartialConvention("XXZ", AxesConvention.INTRINSIC, Unit.DEG), "order is 'XXZ'"),
     ],
 )
-def test_the_convention_is_never_guessed(stated: Stated, problem: str) -> None:
+def test_the_convention_is_never_guessed(stated: PartialConvention, problem: str) -> None:
     with pytest.raises(RangeError, match=problem):
         csv_reader.read(KEYS.encode(), stated)
 
@@ -134,7 +137,7 @@ def test_the_convention_in_a_persons_spelling() -> None:
     loose = FRAMES.replace("order=ZXY frame=intrinsic", "Order = zxy, FRAME = Intrinsic,").replace("#node", "# node")
     assert loose != FRAMES
     for text in (loose.encode(), FRAMES.encode("utf-16"), FRAMES.replace("\n", "\r").encode()):
-        motion = csv_reader.read(text, NOTHING)
+        motion = csv_reader.read(text, UNSPECIFIED)
         assert [(n.name, n.parent, n.order, n.frame) for n in motion.nodes] == [
             ("hips", -1, "ZXY", AxesConvention.INTRINSIC),
             ("spine, lower", 0, "ZXY", AxesConvention.INTRINSIC),
@@ -177,7 +180,7 @@ def test_two_conventions_are_refused() -> None:
 def test_a_fault_is_told_with_its_line(old: str, new: str, problem: str) -> None:
     assert old in FRAMES
     with pytest.raises(FormatError, match=problem):
-        csv_reader.read(FRAMES.replace(old, new, 1).encode(), NOTHING)
+        csv_reader.read(FRAMES.replace(old, new, 1).encode(), UNSPECIFIED)
 
 
 @pytest.mark.parametrize(

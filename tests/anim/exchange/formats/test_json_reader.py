@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anim.errors import FormatError, RangeError
-from anim.exchange.euler.convention import NOTHING, Stated
+from anim.exchange.euler.convention import UNSPECIFIED, PartialConvention
 from anim.exchange.euler.curve import Mode
 from anim.exchange.euler.motion import Convention, Unit
 from anim.exchange.formats import json_reader
@@ -49,7 +49,7 @@ CURVES: dict[str, Any] = {
 }
 
 
-def _read(content: dict[str, Any], options: Stated = NOTHING) -> Any:
+def _read(content: dict[str, Any], options: PartialConvention = UNSPECIFIED) -> Any:
     return json_reader.read(plain_json.dumps(content).encode(), options)
 
 
@@ -83,7 +83,9 @@ def test_what_is_written_is_read_as_the_same() -> None:
     for key in ("pre_rotation", "post_rotation", "rotation_pivot"):
         del content["nodes"][0][key]
     motion = _read(content)
-    again = json_reader.read(json_reader.write(motion, Convention("XYZ", AxesConvention.EXTRINSIC, Unit.RAD)), NOTHING)
+    again = json_reader.read(
+        json_reader.write(motion, Convention("XYZ", AxesConvention.EXTRINSIC, Unit.RAD)), UNSPECIFIED
+    )
     one, two = motion.nodes[1], again.nodes[1]
     np.testing.assert_allclose(two.angles, one.angles)
     for a, b in zip([*one.rotation[:2], one.moves[2]], [*two.rotation[:2], two.moves[2]], strict=True):
@@ -140,7 +142,7 @@ def test_a_fault_is_told_with_its_place(path: str, value: object, problem: str) 
 def test_a_number_beyond_any_float_is_refused() -> None:
     content = plain_json.dumps(_changed("nodes/0/curves/rotation.x/values", [0, 7.25])).replace("7.25", "1e999")
     with pytest.raises(FormatError, match=r"values holds a number beyond 1e\+15"):
-        json_reader.read(content.encode(), NOTHING)
+        json_reader.read(content.encode(), UNSPECIFIED)
 
 
 def test_the_convention_is_never_guessed() -> None:
@@ -148,11 +150,11 @@ def test_the_convention_is_never_guessed() -> None:
     del content["frame"]
     with pytest.raises(RangeError, match="nobody says the frame"):
         _read(content)
-    assert _read(content, Stated(frame=AxesConvention.INTRINSIC)).nodes[1].frame == AxesConvention.INTRINSIC
+    assert _read(content, PartialConvention(frame=AxesConvention.INTRINSIC)).nodes[1].frame == AxesConvention.INTRINSIC
     with pytest.raises(RangeError, match="the file says order XYZ, the options say YXZ"):
-        _read(content, Stated("YXZ", AxesConvention.INTRINSIC))
+        _read(content, PartialConvention("YXZ", AxesConvention.INTRINSIC))
 
 
 def test_broken_json_has_line_and_column() -> None:
     with pytest.raises(FormatError, match="line 2, column"):
-        json_reader.read(b'{"schema":\n oops}', NOTHING)
+        json_reader.read(b'{"schema":\n oops}', UNSPECIFIED)

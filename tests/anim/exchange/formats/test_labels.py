@@ -7,7 +7,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anim.exchange.formats.labels import label_of, labels, left_out, unique
+from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from tests.clips import skeleton, track
 
 
@@ -37,6 +37,6 @@ def test_what_is_left_out_is_one_note() -> None:
     words = [label_of(track("scale", [0], [[1, 1, 1]], node=node), "abcde") for node in range(5)]
     words.append(label_of(track("/materials/0/alphaCutoff", [0], [[1]]), "a"))
     assert words[-1] == "/materials/0/alphaCutoff"
-    assert left_out(words) == ("left out: scale of 'a', scale of 'b', scale of 'c' and 3 more",)
-    assert left_out(words[:1]) == ("left out: scale of 'a'",)
-    assert left_out([]) == ()
+    assert skipped_note(words) == ("left out: scale of 'a', scale of 'b', scale of 'c' and 3 more",)
+    assert skipped_note(words[:1]) == ("left out: scale of 'a'",)
+    assert skipped_note([]) == ()

@@ -11,7 +11,7 @@ from anim.errors import NotFoundError
 from anim.exchange.euler.curve import linear
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import EulerMotion, EulerNode
-from anim.exchange.retarget.apply import onto
+from anim.exchange.retarget.apply import apply_to_character
 from anim.gltf import authoring
 from anim.gltf.reading import reader
 from anim.maths.euler import AxesConvention
@@ -34,7 +34,7 @@ def test_curves_without_a_hierarchy_are_the_nodes_own() -> None:
     curve = linear(np.array((0.0, 1.0)), np.array((0.0, 0.5)))
     node = EulerNode("tail2", -1, np.zeros(3), "Z", AxesConvention.INTRINSIC, np.zeros(1), (curve,))
     source = from_euler(EulerMotion((node,), nested=False), tolerance=1e-4)
-    done = onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=False)
+    done = apply_to_character(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=False)
     assert [(track.node, track.path) for track in done.clip.tracks] == [(1, "rotation")]
 
 
@@ -44,9 +44,9 @@ def test_strangers_are_refused() -> None:
     )
     source = from_euler(EulerMotion((node,)), tolerance=1e-4)
     with pytest.raises(NotFoundError, match="no joint of the motion"):
-        onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True)
+        apply_to_character(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True)
     with pytest.raises(NotFoundError, match="the character has no nodes"):
-        onto(source, Scene(skeleton([]), ()), aliases={}, nested=True)
+        apply_to_character(source, Scene(skeleton([]), ()), aliases={}, nested=True)
 
 
 def test_the_example_pairs_the_topmost_joints() -> None:
@@ -56,7 +56,7 @@ def test_the_example_pairs_the_topmost_joints() -> None:
     source = from_euler(EulerMotion((node,)), tolerance=1e-4)
     character = replace(skeleton([1, -1]), names=("socket", "body"))
     with pytest.raises(NotFoundError) as caught:
-        onto(source, Scene(character, ()), aliases={}, nested=True)
+        apply_to_character(source, Scene(character, ()), aliases={}, nested=True)
     assert caught.value.help.endswith("'wing,body'")
 
 

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from anim.arrays import Floats
-from anim.exchange.retarget.apply import onto
+from anim.exchange.retarget.apply import apply_to_character
 from anim.exchange.retarget.bind_pose import bind_pose
-from anim.exchange.retarget.retarget import Floor
+from anim.exchange.retarget.retarget import GroundMode
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.model import Pose, Scene, Skeleton, Skin
@@ -170,7 +170,7 @@ def test_a_recording_moves_them_alike(build: Callable[[Rig], Rig], asset: Find) 
     instances = tuple(replace(instance, node=holder, skin=skin) for holder, skin in skins)
     source = recorded("freebvh.bvh", asset)
     clean, other = (
-        onto(source, Scene(each, instances), aliases={}, nested=True, floor=Floor.KEEP).clip
+        apply_to_character(source, Scene(each, instances), aliases={}, nested=True, floor=GroundMode.KEEP).clip
         for each in (bones, dancing)
     )
     joints, times = skins[0][1].joints, clean.tracks[0].times

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.exchange.retarget.ground_contact import heights_above_contact
+from anim.exchange.retarget.ground_contact import ground_offset
 
 TIMES = np.arange(121) / 60
 HEAD = np.full(121, 1.0)
@@ -20,7 +20,7 @@ def _steps(left: float, right: float, lift: float = 0.2) -> Floats:
 
 def _lowered(source: Floats, target: Floats, scale: float = 1.0) -> Floats:
     feet = [np.array([0]), np.array([1])]
-    return heights_above_contact(TIMES, source, feet, target, 0.0, scale)
+    return ground_offset(TIMES, source, feet, target, 0.0, scale)
 
 
 @pytest.mark.parametrize("uneven", [0.0, 0.02, 0.035])

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.exchange.euler.convention import Stated
-from anim.exchange.euler.from_euler import Converted, from_euler
-from anim.exchange.euler.motion import Convention, Unit, scaled
+from anim.exchange.euler.convention import PartialConvention
+from anim.exchange.euler.from_euler import ImportedMotion, from_euler
+from anim.exchange.euler.motion import Convention, Unit, scale_motion
 from anim.exchange.euler.to_bvh_motion import to_bvh
 from anim.exchange.euler.to_euler import to_euler
 from anim.exchange.formats import bvh_reader, json_reader
-from anim.exchange.retarget.apply import onto
-from anim.exchange.retarget.bind_pose import bind_pose, completed
+from anim.exchange.retarget.apply import apply_to_character
+from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.maths.euler import AxesConvention
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene, Skeleton, Skin
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, recorded
@@ -46,17 +46,17 @@ def _skins(scene: Scene) -> list[tuple[int, Skin]]:
     return [(each.node, each.skin) for each in scene.instances if each.skin is not None]
 
 
-def _written(scene: Scene, clip: Clip, kind: str, fps: float | None) -> Converted:
+def _written(scene: Scene, clip: Clip, kind: str, fps: float | None) -> ImportedMotion:
     """A clip through the bytes of a file."""
     bones = bind_pose(scene.skeleton, _skins(scene)).skeleton
-    clip = completed(clip, scene.skeleton, bones)
+    clip = fill_from_parents(clip, scene.skeleton, bones)
     if kind == "json":
         curves = to_euler(bones, clip, order="ZXY", fps=fps).motion
-        motion = json_reader.read(json_reader.write(curves, CONVENTION), Stated())
+        motion = json_reader.read(json_reader.write(curves, CONVENTION), PartialConvention())
     else:
         joints = {int(node) for each in scene.instances if each.skin is not None for node in each.skin.joints}
         curves = to_bvh(bones, clip, order="ZXY", fps=fps, joints=joints, meters_per_unit=CENTIMETERS)
-        motion = scaled(bvh_reader.read(bvh_reader.write(curves, CONVENTION)), CENTIMETERS)
+        motion = scale_motion(bvh_reader.read(bvh_reader.write(curves, CONVENTION)), CENTIMETERS)
     return from_euler(motion, tolerance=TOLERANCE, name=clip.name)
 
 
@@ -71,8 +71,8 @@ def _error(scene: Scene, clip: Clip, kind: str, fps: float | None) -> float:
 
     A BVH has the joints at its frames, and not what other nodes do between frames: those are the times looked at.
     """
-    done = onto(_written(scene, clip, kind, fps), scene, aliases={}, nested=True)
-    ruler = Ruler(scene)
+    done = apply_to_character(_written(scene, clip, kind, fps), scene, aliases={}, nested=True)
+    ruler = ErrorMetric(scene)
     if kind == "bvh":
         times = np.unique(np.concatenate([each.times for each in done.clip.tracks]))
         found = ruler.error_at(_from_zero(clip), done.clip, times)
@@ -122,7 +122,7 @@ def test_a_figure_placed_elsewhere_does_the_same(name: str, kind: str, asset: Fi
     scene, clip = reader.scene(document), reader.clips(document)[3]
     source = _written(scene, clip, kind, FPS.get(name))
     placed = _under(scene.skeleton, ASIDE, TURNED, 2.0)
-    done = onto(source, replace(scene, skeleton=placed), aliases={}, nested=True)
+    done = apply_to_character(source, replace(scene, skeleton=placed), aliases={}, nested=True)
     times = done.clip.tracks[0].times
     expected, found = (world_matrices(placed, sample_pose(placed, each, times)) for each in (clip, done.clip))
     np.testing.assert_allclose(found[..., 3], expected[..., 3], atol=2 * MAX_ERROR_M)
@@ -137,7 +137,7 @@ def test_a_figure_of_another_size_does_the_same(factor: float, asset: Find) -> N
     bones = scene.skeleton
     other = replace(bones, translation=factor * bones.translation, names=tuple(f"Rig:{n}" for n in bones.names))
     target = Scene(other, tuple(replace(each, skin=_bound(each.skin, factor)) for each in scene.instances))
-    done = onto(_written(scene, clip, "json", 30), target, aliases={}, nested=True)
+    done = apply_to_character(_written(scene, clip, "json", 30), target, aliases={}, nested=True)
     assert done.scale == pytest.approx(factor, rel=1e-6)
     times = done.clip.tracks[0].times
     expected = world_matrices(bones, sample_pose(bones, clip, times))
@@ -178,7 +178,8 @@ def test_nodes_that_rest_in_a_dance_are_no_rest(name: str, asset: Find) -> None:
     assert bind_pose(dancing, _skins(scene)).num_joints > 3
     source = recorded("freebvh.bvh", asset)
     clean, other = (
-        onto(source, replace(scene, skeleton=each), aliases={}, nested=True).clip for each in (scene.skeleton, dancing)
+        apply_to_character(source, replace(scene, skeleton=each), aliases={}, nested=True).clip
+        for each in (scene.skeleton, dancing)
     )
     joints = _skins(scene)[0][1].joints
     times = clean.tracks[0].times

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.exchange.euler.convention import Stated
-from anim.exchange.euler.from_euler import Converted, from_euler
+from anim.exchange.euler.convention import PartialConvention
+from anim.exchange.euler.from_euler import ImportedMotion, from_euler
 from anim.exchange.euler.motion import Convention, Unit
 from anim.exchange.euler.to_euler import to_euler
 from anim.exchange.formats import json_reader
-from anim.exchange.retarget.apply import onto
+from anim.exchange.retarget.apply import apply_to_character
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
@@ -43,10 +43,10 @@ def _wave(joints: int) -> Clip:
     return Clip("wave", (*turns, track("translation", TIMES, 0.3 * np.sin(phases), node=1)))
 
 
-def _written(skeleton: Skeleton, clip: Clip) -> Converted:
+def _written(skeleton: Skeleton, clip: Clip) -> ImportedMotion:
     curves = to_euler(skeleton, clip, order="XYZ").motion
     motion = json_reader.read(
-        json_reader.write(curves, Convention("XYZ", AxesConvention.INTRINSIC, Unit.DEG)), Stated()
+        json_reader.write(curves, Convention("XYZ", AxesConvention.INTRINSIC, Unit.DEG)), PartialConvention()
     )
     return from_euler(motion, tolerance=1e-3, name=clip.name)
 
@@ -72,7 +72,7 @@ PLACED: dict[str, tuple[Floats, Floats, Floats, float]] = {  # at, turn, scale o
 @pytest.mark.parametrize("joints", [1, 2, 6])
 def test_a_straight_tail_does_the_same(joints: int, placed: str) -> None:
     skeleton = _tail(joints, *PLACED[placed])
-    done = onto(_written(skeleton, _wave(joints)), Scene(skeleton, ()), aliases={}, nested=True)
+    done = apply_to_character(_written(skeleton, _wave(joints)), Scene(skeleton, ()), aliases={}, nested=True)
     assert done.lowered == (0, 0)
     assert _error(skeleton, _wave(joints), done.clip) < MAX_ERROR_M
 
@@ -82,7 +82,7 @@ def test_a_straight_fixture_does_the_same(name: str) -> None:
     document = opened_fixture(name)
     scene = reader.scene(document)
     for clip in reader.clips(document):
-        done = onto(_written(scene.skeleton, clip), scene, aliases={}, nested=True)
+        done = apply_to_character(_written(scene.skeleton, clip), scene, aliases={}, nested=True)
         assert _error(scene.skeleton, clip, done.clip) < MAX_ERROR_M, clip.name
 
 
@@ -91,6 +91,6 @@ def test_a_straight_tail_placed_elsewhere_does_the_same() -> None:
     skeleton = _tail(6, *PLACED["as it is"])
     down = np.array((np.sin(0.6), 0, 0, np.cos(0.6)))
     placed = _tail(6, np.array((5.0, 3, -2)), down, 2 * ONES, 0.25)
-    done = onto(_written(skeleton, _wave(6)), Scene(placed, ()), aliases={}, nested=True)
+    done = apply_to_character(_written(skeleton, _wave(6)), Scene(placed, ()), aliases={}, nested=True)
     assert done.scale == pytest.approx(2)
     assert _error(placed, _wave(6), done.clip) < MAX_ERROR_M

@@ -8,10 +8,10 @@ import pytest
 
 from anim.errors import FormatError, NotFoundError
 from anim.exchange.retarget import aliases
-from anim.exchange.retarget.joint_matching import Matching, match
-from anim.exchange.retarget.joint_names import Name, plain
-from anim.exchange.retarget.joint_roles import MIDDLE, SIDED, roles
-from anim.exchange.retarget.vrm_humanoid import stated_roles
+from anim.exchange.retarget.joint_matching import JointMatch, match_joints
+from anim.exchange.retarget.joint_names import JointName, normalize_names
+from anim.exchange.retarget.joint_roles import MIDDLE, SIDED, joint_roles
+from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
 from tests.anim.exchange.figures import Find
 from tests.files import opened_path
 
@@ -55,8 +55,8 @@ PEOPLE = {"cmu": CMU, "biped": BIPED, "kaykit": KAYKIT, "mixamo": MIXAMO, "unrea
 LIMBS = {f"{side}_{role}" for side in ("left", "right") for role in SIDED if role != "shoulder"}
 
 
-def _match(source: tuple[str, ...], target: tuple[str, ...], **names: str) -> Matching:
-    return match(source, target, aliases=names, of_source=range(len(source)), of_target=range(len(target)))
+def _match(source: tuple[str, ...], target: tuple[str, ...], **names: str) -> JointMatch:
+    return match_joints(source, target, aliases=names, of_source=range(len(source)), of_target=range(len(target)))
 
 
 def _pairs(source: tuple[str, ...], target: tuple[str, ...]) -> dict[str, str]:
@@ -77,18 +77,22 @@ def _pairs(source: tuple[str, ...], target: tuple[str, ...]) -> dict[str, str]:
     ],
 )
 def test_a_name_is_taken_apart(name: str, side: str, stem: str) -> None:
-    assert plain([name]) == [Name(side, stem)]
+    assert normalize_names([name]) == [JointName(side, stem)]
 
 
 def test_a_shared_prefix_goes() -> None:
-    assert plain(BIPED)[10] == Name("left", "thigh")
-    assert plain(["left_arm", "left_leg", "left_foot"])[0] == Name("left", "arm")
-    assert plain(["Tail.1", "Tail.2", "Tail.L"]) == [Name("", "tail1"), Name("", "tail2"), Name("left", "tail")]
+    assert normalize_names(BIPED)[10] == JointName("left", "thigh")
+    assert normalize_names(["left_arm", "left_leg", "left_foot"])[0] == JointName("left", "arm")
+    assert normalize_names(["Tail.1", "Tail.2", "Tail.L"]) == [
+        JointName("", "tail1"),
+        JointName("", "tail2"),
+        JointName("left", "tail"),
+    ]
 
 
 @pytest.mark.parametrize("names", PEOPLE.values(), ids=PEOPLE)
 def test_the_joints_of_a_person_are_found(names: tuple[str, ...]) -> None:
-    found = roles(plain(names), range(len(names)))
+    found = joint_roles(normalize_names(names), range(len(names)))
     assert found.keys() >= LIMBS | {"hips", "chest", "head"}
     assert "spine" in found or names is BITMOJI  # whose second is the chest
     assert len(set(found.values())) == len(found)
@@ -100,19 +104,19 @@ def test_cmu_fits_each(target: tuple[str, ...]) -> None:
     pairs = _pairs(CMU, target)
     assert len(pairs) >= 18
     assert len(set(pairs.values())) == len(pairs)
-    assert plain(target)[target.index(pairs["LeftLeg"])].side == "left"
+    assert normalize_names(target)[target.index(pairs["LeftLeg"])].side == "left"
     assert _match(CMU, target).unmatched
 
 
 def test_names_of_the_deforming_joints_are_taken() -> None:
-    found = roles(plain(SKETCHFAB), range(len(SKETCHFAB)))
+    found = joint_roles(normalize_names(SKETCHFAB), range(len(SKETCHFAB)))
     assert {SKETCHFAB[node][:4] for node in found.values()} == {"DEF-"}
     assert SKETCHFAB[found["left_upper_leg"]].startswith("DEF-thigh.L_")
     assert RIGIFY[found["hips"]] == "DEF-spine"
 
 
 def test_numbers_that_tell_joints_apart_stay() -> None:
-    assert plain(["Tail_01", "Tail_02", "Tail_03"]) == [Name("", f"tail{i}") for i in (1, 2, 3)]
+    assert normalize_names(["Tail_01", "Tail_02", "Tail_03"]) == [JointName("", f"tail{i}") for i in (1, 2, 3)]
 
 
 NAMED_BADLY = ("a", "b", "LeftHand", "d")
@@ -128,10 +132,10 @@ NAMED_BADLY = ("a", "b", "LeftHand", "d")
     ids=["0.x", "1.0", "animation"],
 )
 def test_stated_roles_win_over_names(extensions: dict[str, Any]) -> None:
-    stated = stated_roles({"nodes": [{}] * 4, "extensions": extensions})
+    stated = read_vrm_roles({"nodes": [{}] * 4, "extensions": extensions})
     assert stated == {"hips": 1, "left_upper_arm": 2}
     source = ("Hips", "LeftArm", "LeftHand")
-    found = match(source, NAMED_BADLY, aliases={}, of_source=range(3), of_target=range(4), stated=stated)
+    found = match_joints(source, NAMED_BADLY, aliases={}, of_source=range(3), of_target=range(4), stated=stated)
     assert found.pairs == {0: 1, 1: 2}
     assert found.target_roles == {"hips": 1, "left_upper_arm": 2}
 
@@ -139,13 +143,13 @@ def test_stated_roles_win_over_names(extensions: dict[str, Any]) -> None:
 @pytest.mark.parametrize("bones", [3, [4], {"hips": 1}, {"hips": {"node": 9}}, {"hips": {"node": True}}, None])
 def test_what_is_no_humanoid_states_nothing(bones: Any) -> None:
     extensions = {"VRMC_vrm": {"humanoid": {"humanBones": bones}}}
-    assert stated_roles({"nodes": [{}], "extensions": extensions}) == {}
+    assert read_vrm_roles({"nodes": [{}], "extensions": extensions}) == {}
 
 
 @pytest.mark.parametrize("name", ["vrm/Godette.vrm", "vrm/test.vrma"])
 def test_real_files_state_a_whole_person(name: str, asset: Find) -> None:
     json = opened_path(asset(name)).json
-    stated = stated_roles(json)
+    stated = read_vrm_roles(json)
     assert stated.keys() >= LIMBS - {"left_toe", "right_toe"} | {"hips", "spine", "chest", "neck", "head"}
     assert len(set(stated.values())) == len(stated)
 
@@ -162,7 +166,7 @@ def test_the_parts_of_a_limb_are_told_apart() -> None:
 def test_joints_of_the_skin_come_before_other_nodes() -> None:
     target = ("Hips", "rig:pelvis", "LeftFoot", "foot.l")
     source = ("Hips", "LeftFoot", "RightFoot")
-    found = match(source, target, aliases={}, of_source=range(3), of_target=(1,), others=(0, 2, 3))
+    found = match_joints(source, target, aliases={}, of_source=range(3), of_target=(1,), others=(0, 2, 3))
     assert found.pairs == {0: 1, 1: 2}
 
 

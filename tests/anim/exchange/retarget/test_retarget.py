@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.exchange.euler.from_euler import Converted, from_euler
+from anim.exchange.euler.from_euler import ImportedMotion, from_euler
 from anim.exchange.euler.motion import Convention, Unit
 from anim.exchange.euler.to_bvh_motion import to_bvh
 from anim.exchange.formats import bvh_reader
-from anim.exchange.retarget.apply import onto
-from anim.exchange.retarget.retarget import Floor
+from anim.exchange.retarget.apply import apply_to_character
+from anim.exchange.retarget.retarget import GroundMode
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
@@ -114,12 +114,15 @@ def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
     """Frame 0 of this recording is the pose of all zeros, but for legs and thumbs: for the others nothing changes."""
     source, document = recorded("cmu_01_01.bvh", asset), character("biped", asset)
     scene = reader.scene(document)
-    one, two = (onto(source, scene, aliases={}, nested=True, floor=Floor.KEEP, rest_at=at).clip for at in (None, 0.0))
+    one, two = (
+        apply_to_character(source, scene, aliases={}, nested=True, floor=GroundMode.KEEP, rest_at=at).clip
+        for at in (None, 0.0)
+    )
     for a, b in zip(one.tracks, two.tracks, strict=True):
         name = scene.skeleton.names[a.node or 0]
         if not name.endswith(("leg", "foot", "toe")):
             np.testing.assert_allclose(b.values, a.values, atol=1e-6, err_msg=name)
-    turned = onto(source, scene, aliases={}, nested=True, floor=Floor.KEEP, rest_at=5.0).clip
+    turned = apply_to_character(source, scene, aliases={}, nested=True, floor=GroundMode.KEEP, rest_at=5.0).clip
     bones = scene.skeleton
     hips = bones.names.index("hips")
     at_rest = sample_pose(bones, turned, np.array([5.0])).rotation[0, hips]
@@ -129,7 +132,7 @@ def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
 def test_feet_that_are_flat_stay_flat(asset: Find) -> None:
     """In CMU's rest pose, frame 0 turned off, the biped stands with its soles down although its foot slopes more."""
     source, document = recorded("cmu_01_01.bvh", asset), character("biped", asset)
-    still = Converted(source.skeleton, Clip("rest", source.clip.tracks[:1]), source.ends)
+    still = ImportedMotion(source.skeleton, Clip("rest", source.clip.tracks[:1]), source.ends)
     done = put_on(document, still, {})
     bones = reader.skeleton(document)
     foot = bones.names.index("left_foot")
@@ -143,7 +146,7 @@ def test_a_characters_own_motion_comes_back(asset: Find) -> None:
     bones, walk = reader.skeleton(document), reader.clips(document)[0]
     joints = set(document.json["skins"][0]["joints"])
     text = bvh_reader.write(to_bvh(bones, walk, order="YZX", joints=joints, fps=30), BVH)
-    done = put_on(document, from_euler(bvh_reader.read(text), tolerance=1e-3), {}, Floor.KEEP)
+    done = put_on(document, from_euler(bvh_reader.read(text), tolerance=1e-3), {}, GroundMode.KEEP)
     assert not done.matching.unmatched
     times = np.arange(int(walk.end * 30)) / 30
     before, after = (world_matrices(bones, sample_pose(bones, clip, times))[..., 3] for clip in (walk, done.clip))

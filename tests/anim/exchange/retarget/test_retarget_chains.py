@@ -12,8 +12,8 @@ from anim.errors import RangeError
 from anim.exchange.euler.curve import Curve, Mode, linear, uniform_modes
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import EulerMotion, EulerNode
-from anim.exchange.retarget.apply import onto
-from anim.exchange.retarget.retarget import Floor
+from anim.exchange.retarget.apply import apply_to_character
+from anim.exchange.retarget.retarget import GroundMode
 from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
@@ -41,7 +41,7 @@ def test_other_chains_point_alike() -> None:
     )
     source = from_euler(EulerMotion(nodes), tolerance=1e-4)
     target = tail(quaternion.from_rotation_vector(np.array((0, 1.2, 0))))
-    done = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP)
+    done = apply_to_character(source, Scene(target, ()), aliases={}, nested=True, floor=GroundMode.KEEP)
     one, two = (
         world_matrices(bones, sample_pose(bones, clip, np.array((0.5,))))[0, :, :, 3]
         for bones, clip in ((source.skeleton, source.clip), (target, done.clip))
@@ -71,7 +71,7 @@ def test_keys_between_keys_keep_the_tolerance() -> None:
     )
     source = from_euler(EulerMotion(nodes), tolerance=tolerance)
     target = tail(quaternion.from_rotation_vector(np.array((0, 0, 0.0))))
-    clip = onto(source, Scene(target, ()), aliases={}, nested=True, floor=Floor.KEEP).clip
+    clip = apply_to_character(source, Scene(target, ()), aliases={}, nested=True, floor=GroundMode.KEEP).clip
     joint, at = target.names.index("tail2"), np.linspace(0, 4, 3001)
 
     def wanted(times: Floats) -> Floats:
@@ -91,15 +91,17 @@ def test_a_motion_of_days_is_not_looked_through_for_contacts() -> None:
     source = from_euler(EulerMotion((replace(_keyed("tail1", -1), rotation=turning),)), tolerance=1e-3)
     target = Scene(tail(np.array((0, 0, 0, 1.0))), ())
     with pytest.raises(RangeError, match="the motion lasts 200000 s: too long"):
-        onto(source, target, aliases={}, nested=True)
-    clip = onto(source, target, aliases={}, nested=True, floor=Floor.KEEP).clip
+        apply_to_character(source, target, aliases={}, nested=True)
+    clip = apply_to_character(source, target, aliases={}, nested=True, floor=GroundMode.KEEP).clip
     assert clip.end == days[1]
 
 
 def test_steps_stay_steps() -> None:
     nodes = [_keyed("tail1", -1, (0, 80, 0), (0, 0, 0), (0, 0, 0), mode=Mode.STEP)]
     source = from_euler(EulerMotion(tuple(nodes)), tolerance=1e-3)
-    clip = onto(source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True, floor=Floor.KEEP).clip
+    clip = apply_to_character(
+        source, Scene(tail(np.array((0, 0, 0, 1.0))), ()), aliases={}, nested=True, floor=GroundMode.KEEP
+    ).clip
     turn = next(track for track in clip.tracks if track.path == "rotation")
     before, after = sample(turn, np.array((1.999, 2.001)))
     assert quaternion.angle_between(before, np.array((0, 0, 0, 1.0))) < 1e-6
@@ -114,7 +116,7 @@ def test_steps_are_exact_at_frames(fps: int) -> None:
     steps = replace(steps, modes=uniform_modes(len(times), Mode.STEP))
     node = replace(_keyed("tail1", -1), rotation=(steps, *[linear(times[:1], np.zeros(1))] * 2))
     source = from_euler(EulerMotion((node,)), tolerance=1e-3)
-    clip = onto(source, Scene(figure, ()), aliases={}, nested=True, floor=Floor.KEEP).clip
+    clip = apply_to_character(source, Scene(figure, ()), aliases={}, nested=True, floor=GroundMode.KEEP).clip
     (before,), (after,) = ([t for t in each.tracks if t.path == "rotation"] for each in (source.clip, clip))
     assert before.interpolation is after.interpolation is Interpolation.STEP
     frames = key_times(frame_times(clip.start, clip.end, fps=fps))
@@ -129,6 +131,6 @@ def test_the_path_begins_from_where_the_character_stands() -> None:
     here, there = (
         sample_pose(each, clip, np.zeros(1)).translation[0, 0]
         for each in (target, aside)
-        for clip in [onto(source, Scene(each, ()), aliases={}, nested=True, floor=Floor.KEEP).clip]
+        for clip in [apply_to_character(source, Scene(each, ()), aliases={}, nested=True, floor=GroundMode.KEEP).clip]
     )
     np.testing.assert_allclose(there - here, (3, 0, -2), atol=1e-9)

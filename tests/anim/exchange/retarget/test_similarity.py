@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
-from anim.exchange.retarget.similarity import similarity
+from anim.exchange.retarget.similarity import fit_similarity
 
 FIGURE = np.array(((0.0, 0, 0), (0, 1, 0), (0.3, 1, 0), (0, 1.5, 0.2)))
 LINE = np.array(((0.0, 1, 0), (0, 2, 0), (0, 4.5, 0)))
@@ -19,7 +19,7 @@ def _placed(points: Floats, turn: Rotation) -> Floats:
 
 
 def test_a_figure_is_found_again() -> None:
-    found = similarity(FIGURE, _placed(FIGURE, TURN))
+    found = fit_similarity(FIGURE, _placed(FIGURE, TURN))
     assert found.unique
     assert found.scale == pytest.approx(2.5)
     assert found.error < 1e-12
@@ -30,7 +30,7 @@ def test_a_figure_is_found_again() -> None:
 def test_a_line_turns_no_more_than_it_must(turn: Rotation) -> None:
     """Its turn is that between the two directions, by scipy; a turn about the line would add to it."""
     placed = _placed(LINE, turn)
-    found = similarity(LINE, placed)
+    found = fit_similarity(LINE, placed)
     assert not found.unique
     assert found.scale == pytest.approx(2.5)
     assert found.error < 1e-12
@@ -39,13 +39,13 @@ def test_a_line_turns_no_more_than_it_must(turn: Rotation) -> None:
 
 
 def test_a_line_with_other_distances_is_another() -> None:
-    assert similarity(LINE, LINE[:, [1, 0, 2]] * (1, 2, 1) + ((0, 0, 0), (1, 0, 0), (0, 0, 0))).error > 0.1
-    assert similarity(LINE, FIGURE[:3]).error > 0.1
+    assert fit_similarity(LINE, LINE[:, [1, 0, 2]] * (1, 2, 1) + ((0, 0, 0), (1, 0, 0), (0, 0, 0))).error > 0.1
+    assert fit_similarity(LINE, FIGURE[:3]).error > 0.1
 
 
 def test_one_place_neither_turns_nor_grows() -> None:
     one, other = np.array(((1.0, 2, 3),)), np.array(((4.0, 4, 4),))
-    found = similarity(one, other)
+    found = fit_similarity(one, other)
     assert (found.rotation.tolist(), found.scale, found.error, found.unique) == ([0, 0, 0, 1], 1.0, 0.0, False)
-    assert similarity(np.repeat(one, 3, axis=0), LINE).error == np.inf
-    assert similarity(LINE, np.repeat(one, 3, axis=0)).error == np.inf
+    assert fit_similarity(np.repeat(one, 3, axis=0), LINE).error == np.inf
+    assert fit_similarity(LINE, np.repeat(one, 3, axis=0)).error == np.inf

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from anim.errors import RangeError, ShapeError
 from anim.gltf.meshopt import storage
-from anim.gltf.meshopt.storage import Filtered
+from anim.gltf.meshopt.storage import FilteredValues
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
@@ -58,10 +58,10 @@ def test_any_codes_come_back_as_what_they_decode_to(extension: str, data: st.Dat
     mantissa = np.reshape(whole, (count, 3)).astype(float)
     move = track("translation", np.arange(count), mantissa * 2.0**power)
     filler = [exponents(track("scale", np.arange(200), np.ones((200, 3)), node=node)) for node in (0, 1)]
-    codes = {id(turn): turn_codes, id(move): Filtered("EXPONENTIAL", exponent_codes(mantissa, power))}
+    codes = {id(turn): turn_codes, id(move): FilteredValues("EXPONENTIAL", exponent_codes(mantissa, power))}
     codes |= {id(each): filtered for each, filtered in filler}
     clip = Clip("walk", (turn, move, *(each for each, _ in filler)))
-    packing = storage.compressed(extension, codes)
+    packing = storage.compress_document(extension, codes)
     after = opened(glb_of(writer.replace_clips(of_nodes(2), {0: clip}, packing=packing)))
     assert "EXPONENTIAL" in [stream.get("filter") for stream in streams(after, extension)]
     found = {each.target: each for each in reader.clips(after)[0].tracks}
@@ -99,7 +99,7 @@ def test_the_validator_finds_no_error(extension: str, asset: Find) -> None:
 def test_codes_of_other_values_are_refused() -> None:
     made, filtered = quaternions(track("rotation", TIMES, SMOOTH))
     wrong = replace(made, values=made.values[::-1])
-    packing = storage.compressed(EXTENSIONS[0], {id(wrong): filtered})
+    packing = storage.compress_document(EXTENSIONS[0], {id(wrong): filtered})
     with pytest.raises(ShapeError, match="rotation of node 0: values are not what their QUATERNION codes decode to"):
         writer.replace_clips(of_nodes(1), {0: Clip("walk", (wrong,))}, packing=packing)
 
@@ -108,29 +108,29 @@ def test_codes_of_other_values_are_refused() -> None:
 def test_codes_of_another_length_or_kind_are_refused(path: str) -> None:
     values = SMOOTH if path == "rotation" else SMOOTH[:, :3]
     made, filtered = exponents(track(path, TIMES, values))
-    for wrong in (Filtered("EXPONENTIAL", filtered.codes[:-4]), Filtered("QUATERNION", filtered.codes)):
-        packing = storage.compressed(EXTENSIONS[0], {id(made): wrong})
+    for wrong in (FilteredValues("EXPONENTIAL", filtered.codes[:-4]), FilteredValues("QUATERNION", filtered.codes)):
+        packing = storage.compress_document(EXTENSIONS[0], {id(made): wrong})
         with pytest.raises(ShapeError, match="codes decode to"):
             writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, packing=packing)
 
 
 def test_what_a_packing_can_not_be() -> None:
     with pytest.raises(RangeError, match="extension 'ACME_zip'"):
-        storage.compressed("ACME_zip", {})
+        storage.compress_document("ACME_zip", {})
     with pytest.raises(RangeError, match="filter 'OCTAHEDRAL'"):
-        Filtered("OCTAHEDRAL", bytes(8))
+        FilteredValues("OCTAHEDRAL", bytes(8))
     for name, codes in (("QUATERNION", bytes(12)), ("EXPONENTIAL", bytes(3)), ("EXPONENTIAL", b"")):
         with pytest.raises(ShapeError, match=f"{len(codes)} bytes of codes"):
-            Filtered(name, codes)
+            FilteredValues(name, codes)
 
 
 def test_decoded_quaternions_by_closed_form() -> None:
     """The three smallest of the components from their codes, the largest from the unit length."""
     made, filtered = quaternions(track("rotation", TIMES, SMOOTH), 16)
     unit = SMOOTH / np.linalg.norm(SMOOTH, axis=1, keepdims=True)
-    np.testing.assert_allclose(storage.decoded(filtered, 4), unit, atol=1e-4)
+    np.testing.assert_allclose(storage.decompress_document(filtered, 4), unit, atol=1e-4)
     rows = np.frombuffer(filtered.codes, "<i2").reshape(-1, 4).astype(float)
     three = rows[:, :3] / np.sqrt(2) / (rows[:, 3:].astype(int) | 3)
     largest = np.sqrt(1 - (three**2).sum(axis=1))
-    np.testing.assert_allclose(storage.decoded(filtered, 4)[:, 3], largest, atol=1.01 / 32767)
+    np.testing.assert_allclose(storage.decompress_document(filtered, 4)[:, 3], largest, atol=1.01 / 32767)
     assert AccessorFormat(5122, normalized=True) == made.storage

@@ -116,7 +116,7 @@ def test_calm_tracks_lie_together_where_that_is_smaller() -> None:
         )
         tracks.append(made)
         codes[id(made)] = filtered
-    packing = storage.compressed(EXTENSIONS[0], codes)
+    packing = storage.compress_document(EXTENSIONS[0], codes)
     after = writer.replace_clips(of_nodes(40), {0: Clip("walk", tuple(tracks))}, packing=packing)
     rows = np.frombuffer(b"".join(codes[id(each)].codes for each in tracks), np.uint8).reshape(-1, 8)
     (stream,) = streams(after, EXTENSIONS[0])
@@ -129,7 +129,9 @@ def test_equal_values_share_an_accessor_and_take_the_codes_of_either() -> None:
     made, filtered = exponents(replace(bare, node=1), -6)
     np.testing.assert_array_equal(made.values, bare.values)
     after = writer.replace_clips(
-        of_nodes(2), {0: Clip("walk", (bare, made))}, packing=storage.compressed(EXTENSIONS[0], {id(made): filtered})
+        of_nodes(2),
+        {0: Clip("walk", (bare, made))},
+        packing=storage.compress_document(EXTENSIONS[0], {id(made): filtered}),
     )
     assert [channel["sampler"] for channel in after.json["animations"][0]["channels"]] == [0, 0]
     assert [stream["filter"] for stream in streams(after, EXTENSIONS[0])] == ["EXPONENTIAL"]
@@ -138,7 +140,7 @@ def test_equal_values_share_an_accessor_and_take_the_codes_of_either() -> None:
 def test_splines_are_filtered_with_their_tangents() -> None:
     rows = SMOOTH[:, :3]
     made, filtered = exponents(track("translation", TIMES, rows, CUBICSPLINE, tangents=(rows - 1, rows + 1)))
-    packing = storage.compressed(EXTENSIONS[0], {id(made): filtered})
+    packing = storage.compress_document(EXTENSIONS[0], {id(made): filtered})
     after = writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, packing=packing)
     assert [stream["count"] for stream in streams(after, EXTENSIONS[0])] == [3 * KEYS]
     check_clips({0: Clip("walk", (made,))}, after)
@@ -147,6 +149,6 @@ def test_splines_are_filtered_with_their_tangents() -> None:
 def test_negative_zeros_do_no_harm() -> None:
     made, filtered = exponents(track("translation", TIMES, -1e-9 * np.ones((KEYS, 3))))
     assert np.signbit(made.values).all()
-    packing = storage.compressed(EXTENSIONS[0], {id(made): filtered})
+    packing = storage.compress_document(EXTENSIONS[0], {id(made): filtered})
     after = writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, packing=packing)
     assert not reader.clips(after)[0].tracks[0].values.any()

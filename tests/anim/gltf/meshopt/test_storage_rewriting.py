@@ -22,7 +22,7 @@ from tests.files import glb_of, opened, opened_path
 def test_packing_again_changes_no_byte(name: str, extension: str, asset: Find) -> None:
     document = opened_path(asset(name))
     clips, codes = filtered_clips(reader.clips(document))
-    packing = storage.compressed(extension, codes)
+    packing = storage.compress_document(extension, codes)
     once = glb_of(writer.replace_clips(document, clips, packing=packing))
     assert glb_of(writer.replace_clips(opened(once), clips, packing=packing)) == once
 
@@ -47,7 +47,7 @@ def test_other_clips_of_a_packed_file_stay() -> None:
     document = opened(glb(text(animated() | {"nodes": [{}], "animations": animated()["animations"] * 2})))
     run = Clip("run", (replace(walk.tracks[0], values=walk.tracks[0].values[::-1]), walk.tracks[1]))
     clips, codes = filtered_clips([walk, run])
-    after = writer.replace_clips(document, clips, packing=storage.compressed(EXTENSIONS[0], codes))
+    after = writer.replace_clips(document, clips, packing=storage.compress_document(EXTENSIONS[0], codes))
     again = opened(glb_of(writer.replace_clips(after, {0: clips[0]})))
     check_clips(clips, again)
     assert len(streams(again, EXTENSIONS[0])) == 2

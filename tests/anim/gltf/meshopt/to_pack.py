@@ -65,5 +65,5 @@ def packed_walk(extension: str, *, keys: int = KEYS) -> tuple[Clip, Document]:
     turn, turn_codes = quaternions(track("rotation", TIMES[:keys], SMOOTH[:keys]))
     move, move_codes = exponents(track("translation", TIMES[:keys], SMOOTH[:keys, :3]))
     clip = Clip("walk", (turn, move))
-    packing = storage.compressed(extension, {id(turn): turn_codes, id(move): move_codes})
+    packing = storage.compress_document(extension, {id(turn): turn_codes, id(move): move_codes})
     return clip, writer.replace_clips(of_nodes(1), {0: clip}, packing=packing)

@@ -57,7 +57,7 @@ def test_one_fault_takes_what_rests_on_it_and_no_more(
     given = json.dumps(biped)
     found = salvage(biped)
     assert json.dumps(biped) == given != before  # is not changed itself
-    structure.check(found.json)
+    structure.validate(found.json)
     assert found.faults
     assert found.lost_clips == lost_clips
     assert found.lost_skins == lost_skins
@@ -81,7 +81,7 @@ def test_a_file_of_faults_ends() -> None:
     content = {"asset": {"version": "2.0"}, "nodes": [{"rotation": []} for _ in range(1000)]}
     found = salvage(content)
     assert len(found.faults) == MAX_FAULTS + 1
-    structure.check(found.json)
+    structure.validate(found.json)
 
 
 def test_random_damage_is_survived(biped: Json) -> None:
@@ -100,4 +100,4 @@ def test_random_damage_is_survived(biped: Json) -> None:
                     continue
                 part[key] = values[int(rng.integers(len(values)))]()
                 break
-        structure.check(salvage(damaged).json)
+        structure.validate(salvage(damaged).json)

@@ -17,7 +17,7 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
 from anim.gltf.writing.byte_ranges import difference
-from anim.gltf.writing.compaction import places
+from anim.gltf.writing.compaction import referenced_ranges
 from anim.model import Clip
 from fixtures.broken.pieces import animated, data_uri, glb, text
 from tests.anim.gltf.meshopt.packing import EXTENSIONS, exponents, filtered_clips, gltfpack, packed, streams
@@ -46,7 +46,9 @@ def _written(document: Document, clips: dict[int, Clip], extension: str) -> tupl
         each, filtered = exponents(clip.tracks[0])
         made[number] = Clip(clip.name, (each,))
         codes[id(each)] = filtered
-    return made, opened(glb_of(writer.replace_clips(document, made, packing=storage.compressed(extension, codes))))
+    return made, opened(
+        glb_of(writer.replace_clips(document, made, packing=storage.compress_document(extension, codes)))
+    )
 
 
 def _two(extension: str) -> tuple[dict[int, Clip], Document]:
@@ -99,7 +101,7 @@ def test_the_last_packed_clip_takes_the_buffer_and_the_names_along() -> None:
 def test_an_extension_changed_for_the_other_takes_its_buffer_over() -> None:
     clips, document = _two(EXT)
     raw, codes = filtered_clips(list(clips.values()))
-    after = writer.replace_clips(document, raw, packing=storage.compressed(KHR, codes))
+    after = writer.replace_clips(document, raw, packing=storage.compress_document(KHR, codes))
     assert after.json["buffers"][1] == {"byteLength": 24 * KEYS, "extensions": {KHR: {"fallback": True}}}
     assert after.json["extensionsUsed"] == after.json["extensionsRequired"] == [KHR]
     assert len(after.json["buffers"]) == 2
@@ -199,7 +201,7 @@ def test_clips_packed_over_gltfpacks_leave_no_dead_byte(fox: Document, extension
     _, after = packed(fox, extension)
     after = opened(glb_of(after))
     for number, buffer in enumerate(after.json["buffers"]):
-        used = [span for view in after.json["bufferViews"] for at, span in places(view) if at == number]
+        used = [span for view in after.json["bufferViews"] for at, span in referenced_ranges(view) if at == number]
         gaps = difference([(0, buffer["byteLength"])], used)
         assert all(end - start < 4 for start, end in gaps)
     assert streams(after, extension)

@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anim.gltf.writing.byte_ranges import Range, Shift, aligned, difference, union
+from anim.gltf.writing.byte_ranges import OffsetMap, Range, aligned, difference, union
 
 LENGTH = 60
 RANGES = st.lists(st.tuples(st.integers(0, LENGTH), st.integers(0, LENGTH)), max_size=8)
@@ -52,7 +52,7 @@ def test_aligned_keeps_the_whole_fours_inside(ranges: list[Range]) -> None:
 
 @given(RANGES)
 def test_shift_says_where_every_byte_goes(dropped: list[Range]) -> None:
-    shift = Shift(dropped)
+    shift = OffsetMap(dropped)
     gone = _bytes(dropped)
     assert shift.dropped_bytes == len(gone)
     for at in range(LENGTH + 1):

@@ -43,7 +43,7 @@ PRIMITIVE: Json = {"attributes": {}}
     ],
 )
 def test_each_place(content: Json, accessors: set[int], views: set[int]) -> None:
-    found = references.outside(content, {0})
+    found = references.references_outside(content, {0})
     assert found.accessors == accessors
     assert found.views == views
 
@@ -51,7 +51,7 @@ def test_each_place(content: Json, accessors: set[int], views: set[int]) -> None
 def test_draco_names_a_view() -> None:
     """Its attribute numbers are Draco's own; taking them for views too does no harm."""
     draco = {"KHR_draco_mesh_compression": {"bufferView": 5, "attributes": {"POSITION": 0}}}
-    found = references.outside({"meshes": [{"primitives": [PRIMITIVE | {"extensions": draco}]}]}, set())
+    found = references.references_outside({"meshes": [{"primitives": [PRIMITIVE | {"extensions": draco}]}]}, set())
     assert found.views >= {5}
     assert found.accessors == set()
 
@@ -73,7 +73,7 @@ def test_ids_inside_draco_data_name_no_views() -> None:
     """Or the keys of old clips stay in the file, in views that have the same number as an attribute."""
     draco = {"KHR_draco_mesh_compression": {"bufferView": 3, "attributes": {"POSITION": 0, "JOINTS_0": 1}}}
     json = {"meshes": [{"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1}, "extensions": draco}]}]}
-    assert references.outside(json, ()).views == {3}
+    assert references.references_outside(json, ()).views == {3}
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
-from anim.gltf.writing.reindex import compacted
+from anim.gltf.writing.reindex import drop_placeholders
 from anim.model import Clip
 from fixtures.broken.pieces import animated, glb, text
 from tests.anim.gltf.writing.documents import check_same
@@ -51,7 +51,7 @@ def _file(**more: Any) -> Document:
 def test_numbers_close_up() -> None:
     document = _file()
     before = json.dumps(document.json)
-    after = compacted(document)
+    after = drop_placeholders(document)
     assert [each.get("bufferView") for each in after.json["accessors"]] == [0, 0]
     assert after.json["bufferViews"] == [{"buffer": 0, "byteLength": 32}]
     assert after.json["animations"][0]["samplers"] == [{"input": 0, "output": 1}]
@@ -61,8 +61,8 @@ def test_numbers_close_up() -> None:
 
 
 def test_a_second_time_there_is_nothing_to_do() -> None:
-    after = compacted(_file())
-    assert compacted(after) is after
+    after = drop_placeholders(_file())
+    assert drop_placeholders(after) is after
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_a_second_time_there_is_nothing_to_do() -> None:
     ],
 )
 def test_who_names_an_accessor_follows(more: Json, place: str) -> None:
-    after = compacted(_file(**more)).json
+    after = drop_placeholders(_file(**more)).json
     assert _at(after, place) == 1
 
 
@@ -109,7 +109,7 @@ def test_who_names_an_accessor_follows(more: Json, place: str) -> None:
     ],
 )
 def test_who_names_a_view_follows(more: Json, place: str) -> None:
-    after = compacted(_file(**more)).json
+    after = drop_placeholders(_file(**more)).json
     assert _at(after, place) == 0
     if "draco" in place:  # its attributes have numbers of its own
         assert _at(after, place.replace("bufferView", "attributes POSITION")) == 2
@@ -136,7 +136,7 @@ def test_matrices_of_a_skin_and_sparse_numbers_follow() -> None:
         "meshes": [{"primitives": [{"attributes": {"_A": 3}}]}],
     }
     document = opened(glb(text(content), struct.pack("<16f4B", *range(16), 1, 0, 0, 0)))
-    after = opened(glb_of(compacted(document)))
+    after = opened(glb_of(drop_placeholders(document)))
     assert (len(after.json["accessors"]), len(after.json["bufferViews"])) == (2, 2)
     np.testing.assert_array_equal(Accessors(after).raw(after.json["skins"][0]["inverseBindMatrices"]), [range(16)])
     found = Accessors(after).raw(after.json["meshes"][0]["primitives"][0]["attributes"]["_A"])
@@ -152,12 +152,12 @@ def test_matrices_of_a_skin_and_sparse_numbers_follow() -> None:
 )
 def test_where_an_unknown_number_might_mean_one_nothing_changes(more: Json) -> None:
     document = _file(**more)
-    assert compacted(document).json["accessors"] is document.json["accessors"]
+    assert drop_placeholders(document).json["accessors"] is document.json["accessors"]
 
 
 def test_unknown_numbers_beyond_the_lists_or_before_the_holes_pin_nothing() -> None:
     document = _file(extensions={"ACME": {"version": 4, "year": 2026, "share": 0.5, "flag": True}}, extras={"id": 1})
-    assert len(compacted(document).json["accessors"]) == 2
+    assert len(drop_placeholders(document).json["accessors"]) == 2
     content = dict(document.json)
     content["bufferViews"] = content["bufferViews"][2:]
     content["accessors"] = [{**each, "bufferView": 0} for each in content["accessors"][1::2]] + [HOLE, HOLE]
@@ -165,7 +165,7 @@ def test_unknown_numbers_beyond_the_lists_or_before_the_holes_pin_nothing() -> N
     content["animations"][0]["samplers"] = [{"input": 0, "output": 1}]
     content["meshes"] = [{"primitives": [{"attributes": {"_A": 4}}]}]
     content["extensions"] = {"ACME": {"which": 1}}
-    after = compacted(Document(content, document.buffers))
+    after = drop_placeholders(Document(content, document.buffers))
     assert len(after.json["accessors"]) == 3
     assert after.json["meshes"][0]["primitives"][0]["attributes"] == {"_A": 2}
     assert after.json["extensions"] == {"ACME": {"which": 1}}
@@ -181,7 +181,7 @@ def test_unknown_numbers_beyond_the_lists_or_before_the_holes_pin_nothing() -> N
 )
 def test_broken_extensions_stay_as_they_are(more: Json) -> None:
     """Reading does not check them, so what names nothing must do no harm here."""
-    assert compacted(_file(**more)).json["nodes"] == more["nodes"]
+    assert drop_placeholders(_file(**more)).json["nodes"] == more["nodes"]
 
 
 @settings(max_examples=100, deadline=None)
@@ -190,14 +190,14 @@ def test_random_files_keep_what_meshes_and_clips_use(content: Json, blob: bytes)
     document = opened(glb(text(content), blob + struct.pack("<8f", 0, 1, *range(6))))
     clip = Clip("", (track("translation", [0.0, 1.0], [[1, 2, 3], [4, 5, 6]]),))
     written = writer.replace_clips(document, {0: clip})
-    after = opened(glb_of(compacted(written)))
+    after = opened(glb_of(drop_placeholders(written)))
     old, new = (each.json["meshes"][0]["primitives"][0]["attributes"] for each in (written, after))
     for name in old:
         np.testing.assert_array_equal(Accessors(written).raw(old[name]), Accessors(after).raw(new[name]))
     check_same(clip.tracks[0], reader.clips(after)[0].tracks[0])
     if "extensions" not in content:
         assert HOLE not in after.json["accessors"]
-        assert glb_of(compacted(after)) == glb_of(after)
+        assert glb_of(drop_placeholders(after)) == glb_of(after)
 
 
 @needs_validator
@@ -207,7 +207,7 @@ def test_real_files_stay_valid_and_get_smaller(asset: Find) -> None:
         document = opened_path(asset(name))
         clips = {i: Clip(clip.name, clip.tracks[:2]) for i, clip in enumerate(reader.clips(document))}
         documents.append(writer.replace_clips(document, clips))
-        results.append(compacted(documents[-1]))
+        results.append(drop_placeholders(documents[-1]))
         assert len(glb_of(results[-1])) <= len(glb_of(documents[-1]))
         scenes = [reader.scene(each) for each in (documents[-1], results[-1])]
         for a, b in zip(*(scene.instances for scene in scenes), strict=True):

@@ -10,7 +10,7 @@ import pytest
 from anim.arrays import Floats, Ints
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
-from anim.measure.error.metric import NOISE, Ruler, dense_times
+from anim.measure.error.metric import NOISE, ErrorMetric, dense_times
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened_fixture
@@ -44,8 +44,10 @@ def test_nor_do_other_numbers_of_nodes(skinned: tuple[Scene, Clip, Clip]) -> Non
     scene, before, after = skinned
     other, moved = _renumbered(scene, after)
     times = dense_times(before, after)
-    plain = Ruler(scene).error_at(before, after, times)
-    assert Ruler(scene, other).error_at(before, moved, times).max_error == pytest.approx(plain.max_error, rel=1e-3)
+    plain = ErrorMetric(scene).error_at(before, after, times)
+    assert ErrorMetric(scene, other).error_at(before, moved, times).max_error == pytest.approx(
+        plain.max_error, rel=1e-3
+    )
 
 
 def test_names_that_were_stripped_are_found_by_order(skinned: tuple[Scene, Clip, Clip]) -> None:
@@ -62,11 +64,13 @@ def test_joints_that_are_gone_show_what_they_did() -> None:
     assert skin is not None
     upper = int(skin.joints[1])
     other = replace(scene, skeleton=replace(scene.skeleton, names=_renamed(scene.skeleton, upper)))
-    ruler = Ruler(scene, other)
+    ruler = ErrorMetric(scene, other)
     assert ruler.pairs.nodes[upper] == -1
     assert ruler.error(clip(), clip()).max_error < 1e-6
     turn = clip(track("rotation", [0], about("z", [30]), node=upper))
-    assert ruler.error(turn, clip()).max_error == pytest.approx(Ruler(scene).error(turn, clip()).max_error, rel=1e-3)
+    assert ruler.error(turn, clip()).max_error == pytest.approx(
+        ErrorMetric(scene).error(turn, clip()).max_error, rel=1e-3
+    )
 
 
 def test_joints_that_were_turned_in_their_places_are_bound_anew() -> None:
@@ -91,7 +95,7 @@ def test_joints_that_were_turned_in_their_places_are_bound_anew() -> None:
         replace(scene.skeleton, rotation=rotation, translation=place_of),
         (replace(instance, skin=replace(skin, inverse_bind=bind)),),
     )
-    assert Ruler(scene, other).error(clip(), clip()).max_error < 1e-7
+    assert ErrorMetric(scene, other).error(clip(), clip()).max_error < 1e-7
 
 
 def test_a_rest_pose_that_moved_is_motion_unless_a_track_says_so() -> None:
@@ -105,7 +109,7 @@ def test_a_rest_pose_that_moved_is_motion_unless_a_track_says_so() -> None:
     rotation[upper] = about("x", 25)
     rebased = replace(scene, skeleton=replace(scene.skeleton, rotation=rotation))
     constant = clip(track("rotation", [0, 1], about("x", [25, 25]), node=upper))
-    ruler = Ruler(scene, rebased)
+    ruler = ErrorMetric(scene, rebased)
     assert ruler.error(constant, clip()).max_error == pytest.approx(0, abs=1e-12)
     assert ruler.error(clip(), clip()).max_error > 0.1
     assert ruler.pairs.by_vertex
@@ -123,11 +127,13 @@ def test_a_mesh_node_whose_frame_took_up_the_quantization() -> None:
     (instance,) = other.instances
     other = replace(other, instances=(replace(instance, mesh=_in_space(instance.mesh)),))
     for reordered in (other, replace(other, instances=tuple(map(_backward, other.instances)))):
-        ruler = Ruler(scene, reordered)
+        ruler = ErrorMetric(scene, reordered)
         turn = clip(track("rotation", [0, 1], about("z", [0, 90]), node=0))
         assert ruler.error(turn, turn).max_error < 1e-12
         late = clip(track("rotation", [0, 1], about("z", [0, 80]), node=0))
-        assert ruler.error(turn, late).max_error == pytest.approx(Ruler(scene).error(turn, late).max_error, rel=1e-3)
+        assert ruler.error(turn, late).max_error == pytest.approx(
+            ErrorMetric(scene).error(turn, late).max_error, rel=1e-3
+        )
 
 
 def test_a_mesh_that_was_put_on_a_new_child() -> None:
@@ -137,7 +143,7 @@ def test_a_mesh_that_was_put_on_a_new_child() -> None:
     (instance,) = _box(nodes, 1).instances
     other = Scene(replace(nodes, names=("0", "")), (replace(instance, mesh=_in_space(_fewer(instance).mesh)),))
     turn = clip(track("rotation", [0, 1], about("z", [0, 90])))
-    assert Ruler(scene, other).error(turn, turn).max_error == 0
+    assert ErrorMetric(scene, other).error(turn, turn).max_error == 0
 
 
 def test_meshes_that_were_merged_follow_what_they_hung_on() -> None:
@@ -151,31 +157,31 @@ def test_meshes_that_were_merged_follow_what_they_hung_on() -> None:
         (replace(boxes[0], mesh=_mesh(both)),),
     )
     turn = clip(track("rotation", [0, 1], about("z", [0, 90]), node=0))
-    assert Ruler(scene, merged).error(turn, turn).max_error < 1e-12
+    assert ErrorMetric(scene, merged).error(turn, turn).max_error < 1e-12
 
 
 def test_scenes_without_meshes_are_matched_by_node() -> None:
     old = Scene(skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]]), ())
     new = Scene(replace(skeleton([1, -1], translation=[[1, 0, 0], [0, 0, 0]]), names=("1", "0")), ())
     one, other = (clip(track("rotation", [0], about("z", [90]), node=n)) for n in (0, 1))
-    assert Ruler(old, new).error(one, other).max_error < 1e-12
-    assert Ruler(old, new).error(one, one).max_error > 1
+    assert ErrorMetric(old, new).error(one, other).max_error < 1e-12
+    assert ErrorMetric(old, new).error(one, one).max_error > 1
 
 
 def test_morph_weights_are_found_on_the_node_that_has_the_mesh() -> None:
     document = opened_fixture("morph_cube")
     scene, before = reader.scene(document), reader.clips(document)[0]
     other, moved = _renumbered(scene, before)
-    ruler = Ruler(scene, other)
+    ruler = ErrorMetric(scene, other)
     assert ruler.error(before, moved).max_error == 0
     assert ruler.error(before, clip()).max_error > 0.01
 
 
-def _same_as_plain(scene: Scene, other: Scene, before: Clip, after: Clip) -> Ruler:
+def _same_as_plain(scene: Scene, other: Scene, before: Clip, after: Clip) -> ErrorMetric:
     """Nothing against itself, and the same between two clips as on one scene alone."""
-    ruler, times = Ruler(scene, other), dense_times(before, after)
+    ruler, times = ErrorMetric(scene, other), dense_times(before, after)
     assert ruler.error_at(before, before, times).max_error <= 3 * NOISE * ruler.diagonal
-    plain = Ruler(scene).error_at(before, after, times)
+    plain = ErrorMetric(scene).error_at(before, after, times)
     found = ruler.error_at(before, after, times)
     assert found.max_error == pytest.approx(plain.max_error, rel=2e-3)
     assert plain.max_error > 1e-4 * ruler.diagonal

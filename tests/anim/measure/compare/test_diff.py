@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.measure.compare.diff import diff
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
 from anim.ops.resample import resample
 from tests.clips import about, clip, skeleton, track
@@ -23,7 +23,7 @@ def _moved(name: str, meters: float, end: float = 1) -> Clip:
 def test_the_worst_clip_comes_first() -> None:
     old = [_moved("a", 1), _moved("b", 1), _moved("c", 1)]
     new = [_moved("c", 1.5), _moved("a", 1.25), _moved("b", 1)]
-    found = diff(Ruler(SCENE), old, new)
+    found = diff(ErrorMetric(SCENE), old, new)
     assert [(each.name, each.old, each.new) for each in found.clips] == [("c", 2, 0), ("a", 0, 1), ("b", 1, 2)]
     assert [each.error.max_error for each in found.clips] == pytest.approx([0.5, 0.25, 0], rel=1e-3)
     assert found.clips[0].statistics.speed.size == pytest.approx(0.5, rel=0.02)
@@ -32,17 +32,17 @@ def test_the_worst_clip_comes_first() -> None:
 
 def test_clips_that_only_one_has() -> None:
     old, new = [_moved("a", 1), _moved("b", 1)], [_moved("b", 1), _moved("x", 1), _moved("y", 1)]
-    found = diff(Ruler(SCENE), old, new)
+    found = diff(ErrorMetric(SCENE), old, new)
     assert [each.name for each in found.clips] == ["b"]
     assert (found.missing_clips, found.added_clips) == ((0,), (1, 2))
-    chosen = diff(Ruler(SCENE), old, new, chosen=[1])
+    chosen = diff(ErrorMetric(SCENE), old, new, chosen=[1])
     assert (chosen.missing_clips, chosen.added_clips) == ((), ())
 
 
 def test_tracks_and_ends_that_only_one_has() -> None:
     before = clip(*_moved("a", 1).tracks, track("rotation", [0, 1], about("z", [0, 9]), node=1), name="a")
     after = clip(*_moved("a", 1, end=0.75).tracks, track("/materials/0/alphaCutoff", [0], [[1]]), name="a")
-    (found,) = diff(Ruler(SCENE), [before], [after]).clips
+    (found,) = diff(ErrorMetric(SCENE), [before], [after]).clips
     assert found.missing == (("1", "rotation"),)
     assert found.added == (("/materials/0/alphaCutoff", "pointer"),)
     assert (found.end_old, found.end_new) == (1, 0.75)
@@ -51,7 +51,7 @@ def test_tracks_and_ends_that_only_one_has() -> None:
 
 def test_nodes_that_only_one_has() -> None:
     other = Scene(replace(skeleton([-1, 0, 0]), names=("0", "x", "y")), ())
-    found = diff(Ruler(SCENE, other), [], [])
+    found = diff(ErrorMetric(SCENE, other), [], [])
     assert (found.missing_nodes, found.added_nodes, found.clips) == (("1",), ("x", "y"), ())
 
 
@@ -60,7 +60,7 @@ def test_a_player_shows_what_another_does_not() -> None:
     one = clip(track("rotation", [0, 1], about("z", [0, 90])), name="a")
     many = resample(one, fps=64)
     by_player = {
-        player: diff(Ruler(SCENE), [one], [many], player=player).clips[0].statistics.angle.size
+        player: diff(ErrorMetric(SCENE), [one], [many], player=player).clips[0].statistics.angle.size
         for player in ("spec", "nlerp")
     }
     assert np.degrees(by_player["spec"]) < 1e-4

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.measure.compare.name_matching import by_name, by_name_then_order, nodes
+from anim.measure.compare.name_matching import match_by_name, match_by_name_then_order, match_nodes
 from anim.model import Mesh, MeshInstance, Scene, Skeleton, Skin
 from tests.clips import skeleton
 
@@ -14,46 +14,46 @@ NOTHING = np.empty(0)
 
 
 def test_by_name_the_first_belongs_to_the_first() -> None:
-    assert by_name(["a", "b", "a"], ["b", "a"]).tolist() == [1, 0, -1]
-    assert by_name(["a", "a"], ["x", "a", "a"]).tolist() == [1, 2]
-    assert by_name(["", "a"], ["", ""]).tolist() == [-1, -1]
-    assert by_name([], ["a"]).tolist() == []
+    assert match_by_name(["a", "b", "a"], ["b", "a"]).tolist() == [1, 0, -1]
+    assert match_by_name(["a", "a"], ["x", "a", "a"]).tolist() == [1, 2]
+    assert match_by_name(["", "a"], ["", ""]).tolist() == [-1, -1]
+    assert match_by_name([], ["a"]).tolist() == []
 
 
 def test_by_order_only_where_names_say_nothing() -> None:
-    assert by_name_then_order(["walk", ""], ["run", "walk"]).tolist() == [1, 0]
-    assert by_name_then_order(["walk", "run"], ["", "walk"]).tolist() == [1, 0]
-    assert by_name_then_order(["walk", "run"], ["walk", "jump"]).tolist() == [0, -1]
-    assert by_name_then_order(["a", "b"], ["c", "d"]).tolist() == [0, 1]
-    assert by_name_then_order(["a", "b", "c"], ["d"]).tolist() == [0, -1, -1]
+    assert match_by_name_then_order(["walk", ""], ["run", "walk"]).tolist() == [1, 0]
+    assert match_by_name_then_order(["walk", "run"], ["", "walk"]).tolist() == [1, 0]
+    assert match_by_name_then_order(["walk", "run"], ["walk", "jump"]).tolist() == [0, -1]
+    assert match_by_name_then_order(["a", "b"], ["c", "d"]).tolist() == [0, 1]
+    assert match_by_name_then_order(["a", "b", "c"], ["d"]).tolist() == [0, -1, -1]
 
 
 def test_nodes_by_name_wherever_they_are() -> None:
     old = Scene(_named(["hip", "knee", "foot"], [-1, 0, 1]), ())
     new = Scene(_named(["foot", "extra", "knee", "hip"], [2, -1, 3, 1]), ())
-    assert nodes(old, new).tolist() == [3, 2, 0]
-    assert nodes(new, old).tolist() == [2, -1, 1, 0]
+    assert match_nodes(old, new).tolist() == [3, 2, 0]
+    assert match_nodes(new, old).tolist() == [2, -1, 1, 0]
 
 
 def test_joints_without_names_by_their_order_in_the_skin() -> None:
     old = _skinned(_named(["a", "b", "c"], [-1, 0, 1]), [0, 1, 2])
     new = _skinned(_named(["", "", "", ""], [3, 0, 1, -1]), [0, 1, 2])
-    assert nodes(old, new).tolist() == [0, 1, 2]
+    assert match_nodes(old, new).tolist() == [0, 1, 2]
 
 
 def test_children_by_their_order_under_one_parent() -> None:
     """The second of the children is a parent itself, in both; the others follow in order."""
     old = Scene(_named(["root", "", "", "", ""], [-1, 0, 0, 0, 2]), ())
     new = Scene(_named(["", "", "root", "", ""], [2, 2, -1, 0, 2]), ())
-    assert nodes(old, new).tolist() == [2, 1, 0, 4, 3]
+    assert match_nodes(old, new).tolist() == [2, 1, 0, 4, 3]
 
 
 def test_other_names_beside_known_ones_are_other_nodes() -> None:
     old = Scene(_named(["root", "left"], [-1, 0]), ())
     new = Scene(_named(["root", "right"], [-1, 0]), ())
-    assert nodes(old, new).tolist() == [0, -1]
+    assert match_nodes(old, new).tolist() == [0, -1]
     strangers = Scene(_named(["armature", "arm"], [-1, 0]), ())
-    assert nodes(old, strangers).tolist() == [0, 1]  # nothing has the same name: order is all there is
+    assert match_nodes(old, strangers).tolist() == [0, 1]  # nothing has the same name: order is all there is
 
 
 def _named(names: list[str], parents: list[int]) -> Skeleton:

@@ -15,7 +15,7 @@ from anim.curves.tangents.table import TANGENTS, apply_rotation_tangents, apply_
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.continuity import knots
-from anim.measure.continuity.continuity import Grade, Seam, TrackContinuity, at_keys, continuity, seam
+from anim.measure.continuity.continuity import ContinuityClass, LoopGap, TrackContinuity, at_keys, continuity, loop_gap
 from anim.model import AccessorFormat, Track
 from anim.sampling import derivatives
 from tests import clips
@@ -111,7 +111,7 @@ def test_rotations() -> None:
 def test_slerp_about_one_axis() -> None:
     speeds_up = clips.track("rotation", [0, 1, 2, 3], about("y", [0, 30, 90, 120]))
     found = at_keys(speeds_up)
-    assert list(found.grades) == [Grade.G1, Grade.G1]
+    assert list(found.grades) == [ContinuityClass.G1, ContinuityClass.G1]
     np.testing.assert_allclose(np.degrees(found.speed), [30, 30])
     assert grades(clips.track("rotation", [0, 1, 2], about("y", [0, 40, 80]))) == ["C2"]
     assert grades(clips.track("rotation", [0, 1, 2], about("y", [0, 40, 0]))) == ["C0"]
@@ -135,7 +135,7 @@ def test_jumps_against_scipy_piece_by_piece() -> None:
         for order, sizes in ((1, found.speed), (2, found.acceleration)):
             jump = pieces[k](t[k], order) - pieces[k - 1](t[k], order)
             np.testing.assert_allclose(sizes[k - 1], np.linalg.norm(jump), rtol=1e-9)
-    assert set(found.grades) == {Grade.C0}
+    assert set(found.grades) == {ContinuityClass.C0}
 
 
 def test_scipys_natural_spline_has_no_jumps() -> None:
@@ -180,17 +180,17 @@ def test_two_keys_one_float_apart_are_a_jump() -> None:
     t = [0, early, 1, 2]
     v = np.array([[0.0], [0.5], [0.8], [1.0]])
     found = at_keys(clips.track("weights", t, v))
-    assert list(found.grades) == [Grade.JUMP]
+    assert list(found.grades) == [ContinuityClass.JUMP]
     np.testing.assert_allclose(found.value, [0.3])
     np.testing.assert_allclose(found.times, [1])
     np.testing.assert_allclose(found.speed, [0.3], rtol=1e-5)
     same = at_keys(clips.track("weights", t, np.array([[0.0], [0.5], [0.5], [1.0]])))
-    assert list(same.grades) == [Grade.C2]
+    assert list(same.grades) == [ContinuityClass.C2]
 
 
 def test_a_jump_at_the_start_counts_though_it_is_no_inner_key() -> None:
     found = at_keys(clips.track("weights", [0, 1e-6, 1], [[0.0], [0.4], [1.0]]))
-    assert list(found.grades) == [Grade.JUMP]
+    assert list(found.grades) == [ContinuityClass.JUMP]
     np.testing.assert_allclose(found.value, [0.4])
 
 
@@ -223,41 +223,41 @@ def test_seams() -> None:
     t = np.arange(5.0)
     ring = np.stack((np.cos(np.pi / 2 * t), np.sin(np.pi / 2 * t), np.zeros(5)), axis=1)
     ring[-1] = ring[0]
-    for rule, grade in (("natural", Grade.C0), ("periodic", Grade.C2)):
+    for rule, grade in (("natural", ContinuityClass.C0), ("periodic", ContinuityClass.C2)):
         keys = apply_tangents(t, ring, TANGENTS[rule])
         track = clips.track("translation", t, keys.values, CUBICSPLINE, tangents=(keys.in_tangents, keys.out_tangents))
-        assert seam(track, start=0, end=4).grade is grade, rule
+        assert loop_gap(track, start=0, end=4).grade is grade, rule
     closed = apply_tangents(t, ring, TANGENTS["time-aware"], cyclic=True)
     track = clips.track(
         "translation", t, closed.values, CUBICSPLINE, tangents=(closed.in_tangents, closed.out_tangents)
     )
-    assert seam(track, start=0, end=4).grade is Grade.C1
+    assert loop_gap(track, start=0, end=4).grade is ContinuityClass.C1
     away = clips.track("translation", range(3), [[0, 0, 0], [1, 0, 0], [2, 0, 0]])
-    found = seam(away, start=0, end=2)
-    assert found.grade is Grade.JUMP
+    found = loop_gap(away, start=0, end=2)
+    assert found.grade is ContinuityClass.JUMP
     assert found.value_jump == 2
 
 
 def test_a_step_track_steps_at_the_seam_too() -> None:
     """In a loop its last value but one is followed by the first one: 0 0 3 0 jumps by 3 at its end."""
 
-    def stepped(*values: float) -> Seam:
+    def stepped(*values: float) -> LoopGap:
         keys = np.outer(values, [1.0, 0, 0])
-        return seam(clips.track("translation", range(len(keys)), keys, STEP), start=0, end=len(keys) - 1)
+        return loop_gap(clips.track("translation", range(len(keys)), keys, STEP), start=0, end=len(keys) - 1)
 
-    assert stepped(0, 0, 3, 0) == Seam(Grade.JUMP, 3, 0, 0)
-    assert stepped(0, 3, 0, 2) == Seam(Grade.JUMP, 2, 0, 0)  # shown by players that stop at the end
-    assert stepped(0, 3, 0, 0) == Seam(Grade.C2, 0, 0, 0)
+    assert stepped(0, 0, 3, 0) == LoopGap(ContinuityClass.JUMP, 3, 0, 0)
+    assert stepped(0, 3, 0, 2) == LoopGap(ContinuityClass.JUMP, 2, 0, 0)  # shown by players that stop at the end
+    assert stepped(0, 3, 0, 0) == LoopGap(ContinuityClass.C2, 0, 0, 0)
     late = clips.track("translation", [0, 1, 2], np.outer([0, 3, 0], [1.0, 0, 0]), STEP)
-    assert seam(late, start=0, end=3).grade is Grade.C2  # the track ends before the clip does
+    assert loop_gap(late, start=0, end=3).grade is ContinuityClass.C2  # the track ends before the clip does
     turned = clips.track("rotation", [0, 1, 2], clips.about("z", [0, 90, 360]), STEP)
-    assert seam(turned, start=0, end=2).value_jump == pytest.approx(np.pi / 2)
+    assert loop_gap(turned, start=0, end=2).value_jump == pytest.approx(np.pi / 2)
 
 
 def test_a_track_that_ends_before_its_clip_rests_at_the_seam() -> None:
     bump = clips.track("translation", [0, 1, 2], [[0, 0, 0], [1, 0, 0], [0, 0, 0]])
-    assert seam(bump, start=0, end=2).speed_jump == 2
-    assert seam(bump, start=0, end=3).speed_jump == 1
+    assert loop_gap(bump, start=0, end=2).speed_jump == 2
+    assert loop_gap(bump, start=0, end=3).speed_jump == 1
 
 
 @pytest.mark.parametrize(

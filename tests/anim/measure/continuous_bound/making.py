@@ -9,8 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.prover import Proof, Prover
-from anim.measure.error.metric import Ruler, dense_times
-from anim.measure.error.surface import placed, surfaces
+from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import world_matrices
 from anim.sampling.players import sampler_for
@@ -50,7 +50,7 @@ def pair(
 
 def proven(scene: Scene, before: Clip, after: Clip, *, players: Sequence[str] = ALL, **more: float) -> Proof:
     """What is certified of a pair of clips, looked at where `optimize` looks."""
-    ruler = Ruler(scene)
+    ruler = ErrorMetric(scene)
     times = dense_times(before, after)
     looks = {player: ruler.look(before, after, times, player=player) for player in players}
     return Prover(ruler).certified(before, after, times, looks, **more)
@@ -67,7 +67,9 @@ def apart(scene: Scene, before: Clip, after: Clip, times: Floats, player: str) -
             for pose, world in zip(poses, worlds, strict=True):
                 weights = pose.weights.get(surface.owner)
                 points.append(
-                    placed(surface, world[f, surface.nodes], surface.rest_weights if weights is None else weights[f])
+                    place_points(
+                        surface, world[f, surface.nodes], surface.rest_weights if weights is None else weights[f]
+                    )
                 )
             worst = max(worst, float(np.linalg.norm(points[1] - points[0], axis=1).max()))
     return worst

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.arcs import LAWS
-from anim.measure.continuous_bound.intervals import gaps
-from anim.measure.continuous_bound.rotation_endpoints import turns
+from anim.measure.continuous_bound.arcs import ARCS
+from anim.measure.continuous_bound.intervals import merge_intervals
+from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
 from anim.measure.error.metric import dense_times
 from anim.model import Interpolation, Track
 from anim.sampling.batch import batches
@@ -31,7 +31,7 @@ def _rotations(mode: Interpolation, seed: int) -> Track:
 
 
 def test_every_player_has_a_law() -> None:
-    assert set(LAWS) == set(PLAYERS)
+    assert set(ARCS) == set(PLAYERS)
 
 
 @pytest.mark.parametrize("mode", [LINEAR, STEP, CUBICSPLINE])
@@ -39,9 +39,9 @@ def test_every_player_has_a_law() -> None:
 def test_laws_play_as_players_do(mode: Interpolation, seed: int) -> None:
     moving = clip(_rotations(mode, seed))
     times = np.unique(np.concatenate((dense_times(moving), [0.0, 1.2])))
-    where = gaps(times, moving)
-    players = list(LAWS)
-    found = turns(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
+    where = merge_intervals(times, moving)
+    players = list(ARCS)
+    found = rotation_endpoints(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
     length = np.linalg.norm(found.value, axis=1)  # (2, P, G, U)
     shown = found.value / np.where(found.unit, length, 1.0)[:, None]
     for p, player in enumerate(players):
@@ -59,9 +59,9 @@ def test_laws_play_as_players_do(mode: Interpolation, seed: int) -> None:
 def test_within_gaps_the_law_goes_on(seed: int) -> None:
     """Half-way through a gap, by c″ = −ν²c from both ends, divided by its length where it says so."""
     moving = clip(_rotations(LINEAR, seed))
-    where = gaps(dense_times(moving), moving)
-    players = list(LAWS)
-    found = turns(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
+    where = merge_intervals(dense_times(moving), moving)
+    players = list(ARCS)
+    found = rotation_endpoints(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
     middle = (found.value[0] + found.value[1]) / (2 * np.cos(found.turn / 2))
     middle /= np.where(found.unit, np.linalg.norm(middle, axis=0), 1.0)
     for p, player in enumerate(players):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.measure.continuous_bound.derivative_bounds import majorant, product, resting
+from anim.measure.continuous_bound.derivative_bounds import derivative_bound, product, resting
 
 
 def test_a_product_by_hand() -> None:
     """(2 + 3t + 4t²/2)(5 + 6t + 7t²/2) and the same with 1, 1, 1 added to the first: by Leibniz' rule."""
-    a = majorant(np.array([2.0, 3, 4]), np.array([1.0, 1, 1]))
-    b = majorant(np.array([5.0, 6, 7]), np.zeros(3))
+    a = derivative_bound(np.array([2.0, 3, 4]), np.array([1.0, 1, 1]))
+    b = derivative_bound(np.array([5.0, 6, 7]), np.zeros(3))
     assert product(a, b)[:, 0].tolist() == [10, 27, 4 * 5 + 2 * 3 * 6 + 2 * 7]
     assert (product(a, b)[:, 1] - product(a, b)[:, 0]).tolist() == [5, 11, 5 + 2 * 6 + 7]
 
@@ -27,7 +27,7 @@ def test_differences_of_products() -> None:
     ones = [np.sin(3 * t), np.sin(3.01 * t), np.cos(5 * t), np.cos(5.02 * t)]
     jets = [np.stack((x, np.gradient(x, t), np.gradient(np.gradient(x, t), t)))[:, 5:-5] for x in ones]
     bounds = [
-        majorant(np.abs(first).max(axis=1), np.abs(second - first).max(axis=1))
+        derivative_bound(np.abs(first).max(axis=1), np.abs(second - first).max(axis=1))
         for first, second in (jets[:2], jets[2:])
     ]
     found = product(*bounds)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.endpoints import ends, slides
-from anim.measure.continuous_bound.intervals import Gaps
+from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
+from anim.measure.continuous_bound.intervals import Intervals
 from anim.model import Interpolation, Track
 from anim.sampling.batch import batches
 from anim.sampling.track import sample
 from tests.clips import CUBICSPLINE, LINEAR, STEP, track
 
-WHERE = Gaps(np.array([0.0, 0.5, 1, 2, 3]))
+WHERE = Intervals(np.array([0.0, 0.5, 1, 2, 3]))
 KEYS = np.array([[1.0, 0, 0], [3, 0, 2], [3, 4, 0]])
 TANGENTS = (np.array([[0.0, 1, 0], [2, 0, 0], [0, 0, 3]]), np.array([[1.0, 0, 1], [0, -2, 0], [0, 0, 1]]))
 
@@ -26,7 +26,7 @@ def _length(vectors: Floats) -> Floats:
 def test_one_sided_values_and_slopes(mode: Interpolation) -> None:
     """Against the track itself, a little inside both ends of each gap."""
     moving = _track(mode)
-    found = ends(np.zeros((2, 3)), batches([moving]), {0: 1}, WHERE)
+    found = endpoints(np.zeros((2, 3)), batches([moving]), {0: 1}, WHERE)
     assert not found.value[..., 0].any()
     for side, at, inward in ((0, WHERE.starts, 1e-5), (1, WHERE.ends, -1e-5)):
         near = [sample(moving, at + k * inward).T for k in (1, 2, 3)]
@@ -38,8 +38,8 @@ def test_one_sided_values_and_slopes(mode: Interpolation) -> None:
 @pytest.mark.parametrize("modes", [(LINEAR, LINEAR), (CUBICSPLINE, LINEAR), (CUBICSPLINE, CUBICSPLINE)])
 def test_bounds_of_slides(modes: tuple[Interpolation, Interpolation]) -> None:
     a, b = _track(modes[0]), _track(modes[1], 0.1)
-    both = [ends(np.zeros((1, 3)), batches([each]), {0: 0}, WHERE) for each in (a, b)]
-    found = slides(both[0], both[1], WHERE.lengths, _length)[..., 0]
+    both = [endpoints(np.zeros((1, 3)), batches([each]), {0: 0}, WHERE) for each in (a, b)]
+    found = slide_bounds(both[0], both[1], WHERE.lengths, _length)[..., 0]
     for gap in range(len(WHERE)):
         t = np.linspace(WHERE.starts[gap], WHERE.ends[gap], 2001)[:-1]
         for row, motion in ((found[:, 0], sample(a, t)), (found[:, 1] - found[:, 0], sample(b, t) - sample(a, t))):

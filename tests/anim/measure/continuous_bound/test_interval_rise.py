@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.influence_radius import joined, reach
-from anim.measure.continuous_bound.interval_rise import Rises, rises
-from anim.measure.continuous_bound.refinement import again, cuts
-from anim.measure.error.metric import Ruler
+from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
+from anim.measure.continuous_bound.interval_rise import IntervalRise, interval_rise
+from anim.measure.continuous_bound.refinement import refine, subdivide
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
 from tests.anim.measure.continuous_bound.making import apart, pair
 from tests.anim.skinning.scenes import mesh, random_scene, scene
@@ -26,10 +26,10 @@ def _turning(degrees: float, end: float = 1.0) -> Clip:
     return clip(track("rotation", [0, end], about("z", [0, degrees])))
 
 
-def _rises(of: Scene, before: Clip, after: Clip, times: Floats, player: str = "spec") -> Rises:
-    ruler = Ruler(of)
-    reaches = [each for each in map(reach, ruler.parts) if each is not None]
-    return rises((of, of), (before, after), times, reaches, [player])
+def _rises(of: Scene, before: Clip, after: Clip, times: Floats, player: str = "spec") -> IntervalRise:
+    ruler = ErrorMetric(of)
+    reaches = [each for each in map(influence_radius, ruler.parts) if each is not None]
+    return interval_rise((of, of), (before, after), times, reaches, [player])
 
 
 def test_a_turn_away_from_rest_rises_by_its_sagitta() -> None:
@@ -78,7 +78,7 @@ def test_what_has_no_bound_is_infinite() -> None:
 def test_every_stretch_keeps_its_own_bound(player: str) -> None:
     of, before, after = pair(3, modes=(LINEAR,), wild=(0.3,))
     times = np.unique(np.concatenate([np.linspace(0, 1, 60), *before.axes, *after.axes]))
-    ruler = Ruler(of)
+    ruler = ErrorMetric(of)
     found = _rises(of, before, after, times, player)
     limits = np.concatenate(ruler.look(before, after, times, player=player).limits)
     tops = (np.maximum(limits[:, :-1], limits[:, 1:] + found.jump) + found.rise).max(axis=0)
@@ -92,7 +92,7 @@ def test_cuts_by_hand() -> None:
     """Two parts of the first stretch for both groups, three of the last for the second one."""
     asked = np.array([[True, False, False], [True, False, True]])
     rise = np.array([[4.0, 1, 9], [8, 1, 18]])
-    found = cuts("spec", np.array([0.0, 1, 2, 5]), rise, asked, np.array([2, 9, 3]))
+    found = subdivide("spec", np.array([0.0, 1, 2, 5]), rise, asked, np.array([2, 9, 3]))
     assert found.times.tolist() == [0, 0.5, np.nextafter(1, 0), 2, 3, 4, np.nextafter(5, 2)]
     assert np.array_equal(found.more[0], [1, 1, 1, *[np.nan] * 4], equal_nan=True)
     assert found.more[1].tolist() == [2, 2, 2, 2, 2, 2, 2]
@@ -103,13 +103,13 @@ def test_cuts_by_hand() -> None:
 def test_a_second_look(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
     """Half-way through a swing that both ends don't show, by the player that shows it; in chunks of any length."""
     away = clip(track("translation", [0, 1, 2], np.array([[0, 0, 0], [0, 0.3, 0], [0, 0, 0]])))
-    ruler = Ruler(POINT)
-    monkeypatch.setattr(Ruler, "length", length)
+    ruler = ErrorMetric(POINT)
+    monkeypatch.setattr(ErrorMetric, "length", length)
     asked = [
-        cuts(player, np.array([0.0, 2.0]), np.array([[0.4]]), np.array([[True]]), np.array([parts]))
+        subdivide(player, np.array([0.0, 2.0]), np.array([[0.4]]), np.array([[True]]), np.array([parts]))
         for player, parts in (("nlerp", 1), ("spec", 2))
     ]
-    seen = again(ruler, (HELD, away), asked, ruler.parts, target=0.05)
+    seen = refine(ruler, (HELD, away), asked, ruler.parts, target=0.05)
     assert (seen.player, seen.time) == ("spec", 1.0)
     assert seen.largest == pytest.approx(0.3)
     assert seen.bound == pytest.approx(max(0.3 + 0.4 / 4, 0.4))
@@ -117,8 +117,8 @@ def test_a_second_look(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
 
 def test_arms_reach_every_vertex() -> None:
     of = random_scene(5, joints=6, vertices=80)
-    (part,) = Ruler(of).parts
-    found = reach(part)
+    (part,) = ErrorMetric(of).parts
+    found = influence_radius(part)
     assert found is not None
     (instance,) = of.instances
     assert instance.skin is not None
@@ -127,7 +127,7 @@ def test_arms_reach_every_vertex() -> None:
         bind = instance.skin.inverse_bind[node]
         assert arm == pytest.approx(np.linalg.norm(carried @ bind[:, :3].T + bind[:, 3], axis=1).max())
     assert not found.apart.any()
-    two = joined([found, found])
+    two = join_reaches([found, found])
     assert len(two.nodes) == 2 * len(found.nodes)
     assert [each.tolist() for each in two.groups[len(found.groups) :]] == [
         (each + len(found.nodes)).tolist() for each in found.groups
@@ -135,8 +135,8 @@ def test_arms_reach_every_vertex() -> None:
 
 
 def test_shells_reach_as_far_as_their_points() -> None:
-    of = Ruler(Scene(POINT.skeleton, POINT.instances), shell=0.01)
-    found = [each for each in map(reach, of.parts) if each is not None]
+    of = ErrorMetric(Scene(POINT.skeleton, POINT.instances), shell=0.01)
+    found = [each for each in map(influence_radius, of.parts) if each is not None]
     assert [each.arms.tolist() for each in found[1:]] == [[pytest.approx(0.01 * of.diagonal)] * len(found[1].nodes)]
 
 

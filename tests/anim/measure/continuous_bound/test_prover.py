@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.gltf.reading import reader
-from anim.measure.continuous_bound.prover import NEAR, Prover
-from anim.measure.error.metric import Ruler, dense_times
+from anim.measure.continuous_bound.prover import BOUND_SLACK, Prover
+from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.model import Scene, Track
 from tests.anim.measure.continuous_bound.making import ALL, apart, between, pair, proven
 from tests.anim.skinning.scenes import mesh, scene
@@ -56,12 +56,12 @@ def test_real_files(asset: Asset, name: str, number: int, step: int) -> None:
     document = opened_path(asset(name))
     of, before = reader.scene(document), reader.clips(document)[number]
     after = clip(*(_coarser(each, step) for each in before.tracks))
-    ruler = Ruler(of, shell=0.01)
+    ruler = ErrorMetric(of, shell=0.01)
     times = dense_times(before, after)
     looks = {player: ruler.look(before, after, times, player=player) for player in ALL}
     found = Prover(ruler).certified(before, after, times, looks)
     assert found.bound is not None
-    assert found.error.max_error <= found.bound <= (1 + NEAR) * found.error.max_error + 1e-6 * ruler.diagonal
+    assert found.error.max_error <= found.bound <= (1 + BOUND_SLACK) * found.error.max_error + 1e-6 * ruler.diagonal
     dense = between(times, 50)
     truth = max(ruler.error_at(before, after, dense, player=player).max_error for player in ALL)
     assert truth <= found.bound * 1.0011 + 1e-12  # a ruler is up to 0.1 % above the truth itself
@@ -89,7 +89,7 @@ def test_an_arc_above_its_chord(degrees: float, turning_first: bool) -> None:
     found = proven(POINT, *clips, players=("spec",))
     assert found.bound is not None
     assert sagitta <= found.bound * ROUNDING
-    assert found.bound <= sagitta * (1 + NEAR)
+    assert found.bound <= sagitta * (1 + BOUND_SLACK)
 
 
 def test_the_ends_alone_show_nothing_and_the_second_look_shows_all() -> None:
@@ -97,7 +97,7 @@ def test_the_ends_alone_show_nothing_and_the_second_look_shows_all() -> None:
     turn = about("z", [0, 20])
     end = np.array([np.cos(np.radians(20)) - 1, np.sin(np.radians(20)), 0]) * RADIUS
     arc, chord = clip(track("rotation", [0, 1], turn)), clip(track("translation", [0, 1], np.array([np.zeros(3), end])))
-    ruler, times = Ruler(POINT), np.array([0.0, 1.0])
+    ruler, times = ErrorMetric(POINT), np.array([0.0, 1.0])
     looks = {"spec": ruler.look(chord, arc, times)}
     assert looks["spec"].error.max_error < 1e-12
     found = Prover(ruler).certified(chord, arc, times, looks)
@@ -113,7 +113,7 @@ def test_the_moment_before_a_jump() -> None:
     keys = about("z", [0, 60, 61])
     long = keys * np.array([[1], [1.001], [1]])
     before, after = (clip(track("rotation", [0, 1, 2], each)) for each in (keys, long))
-    ruler = Ruler(POINT)
+    ruler = ErrorMetric(POINT)
     times = dense_times(before, after)
     look = ruler.look(before, after, times, player="three")
     found = Prover(ruler).certified(before, after, times, {"three": look})
@@ -157,7 +157,7 @@ def test_what_can_not_be_proven_is_not() -> None:
     turning = clip(track("rotation", [0, 1], about("z", [0, 30])))
     assert proven(POINT, turning, through).bound is None
     one, other = (Scene(skeleton([-1, 0, parent]), ()) for parent in (0, 1))
-    ruler, times = Ruler(one, other), np.array([0.0, 1.0])
+    ruler, times = ErrorMetric(one, other), np.array([0.0, 1.0])
     assert Prover(ruler).certified(turning, turning, times, {"spec": ruler.look(turning, turning, times)}).bound is None
 
 
@@ -172,7 +172,7 @@ def test_long_clips_are_gone_through_in_parts(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("anim.measure.continuous_bound.prover.BLOCK", 1)
     parts = proven(of, before, after)
     assert whole.bound is not None
-    assert parts.bound == pytest.approx(whole.bound, rel=NEAR)
+    assert parts.bound == pytest.approx(whole.bound, rel=BOUND_SLACK)
     times = between(dense_times(before, after), 3)
     assert parts.bound is not None
     assert max(apart(of, before, after, times, player) for player in ALL) <= parts.bound * ROUNDING

@@ -7,8 +7,15 @@ import pytest
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.cubic_bounds import on_cubics
-from anim.measure.continuous_bound.difference_bounds import drift
-from anim.measure.continuous_bound.quaternion_bounds import Flight, Line, line, mix, on_arcs, on_lines
+from anim.measure.continuous_bound.difference_bounds import difference_bounds
+from anim.measure.continuous_bound.quaternion_bounds import (
+    ChordBounds,
+    QuaternionBounds,
+    arc_mix,
+    chord_bounds,
+    nlerp_bounds,
+    slerp_bounds,
+)
 
 H = np.array([[0.5]])  # s, one gap and one node
 U = np.linspace(0, 1, 4001)
@@ -29,20 +36,24 @@ def _wide(*values: Floats) -> Floats:
     return np.stack(values)[:, :, None, None, None]
 
 
-def _arc(a: Floats, b: Floats, turn: float) -> tuple[Floats, Flight, Line]:
+def _arc(a: Floats, b: Floats, turn: float) -> tuple[Floats, QuaternionBounds, ChordBounds]:
     curve = (np.sin((1 - U) * turn)[:, None] * a + np.sin(U * turn)[:, None] * b) / np.sin(turn)
     rates = [(b - np.cos(turn) * a), (np.cos(turn) * b - a)]
-    of = mix(_wide(a, b), _wide(*rates) * turn / np.sin(turn) / H)
-    return curve, on_arcs(of, np.full((1, 1, 1), turn), H), line(of, H)
+    of = arc_mix(_wide(a, b), _wide(*rates) * turn / np.sin(turn) / H)
+    return curve, slerp_bounds(of, np.full((1, 1, 1), turn), H), chord_bounds(of, H)
 
 
-def _line(a: Floats, b: Floats) -> tuple[Floats, Flight, Line]:
+def _line(a: Floats, b: Floats) -> tuple[Floats, QuaternionBounds, ChordBounds]:
     curve = a + U[:, None] * (b - a)
-    of = mix(_wide(a, b), _wide(b - a, b - a) / H)
-    return curve / np.linalg.norm(curve, axis=1, keepdims=True), on_lines(of, line(of, H)), line(of, H)
+    of = arc_mix(_wide(a, b), _wide(b - a, b - a) / H)
+    return (
+        curve / np.linalg.norm(curve, axis=1, keepdims=True),
+        nlerp_bounds(of, chord_bounds(of, H)),
+        chord_bounds(of, H),
+    )
 
 
-def _cubic(a: Floats, b: Floats, seed: int, size: float) -> tuple[Floats, Flight, Line]:
+def _cubic(a: Floats, b: Floats, seed: int, size: float) -> tuple[Floats, QuaternionBounds, ChordBounds]:
     """c = a + u(b − a) + u(1 − u)(p + uq)."""
     p, q = size * np.random.default_rng(seed).normal(size=(2, 4))
     u = U[:, None]
@@ -50,7 +61,11 @@ def _cubic(a: Floats, b: Floats, seed: int, size: float) -> tuple[Floats, Flight
     slopes, bends = (b - a + p, b - a - p - q), (2 * (q - p), -2 * p - 4 * q)
     value = _wide(a, b)
     found = on_cubics(value, _wide(*slopes) / H, _wide(*bends) / H**2, H)
-    return curve / np.linalg.norm(curve, axis=1, keepdims=True), found, line(mix(value, _wide(b - a, b - a) / H), H)
+    return (
+        curve / np.linalg.norm(curve, axis=1, keepdims=True),
+        found,
+        chord_bounds(arc_mix(value, _wide(b - a, b - a) / H), H),
+    )
 
 
 def _jets(curve: Floats) -> list[Floats]:
@@ -64,7 +79,7 @@ def _size(vectors: Floats) -> float:
     return float(np.linalg.norm(vectors, axis=1).max())
 
 
-def _check(curve: Floats, found: Flight, *, slack: float) -> None:
+def _check(curve: Floats, found: QuaternionBounds, *, slack: float) -> None:
     q, rate, bend = _jets(curve)
     assert found.value[0, :, 0, 0, 0] == pytest.approx(curve[0])
     assert found.slope[0, :, 0, 0, 0] == pytest.approx(rate[0], rel=0.05, abs=0.02 * _size(rate))
@@ -133,7 +148,7 @@ def test_drift_of_lines_that_change_in_length_more_than_they_turn() -> None:
     cos, sin = np.cos(0.01), np.sin(0.01)
     turn = np.array([[cos, -sin, 0, 0], [sin, cos, 0, 0], [0, 0, cos, -sin], [0, 0, sin, cos]])
     first, second = _line(a, b), _line(turn @ a, turn @ b)
-    found = drift(first[1], second[1], (first[2], second[2], np.full((1, 1, 1), True)), H)[:, 0, 0, 0]
+    found = difference_bounds(first[1], second[1], (first[2], second[2], np.full((1, 1, 1), True)), H)[:, 0, 0, 0]
     truths = [_size(y - x) for x, y in zip(_jets(first[0]), _jets(second[0]), strict=True)]
     assert truths[2] <= found[2] <= 6 * truths[2]
 
@@ -148,7 +163,7 @@ def test_drift(kinds: str, width: float) -> None:
             c, d = a * 1.001 + off * width * np.roll(b, 1), b + off * width * np.roll(a, 2)
             first, second = _curve(kinds[0], a, b, width, seed), _curve(kinds[1], c, d, width * (1 + off), seed)
             lines = np.full((1, 1, 1), kinds == "ll")
-            found = drift(first[1], second[1], (first[2], second[2], lines), H)[:, 0, 0, 0]
+            found = difference_bounds(first[1], second[1], (first[2], second[2], lines), H)[:, 0, 0, 0]
             noise = 3e-6 * width / np.array([1, *(H[0, 0] ** k for k in (1, 2))])
             truths = [_size(y - x) for x, y in zip(_jets(first[0]), _jets(second[0]), strict=True)]
             assert (truths <= found * 1.001 + noise).all(), (seed, off, truths, found)
@@ -158,12 +173,12 @@ def test_drift_of_two_lines_of_one_turn_is_tight() -> None:
     """The first half of a wide chord beside the first half as a chord of its own: only their speeds differ."""
     a, b = (np.array([0, 0, np.sin(x), np.cos(x)]) for x in (0.0, 0.8))
     whole, half = _line(a, (a + b) / 2), _line(a, (a + b) / np.linalg.norm(a + b))
-    found = drift(whole[1], half[1], (whole[2], half[2], np.full((1, 1, 1), True)), H)[:, 0, 0, 0]
+    found = difference_bounds(whole[1], half[1], (whole[2], half[2], np.full((1, 1, 1), True)), H)[:, 0, 0, 0]
     truths = [_size(y - x) for x, y in zip(_jets(whole[0]), _jets(half[0]), strict=True)]
     assert truths[2] <= found[2] <= 3 * truths[2]
 
 
-def _curve(kind: str, a: Floats, b: Floats, width: float, seed: int) -> tuple[Floats, Flight, Line]:
+def _curve(kind: str, a: Floats, b: Floats, width: float, seed: int) -> tuple[Floats, QuaternionBounds, ChordBounds]:
     if kind == "a":
         return _arc(a, b, width)
     return _line(a, b) if kind == "l" else _cubic(a, b, seed, 0.2 * width)

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.arcs import LAWS
-from anim.measure.continuous_bound.intervals import Gaps, gaps
-from anim.measure.continuous_bound.node_bounds import in_parents, in_world
-from anim.measure.continuous_bound.track_partition import sides
+from anim.measure.continuous_bound.arcs import ARCS
+from anim.measure.continuous_bound.intervals import Intervals, merge_intervals
+from anim.measure.continuous_bound.node_bounds import local_bounds, world_bounds
+from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.measure.error.metric import dense_times
 from anim.model import Clip, Scene
 from anim.sampling import world_matrices
@@ -22,7 +22,7 @@ from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, skeleton, track
 STEPS = 2e-3  # of a gap, for differences
 
 
-def _derivatives(of: Scene, moving: Clip, where: Gaps, player: str, share: float) -> Floats:
+def _derivatives(of: Scene, moving: Clip, where: Intervals, player: str, share: float) -> Floats:
     """World matrices (3, N, G, 3, 4) with two derivatives, a share of the way through gaps, by differences."""
     poses = sampler_for(of.skeleton, moving, player=player)
     at, step = where.starts + share * where.lengths, STEPS * where.lengths
@@ -31,16 +31,16 @@ def _derivatives(of: Scene, moving: Clip, where: Gaps, player: str, share: float
     return np.stack((here, (right - left) / (2 * step), (right - 2 * here + left) / step**2))
 
 
-@given(st.integers(0, 100_000), st.sampled_from(list(LAWS)), st.floats(0.05, 0.95))
+@given(st.integers(0, 100_000), st.sampled_from(list(ARCS)), st.floats(0.05, 0.95))
 @settings(max_examples=40, deadline=None)
 def test_no_derivative_exceeds_its_majorant(seed: int, player: str, share: float) -> None:
     of, before, after = pair(seed, modes=(STEP, LINEAR, LINEAR, CUBICSPLINE))
-    where = gaps(dense_times(before, after), before, after)
-    where = Gaps(where.edges[np.concatenate(([True], np.diff(where.edges) > 1e-4))])  # differences need room
+    where = merge_intervals(dense_times(before, after), before, after)
+    where = Intervals(where.edges[np.concatenate(([True], np.diff(where.edges) > 1e-4))])  # differences need room
     if len(where) < 1 or not {t for each in (before, after) for t in np.concatenate(each.axes)} <= set(where.edges):
         return
     with np.errstate(all="ignore"):
-        found = in_world(*sides((of, of), (before, after)), where, players=[player])
+        found = world_bounds(*partition_tracks((of, of), (before, after)), where, players=[player])
     a, b = (_derivatives(of, each, where, player, share) for each in (before, after))
     for bounds, part in ((found.matrices, np.s_[..., :3]), (found.origins, np.s_[..., 3:])):
         sizes = np.linalg.norm(a[part], 2, axis=(-1, -2)), np.linalg.norm((b - a)[part], 2, axis=(-1, -2))
@@ -56,8 +56,8 @@ def test_a_turn_at_constant_speed_is_bounded_exactly() -> None:
     """|R| = 1, |R′| = ω, |R″| = ω²; of two turns about one axis |ΔR″| = |ω₂² − ω₁²| and what has come of it."""
     of = Scene(skeleton([-1]), ())
     slow, fast = (clip(track("rotation", [0, 0.01], about("z", [0, degrees]))) for degrees in (1.0, 1.001))
-    where = Gaps(np.array([0.0, 0.01]))
-    found = in_parents(*sides((of, of), (slow, fast)), where, players=["spec"]).matrices[:, :, 0, 0]
+    where = Intervals(np.array([0.0, 0.01]))
+    found = local_bounds(*partition_tracks((of, of), (slow, fast)), where, players=["spec"]).matrices[:, :, 0, 0]
     first, second = np.radians([100, 100.1])
     assert found[:, 0] == pytest.approx([1, first, first**2], rel=1e-4)
     assert found[2, 1] - found[2, 0] == pytest.approx(second**2 - first**2, rel=0.02)
@@ -68,8 +68,8 @@ def test_a_jump_is_bounded_exactly() -> None:
     of = Scene(skeleton([-1, 0], translation=[[0, 0, 0], [3, 0, 0]]), ())
     keys = about("z", [0, 60, 61]) * np.array([[1], [1.001], [1]])
     moving = clip(track("rotation", [0, 0.01, 0.02], keys))
-    where = Gaps(np.array([0.0, 0.01, 0.02]))
-    jumps = in_world(*sides((of, of), (moving, moving)), where, players=["three"]).jumps
+    where = Intervals(np.array([0.0, 0.01, 0.02]))
+    jumps = world_bounds(*partition_tracks((of, of), (moving, moving)), where, players=["three"]).jumps
     poses = sampler_for(of.skeleton, moving, player="three").at(np.array([np.nextafter(0.01, 0), 0.01]))
     before, after = world_matrices(of.skeleton, poses)
     assert jumps[0, 0, 0] == pytest.approx(2 * 2 * (1.001**2 - 1))  # of both versions

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anim.measure.continuous_bound.track_partition import sides
+from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.model import Scene
 from anim.sampling.batch import Batch
 from tests.clips import CUBICSPLINE, clip, skeleton, track
@@ -23,7 +23,7 @@ def _nodes(batches: Sequence[Batch]) -> set[tuple[int | None, str]]:
 def test_what_moves_in_one_version_moves_in_both() -> None:
     first = clip(track("scale", TIMES, SAME, node=0), track("scale", TIMES, SAME, node=1))
     second = clip(track("scale", TIMES, SAME, node=0), track("scale", TIMES, OTHER, node=1))
-    a, b = sides((OF, OF), (first, second))
+    a, b = partition_tracks((OF, OF), (first, second))
     assert _nodes(a.moving) == _nodes(b.moving) == {(1, "scale")}
     assert _nodes(a.still) == _nodes(b.still) == {(0, "scale")}
     assert all(len(batch.times) == len(batch.values) == 1 for batch in a.still)
@@ -32,19 +32,19 @@ def test_what_moves_in_one_version_moves_in_both() -> None:
 def test_a_cubic_of_equal_keys_moves_where_it_has_tangents() -> None:
     zero, some = np.zeros((2, 3)), np.ones((2, 3))
     both = [track("scale", TIMES, SAME, CUBICSPLINE, node=n, tangents=(t, t)) for n, t in ((0, zero), (1, some))]
-    a, _ = sides((OF, OF), (clip(*both), clip(*both)))
+    a, _ = partition_tracks((OF, OF), (clip(*both), clip(*both)))
     assert (_nodes(a.moving), _nodes(a.still)) == ({(1, "scale")}, {(0, "scale")})
     assert a.still[0].tangents is not None
     assert a.still[0].tangents[0].shape == (1, 1, 3)
 
 
 def test_tracks_of_nodes_that_are_not_there_are_left_out() -> None:
-    a, b = sides((OF, OF), (clip(track("scale", TIMES, OTHER, node=7)), clip()))
+    a, b = partition_tracks((OF, OF), (clip(track("scale", TIMES, OTHER, node=7)), clip()))
     assert [*a.moving, *a.still, *b.moving, *b.still] == []
 
 
 def test_weights_by_their_number() -> None:
     first = clip(track("weights", TIMES, [[0, 1], [1, 1]], node=2), track("weights", TIMES, [[1], [1]], node=1))
-    a, _ = sides((OF, OF), (first, first))
+    a, _ = partition_tracks((OF, OF), (first, first))
     assert [batch.values.shape for batch in (*a.weights(2, 2), *a.weights(1, 1))] == [(2, 1, 2), (2, 1, 1)]
     assert a.weights(2, 3) == a.weights(0, 2) == []

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.error.displacement import Groups, Linear, Rate, lengths, longest
+from anim.measure.error.displacement import (
+    BoundGroups,
+    DisplacementRate,
+    SkinnedDisplacement,
+    lengths,
+    max_displacement,
+)
 
 RNG = np.random.default_rng(5)
 JOINTS, FRAMES, VERTICES = 4, 40, 30
 
 
 @pytest.fixture
-def field() -> Linear:
+def field() -> SkinnedDisplacement:
     """Three groups of vertices in random places, carried by one or two of four joints that move at random."""
     points = RNG.normal(size=(VERTICES, 3))
     low, high = points.min(axis=0), points.max(axis=0)
@@ -21,54 +27,54 @@ def field() -> Linear:
     corners = np.tile(low + sides * (high - low), (JOINTS, 1, 1))
     whole = np.column_stack((points, np.ones(VERTICES)))
     two = np.concatenate((0.25 * whole[20:], 0.75 * whole[20:]), axis=1)
-    groups = Groups([np.array([0]), np.array([1]), np.array([2, 3])], [whole[:10], whole[10:20], two], corners)
-    return Linear(groups, RNG.normal(size=(JOINTS, FRAMES, 3, 4)))
+    groups = BoundGroups([np.array([0]), np.array([1]), np.array([2, 3])], [whole[:10], whole[10:20], two], corners)
+    return SkinnedDisplacement(groups, RNG.normal(size=(JOINTS, FRAMES, 3, 4)))
 
 
-def _all(field: Linear | Rate, frames: int) -> list[Floats]:
+def _all(field: SkinnedDisplacement | DisplacementRate, frames: int) -> list[Floats]:
     return [lengths(field, group, np.arange(frames)) for group in range(3)]
 
 
-def test_the_longest_is_found_where_it_is(field: Linear) -> None:
+def test_the_longest_is_found_where_it_is(field: SkinnedDisplacement) -> None:
     every = _all(field, FRAMES)
     top = max(each.max() for each in every)
-    found = longest(field, floor=0, slack=1, most=10**9)
+    found = max_displacement(field, floor=0, slack=1, most=10**9)
     assert found.length == top
     assert every[found.group][found.vertex, found.frame] == top
 
 
 @pytest.mark.parametrize("most", [0, 1, 50, 500])
-def test_less_searching_says_more_never_less(field: Linear, most: int) -> None:
+def test_less_searching_says_more_never_less(field: SkinnedDisplacement, most: int) -> None:
     top = max(each.max() for each in _all(field, FRAMES))
-    found = longest(field, floor=0, slack=1, most=most)
+    found = max_displacement(field, floor=0, slack=1, most=most)
     assert top <= found.length <= field.limits.max()
     if not most:
         assert (found.length, found.vertex) == (field.limits.max(), -1)
 
 
-def test_what_is_below_the_floor_is_only_bounded(field: Linear) -> None:
-    found = longest(field, floor=1e9, slack=1, most=10**9)
+def test_what_is_below_the_floor_is_only_bounded(field: SkinnedDisplacement) -> None:
+    found = max_displacement(field, floor=1e9, slack=1, most=10**9)
     assert (found.length, found.vertex) == (field.limits.max(), -1)
 
 
-def test_limits_are_limits(field: Linear) -> None:
+def test_limits_are_limits(field: SkinnedDisplacement) -> None:
     step = np.full(FRAMES - 1, 0.1)
-    for one, frames in ((field, FRAMES), (field.rate(step), FRAMES - 1), (Rate(field, step), FRAMES - 1)):
+    for one, frames in ((field, FRAMES), (field.rate(step), FRAMES - 1), (DisplacementRate(field, step), FRAMES - 1)):
         for group, sizes in enumerate(_all(one, frames)):  # type: ignore[arg-type]
             assert (sizes <= one.limits[group] * (1 + 1e-12)).all()
 
 
-def test_rates_are_differences(field: Linear) -> None:
+def test_rates_are_differences(field: SkinnedDisplacement) -> None:
     step = RNG.uniform(0.1, 0.2, FRAMES - 1)
     frames = np.array([3, 17, 0])
     for group in range(3):
         vectors = field.vectors(group, np.arange(FRAMES))
         expected = (np.diff(vectors, axis=-1) / step)[..., frames]
-        for one in (field.rate(step), Rate(field, step)):
+        for one in (field.rate(step), DisplacementRate(field, step)):
             assert one.vectors(group, frames) == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_joint_that_moves_a_vertex_most_is_named(field: Linear) -> None:
+def test_the_joint_that_moves_a_vertex_most_is_named(field: SkinnedDisplacement) -> None:
     """A vertex with shares 1/4 and 3/4 of two joints: whichever carries it farther."""
     for frame in range(10):
         single = [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.measure.error.metric import NOISE, SLACK, Ruler, check_times
+from anim.measure.error.metric import NOISE, SLACK, ErrorMetric, key_and_mid_times
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene, Track
 from anim.ops.resample import resample
@@ -49,19 +49,19 @@ def scene_and_clip(request: pytest.FixtureRequest, asset: Find) -> tuple[Scene, 
 def test_nothing_is_understated_and_little_is_overstated(scene_and_clip: tuple[Scene, Clip], change: str) -> None:
     scene, before = scene_and_clip
     after = CHANGES[change](before)
-    found = Ruler(scene).error(before, after)
-    truth = brute(scene, before, after, check_times(before, after))
+    found = ErrorMetric(scene).error(before, after)
+    truth = brute(scene, before, after, key_and_mid_times(before, after))
     noise = NOISE * diagonal(scene)
     assert found.max_error >= truth - 1e-12
     assert found.max_error <= SLACK * truth + noise
-    assert found.times == len(check_times(before, after))
+    assert found.times == len(key_and_mid_times(before, after))
     here = brute(scene, before, after, np.array([found.time]))
     assert here >= truth / SLACK - noise  # the time that is named is one of the worst
 
 
 def test_the_same_clip_is_0_away(scene_and_clip: tuple[Scene, Clip]) -> None:
     scene, before = scene_and_clip
-    assert Ruler(scene).error(before, before).max_error <= 1e-12
+    assert ErrorMetric(scene).error(before, before).max_error <= 1e-12
 
 
 def test_the_oracle_can_see() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.measure.error.error_curve import JOINTS, profile
-from anim.measure.error.metric import Ruler
+from anim.measure.error.error_curve import JOINTS, error_curve
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Scene
 from anim.ops.resample import resample
 from tests.clips import clip, skeleton
@@ -16,10 +16,10 @@ from tests.files import opened_fixture
 
 def test_a_profile_is_the_error_time_by_time() -> None:
     document = opened_fixture("biped")
-    ruler = Ruler(reader.scene(document), shell=0.01)
+    ruler = ErrorMetric(reader.scene(document), shell=0.01)
     before = reader.clips(document)[0]
     after = resample(before, fps=6)
-    found = profile(ruler, before, after, fps=30)
+    found = error_curve(ruler, before, after, fps=30)
     for i in range(0, len(found.times), 7):
         alone = ruler.error_at(before, after, found.times[i : i + 1]).max_error
         assert found.error[i] == pytest.approx(alone, rel=2e-3, abs=2e-7 * ruler.diagonal)
@@ -31,6 +31,6 @@ def test_a_profile_is_the_error_time_by_time() -> None:
 
 
 def test_a_profile_of_nothing() -> None:
-    found = profile(Ruler(Scene(skeleton([-1]), ())), clip(), clip())
+    found = error_curve(ErrorMetric(Scene(skeleton([-1]), ())), clip(), clip())
     assert found.error.tolist() == [0]
     assert found.joints == ()

@@ -9,7 +9,7 @@ import pytest
 
 from anim.arrays import Floats
 from anim.measure.error import point_matrix as points_
-from anim.measure.error.point_matrix import CARRIED, Points, of_scene, stacked
+from anim.measure.error.point_matrix import CARRIED, PointMatrix, sample_points, stack_points
 from anim.measure.error.surface import surfaces
 from anim.model import Scene
 from anim.sampling import rest_pose, world_matrices
@@ -49,7 +49,7 @@ def test_moves_are_differences_of_places(dense: int, monkeypatch: pytest.MonkeyP
     of = scene()
     points = every_point(of)
     a, b = _world(of), _world(of)
-    moved = points.rows().moves(stacked(b, points.nodes) - stacked(a, points.nodes))
+    moved = points.rows().moves(stack_points(b, points.nodes) - stack_points(a, points.nodes))
     assert moved.swapaxes(1, 2) == pytest.approx(_places(of, b) - _places(of, a), abs=1e-4)
 
 
@@ -59,14 +59,14 @@ def test_a_joint_twice_on_one_vertex_counts_twice() -> None:
     world = np.eye(4)[:3][None, None] * np.array([2.0, 1, 1, 1])[:, None][:3]
     world = np.repeat(world, 2, axis=0)
     moved = points.rows().moves(
-        stacked(world, points.nodes) - stacked(np.tile(np.eye(4)[:3], (2, 1, 1, 1)), points.nodes)
+        stack_points(world, points.nodes) - stack_points(np.tile(np.eye(4)[:3], (2, 1, 1, 1)), points.nodes)
     )
     assert moved[0, :, 0] == pytest.approx([1, 0, 0])
 
 
 def test_shells_are_six_points_around_a_node() -> None:
     of = Scene(skeleton([-1, 0], translation=[[1, 0, 0], [0, 2, 0]], scale=[[2, 2, 2], [1, 1, 1]]), ())
-    points = of_scene(of, {1}, 0.25)
+    points = sample_points(of, {1}, 0.25)
     world = world_matrices(of.skeleton, rest_pose(of.skeleton)).swapaxes(0, 1)
     places = points.places(world)[:, 0]
     assert places.mean(axis=0) == pytest.approx([1, 4, 0])
@@ -77,7 +77,7 @@ def test_shells_are_six_points_around_a_node() -> None:
 
 
 def test_nothing_to_measure() -> None:
-    points = of_scene(Scene(skeleton([-1]), ()), frozenset(), 1.0)
+    points = sample_points(Scene(skeleton([-1]), ()), frozenset(), 1.0)
     assert len(points) == 0
     assert points.places(np.ones((1, 5, 3, 4))).shape == (0, 5, 3)
 
@@ -86,7 +86,7 @@ def test_what_sticks_out_is_measured() -> None:
     """For every joint and direction of its space, no vertex that it carries most lies beyond the chosen ones."""
     of = scene(8)
     (surface,) = surfaces(of)
-    chosen = sorted(points_.extremes(surface))
+    chosen = sorted(points_.extreme_vertices(surface))
     assert 0 < len(chosen) < 60
     (instance,) = of.instances
     assert instance.skin is not None
@@ -111,11 +111,11 @@ def test_what_sticks_out_is_measured() -> None:
 
 def test_extra_vertices_are_measured_too() -> None:
     of = scene()
-    usual = of_scene(of, frozenset(), 0.0)
+    usual = sample_points(of, frozenset(), 0.0)
     (surface,) = surfaces(of)
-    missing = min(set(range(60)) - points_.extremes(surface))
-    assert len(of_scene(of, frozenset(), 0.0, {(0, missing)})) == len(usual) + 1
-    assert len(of_scene(of, frozenset(), 0.0, {(1, missing)})) == len(usual)
+    missing = min(set(range(60)) - points_.extreme_vertices(surface))
+    assert len(sample_points(of, frozenset(), 0.0, {(0, missing)})) == len(usual) + 1
+    assert len(sample_points(of, frozenset(), 0.0, {(1, missing)})) == len(usual)
 
 
 def test_morphed_as_at_rest() -> None:
@@ -125,7 +125,7 @@ def test_morphed_as_at_rest() -> None:
 
 
 def test_points_answer_for_what_they_noticeably_hang_on() -> None:
-    one = Points(np.array([2, 7]), np.array([[0, 1], [1, 0]]), np.ones((2, 2, 4)) * [[[0.95], [0.05]]])
+    one = PointMatrix(np.array([2, 7]), np.array([[0, 1], [1, 0]]), np.ones((2, 2, 4)) * [[[0.95], [0.05]]])
     nodes = np.zeros(9, np.bool_)
     nodes[2] = True
     assert one.on(nodes).tolist() == [True, False]

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.measure.error import metric
-from anim.measure.error.displacement import Morphed
-from anim.measure.error.metric import Ruler, check_times, dense_times
+from anim.measure.error.displacement import MorphedDisplacement
+from anim.measure.error.metric import ErrorMetric, dense_times, key_and_mid_times
 from anim.measure.error.statistics import FRAMES, SLACK, Peak, speed_error, statistics
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Track
 from anim.ops.resample import resample
@@ -40,15 +40,15 @@ def versions(request: pytest.FixtureRequest) -> tuple[Scene, Clip, Clip]:
 
 def test_a_plain_loop_finds_the_same(versions: tuple[Scene, Clip, Clip]) -> None:
     scene, before, after = versions
-    times = check_times(before, after)[::9][:FRAMES]
-    found = statistics(Ruler(scene), before, after, times=times)
+    times = key_and_mid_times(before, after)[::9][:FRAMES]
+    found = statistics(ErrorMetric(scene), before, after, times=times)
     apart = np.array([[np.linalg.norm(v) for v in _apart(scene, before, after, time)] for time in times])
     assert apart.max() > 0.001
     assert found.mean == pytest.approx(apart.mean(), rel=1e-9)
     ordered = np.sort(apart.reshape(-1))
     assert found.p99 == pytest.approx(ordered[int(np.ceil(0.99 * len(ordered))) - 1], rel=1e-9)
-    assert statistics(Ruler(scene, shell=0.01), before, after, times=times).mean == found.mean
-    largest = Ruler(scene).error_at(before, after, times)
+    assert statistics(ErrorMetric(scene, shell=0.01), before, after, times=times).mean == found.mean
+    largest = ErrorMetric(scene).error_at(before, after, times)
     assert apart.max() - 1e-12 <= largest.max_error <= 1.001 * apart.max()
     frame = int(np.flatnonzero(times == largest.time)[0])
     assert apart[frame, largest.vertex] == pytest.approx(apart.max(), rel=1e-3)
@@ -59,7 +59,7 @@ def test_speeds_are_differences_on_the_grid(versions: tuple[Scene, Clip, Clip]) 
     times = frame_times(0.0, max(before.end, after.end), fps=6)
     apart = np.array([_apart(scene, before, after, time) for time in times])
     speeds = np.linalg.norm(np.diff(apart, axis=0), axis=2) / np.diff(times)[:, None]
-    found = speed_error(Ruler(scene), before, after, fps=6)
+    found = speed_error(ErrorMetric(scene), before, after, fps=6)
     assert speeds.max() - 1e-9 <= found.size <= SLACK * speeds.max()
     frame = int(np.argmin(np.abs((times[1:] + times[:-1]) / 2 - found.time)))
     assert speeds[frame, found.vertex] >= speeds.max() / SLACK - 1e-9
@@ -67,8 +67,8 @@ def test_speeds_are_differences_on_the_grid(versions: tuple[Scene, Clip, Clip]) 
 
 def test_turns_are_those_of_the_world(versions: tuple[Scene, Clip, Clip]) -> None:
     scene, before, after = versions
-    times = check_times(before, after)[::3]
-    found = statistics(Ruler(scene), before, after, times=times)
+    times = key_and_mid_times(before, after)[::3]
+    found = statistics(ErrorMetric(scene), before, after, times=times)
     angles = [
         (one[1].inv() * other[1]).magnitude()
         for time in times
@@ -81,10 +81,10 @@ def test_blocks_don_t_show(versions: tuple[Scene, Clip, Clip], monkeypatch: pyte
     """However few times are gone through at once, the answer is the same."""
     scene, before, after = versions
     times = dense_times(before, after)
-    whole = Ruler(scene, shell=0.01).error_at(before, after, times), statistics(Ruler(scene), before, after)
+    whole = ErrorMetric(scene, shell=0.01).error_at(before, after, times), statistics(ErrorMetric(scene), before, after)
     monkeypatch.setattr(metric, "BLOCK", 1)
-    assert len(list(Ruler(scene).blocks(before, after, times))) > 10
-    parts = Ruler(scene, shell=0.01).error_at(before, after, times), statistics(Ruler(scene), before, after)
+    assert len(list(ErrorMetric(scene).blocks(before, after, times))) > 10
+    parts = ErrorMetric(scene, shell=0.01).error_at(before, after, times), statistics(ErrorMetric(scene), before, after)
     assert parts[0].max_error == pytest.approx(whole[0].max_error, rel=1e-3)
     assert parts[1].mean == pytest.approx(whole[1].mean, rel=1e-12)
     assert parts[1].speed.size == pytest.approx(whole[1].speed.size, rel=0.01)
@@ -98,7 +98,7 @@ def test_a_point_that_hurries() -> None:
     """At 1 m/s against 3 m/s over one second: 2 m/s all the way; half of the distances are above 1 m."""
     scene = _points([[0, 0, 0]])
     before, after = (clip(track("translation", [0, 1], np.array([[0, 0, 0], [s, 0, 0]]))) for s in (1, 3))
-    found = statistics(Ruler(scene), before, after, times=np.linspace(0, 1, 51))
+    found = statistics(ErrorMetric(scene), before, after, times=np.linspace(0, 1, 51))
     assert found.speed.size == pytest.approx(2, rel=0.01)
     assert found.mean == pytest.approx(1)
     assert found.p99 == pytest.approx(2 * 0.99, abs=0.03)
@@ -109,7 +109,7 @@ def test_a_step_is_as_fast_as_a_frame() -> None:
     """A jump of 0.1 m within one frame of 120 a second is 12 m/s, whatever happens elsewhere."""
     jump = clip(track("translation", [0, 0.5, 1], np.array([[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0]]), STEP))
     still = clip(track("translation", [0, 1], np.zeros((2, 3))))
-    found = speed_error(Ruler(_points([[0, 0, 0]])), still, jump)
+    found = speed_error(ErrorMetric(_points([[0, 0, 0]])), still, jump)
     assert found.size == pytest.approx(12, rel=0.01)
     assert found.time == pytest.approx(0.5, abs=1 / 120)
 
@@ -117,7 +117,7 @@ def test_a_step_is_as_fast_as_a_frame() -> None:
 def test_turns_add_up_down_the_chain() -> None:
     nodes = skeleton([-1, 0, 1])
     after = clip(*(track("rotation", [0], about("z", [d]), node=n) for n, d in ((0, 1), (1, 2), (2, 4))))
-    found = statistics(Ruler(Scene(nodes, ())), clip(), after)
+    found = statistics(ErrorMetric(Scene(nodes, ())), clip(), after)
     assert np.degrees(found.angle.size) == pytest.approx(7)
     assert found.angle.joint == "2"
 
@@ -127,7 +127,7 @@ def test_morph_weights_by_hand() -> None:
     scene = _points([[0, 0, 0], [1, 0, 0]], targets=[[[0, 0, 0], [0, 2, 0]], [[0, 0, 0], [0, 0, 1]]])
     before = clip(track("weights", [0, 0.5, 1], np.zeros((3, 2))))
     after = clip(track("weights", [0, 0.5, 1], np.array([[0, 0], [0.25, 0], [0, 0]])))
-    found = statistics(Ruler(scene), before, after)
+    found = statistics(ErrorMetric(scene), before, after)
     assert found.weight == Peak(0.25, 0.5, "0", "0", 0)
     assert found.speed.size == pytest.approx(2 * 0.25 / 0.5, rel=0.01)
     assert found.speed.vertex == 1
@@ -143,10 +143,10 @@ def test_morphs_and_skins_together_are_a_plain_sum(asset: Find) -> None:
     weights = np.tile(instance.weights, (3, 1))
     weights[1, 5] += 0.5
     moving = Clip("", (*before.tracks, track("weights", [0, end / 2, end], weights, node=instance.node)))
-    found = Ruler(scene).error_at(before, moving, np.array([end / 2]))
+    found = ErrorMetric(scene).error_at(before, moving, np.array([end / 2]))
     alone = np.abs(0.5 * np.linalg.norm(instance.mesh.targets[5], axis=1)).max()
     assert found.max_error == pytest.approx(alone, rel=1e-3)  # joints turn, but don't scale
-    assert statistics(Ruler(scene), before, moving).weight.vertex == 5
+    assert statistics(ErrorMetric(scene), before, moving).weight.vertex == 5
 
 
 def test_bounds_hold_where_skin_is_morphed_too(asset: Find) -> None:
@@ -154,13 +154,13 @@ def test_bounds_hold_where_skin_is_morphed_too(asset: Find) -> None:
     document = opened_path(asset("BitmojiRun.glb"))
     before = reader.clips(document)[0]
     slower = Clip("", tuple(replace(each, times=1.07 * each.times) for each in before.tracks))
-    ruler = Ruler(reader.scene(document))
+    ruler = ErrorMetric(reader.scene(document))
     times = frame_times(0.0, slower.end, fps=60)
     found = ruler.error_at(before, slower, times), speed_error(ruler, before, slower, fps=60)
     (block,) = ruler.blocks(before, slower, times)
     (part,) = ruler.parts
     field = part.field(block.old, block.new)
-    assert isinstance(field, Morphed)
+    assert isinstance(field, MorphedDisplacement)
     frames = np.arange(len(times))
     apart = np.concatenate([field.vectors(group, frames) for group in range(len(part.groups))])
     largest = np.linalg.norm(apart, axis=1).max()
@@ -179,7 +179,7 @@ def test_a_model_of_any_size_is_measured_alike(factor: float) -> None:
     roots = {n for n in range(len(nodes)) if nodes.parents[n] < 0}
     place = np.where((nodes.parents < 0)[:, None], factor * nodes.translation, nodes.translation)
     large = replace(scene, skeleton=replace(nodes, scale=scale, translation=place))
-    plain, other = Ruler(scene, shell=0.01), Ruler(large, shell=0.01)
+    plain, other = ErrorMetric(scene, shell=0.01), ErrorMetric(large, shell=0.01)
     resized = [Clip("", tuple(_times(factor, e) if e.node in roots else e for e in c.tracks)) for c in (before, after)]
     assert other.diagonal == pytest.approx(factor * plain.diagonal)
     expected = factor * plain.error(before, after).max_error
@@ -197,7 +197,7 @@ def _times(factor: float, each: Track) -> Track:
 def test_the_same_clip_is_exactly_0_away() -> None:
     for name in ("biped", "morph_cube", "interpolations"):
         document = opened_fixture(name)
-        ruler = Ruler(reader.scene(document), reader.scene(opened_fixture(name)), shell=0.01)
+        ruler = ErrorMetric(reader.scene(document), reader.scene(opened_fixture(name)), shell=0.01)
         for each in reader.clips(document):
             assert ruler.error_at(each, each, dense_times(each)).max_error == 0
             found = statistics(ruler, each, each)
@@ -293,6 +293,6 @@ def test_without_vertices_the_points_of_shells_count() -> None:
     way = np.array([[0.0, 0, 0], [1, 0, 0]])
     before, after = (clip(track("translation", [0, 1], way + [[0], [lift]] * np.eye(3)[1])) for lift in (0, 0.002))
     times = np.linspace(0, 1, 11)
-    for ruler in (Ruler(scene, shell=0.01), Ruler(scene)):
+    for ruler in (ErrorMetric(scene, shell=0.01), ErrorMetric(scene)):
         found = statistics(ruler, before, after, times=times)
         assert [found.mean, found.p99] == pytest.approx([0.001, 0.002])

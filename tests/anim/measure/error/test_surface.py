@@ -14,7 +14,7 @@ import trimesh
 import fixtures
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.measure.error.surface import SHELL, diagonal, placed, surfaces
+from anim.measure.error.surface import SHELL, diagonal, place_points, surfaces
 from anim.model import Scene
 from anim.sampling import rest_pose, world_matrices
 from fixtures.broken.pieces import buffered, data_uri, text
@@ -56,7 +56,7 @@ def test_real_models_have_their_known_sizes(asset: Find) -> None:
         scene = reader.scene(opened_path(asset(name)))
         world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
         (surface,) = surfaces(scene)
-        points = placed(surface, world[surface.nodes], surface.rest_weights)
+        points = place_points(surface, world[surface.nodes], surface.rest_weights)
         assert np.ptp(points[:, 1]) == pytest.approx(height, rel=0.01)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Bools
-from anim.measure.inspect.redundant_keys import removable
+from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Track
 from tests.clips import track
 
@@ -22,7 +22,7 @@ def _mask(keys: int, *given: int) -> np.ndarray:
 
 
 def _counts(tracks: list[Track], given: dict[int, Bools]) -> list[int]:
-    return [int(mask.sum()) for mask in removable(tracks, given)]
+    return [int(mask.sum()) for mask in redundant_keys(tracks, given)]
 
 
 def test_alone_on_its_axis_every_key_that_is_given_goes() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anim.measure.inspect.root_motion import Travel, traveling_root, travels
+from anim.measure.inspect.root_motion import RootMotion, root_motion_node, root_motions
 from anim.model import Clip, Skeleton
 from tests import clips
 from tests.anim.ops.tracks import TRACKS
@@ -13,23 +13,23 @@ ARM = clips.skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]])  # its size is
 WALK = clips.clip(clips.track("translation", [0, 4], [[0, 0, 0], [2, 0, 0]]))
 
 
-def only(skeleton: Skeleton, clip: Clip) -> Travel:
-    return travels(skeleton, [clip])[0]
+def only(skeleton: Skeleton, clip: Clip) -> RootMotion:
+    return root_motions(skeleton, [clip])[0]
 
 
 def test_a_root_that_leads_somewhere() -> None:
-    assert only(ARM, WALK) == Travel(0, 2.0, 0.5)
-    assert traveling_root(ARM, WALK) == 0
+    assert only(ARM, WALK) == RootMotion(0, 2.0, 0.5)
+    assert root_motion_node(ARM, WALK) == 0
 
 
 def test_a_node_with_nothing_on_it_leads_nowhere() -> None:
-    assert traveling_root(clips.skeleton([-1, -1]), WALK) == -1
+    assert root_motion_node(clips.skeleton([-1, -1]), WALK) == -1
 
 
 def test_there_and_back_leads_nowhere() -> None:
     swing = clips.clip(clips.track("translation", [0, 1, 2], [[0, 0, 0], [1, 0, 0], [0, 0, 0]]))
-    assert only(ARM, swing) == Travel(0, 0.0, 0.0)
-    assert traveling_root(ARM, swing) == -1
+    assert only(ARM, swing) == RootMotion(0, 0.0, 0.0)
+    assert root_motion_node(ARM, swing) == -1
 
 
 def test_a_turn_has_no_root() -> None:
@@ -43,15 +43,15 @@ def test_the_root_is_the_moved_node_nearest_to_the_top() -> None:
 
 
 def test_a_clip_without_time_has_no_way() -> None:
-    nothing = Travel(-1, 0.0, 0.0)
+    nothing = RootMotion(-1, 0.0, 0.0)
     assert only(ARM, clips.clip(clips.track("translation", [1], [[3, 0, 0]]))) == nothing
-    assert travels(clips.skeleton([]), [clips.clip()]) == [nothing]
-    assert travels(ARM, []) == []
+    assert root_motions(clips.skeleton([]), [clips.clip()]) == [nothing]
+    assert root_motions(ARM, []) == []
 
 
 def test_clips_of_different_lengths_are_each_seen_at_their_own_ends() -> None:
     many = [clips.clip(track) for track in TRACKS.values()] + [WALK]
-    ways = travels(ARM, many)
+    ways = root_motions(ARM, many)
     for clip, way in zip(many, ways, strict=True):
         assert way == only(ARM, clip)
     assert ways[-1].distance == pytest.approx(2)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from anim.gltf.document import Document, Json
-from anim.measure.inspect.storage_cost import Footprint, footprints
+from anim.measure.inspect.storage_cost import StorageCost, storage_costs
 from tests.files import REAL, SHARED, opened_path
 
 KEYS = {"componentType": 5126, "count": 2}
@@ -50,15 +50,15 @@ def json_bytes(content: Json, numbers: list[int]) -> int:
 
 
 def test_by_hand() -> None:
-    alone, together = footprints(Document(SHARING, ()))
+    alone, together = storage_costs(Document(SHARING, ()))
     data = [8 + 24, 8 + 24]  # nothing is stored of output 3, and nobody knows what a VEC5 is
-    assert alone == [Footprint(size, json_bytes(SHARING, [i])) for i, size in enumerate(data)]
-    assert together == Footprint(8 + 24 + 24, json_bytes(SHARING, [0, 1]))
+    assert alone == [StorageCost(size, json_bytes(SHARING, [i])) for i, size in enumerate(data)]
+    assert together == StorageCost(8 + 24 + 24, json_bytes(SHARING, [0, 1]))
     assert together.total == together.data + together.json
 
 
 def test_no_animations_cost_nothing() -> None:
-    assert footprints(Document({"asset": {"version": "2.0"}}, ())) == ([], Footprint(0, 0))
+    assert storage_costs(Document({"asset": {"version": "2.0"}}, ())) == ([], StorageCost(0, 0))
 
 
 @pytest.mark.parametrize("name", REAL)
@@ -67,7 +67,7 @@ def test_real_files_part_by_part(name: str) -> None:
     if not path.is_file():
         pytest.skip(f"{name} is not there")
     document = opened_path(path)
-    alone, together = footprints(document)
+    alone, together = storage_costs(document)
     every = list(range(len(document.json["animations"])))
     assert [each.json for each in alone] == [json_bytes(document.json, [i]) for i in every]
     assert together.json == json_bytes(document.json, every)

@@ -9,7 +9,7 @@ import pytest
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.measure.inspect.stored_bytes import stored
+from anim.measure.inspect.stored_bytes import stored_bytes
 from tests.files import opened_fixture
 
 FLOAT = {"componentType": 5126}
@@ -28,7 +28,7 @@ def test_plain_accessors_by_hand() -> None:
         {"bufferView": 1, "byteOffset": 36, "componentType": 5122, "count": 3, "type": "VEC4"},
     ]
     views = [{"buffer": 0, "byteLength": 12}, {"buffer": 0, "byteLength": 100}]
-    assert stored(_document(accessors, views, [(0, 1), (0, 2)])) == 12 + 36 + 24
+    assert stored_bytes(_document(accessors, views, [(0, 1), (0, 2)])) == 12 + 36 + 24
 
 
 def test_what_accessors_share_counts_once() -> None:
@@ -40,7 +40,7 @@ def test_what_accessors_share_counts_once() -> None:
         {"bufferView": 1, **FLOAT, "count": 5, "type": "VEC3"},
     ]
     views = [{"buffer": 0, "byteLength": 20}, {"buffer": 0, "byteLength": 60}]
-    assert stored(_document(accessors, views, [(0, 3), (1, 3), (2, 3)])) == 20 + 60
+    assert stored_bytes(_document(accessors, views, [(0, 3), (1, 3), (2, 3)])) == 20 + 60
 
 
 def test_what_meshes_use_too_does_not_count() -> None:
@@ -50,7 +50,7 @@ def test_what_meshes_use_too_does_not_count() -> None:
     ]
     views = [{"buffer": 0, "byteLength": 12}, {"buffer": 0, "byteLength": 36}]
     meshes = [{"primitives": [{"attributes": {"POSITION": 1}}]}]
-    assert stored(_document(accessors, views, [(0, 1)], meshes=meshes)) == 12
+    assert stored_bytes(_document(accessors, views, [(0, 1)], meshes=meshes)) == 12
 
 
 @pytest.mark.parametrize("name", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
@@ -62,13 +62,13 @@ def test_compressed_views_count_as_compressed(name: str) -> None:
         {"bufferView": 1, "byteOffset": 24, **FLOAT, "count": 1, "type": "VEC3"},
     ]
     views = [{"buffer": 0, "byteLength": 12}, {"buffer": 1, "byteLength": 36, "extensions": {name: packed}}]
-    assert stored(_document(accessors, views, [(0, 1), (0, 2)])) == 12 + 17
+    assert stored_bytes(_document(accessors, views, [(0, 1), (0, 2)])) == 12 + 17
 
 
 def test_nothing_is_stored_of_zeros() -> None:
     accessors = [{**FLOAT, "count": 3, "type": "SCALAR"}, {**FLOAT, "count": 3, "type": "VEC3"}]
-    assert stored(_document(accessors, [], [(0, 1)])) == 0
-    assert stored(Document({"asset": {"version": "2.0"}}, ())) == 0
+    assert stored_bytes(_document(accessors, [], [(0, 1)])) == 0
+    assert stored_bytes(Document({"asset": {"version": "2.0"}}, ())) == 0
 
 
 @pytest.mark.parametrize("name", ["biped", "interpolations", "pointer"])
@@ -78,7 +78,7 @@ def test_a_written_file_holds_as_much_less_without_its_animations(name: str) -> 
     written = writer.replace_clips(document, dict(enumerate(reader.clips(document))))
     size = sum(len(buffer.data) for buffer in written.buffers)
     meshes = sum(view["byteLength"] for i, view in enumerate(written.json["bufferViews"]) if i in _of_meshes(written))
-    assert 0 <= size - meshes - stored(written) <= 4 * len(written.json["bufferViews"])
+    assert 0 <= size - meshes - stored_bytes(written) <= 4 * len(written.json["bufferViews"])
 
 
 def _of_meshes(document: Document) -> set[int]:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from anim.optimize.options import EFFORTS
-from anim.optimize.search.axis_layouts import LAYOUTS, Layouts
+from anim.optimize.search.axis_layouts import LAYOUTS, TimeAxisSearch
 from tests.anim.optimize.making import CORE, TIMES, every_point, scene, truth_of, turning, waving
 from tests.clips import clip, track
 
 
-def _layouts() -> Layouts:
+def _layouts() -> TimeAxisSearch:
     of = scene()
-    return Layouts(truth_of(of, waving(), every_point(of)), CORE, 1e-3)
+    return TimeAxisSearch(truth_of(of, waving(), every_point(of)), CORE, 1e-3)
 
 
 KEYED = np.array([0, 1, 2])
@@ -64,7 +64,7 @@ def test_own_keys_are_those_of_the_source() -> None:
     of, thirds = scene(), TIMES[::3]
     bent = track("rotation", thirds, turning(1.5, times=thirds), node=1)
     truth = truth_of(of, clip(bent, *waving().tracks[2:3]), every_point(of))
-    layouts = Layouts(truth, CORE, 1e-3)
+    layouts = TimeAxisSearch(truth, CORE, 1e-3)
     tight = np.full(2, 1e-9)
     by_track = {i: axis.keys for axis in layouts.axes("own", np.arange(2), tight) for i in axis.members}
     assert truth.grid[by_track[0]] == pytest.approx(thirds)

@@ -7,9 +7,9 @@ import pytest
 
 from anim.arrays import Floats
 from anim.optimize.options import Bounds
-from anim.optimize.search.bound_usage import LEAST_GAP, Strains
-from anim.optimize.search.source_motion import Truth
-from anim.optimize.search.world_matrices import worlds
+from anim.optimize.search.bound_usage import LEAST_GAP, BoundUsage
+from anim.optimize.search.source_motion import SourceMotion
+from anim.optimize.search.world_matrices import level_world_matrices
 from tests.anim.optimize.making import every_point, scene, truth_of, waving
 
 OF = scene()
@@ -18,7 +18,7 @@ RNG = np.random.default_rng(11)
 ALLOWED = RNG.uniform(0.5, 2, len(POINTS))
 
 
-def _changed(truth: Truth) -> list[Floats]:
+def _changed(truth: SourceMotion) -> list[Floats]:
     """The truth with every moving track a little off."""
     shown = [part.copy() for part in truth.local]
     for each in truth.moving:
@@ -27,17 +27,19 @@ def _changed(truth: Truth) -> list[Floats]:
     return shown
 
 
-def _moves(truth: Truth, shown: list[Floats]) -> Floats:
+def _moves(truth: SourceMotion, shown: list[Floats]) -> Floats:
     """How far each point is from where it should be, (P, W, 3)."""
     levels = OF.skeleton.levels()
-    return POINTS.places(worlds(OF.skeleton, shown, levels)) - POINTS.places(worlds(OF.skeleton, truth.local, levels))
+    return POINTS.places(level_world_matrices(OF.skeleton, shown, levels)) - POINTS.places(
+        level_world_matrices(OF.skeleton, truth.local, levels)
+    )
 
 
 def test_the_largest_distance_of_each_point() -> None:
     truth = truth_of(OF, waving(), POINTS)
     shown = _changed(truth)
     expected = np.linalg.norm(_moves(truth, shown), axis=2).max(axis=1) / ALLOWED
-    strains = Strains(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0))
+    strains = BoundUsage(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0))
     assert strains.along_arcs(shown) == pytest.approx(expected, rel=1e-5)
     assert strains.along_arcs(truth.local).max() == 0
 
@@ -49,11 +51,11 @@ def test_speeds_count_where_they_are_bounded() -> None:
     gaps = np.maximum(np.diff(truth.at), LEAST_GAP)
     speeds = np.linalg.norm(np.diff(moves, axis=1), axis=2) / gaps
     expected = np.maximum(np.linalg.norm(moves, axis=2).max(axis=1) / ALLOWED, speeds.max(axis=1) / 0.3)
-    strains = Strains(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
+    strains = BoundUsage(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
     assert strains.along_arcs(shown) == pytest.approx(expected, rel=1e-4)
 
 
 def test_without_a_bound_on_angles_tracks_have_no_strain_of_their_own() -> None:
     truth = truth_of(OF, waving(), POINTS)
-    strains = Strains(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0))
+    strains = BoundUsage(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0))
     assert not strains.own(_changed(truth)).any()

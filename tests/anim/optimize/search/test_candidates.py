@@ -9,20 +9,20 @@ from anim.maths import quaternion
 from anim.optimize.options import Packing
 from anim.optimize.search import candidates as candidates_
 from anim.optimize.search.candidates import Candidates
-from anim.optimize.search.time_axes import Axis
+from anim.optimize.search.time_axes import SharedAxis
 from anim.sampling.track import sample
 from tests.anim.optimize.making import every_point, scene, truth_of, waving
 from tests.clips import track
 
 OF = scene()
 TRUTH = truth_of(OF, waving(), every_point(OF))
-EVERY_THIRD = Axis(np.arange(25) % 3 == 0, (0, 1, 2, 4))
-FULL = Axis(np.ones(25, np.bool_), (0, 1, 2, 4))
+EVERY_THIRD = SharedAxis(np.arange(25) % 3 == 0, (0, 1, 2, 4))
+FULL = SharedAxis(np.ones(25, np.bool_), (0, 1, 2, 4))
 
 
 @pytest.mark.parametrize("packing", list(Packing))
 @pytest.mark.parametrize("axis", [EVERY_THIRD, FULL])
-def test_shown_is_what_the_stored_track_is_at_each_moment(packing: Packing, axis: Axis) -> None:
+def test_shown_is_what_the_stored_track_is_at_each_moment(packing: Packing, axis: SharedAxis) -> None:
     misses = [1e-3] * 5
     for i, candidate in Candidates(TRUTH, packing).of(axis, misses):
         moving = TRUTH.moving[i]

@@ -9,7 +9,7 @@ import pytest
 
 from anim.model import Clip, MeshInstance, Scene
 from anim.optimize.options import Policy
-from anim.optimize.search.context import Setting
+from anim.optimize.search.context import Context
 from tests.anim.optimize.making import setting_of
 from tests.anim.skinning.scenes import mesh
 from tests.clips import about, clip, skeleton, track
@@ -21,7 +21,7 @@ SCENE = Scene(NODES, (MeshInstance(1, CUBE, None, np.zeros(1)),))
 MOVING = clip(track("rotation", [0, 1], about("x", [0, 9]), node=1))
 
 
-def _shells(setting: Setting) -> set[int]:
+def _shells(setting: Context) -> set[int]:
     """Nodes that are measured around, by six points each."""
     points = setting.points
     return {node for i, node in enumerate(points.nodes.tolist()) if (points.joints[:, 0] == i).sum() == 6}

@@ -7,25 +7,25 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Bools, Floats
-from anim.measure.error.point_matrix import Points
+from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Scene
 from anim.optimize.options import Packing
 from anim.optimize.search.candidates import Candidates
-from anim.optimize.search.parent_compensation import Aims, leeway
-from anim.optimize.search.source_motion import Truth
-from anim.optimize.search.time_axes import Axis
+from anim.optimize.search.parent_compensation import ParentCompensation, budget_gain
+from anim.optimize.search.source_motion import SourceMotion
+from anim.optimize.search.time_axes import SharedAxis
 from tests.anim.optimize.making import TIMES, truth_of, turning
 from tests.clips import clip, skeleton, track
 
 # An arm of four bones, each 1 m long, and a point at its tip.
 ARM = Scene(skeleton([-1, 0, 1, 2], translation=[[0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]]), ())
-TIP = Points(np.array([3]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
+TIP = PointMatrix(np.array([3]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
 BENDS = clip(*(track("rotation", TIMES, turning(0.6 + 0.2 * i, (0.2 * i, 1, i)), node=i) for i in range(4)))
 EVERY_KEY = np.ones(len(TIMES), np.bool_)
 COARSE = [2e-2] * 4
 
 
-def _truth() -> Truth:
+def _truth() -> SourceMotion:
     return truth_of(ARM, BENDS, TIP)
 
 
@@ -37,14 +37,14 @@ def _directions(rotation: Floats) -> Rotation:
     return found
 
 
-def _shown(truth: Truth, keys: Bools) -> tuple[Floats, Floats]:
+def _shown(truth: SourceMotion, keys: Bools) -> tuple[Floats, Floats]:
     """What all rotations show, stored coarsely: each for itself, and aiming at the world."""
-    axis = Axis(keys, (0, 1, 2, 3))
+    axis = SharedAxis(keys, (0, 1, 2, 3))
     candidates = Candidates(truth, Packing.EXT)
     local, aimed = truth.local[1].copy(), truth.local[1].copy()
     for i, each in candidates.of(axis, COARSE):
         local[truth.moving[i].node] = each.shown
-    found = dict(Aims(ARM.skeleton, truth, candidates).follow([axis], COARSE, aimed))
+    found = dict(ParentCompensation(ARM.skeleton, truth, candidates).follow([axis], COARSE, aimed))
     assert sorted(found) == [0, 1, 2, 3]
     assert all((aimed[truth.moving[i].node] == each.shown).all() for i, each in found.items())
     return local, aimed
@@ -69,17 +69,17 @@ def test_roots_are_as_they_were() -> None:
 def test_tracks_on_no_axis_are_made_up_for() -> None:
     """Joint 1 is held straight: joint 2 turns for both."""
     truth = _truth()
-    axis = Axis(EVERY_KEY, (0, 2, 3))
+    axis = SharedAxis(EVERY_KEY, (0, 2, 3))
     shown = truth.local[1].copy()
     shown[1] = [0, 0, 0, 1]
-    for _ in Aims(ARM.skeleton, truth, Candidates(truth, Packing.CORE)).follow([axis], [0.0] * 4, shown):
+    for _ in ParentCompensation(ARM.skeleton, truth, Candidates(truth, Packing.CORE)).follow([axis], [0.0] * 4, shown):
         pass
     off = _directions(shown[:3]) * _directions(truth.local[1][:3]).inv()
     assert off.magnitude()[truth.on_grid].max() < 1e-5
 
 
 def test_leeway_is_the_whole_arm_against_one_bone() -> None:
-    assert leeway(ARM.skeleton, _truth(), TIP) == pytest.approx([_reach(0), _reach(1), _reach(2), 1])
+    assert budget_gain(ARM.skeleton, _truth(), TIP) == pytest.approx([_reach(0), _reach(1), _reach(2), 1])
 
 
 def _reach(node: int) -> float:
@@ -94,4 +94,4 @@ def _reach(node: int) -> float:
 def test_only_rotations_have_leeway() -> None:
     sway = track("translation", TIMES, np.ones((25, 3)) * TIMES[:, None], node=0)
     truth = truth_of(ARM, clip(sway, *BENDS.tracks), TIP)
-    assert leeway(ARM.skeleton, truth, TIP)[0] == 1
+    assert budget_gain(ARM.skeleton, truth, TIP)[0] == 1

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from anim.optimize.options import EFFORTS, Bounds
-from anim.optimize.search.bound_usage import Strains
-from anim.optimize.search.plan import Fate
+from anim.optimize.search.bound_usage import BoundUsage
+from anim.optimize.search.plan import TrackAction
 from anim.optimize.search.search import search
-from anim.optimize.search.trial import Bench
+from anim.optimize.search.trial import TrialRunner
 from tests.anim.optimize.making import CORE, every_point, scene, truth_of, waving
 
 OF = scene()
 
 
-def _bench(bound: float) -> Bench:
+def _bench(bound: float) -> TrialRunner:
     points = every_point(OF)
     truth = truth_of(OF, waving(), points)
     count = len(truth.moving)
     allowed = np.full(len(points), bound)
-    strains = Strains(OF.skeleton, truth, points, allowed, Bounds(bound, 0.0))
-    return Bench(OF.skeleton, truth, strains, CORE, np.ones(count, bool), [()] * count)
+    strains = BoundUsage(OF.skeleton, truth, points, allowed, Bounds(bound, 0.0))
+    return TrialRunner(OF.skeleton, truth, strains, CORE, np.ones(count, bool), [()] * count)
 
 
 def test_more_effort_and_more_room_take_fewer_bytes() -> None:
@@ -54,7 +54,7 @@ def test_the_same_every_time(effort: str) -> None:
 def test_everything_goes_under_a_bound_that_allows_it() -> None:
     found = search(_bench(100.0), 100.0, EFFORTS["fast"])
     assert found is not None
-    assert (found.fates == Fate.DROPPED).all()
+    assert (found.fates == TrackAction.DROPPED).all()
 
 
 def test_none_where_float32_itself_is_too_coarse() -> None:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from anim.arrays import Bools, Floats
 from anim.optimize.search import segment_errors
-from anim.optimize.search.segment_errors import SPANS, Segments, fits
-from anim.optimize.tracks.key_reduction import needed
+from anim.optimize.search.segment_errors import SPANS, SegmentErrors, fits
+from anim.optimize.tracks.key_reduction import greedy_keys
 
 
 def _missed(values: Floats, times: Floats, keep: Bools) -> float:
@@ -36,7 +36,7 @@ def _chosen(count: int, inner: tuple[int, ...]) -> Bools:
 def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, budget: float) -> None:
     values, times = _random(seed, count)
     budgets = budget * np.array([1.0, 0.5, 2, 0.01])
-    keep = Segments(values, times, np.inf).needed(np.arange(4), budgets)
+    keep = SegmentErrors(values, times, np.inf).needed(np.arange(4), budgets)
     assert keep[:, [0, -1]].all()
     for track in range(4):
         assert _missed(values[track], times, keep[track]) <= budgets[track] * (1 + 1e-5)
@@ -47,7 +47,7 @@ def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, 
 def test_no_choice_of_fewer_keys_does(seed: int) -> None:
     """Tried are all of them."""
     values, times = _random(seed, 9)
-    keep = Segments(values, times, np.inf).needed(np.arange(4), np.full(4, 1.5))
+    keep = SegmentErrors(values, times, np.inf).needed(np.arange(4), np.full(4, 1.5))
     for track in range(4):
         count = int(keep[track].sum())
         fewer = (_chosen(9, inner) for inner in combinations(range(1, 8), max(count - 3, 0)))
@@ -58,13 +58,13 @@ def test_among_the_fewest_the_one_that_misses_least() -> None:
     """A bow in two lines: the middle key misses least."""
     times = np.linspace(0, 1, 11)
     bow = (times**2)[None, :, None]
-    keep = Segments(bow, times, np.inf).needed(np.array([0]), np.array([0.08]))
+    keep = SegmentErrors(bow, times, np.inf).needed(np.array([0]), np.array([0.08]))
     assert np.flatnonzero(keep[0]).tolist() == [0, 5, 10]
 
 
 def test_some_tracks_of_many() -> None:
     values, times = _random(3, 40)
-    table = Segments(values, times, np.inf)
+    table = SegmentErrors(values, times, np.inf)
     every = table.needed(np.arange(4), np.array([1.0, 2, 3, 4]))
     some = table.needed(np.array([3, 1]), np.array([4.0, 2]))
     assert (some == every[[3, 1]]).all()
@@ -72,15 +72,15 @@ def test_some_tracks_of_many() -> None:
 
 def test_never_more_keys_than_greedy_ones() -> None:
     values, times = _random(5, 60, tracks=30)
-    fewest = Segments(values, times, np.inf).needed(np.arange(30), np.full(30, 2.0)).sum(axis=1)
-    greedy = needed(values / 2.0, times).sum(axis=1)
+    fewest = SegmentErrors(values, times, np.inf).needed(np.arange(30), np.full(30, 2.0)).sum(axis=1)
+    greedy = greedy_keys(values / 2.0, times).sum(axis=1)
     assert (fewest <= greedy).all()
     assert fewest.sum() < greedy.sum()
 
 
 def test_long_lines_have_a_key_now_and_then() -> None:
     times = np.arange(300.0)
-    keep = Segments(times[None, :, None] * np.ones(3), times, np.inf).needed(np.array([0]), np.array([1e-3]))
+    keep = SegmentErrors(times[None, :, None] * np.ones(3), times, np.inf).needed(np.array([0]), np.array([1e-3]))
     at = np.flatnonzero(keep[0])
     assert np.diff(at).max() <= SPANS[0]
     assert len(at) == 2 + (299 - 1) // SPANS[0]
@@ -89,7 +89,7 @@ def test_long_lines_have_a_key_now_and_then() -> None:
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_and_two_keys_stay(count: int) -> None:
     values, times = _random(1, count)
-    assert Segments(values, times, np.inf).needed(np.arange(4), np.full(4, 1e9)).all()
+    assert SegmentErrors(values, times, np.inf).needed(np.arange(4), np.full(4, 1e9)).all()
 
 
 def test_tables_are_kept_within_memory(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,7 +104,7 @@ def test_segments_beyond_the_limit_are_not_looked_at() -> None:
     """Budgets within it lead to the same keys; a noisy track has no long segments, a straight one has all of them."""
     values, times = _random(8, 40)
     values[3] = times[:, None] * np.ones(3)
-    whole, limited = Segments(values, times, np.inf), Segments(values, times, 2.0)
+    whole, limited = SegmentErrors(values, times, np.inf), SegmentErrors(values, times, 2.0)
     budgets = np.full(4, 1.9)
     expected = whole.needed(np.arange(4), budgets)
     assert (limited.needed(np.arange(4), budgets) == expected).mean() > 0.98

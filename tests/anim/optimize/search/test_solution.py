@@ -10,17 +10,17 @@ from anim.model import FLOAT32, Clip, Interpolation
 from anim.optimize.options import Objective, Packing
 from anim.optimize.search.solution import Solution, value_bytes
 from anim.optimize.tracks.lossless import INT16
-from anim.optimize.tracks.quantization import PRICES, Coding, Stored, all_stored
+from anim.optimize.tracks.quantization import BYTE_COSTS, EncodedKeys, Encoding, encode_all
 from tests.clips import about, clip, track
 
-PRICE = PRICES[Objective.FILE]
-CORE, EXT = (Coding(packing, PRICE) for packing in (Packing.CORE, Packing.EXT))
+PRICE = BYTE_COSTS[Objective.FILE]
+CORE, EXT = (Encoding(packing, PRICE) for packing in (Packing.CORE, Packing.EXT))
 LINES = track("translation", [0, 1, 2], np.eye(3), node=0)
 TURNS = track("rotation", [0, 1, 2], about("z", [0, 10, 20]), node=0)
 
 
 def _solution(what: Clip) -> Solution:
-    return Solution(what, tuple(Stored(each.values, "as it is") for each in what.tracks), ())
+    return Solution(what, tuple(EncodedKeys(each.values, "as it is") for each in what.tracks), ())
 
 
 def test_values_as_stored() -> None:
@@ -46,7 +46,7 @@ def test_single_keys_are_cheaper() -> None:
 
 
 def test_filtered_tracks_count_as_the_codec_has_them() -> None:
-    (keys,) = all_stored([TURNS.values], [("quaternion", 10)])
+    (keys,) = encode_all([TURNS.values], [("quaternion", 10)])
     both = clip(TURNS, replace(LINES, times=TURNS.times))
-    found = Solution(both, (keys, Stored(LINES.values, "as it is")), ()).size(EXT)
+    found = Solution(both, (keys, EncodedKeys(LINES.values, "as it is")), ()).size(EXT)
     assert found == 2 * PRICE.track + PRICE.axis + 12 + 36 + EXT.size([keys])

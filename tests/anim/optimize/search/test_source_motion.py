@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.point_matrix import Points, stacked
+from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Scene
 from anim.optimize.options import Reference
 from anim.optimize.search.source_motion import PATHS, key_grid, moments
-from anim.optimize.search.world_matrices import needed_levels, worlds
+from anim.optimize.search.world_matrices import level_world_matrices, needed_levels
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.optimize.making import every_point, scene, truth_of, turning, waving
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
@@ -61,7 +61,7 @@ def test_worlds_are_products_of_matrices_with_turns_as_stored() -> None:
     count = len(of.skeleton)
     local = (RNG.normal(size=(count, 3, 3)), 1.01 * quaternion.normalize(RNG.normal(size=(count, 3, 4))),
              RNG.uniform(0.5, 2, (count, 3, 3)))  # fmt: skip
-    found = worlds(of.skeleton, local, of.skeleton.levels())
+    found = level_world_matrices(of.skeleton, local, of.skeleton.levels())
     for node in range(count):
         for frame in range(3):
             assert found[node, frame] == pytest.approx(_chained(of, node, local, frame)[:3], abs=1e-9)
@@ -73,7 +73,7 @@ def test_columns_are_the_sampled_pose() -> None:
     truth = truth_of(of, what, points)
     assert (truth.at[truth.on_grid] == truth.grid).all()
     expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, truth.at)).swapaxes(0, 1)
-    assert truth.columns == pytest.approx(stacked(expected, points.nodes), abs=1e-12)
+    assert truth.columns == pytest.approx(stack_points(expected, points.nodes), abs=1e-12)
 
 
 def test_keys_only() -> None:
@@ -106,7 +106,7 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
     points = every_point(of)
     truth = truth_of(of, what, points)
     rng = np.random.default_rng(seed)
-    before = points.places(worlds(of.skeleton, truth.local, truth.levels))
+    before = points.places(level_world_matrices(of.skeleton, truth.local, truth.levels))
     for g, each in enumerate(truth.moving):
         local = tuple(part.copy() for part in truth.local)
         change = 1e-4 * rng.normal(size=each.values.shape)
@@ -115,7 +115,7 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
             changed = quaternion.normalize(changed)
             change = changed - each.values
         local[PATHS.index(each.path)][each.node] = changed
-        after = points.places(worlds(of.skeleton, (local[0], local[1], local[2]), truth.levels))
+        after = points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), truth.levels))
         moved = np.linalg.norm(after - before, axis=2)
         allowed = each.meters * np.linalg.norm(change, axis=1).max()
         assert moved[truth.answering[g]].max(initial=0.0) <= slack * allowed
@@ -138,7 +138,7 @@ def test_chords_count_only_where_they_leave_the_arc() -> None:
 def test_chords_are_normalized_mixes() -> None:
     """A point at x = 1, a quarter of the way through 120° in one step."""
     of = Scene(skeleton([-1]), ())
-    points = Points(np.array([0]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
+    points = PointMatrix(np.array([0]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
     rotation = track("rotation", [0, 1], about("z", [0, 120]))
     quarters = track("scale", [0, 0.25, 1], np.ones((3, 3)))
     truth = truth_of(of, clip(rotation, quarters), points)

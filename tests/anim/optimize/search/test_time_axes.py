@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Bools, Floats
-from anim.optimize.search.time_axes import Axis, merged
+from anim.optimize.search.time_axes import SharedAxis, merge_axes
 
 AXIS, TIME = 120.0, 4.0
 
@@ -40,8 +40,8 @@ def _random(seed: int, tracks: int, keys: int = 40) -> tuple[Bools, Floats]:
     return keep, rng.choice([8.0, 12.0], tracks)
 
 
-def _merged(keep: Bools, key_bytes: Floats) -> list[Axis]:
-    return merged(keep, key_bytes, axis_bytes=AXIS, time_bytes=TIME)
+def _merged(keep: Bools, key_bytes: Floats) -> list[SharedAxis]:
+    return merge_axes(keep, key_bytes, axis_bytes=AXIS, time_bytes=TIME)
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -85,5 +85,5 @@ def test_two_tracks_merge_just_where_it_pays() -> None:
 
 def test_equal_needs_share_whatever_they_cost() -> None:
     keep = np.tile([True, False, True], (4, 1))
-    (axis,) = merged(keep, np.full(4, 1e9), axis_bytes=0.0, time_bytes=0.0)
+    (axis,) = merge_axes(keep, np.full(4, 1e9), axis_bytes=0.0, time_bytes=0.0)
     assert (axis.members, axis.keys.tolist()) == ((0, 1, 2, 3), [True, False, True])

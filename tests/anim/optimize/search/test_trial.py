@@ -10,16 +10,16 @@ import pytest
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.metric import Ruler
-from anim.measure.error.point_matrix import Points
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Clip, Scene
 from anim.optimize.options import Bounds
 from anim.optimize.search import axis_layouts
 from anim.optimize.search.axis_layouts import LAYOUTS
-from anim.optimize.search.bound_usage import Strains
-from anim.optimize.search.plan import Fate, Outcome, Plan
-from anim.optimize.search.source_motion import Truth
-from anim.optimize.search.trial import Bench
+from anim.optimize.search.bound_usage import BoundUsage
+from anim.optimize.search.plan import Plan, TrackAction, TrialResult
+from anim.optimize.search.source_motion import SourceMotion
+from anim.optimize.search.trial import TrialRunner
 from anim.sampling import sample_pose
 from tests.anim.optimize.making import CORE, every_point, scene, truth_of, turning, waving
 from tests.clips import clip, track
@@ -31,26 +31,26 @@ BOUND = 0.02
 
 def _bench(
     what: Clip, *, bounds: Bounds | None = None, droppable: bool = True, shared: Floats | None = None, of: Scene = OF
-) -> Bench:
-    points: Points = every_point(of)
-    truth: Truth = truth_of(of, what, points)
+) -> TrialRunner:
+    points: PointMatrix = every_point(of)
+    truth: SourceMotion = truth_of(of, what, points)
     count = len(truth.moving)
-    strains = Strains(of.skeleton, truth, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
+    strains = BoundUsage(of.skeleton, truth, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
     values = [() if shared is None else (shared,)] * count
-    return Bench(of.skeleton, truth, strains, CORE, np.full(count, droppable), values)
+    return TrialRunner(of.skeleton, truth, strains, CORE, np.full(count, droppable), values)
 
 
-def _plan(bench: Bench, budget: float = BOUND / 3, **more: object) -> Plan:
+def _plan(bench: TrialRunner, budget: float = BOUND / 3, **more: object) -> Plan:
     count = len(bench.truth.moving)
     plan = Plan(np.full(count, budget), 0.0, "merged", np.ones(count))
     return replace(plan, **more)  # type: ignore[arg-type]
 
 
-def _clip(what: Clip, bench: Bench, outcome: Outcome) -> Clip:
+def _clip(what: Clip, bench: TrialRunner, outcome: TrialResult) -> Clip:
     """What the outcome says would be written."""
     tracks = []
     for k, moving in enumerate(bench.truth.moving):
-        if outcome.fates[k] == Fate.DROPPED:
+        if outcome.fates[k] == TrackAction.DROPPED:
             continue
         at = bench.truth.grid[outcome.on[k]] if k in outcome.on else [0.0]
         tracks.append(track(moving.path, at, outcome.keys[k].values, node=moving.node))
@@ -62,7 +62,7 @@ def test_the_error_is_the_rulers(axes: str) -> None:
     what = waving()
     bench = _bench(what)
     outcome = bench.run(_plan(bench, axes=axes))
-    ruler = Ruler(OF)
+    ruler = ErrorMetric(OF)
     arcs, chords = (
         ruler.error_at(what, _clip(what, bench, outcome), bench.truth.at, player=player).max_error
         for player in ("raw", "nlerp")
@@ -75,7 +75,13 @@ def test_the_error_is_the_rulers(axes: str) -> None:
 def test_the_size_is_keys_and_json() -> None:
     bench = _bench(waving(), droppable=False)
     outcome = bench.run(_plan(bench))
-    assert outcome.fates.tolist() == [Fate.KEYED, Fate.KEYED, Fate.KEYED, Fate.HELD, Fate.HELD]
+    assert outcome.fates.tolist() == [
+        TrackAction.KEYED,
+        TrackAction.KEYED,
+        TrackAction.KEYED,
+        TrackAction.HELD,
+        TrackAction.HELD,
+    ]
     axes = {on.tobytes(): int(on.sum()) for on in outcome.on.values()}
     data = sum(4 * count for count in axes.values())
     for i in range(3):
@@ -87,8 +93,8 @@ def test_the_size_is_keys_and_json() -> None:
 
 def test_what_rests_is_dropped_only_where_it_may_be() -> None:
     kept, dropped = (bench.run(_plan(bench)) for bench in (_bench(waving(), droppable=False), _bench(waving())))
-    assert (kept.fates[3], dropped.fates[3]) == (Fate.HELD, Fate.DROPPED)
-    assert (kept.fates[4], dropped.fates[4]) == (Fate.HELD, Fate.HELD)
+    assert (kept.fates[3], dropped.fates[3]) == (TrackAction.HELD, TrackAction.DROPPED)
+    assert (kept.fates[4], dropped.fates[4]) == (TrackAction.HELD, TrackAction.HELD)
     assert kept.keys[3].values.tolist() == [[1, 1, 1]]
     assert kept.keys[4].values.tolist() == [[0.75, 0.75, 0.75]]
     assert 3 not in dropped.keys
@@ -99,7 +105,7 @@ def test_held_as_other_clips_hold_it() -> None:
         clip(track("scale", [0, 1], [[1.2, 1.2, 1.2], [1.2001, 1.2, 1.2]], node=4)), shared=np.full(3, 1.2002)
     )
     outcome = bench.run(_plan(bench))
-    assert outcome.fates.tolist() == [Fate.HELD]
+    assert outcome.fates.tolist() == [TrackAction.HELD]
     assert outcome.keys[0].values[0] == pytest.approx([1.2002] * 3, rel=1e-6)
 
 
@@ -145,5 +151,5 @@ def test_tracks_stored_alike_count_once() -> None:
     both = _bench(clip(*(track("rotation", times, turning(1.0), node=node) for node in (1, 2))))
     alone = _bench(clip(track("rotation", times, turning(1.0), node=1)))
     pair, one = (bench.run(_plan(bench, axes="full")) for bench in (both, alone))
-    assert pair.fates.tolist() == [Fate.KEYED, Fate.KEYED]
+    assert pair.fates.tolist() == [TrackAction.KEYED, TrackAction.KEYED]
     assert pair.size - one.size == CORE.prices.repeated

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.optimize.search.world_matrices import needed_levels, worlds
+from anim.optimize.search.world_matrices import level_world_matrices, needed_levels
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.optimize.making import scene, waving
 from tests.clips import skeleton
@@ -15,7 +15,7 @@ def test_worlds_are_those_of_poses() -> None:
     of, at = scene(), np.linspace(0, 2, 9)
     shown = sample_pose(of.skeleton, waving(), at)
     local = [np.swapaxes(part, 0, 1) for part in (shown.translation, shown.rotation, shown.scale)]
-    found = worlds(of.skeleton, local, of.skeleton.levels())
+    found = level_world_matrices(of.skeleton, local, of.skeleton.levels())
     assert found == pytest.approx(np.swapaxes(world_matrices(of.skeleton, shown), 0, 1), abs=1e-12)
 
 

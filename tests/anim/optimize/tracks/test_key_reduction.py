@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.arrays import Bools, Floats
-from anim.optimize.tracks.key_reduction import jointly_needed, needed
+from anim.optimize.tracks.key_reduction import greedy_keys, joint_greedy_keys
 
 RNG = np.random.default_rng(5)
 
@@ -54,11 +54,11 @@ def test_lines_between_kept_keys_miss_nothing(seed: int, count: int, size: float
     rng = np.random.default_rng(seed)
     values = np.cumsum(size * rng.normal(size=(4, count, 3)), axis=1)
     times = np.cumsum(rng.uniform(0.01, 1, count))
-    keep = needed(values, times)
+    keep = greedy_keys(values, times)
     assert keep[:, [0, -1]].all()
     for track in range(4):
         assert _missed(values[track], times, keep[track]) <= 1 + 1e-9
-    joint = jointly_needed(values, times)
+    joint = joint_greedy_keys(values, times)
     assert joint[[0, -1]].all()
     assert max(_missed(each, times, joint) for each in values) <= 1 + 1e-9
 
@@ -66,10 +66,10 @@ def test_lines_between_kept_keys_miss_nothing(seed: int, count: int, size: float
 def test_every_track_as_if_it_were_alone() -> None:
     values = np.cumsum(RNG.normal(size=(20, 120, 4)), axis=1)
     times = np.arange(120.0)
-    together = needed(values, times)
+    together = greedy_keys(values, times)
     for track in range(20):
-        assert (needed(values[track : track + 1], times)[0] == together[track]).all()
-        assert (jointly_needed(values[track : track + 1], times) == together[track]).mean() > 0.8
+        assert (greedy_keys(values[track : track + 1], times)[0] == together[track]).all()
+        assert (joint_greedy_keys(values[track : track + 1], times) == together[track]).mean() > 0.8
 
 
 @pytest.mark.parametrize("power", [2, 3])
@@ -79,18 +79,18 @@ def test_bows_take_the_longest_segments(power: int) -> None:
     values = (80 * times**power)[:, None]
     expected = _longest(values, times)
     assert 4 < expected.sum() < 20
-    assert (needed(values[None], times)[0] == expected).all()
-    assert (jointly_needed(values[None], times) == expected).all()
+    assert (greedy_keys(values[None], times)[0] == expected).all()
+    assert (joint_greedy_keys(values[None], times) == expected).all()
 
 
 def test_corners_of_straight_tracks() -> None:
     times = np.array([0, 0.1, 0.5, 1, 1.5, 3, 3.5, 4])
     zigzag = np.interp(times, [0, 1, 3, 4], [0, 50, -50, 0])[:, None]
     line = (7 * times)[:, None]
-    keep = needed(np.stack((zigzag, line)), times)
+    keep = greedy_keys(np.stack((zigzag, line)), times)
     assert times[keep[0]].tolist() == [0, 1, 3, 4]
     assert times[keep[1]].tolist() == [0, 4]
-    assert times[jointly_needed(np.stack((zigzag, line)), times)].tolist() == [0, 1, 3, 4]
+    assert times[joint_greedy_keys(np.stack((zigzag, line)), times)].tolist() == [0, 1, 3, 4]
 
 
 @settings(max_examples=25, deadline=None)
@@ -99,15 +99,15 @@ def test_not_many_more_than_the_fewest(seed: int) -> None:
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.5, 1, 25))
     values = np.cumsum(rng.normal(size=(1, 25, 2)), axis=1)
-    kept = int(needed(values, times).sum())
+    kept = int(greedy_keys(values, times).sum())
     assert _fewest(values[0], times) <= kept <= 2 * _fewest(values[0], times)
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_and_two_keys_stay(count: int) -> None:
-    assert needed(np.zeros((3, count, 3)), np.arange(float(count))).all()
-    assert jointly_needed(np.zeros((3, count, 3)), np.arange(float(count))).all()
+    assert greedy_keys(np.zeros((3, count, 3)), np.arange(float(count))).all()
+    assert joint_greedy_keys(np.zeros((3, count, 3)), np.arange(float(count))).all()
 
 
 def test_no_tracks() -> None:
-    assert needed(np.zeros((0, 9, 4)), np.arange(9.0)).shape == (0, 9)
+    assert greedy_keys(np.zeros((0, 9, 4)), np.arange(9.0)).shape == (0, 9)

@@ -13,7 +13,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing.writer import replace_clips
 from anim.maths import quaternion
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Track
 from anim.optimize.optimize import optimize
 from anim.optimize.options import Bounds, Drop, Packing, Policy
@@ -109,7 +109,7 @@ BUSY = _busy_document()
 @pytest.mark.parametrize("packing", list(Packing))
 def test_what_closed_is_closed_to_the_bit(packing: Packing, share: float, effort: str) -> None:
     scene, clips = reader.scene(BUSY), reader.clips(BUSY)
-    diagonal = Ruler(scene).diagonal
+    diagonal = ErrorMetric(scene).diagonal
     bounds = Bounds(share * diagonal, 0.01 * diagonal)
     request = Request(bounds, packing=packing, effort=effort, policy=Policy(Drop.REST))
     found = optimize(BUSY, scene, clips, request)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import FLOAT32, Interpolation, Track
-from anim.optimize.tracks.lossless import INT16, lossless
+from anim.optimize.tracks.lossless import INT16, reduce_lossless
 from anim.sampling.track import sample
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, track
 
@@ -45,7 +45,7 @@ def _random(seed: int, path: str, mode: Interpolation) -> Track:
 )
 def test_the_same_at_a_thousand_times(seed: int, path: str, mode: Interpolation) -> None:
     before = _random(seed, path, mode)
-    after = lossless(before)
+    after = reduce_lossless(before)
     at = np.random.default_rng(seed).uniform(-1, before.times[-1] + 1, 1000)
     at = np.concatenate((at, before.times, np.nextafter(before.times, -np.inf)))
     assert np.abs(sample(after, at) - sample(before, at)).max() < 1e-12
@@ -67,7 +67,7 @@ def test_the_same_at_a_thousand_times(seed: int, path: str, mode: Interpolation)
     ],
 )
 def test_which_keys_stay(mode: Interpolation, values: list[float], kept: list[int]) -> None:
-    found = lossless(
+    found = reduce_lossless(
         track("translation", np.arange(len(values)), np.repeat(np.array(values)[:, None], 3, axis=1), mode)
     )
     assert found.times.tolist() == kept
@@ -76,7 +76,7 @@ def test_which_keys_stay(mode: Interpolation, values: list[float], kept: list[in
 
 def test_a_spline_at_rest_becomes_one_key() -> None:
     flat = np.zeros((3, 3))
-    found = lossless(track("scale", [0, 1, 2], np.ones((3, 3)), CUBICSPLINE, tangents=(flat, flat)))
+    found = reduce_lossless(track("scale", [0, 1, 2], np.ones((3, 3)), CUBICSPLINE, tangents=(flat, flat)))
     assert (found.interpolation, found.times.tolist(), found.values.tolist()) == (LINEAR, [0], [[1, 1, 1]])
     assert found.in_tangents is None
 
@@ -86,21 +86,23 @@ def test_a_resting_turn_stays_a_spline_where_float32_made_it_too_long() -> None:
     flat = np.zeros((3, 4))
     turn = np.tile(about("x", 37).astype(np.float32).astype(np.float64), (3, 1))
     assert np.linalg.norm(turn[0]) != 1
-    found = lossless(track("rotation", [0, 1, 2], turn, CUBICSPLINE, tangents=(flat, flat)))
+    found = reduce_lossless(track("rotation", [0, 1, 2], turn, CUBICSPLINE, tangents=(flat, flat)))
     assert (found.interpolation, found.times.tolist()) == (CUBICSPLINE, [0, 2])
-    unit = lossless(track("rotation", [0, 1, 2], np.tile([0, 0, 0, 1.0], (3, 1)), CUBICSPLINE, tangents=(flat, flat)))
+    unit = reduce_lossless(
+        track("rotation", [0, 1, 2], np.tile([0, 0, 0, 1.0], (3, 1)), CUBICSPLINE, tangents=(flat, flat))
+    )
     assert (unit.interpolation, unit.times.tolist()) == (LINEAR, [0])
 
 
 def test_a_moving_spline_is_left_alone() -> None:
     slopes = np.eye(3)
     before = track("scale", [0, 1, 2], np.ones((3, 3)), CUBICSPLINE, tangents=(slopes, 0 * slopes))
-    assert lossless(before) is before
+    assert reduce_lossless(before) is before
 
 
 def test_int16_where_it_holds_every_value() -> None:
     turns = np.array([[0, 0, 0, 1.0], [1, 0, 0, 0], [0, -1, 0, 0]])
     before = track("rotation", [0, 1, 2], turns)
-    assert lossless(before).storage == INT16
-    assert lossless(replace(before, values=about("x", [0, 1, 2]))).storage == FLOAT32
-    assert lossless(track("translation", [0, 1], np.eye(3)[:2])).storage == FLOAT32
+    assert reduce_lossless(before).storage == INT16
+    assert reduce_lossless(replace(before, values=about("x", [0, 1, 2]))).storage == FLOAT32
+    assert reduce_lossless(track("translation", [0, 1], np.eye(3)[:2])).storage == FLOAT32

@@ -10,7 +10,7 @@ from anim.measure.error.surface import surfaces
 from anim.model import Scene, Track
 from anim.optimize.options import Packing
 from anim.optimize.search.source_motion import key_grid
-from anim.optimize.tracks.morph_weights import reach, thinned
+from anim.optimize.tracks.morph_weights import reach, reduce_weights
 from anim.sampling.track import sample
 from tests.anim.skinning.scenes import mesh
 from tests.anim.skinning.scenes import scene as made
@@ -58,7 +58,7 @@ def test_reach_is_the_length_of_each_displacement() -> None:
 @pytest.mark.parametrize("span", [(0.0, 1.0), (-0.7, 1.9)])
 def test_no_vertex_leaves_its_path_by_more(packing: Packing, bound: float, span: tuple[float, float]) -> None:
     before = _weights(*span)
-    after, stored, off = thinned(before, _reach(), bound, key_grid([before]), packing)
+    after, stored, off = reduce_weights(before, _reach(), bound, key_grid([before]), packing)
     assert _moved(before, after) <= off * (1 + 1e-9) <= bound * (1 + 1e-9)
     assert (after.values == stored.values).all()
     assert after.interpolation is LINEAR
@@ -68,15 +68,15 @@ def test_no_vertex_leaves_its_path_by_more(packing: Packing, bound: float, span:
 def test_weights_outside_0_and_1_are_not_clamped() -> None:
     before = _weights(-0.7, 1.9)
     for packing in Packing:
-        after, _, _ = thinned(before, _reach(), 1e-3, TIMES, packing)
+        after, _, _ = reduce_weights(before, _reach(), 1e-3, TIMES, packing)
         assert after.values.min() == pytest.approx(before.values.min(), abs=1e-3)
         assert after.values.max() == pytest.approx(before.values.max(), abs=1e-3)
 
 
 def test_few_bits_where_they_do() -> None:
-    loose, _, _ = thinned(_weights(), _reach(), 0.5, TIMES, Packing.CORE)
-    finer, _, _ = thinned(_weights(), _reach(), 5e-3, TIMES, Packing.CORE)
-    finest, _, _ = thinned(_weights(), _reach(), 1e-6, TIMES, Packing.CORE)
+    loose, _, _ = reduce_weights(_weights(), _reach(), 0.5, TIMES, Packing.CORE)
+    finer, _, _ = reduce_weights(_weights(), _reach(), 5e-3, TIMES, Packing.CORE)
+    finest, _, _ = reduce_weights(_weights(), _reach(), 1e-6, TIMES, Packing.CORE)
     assert [each.storage.component_type for each in (loose, finer, finest)] == [5121, 5123, 5126]
     for each, scale in ((loose, 255), (finer, 65535)):
         assert each.values * scale == pytest.approx(np.round(each.values * scale), abs=1e-9)
@@ -86,12 +86,12 @@ def test_splines_become_lines_on_a_finer_grid() -> None:
     times, values = np.array([0.0, 1, 3]), RNG.random((3, 3))
     slopes = RNG.normal(size=(3, 3))
     spline = track("weights", times, values, CUBICSPLINE, tangents=(slopes, slopes), node=1)
-    after, _, off = thinned(spline, _reach(), 0.05, key_grid([spline]), Packing.CORE)
+    after, _, off = reduce_weights(spline, _reach(), 0.05, key_grid([spline]), Packing.CORE)
     assert _moved(spline, after) <= 1.05 * 0.05
     assert off <= 0.05
 
 
 def test_constant_weights_become_one_key() -> None:
     still = track("weights", TIMES, np.tile([0.25, 0.5, 0.75], (61, 1)), node=1)
-    after, _, off = thinned(still, _reach(), 1e-2, TIMES, Packing.CORE)
+    after, _, off = reduce_weights(still, _reach(), 1e-2, TIMES, Packing.CORE)
     assert (len(after.times), off <= 1e-2) == (1, True)

@@ -9,37 +9,37 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from anim.gltf.meshopt import codec
-from anim.gltf.meshopt.storage import Filtered, decoded, decoded_bytes
+from anim.gltf.meshopt.storage import FilteredValues, decompress_document, decompressed_bytes
 from anim.optimize.options import Objective, Packing
 from anim.optimize.tracks import quantization
-from anim.optimize.tracks.quantization import PRICES, Coding, Stored
+from anim.optimize.tracks.quantization import BYTE_COSTS, EncodedKeys, Encoding
 
 RNG = np.random.default_rng(23)
 TURNS = Rotation.random(200, rng=np.random.default_rng(4)).as_quat()
 VECTORS = np.cumsum(RNG.normal(size=(200, 3)), axis=0)
 
 
-def _coding(packing: Packing) -> Coding:
-    return Coding(packing, PRICES[Objective.FILE])
+def _coding(packing: Packing) -> Encoding:
+    return Encoding(packing, BYTE_COSTS[Objective.FILE])
 
 
 def test_int16_is_the_nearest_integer() -> None:
-    stored = quantization.stored(TURNS, ("int16", 0))
+    stored = quantization.encode(TURNS, ("int16", 0))
     integers = stored.values * 32767
     assert integers == pytest.approx(np.round(integers), abs=1e-9)
     assert np.abs(integers - TURNS * 32767).max() <= 0.5 + 1e-9
 
 
 def test_float32_is_what_a_file_holds() -> None:
-    stored = quantization.stored(VECTORS, ("float32", 0))
+    stored = quantization.encode(VECTORS, ("float32", 0))
     assert (stored.values == VECTORS.astype("<f4")).all()
-    assert quantization.held(VECTORS[0]).values.tolist() == [VECTORS[0].astype("<f4").tolist()]
+    assert quantization.constant_cost(VECTORS[0]).values.tolist() == [VECTORS[0].astype("<f4").tolist()]
 
 
 @pytest.mark.parametrize("bits", [5, 9, 12, 16])
 def test_quaternions_as_meshopt_decodes_them(bits: int) -> None:
-    stored = quantization.stored(TURNS, ("quaternion", bits))
-    exact = decoded(Filtered("QUATERNION", stored.codes), 4)
+    stored = quantization.encode(TURNS, ("quaternion", bits))
+    exact = decompress_document(FilteredValues("QUATERNION", stored.codes), 4)
     assert (stored.exact() == exact).all()
     assert np.abs(stored.values - exact).max() <= 1 / 32767 + 1e-12  # float32 inside the decoder: a step at most
     turned = (Rotation.from_quat(exact) * Rotation.from_quat(TURNS).inv()).magnitude()
@@ -48,12 +48,12 @@ def test_quaternions_as_meshopt_decodes_them(bits: int) -> None:
 
 @pytest.mark.parametrize("miss", [4e-5, 2e-4, 1e-3, 1e-2])
 def test_filter_bits_keep_what_storing_may_miss(miss: float) -> None:
-    stored = quantization.stored(TURNS, quantization.form(TURNS, "rotation", miss, Packing.EXT))
+    stored = quantization.encode(TURNS, quantization.choose_format(TURNS, "rotation", miss, Packing.EXT))
     off = stored.exact() * np.sign((stored.exact() * TURNS).sum(axis=1))[:, None] - TURNS
     assert np.linalg.norm(off, axis=1).max() <= 1.5 * miss
     fewer = quantization.filter_bits(miss) - 2
     if fewer >= 5:  # and not by wasting bits
-        coarse = quantization.stored(TURNS, ("quaternion", fewer)).exact()
+        coarse = quantization.encode(TURNS, ("quaternion", fewer)).exact()
         off = coarse * np.sign((coarse * TURNS).sum(axis=1))[:, None] - TURNS
         assert np.linalg.norm(off, axis=1).max() > miss
 
@@ -62,16 +62,16 @@ def test_filter_bits_keep_what_storing_may_miss(miss: float) -> None:
 def test_exponents_as_meshopt_decodes_them(miss: float, size: float) -> None:
     values = size * VECTORS / np.abs(VECTORS).max()
     number = quantization.exponent(values, miss)
-    stored = quantization.stored(values, ("exponent", number))
-    assert (decoded(Filtered("EXPONENTIAL", stored.codes), 3) == stored.values).all()
+    stored = quantization.encode(values, ("exponent", number))
+    assert (decompress_document(FilteredValues("EXPONENTIAL", stored.codes), 3) == stored.values).all()
     finest = 2.0 ** np.ceil(np.log2(size)) / 2**22  # what a mantissa of 23 bits can tell apart
     assert np.abs(stored.values - values).max() <= max(miss, finest)
 
 
 def test_exponents_without_any_allowance_or_size() -> None:
     for values in (np.zeros((2, 3)), np.full((2, 3), 1e-30), VECTORS):
-        stored = quantization.stored(values, ("exponent", quantization.exponent(values, 0.0)))
-        assert (decoded(Filtered("EXPONENTIAL", stored.codes), 3) == stored.values).all()
+        stored = quantization.encode(values, ("exponent", quantization.exponent(values, 0.0)))
+        assert (decompress_document(FilteredValues("EXPONENTIAL", stored.codes), 3) == stored.values).all()
         assert np.abs(stored.values - values).max() <= 1e-6 * max(1.0, np.abs(values).max())
 
 
@@ -86,7 +86,7 @@ def test_exponents_without_any_allowance_or_size() -> None:
     ],
 )
 def test_core_forms(path: str, keys: int, miss: float, expected: str) -> None:
-    assert quantization.form(TURNS[:keys], path, miss, Packing.CORE)[0] == expected
+    assert quantization.choose_format(TURNS[:keys], path, miss, Packing.CORE)[0] == expected
 
 
 @pytest.mark.parametrize(
@@ -95,11 +95,11 @@ def test_core_forms(path: str, keys: int, miss: float, expected: str) -> None:
 )
 def test_compressed_forms(path: str, miss: float, expected: str) -> None:
     for packing in (Packing.EXT, Packing.KHR):
-        assert quantization.form(TURNS, path, miss, packing)[0] == expected
+        assert quantization.choose_format(TURNS, path, miss, packing)[0] == expected
 
 
 def test_sizes_of_core_are_plain() -> None:
-    parts = [quantization.stored(TURNS[:5], ("int16", 0)), quantization.stored(VECTORS[:7], ("float32", 0))]
+    parts = [quantization.encode(TURNS[:5], ("int16", 0)), quantization.encode(VECTORS[:7], ("float32", 0))]
     assert _coding(Packing.CORE).size(parts) == 5 * 8 + 7 * 12
 
 
@@ -108,9 +108,9 @@ def test_sizes_of_core_are_plain() -> None:
 )
 def test_sizes_of_codecs_are_those_of_streams(packing: Packing, name: str) -> None:
     """One stream for each form and number of components, encoded as `anim.gltf` encodes what it writes."""
-    turns = [quantization.stored(TURNS[a : a + 50], ("quaternion", 10)) for a in (0, 50)]
-    moves = [quantization.stored(VECTORS[:40], ("exponent", -9))]
-    weights = [quantization.stored(VECTORS[:40, :1], ("exponent", -9))]
+    turns = [quantization.encode(TURNS[a : a + 50], ("quaternion", 10)) for a in (0, 50)]
+    moves = [quantization.encode(VECTORS[:40], ("exponent", -9))]
+    weights = [quantization.encode(VECTORS[:40, :1], ("exponent", -9))]
     expected = 0
     for stream, stride in ((turns, 8), (moves, 12), (weights, 4)):
         rows = np.frombuffer(b"".join(each.codes for each in stream), np.uint8).reshape(-1, stride)
@@ -122,17 +122,17 @@ def test_sizes_of_codecs_are_those_of_streams(packing: Packing, name: str) -> No
 @pytest.mark.parametrize("packing", [Packing.EXT, Packing.KHR])
 def test_rows_of_many_weights_are_split(packing: Packing, count: int, row: int) -> None:
     """The codec takes rows of up to 256 bytes; longer keys go element by element, as `anim.gltf` writes them."""
-    keys = quantization.stored(np.cumsum(RNG.normal(size=(30, count)), axis=0), ("exponent", -9))
+    keys = quantization.encode(np.cumsum(RNG.normal(size=(30, count)), axis=0), ("exponent", -9))
     rows = np.frombuffer(keys.codes, np.uint8).reshape(-1, row)
     assert _coding(packing).size([keys]) == len(codec.encode(rows, f"{packing.name}_meshopt_compression"))
 
 
 def test_codes_decode_to_as_many_bytes() -> None:
-    stored = quantization.stored(TURNS, ("quaternion", 12))
-    assert len(stored.codes) == len(decoded_bytes(Filtered("QUATERNION", stored.codes))) == 8 * 200
+    stored = quantization.encode(TURNS, ("quaternion", 12))
+    assert len(stored.codes) == len(decompressed_bytes(FilteredValues("QUATERNION", stored.codes))) == 8 * 200
 
 
 def test_prices_are_lower_after_gzip() -> None:
-    file, packed = PRICES[Objective.FILE], PRICES[Objective.GZIP]
+    file, packed = BYTE_COSTS[Objective.FILE], BYTE_COSTS[Objective.GZIP]
     assert (file.track > packed.track, file.held > packed.held, file.axis > packed.axis) == (True, True, True)
-    assert Stored(TURNS, "as it is").exact() is TURNS
+    assert EncodedKeys(TURNS, "as it is").exact() is TURNS

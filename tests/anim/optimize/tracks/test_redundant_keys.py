@@ -7,14 +7,14 @@ import pytest
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.measure.error.metric import Ruler
+from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.track_statistics import stats
 from anim.model import Clip
 from anim.optimize.optimize import Optimized, optimize
 from anim.optimize.options import Bounds, Packing, Policy
 from anim.optimize.request import Request
 from anim.optimize.search.solution import Solution
-from anim.optimize.tracks.quantization import Stored
+from anim.optimize.tracks.quantization import EncodedKeys
 from anim.optimize.tracks.redundant_keys import drop_redundant_keys
 from anim.sampling.joined import concatenate
 from tests.anim.optimize.making import scene
@@ -27,7 +27,7 @@ BEND = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [4, 0, 0], [5, 0, 0]])  # ke
 
 
 def _solution(what: Clip) -> Solution:
-    stored = tuple(Stored(each.values, "exponent", bytes(range(12)) * len(each.times)) for each in what.tracks)
+    stored = tuple(EncodedKeys(each.values, "exponent", bytes(range(12)) * len(each.times)) for each in what.tracks)
     return Solution(what, stored, ())
 
 
@@ -73,7 +73,7 @@ def _redundant(document: Document) -> int:
 
 
 def _optimized(document: Document, packing: Packing) -> tuple[Request, Optimized]:
-    diagonal = Ruler(reader.scene(document)).diagonal
+    diagonal = ErrorMetric(reader.scene(document)).diagonal
     request = Request(Bounds(1e-4 * diagonal, 0.01 * diagonal), packing=packing, effort="fast")
     return request, optimize(document, reader.scene(document), reader.clips(document), request)
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from anim.show.filmstrip import captions, clips
-from anim.show.filmstrip.clips import When
-from anim.show.filmstrip.filmstrip import Extent, Look, Row, filmstrip, moving
+from anim.show.filmstrip.clips import FrameSelection
+from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
 from tests.files import opened_fixture
 
 LONG = "Dualwield_Melee_Attack_Chop"
 FACE = np.array([[0, 1, 2]])
 EXTENT = Extent(np.array([[0, 0, 0], [0.3, 0, 0], [0, 1, 0.0]]), 0.0)
-SMALL = Look(height=64)
+SMALL = ViewOptions(height=64)
 
 
 @pytest.fixture
@@ -34,9 +34,9 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
     return found
 
 
-def row(heading: str, count: int, label: str = "") -> Row:
+def row(heading: str, count: int, label: str = "") -> Strip:
     positions = np.repeat(EXTENT.points[None], count, axis=0)
-    return Row(label, np.arange(count) / 10, positions, FACE, np.full((1, 3), 0.5), heading=heading)
+    return Strip(label, np.arange(count) / 10, positions, FACE, np.full((1, 3), 0.5), heading=heading)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_methods_of_one_clip_are_compared_at_the_same_times(written: list[tuple[
 
 
 def test_names_of_clips_side_by_side_don_t_overlap(written: list[tuple[str, int, int]]) -> None:
-    image = next(moving([row(LONG, 2), row(LONG[::-1], 2)], EXTENT, look=SMALL))
+    image = next(animate_frames([row(LONG, 2), row(LONG[::-1], 2)], EXTENT, look=SMALL))
     cells = sorted({x for text, x, _ in written if text and not text.endswith(" s")})
     assert len(cells) == 2
     frame = cells[1] - cells[0]
@@ -105,14 +105,14 @@ def test_names_of_clips_side_by_side_don_t_overlap(written: list[tuple[str, int,
 
 
 def test_many_clips_of_a_film_go_on_in_a_next_line() -> None:
-    found = list(moving([row(f"clip {i}", 1) for i in range(60)], EXTENT, look=SMALL))
+    found = list(animate_frames([row(f"clip {i}", 1) for i in range(60)], EXTENT, look=SMALL))
     assert found[0].shape[1] <= 1600
     assert found[0].shape[0] > 2 * 64
 
 
 def test_headings_are_the_names_of_clips() -> None:
     document = opened_fixture("biped")
-    rows, _ = clips.rows(clips.of_document(document, [0, 1], ("lbs", "dqs"), When(count=1)))
+    rows, _ = clips.build_strips(clips.of_document(document, [0, 1], ("lbs", "dqs"), FrameSelection(count=1)))
     assert [(each.heading, each.label) for each in rows] == [
         ("walk", "lbs"), ("walk", "dqs"), ("wave", "lbs"), ("wave", "dqs"),
     ]  # fmt: skip

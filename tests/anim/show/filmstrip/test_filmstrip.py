@@ -8,25 +8,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.caches.transforms.up_axis import turned
+from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import NotFoundError, RangeError
 from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
 from anim.show.filmstrip import clips, renderer
 from anim.show.filmstrip import filmstrip as filmstrip_module
-from anim.show.filmstrip.clips import When
-from anim.show.filmstrip.filmstrip import Extent, Look, Row, filmstrip, moving
+from anim.show.filmstrip.clips import FrameSelection
+from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
 from tests.clips import skeleton
 from tests.files import opened_fixture
 
-SMALL = Look(height=64)
+SMALL = ViewOptions(height=64)
 FACE = np.array([[0, 1, 2]])
 
 
 def strip(name: str, *, methods: tuple[str, ...] = (), heated: bool = False, clip: int = 0, **when: Any) -> Any:
     """The rows of a fixture, and its picture."""
-    found = clips.of_document(opened_fixture(name), [clip], methods, When(**when))
-    rows, extent = clips.rows(found, heated=heated)
+    found = clips.of_document(opened_fixture(name), [clip], methods, FrameSelection(**when))
+    rows, extent = clips.build_strips(found, heated=heated)
     return rows, filmstrip(rows, extent, title=name, look=SMALL)
 
 
@@ -80,7 +80,7 @@ def test_a_skeleton_without_a_mesh_is_drawn_as_sticks() -> None:
     document = opened_fixture("biped")
     nodes = [{k: v for k, v in node.items() if k not in ("mesh", "skin")} for node in document.json["nodes"]]
     bare = replace(document, json={**document.json, "nodes": nodes})
-    rows, extent = clips.rows(clips.of_document(bare, [0], (), When(count=2)))
+    rows, extent = clips.build_strips(clips.of_document(bare, [0], (), FrameSelection(count=2)))
     assert len(rows[0].faces) >= 8 * 10
     assert np.ptp(extent.points[:, 1]) > 1
     assert filmstrip(rows, extent, look=SMALL).std() > 5
@@ -98,8 +98,8 @@ def test_a_long_stick_is_no_wider_than_half_more_than_the_middle_one() -> None:
 def test_a_cache_with_z_up_stands() -> None:
     points = np.array([[[0, 0, 0], [1, 0, 0], [0, 2, 0]]], np.float32)
     cache = from_arrays(np.zeros(1), points, FACE)
-    for each in (cache, turned(cache, "z")):
-        (shot,) = clips.of_cache(each, When(count=3))
+    for each in (cache, to_up_axis(cache, "z")):
+        (shot,) = clips.of_cache(each, FrameSelection(count=3))
         assert shot.cache.whole().positions == pytest.approx(points)
 
 
@@ -108,8 +108,8 @@ def test_nearer_faces_hide_others() -> None:
     colors = np.array([[1.0, 0, 0], [0, 0, 1]])
     faces = np.array([[0, 1, 2], [3, 4, 5]])
     positions = np.concatenate((near, far))[None]
-    look = Look(height=64, azimuth=0, elevation=0)
-    image = filmstrip([Row("", np.zeros(1), positions, faces, colors)], Extent(positions[0], 0.0), look=look).astype(
+    look = ViewOptions(height=64, azimuth=0, elevation=0)
+    image = filmstrip([Strip("", np.zeros(1), positions, faces, colors)], Extent(positions[0], 0.0), look=look).astype(
         int
     )
     is_red, is_blue = image[..., 0] > image[..., 2] + 60, image[..., 2] > image[..., 0] + 60
@@ -117,26 +117,26 @@ def test_nearer_faces_hide_others() -> None:
 
 
 def test_moving_pictures_have_their_rows_side_by_side() -> None:
-    found = clips.of_document(opened_fixture("arm"), [0], ("lbs", "dqs"), When(count=3))
-    rows, extent = clips.rows(found)
-    one, *others = moving(rows, extent, title="arm", look=SMALL)
+    found = clips.of_document(opened_fixture("arm"), [0], ("lbs", "dqs"), FrameSelection(count=3))
+    rows, extent = clips.build_strips(found)
+    one, *others = animate_frames(rows, extent, title="arm", look=SMALL)
     assert len(others) == 2
     assert all(image.shape == one.shape for image in others)
-    alone = next(moving(rows[:1], extent, look=SMALL))
+    alone = next(animate_frames(rows[:1], extent, look=SMALL))
     assert one.shape[1] > alone.shape[1]
 
 
-def _turning(times: list[float], *, back: bool) -> Row:
+def _turning(times: list[float], *, back: bool) -> Strip:
     """A triangle that moves to the right, and back where it began or not."""
     way = np.linspace(0, 1, len(times))
     way = np.minimum(way, 1 - way) if back else way
     positions = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]) + way[:, None, None] * np.array([1.0, 0, 0])
-    return Row("", np.array(times), positions, FACE, np.full((1, 3), 0.5))
+    return Strip("", np.array(times), positions, FACE, np.full((1, 3), 0.5))
 
 
 def test_the_shorter_rows_of_a_film_wait_for_the_longest() -> None:
     short, long = _turning([0, 0.1], back=False), _turning([0, 0.1, 0.2, 0.3], back=False)
-    pictures = list(moving([short, long], Extent(long.positions[[0, -1]], 0.0), look=SMALL))
+    pictures = list(animate_frames([short, long], Extent(long.positions[[0, -1]], 0.0), look=SMALL))
     assert len(pictures) == 4
     half = pictures[0].shape[1] // 2
     assert not (pictures[0][:, :half] == pictures[1][:, :half]).all()
@@ -147,9 +147,9 @@ def test_the_shorter_rows_of_a_film_wait_for_the_longest() -> None:
 @pytest.mark.parametrize(("back", "frames"), [(True, 4), (False, 5)])
 def test_a_loop_shows_its_first_frame_once(back: bool, frames: int) -> None:
     row = _turning([0, 0.25, 0.5, 0.75, 1], back=back)
-    assert len(list(moving([row], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == frames
-    still = Row("", row.times, row.positions[[0] * 5], FACE, row.colors)
-    assert len(list(moving([still], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == 5, (
+    assert len(list(animate_frames([row], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == frames
+    still = Strip("", row.times, row.positions[[0] * 5], FACE, row.colors)
+    assert len(list(animate_frames([still], Extent(row.positions[[0, -1]], 0.0), look=SMALL))) == 5, (
         "what doesn't move is no loop"
     )
 
@@ -167,33 +167,33 @@ def test_more_pixels_than_memory_should_hold_are_refused(monkeypatch: pytest.Mon
     with pytest.raises(RangeError, match=r"the picture has \d+ × \d+ pixels, too many"):
         filmstrip([row], Extent(row.positions[0], 0.0), look=SMALL)
     with pytest.raises(RangeError, match=r"3 frames have \d+ × \d+ pixels, too many"):
-        next(moving([row], Extent(row.positions[0], 0.0), look=SMALL))
+        next(animate_frames([row], Extent(row.positions[0], 0.0), look=SMALL))
 
 
 @pytest.mark.parametrize(
     ("when", "times"),
     [
-        (When(at=(1.0, 0.5, 0.5)), [0.5, 1.0]),
-        (When(at=(1.0, 2.5)), [1.0]),
-        (When(count=3), [0, 1, 2]),
-        (When(count=1), [0]),
-        (When(count=3, begin=1), [1, 1.5, 2]),
-        (When(fps=2, end=1), [0, 0.5, 1]),
-        (When(count=2, begin=-5, end=9), [0, 2]),
+        (FrameSelection(at=(1.0, 0.5, 0.5)), [0.5, 1.0]),
+        (FrameSelection(at=(1.0, 2.5)), [1.0]),
+        (FrameSelection(count=3), [0, 1, 2]),
+        (FrameSelection(count=1), [0]),
+        (FrameSelection(count=3, begin=1), [1, 1.5, 2]),
+        (FrameSelection(fps=2, end=1), [0, 0.5, 1]),
+        (FrameSelection(count=2, begin=-5, end=9), [0, 2]),
     ],
 )
-def test_times(when: When, times: list[float]) -> None:
+def test_times(when: FrameSelection, times: list[float]) -> None:
     assert when.times(0.0, 2.0).tolist() == times
 
 
 def test_what_can_t_be_shown_is_refused() -> None:
     with pytest.raises(RangeError, match="nothing lies"):
-        When(count=2, begin=3).times(0, 2)
+        FrameSelection(count=2, begin=3).times(0, 2)
     with pytest.raises(RangeError, match="too many"):
-        When(fps=9999).times(0, 2)
+        FrameSelection(fps=9999).times(0, 2)
     with pytest.raises(NotFoundError, match="no faces"):
-        clips.of_cache(from_arrays(np.zeros(1), np.zeros((1, 3, 3)), np.empty((0, 3), np.int64)), When())
+        clips.of_cache(from_arrays(np.zeros(1), np.zeros((1, 3, 3)), np.empty((0, 3), np.int64)), FrameSelection())
     with pytest.raises(RangeError, match="expected lbs"):
-        clips.of_document(opened_fixture("arm"), [0], ("foo",), When())
+        clips.of_document(opened_fixture("arm"), [0], ("foo",), FrameSelection())
     with pytest.raises(RangeError, match="32"):
-        filmstrip([], Extent(np.zeros((1, 3)), 0.0), look=Look(height=3))
+        filmstrip([], Extent(np.zeros((1, 3)), 0.0), look=ViewOptions(height=3))

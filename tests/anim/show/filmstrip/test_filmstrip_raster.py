@@ -11,8 +11,8 @@ from PIL import Image
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 from anim.show.filmstrip import heat_map, image_file
-from anim.show.filmstrip.camera import framed
-from anim.show.filmstrip.rasterizer import visible
+from anim.show.filmstrip.camera import fit_camera
+from anim.show.filmstrip.rasterizer import visible_faces
 from anim.show.filmstrip.renderer import nice
 
 RANDOM = np.random.default_rng(8)
@@ -40,14 +40,14 @@ def by_loops(corners: Floats, width: int, height: int) -> Ints:
 def test_the_nearest_triangle_is_seen(spread: float) -> None:
     middles = RANDOM.uniform(-5, 35, (40, 1, 3))
     corners = middles + RANDOM.normal(scale=spread, size=(40, 3, 3))
-    assert (visible(corners, width=31, height=23) == by_loops(corners, 31, 23)).all()
+    assert (visible_faces(corners, width=31, height=23) == by_loops(corners, 31, 23)).all()
 
 
 def test_neighbors_leave_no_gap_and_axes_are_met() -> None:
     square = np.array([[[0, 0, 1], [20, 0, 1], [20, 20, 1]], [[0, 0, 1], [20, 20, 1], [0, 20, 1]]], float)
-    assert (visible(square, width=20, height=20) >= 0).all()
+    assert (visible_faces(square, width=20, height=20) >= 0).all()
     one = np.array([[[2, 3, 1], [5, 3, 1], [2, 6, 1]]], float)  # middles of pixels on its long edge count
-    assert np.argwhere(visible(one, width=9, height=9) == 0).tolist() == [
+    assert np.argwhere(visible_faces(one, width=9, height=9) == 0).tolist() == [
         [3, 2],
         [3, 3],
         [3, 4],
@@ -61,15 +61,15 @@ def test_what_can_t_be_drawn_is_left_out() -> None:
     flat = [[0, 0, 1], [5, 5, 1], [9, 9, 1]]
     nowhere = [[np.nan, 0, 1], [5, 0, 1], [0, 5, 1]]
     outside = [[-9, -9, 1], [-5, -9, 1], [-9, -5, 1]]
-    assert (visible(np.array([flat, nowhere, outside], float), width=9, height=9) == -1).all()
-    assert (visible(np.empty((0, 3, 3)), width=4, height=3) == -1).all()
+    assert (visible_faces(np.array([flat, nowhere, outside], float), width=9, height=9) == -1).all()
+    assert (visible_faces(np.empty((0, 3, 3)), width=4, height=3) == -1).all()
 
 
 @pytest.mark.parametrize("stretch", [(1, 1, 1), (9, 1, 1), (1, 9, 1), (1, 1, 9), (0, 0, 0), (1e-3, 1e-3, 1e-3)])
 @pytest.mark.parametrize("azimuth", [0, 35, 200])
 def test_the_camera_holds_all_points(stretch: tuple[float, float, float], azimuth: float) -> None:
     points = RANDOM.normal(size=(300, 3)) * stretch + [4, -2, 7]
-    camera = framed(points, height=200, azimuth=azimuth)
+    camera = fit_camera(points, height=200, azimuth=azimuth)
     x, y, near = camera.project(points).T
     assert (near > 0).all()
     assert 0 < x.min() <= x.max() < camera.width
@@ -79,7 +79,7 @@ def test_the_camera_holds_all_points(stretch: tuple[float, float, float], azimut
 
 
 def test_rays_go_through_their_pixels() -> None:
-    camera = framed(RANDOM.normal(size=(50, 3)), height=64)
+    camera = fit_camera(RANDOM.normal(size=(50, 3)), height=64)
     places = camera.eye + 3.7 * camera.rays()
     x, y, _ = np.moveaxis(camera.project(places), -1, 0)
     assert x == pytest.approx(np.broadcast_to(np.arange(camera.width) + 0.5, x.shape))
@@ -99,8 +99,8 @@ def test_pillow_reads_the_png(shape: tuple[int, int, int]) -> None:
 def test_heat_gets_darker_and_ends_at_the_farthest() -> None:
     colors = heat_map.colors(np.linspace(0, 1, 50))
     assert (np.diff(colors.sum(axis=1)) < 0).sum() > 40
-    assert heat_map.of_faces(np.array([0.0, 0, 0]), np.array([[0, 1, 2]]), 0.0) == pytest.approx(heat_map.STOPS[:1])
-    assert heat_map.of_faces(np.array([2.0, 2, 2]), np.array([[0, 1, 2]]), 2.0) == pytest.approx(heat_map.STOPS[-1:])
+    assert heat_map.heat_colors(np.array([0.0, 0, 0]), np.array([[0, 1, 2]]), 0.0) == pytest.approx(heat_map.STOPS[:1])
+    assert heat_map.heat_colors(np.array([2.0, 2, 2]), np.array([[0, 1, 2]]), 2.0) == pytest.approx(heat_map.STOPS[-1:])
 
 
 @pytest.mark.parametrize(("length", "step"), [(1.0, 1.0), (0.99, 0.5), (19, 10), (5.1, 5), (0.0021, 0.002)])

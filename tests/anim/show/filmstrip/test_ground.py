@@ -10,7 +10,7 @@ import pytest
 
 from anim.model.vertex_cache import VertexCache, from_arrays
 from anim.show.filmstrip import clips
-from anim.show.filmstrip.clips import When
+from anim.show.filmstrip.clips import FrameSelection
 from anim.show.filmstrip.ground import ground_height
 from tests.files import opened_path
 
@@ -54,7 +54,7 @@ def test_a_cache_without_a_rest_pose_begins_with_its_first_frame() -> None:
 def test_knight_stands_at_0_while_its_weapons_are_lower(asset: Callable[[str], Path], clip: str) -> None:
     document = opened_path(asset("Knight.glb"))
     number = [each["name"] for each in document.json["animations"]].index(clip)
-    _, extent = clips.rows(clips.of_document(document, [number], (), When(count=3)))
+    _, extent = clips.build_strips(clips.of_document(document, [number], (), FrameSelection(count=3)))
     assert extent.ground == 0
     if clip != "Running_A":
         assert extent.points[:, 1].min() < -0.2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.show.filmstrip.camera import framed
+from anim.show.filmstrip.camera import fit_camera
 from anim.show.filmstrip.surface_pattern import DARK, EDGE, LIGHT, Checker, barycentric, edges
 
 RANDOM = np.random.default_rng(7)
@@ -23,7 +23,7 @@ def test_squares_are_those_of_the_place_in_space() -> None:
     """A wide triangle that leans away: middles between corners on the screen are not those in space."""
     rest = np.array([[0, 0, 0], [1, 0, -3], [0, 1, 0.0]])
     faces = np.array([[0, 1, 2]])
-    camera = framed(rest, height=300)
+    camera = fit_camera(rest, height=300)
     shares = RANDOM.dirichlet([1, 1, 1], 400)
     places = shares @ rest
     corners = np.repeat(camera.project(rest)[None], 400, axis=0)

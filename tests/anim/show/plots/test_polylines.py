@@ -8,7 +8,7 @@ import pytest
 from anim.model import Track
 from anim.sampling.track import sample
 from anim.show.plots import polylines
-from anim.show.plots.figure import short, spread
+from anim.show.plots.figure import format_number, separate_labels
 from tests import clips
 from tests.clips import CUBICSPLINE, STEP, about
 
@@ -60,7 +60,7 @@ def test_steps_break_and_have_no_speed() -> None:
     line = polylines.value_line(track)
     assert np.isnan(line.values[2::3]).all()
     assert len(polylines.speed_line(track).times) == 0
-    jumps = polylines.risers(track)
+    jumps = polylines.step_edges(track)
     np.testing.assert_array_equal(jumps.times[::3], [0.5, 2.0])
     np.testing.assert_array_equal(jumps.values[1], PLACES[1])
 
@@ -110,8 +110,8 @@ def test_handles_are_a_third_of_the_way() -> None:
 )
 def test_names_keep_apart(places: list[float], expected: list[float]) -> None:
     low = -1.0 if expected[0] < 0 else 0.0
-    assert spread(places, 2.0, low, 9.0) == pytest.approx(expected)
+    assert separate_labels(places, 2.0, low, 9.0) == pytest.approx(expected)
 
 
 def test_short_numbers() -> None:
-    assert [short(x) for x in (0.0, 1e-4, 123456.0, -2.5, 1 / 3)] == ["0", "0.0001", "123000", "−2.5", "0.333"]
+    assert [format_number(x) for x in (0.0, 1e-4, 123456.0, -2.5, 1 / 3)] == ["0", "0.0001", "123000", "−2.5", "0.333"]

@@ -5,43 +5,43 @@ from __future__ import annotations
 import pytest
 
 from anim.errors import RangeError
-from anim.optimize.rate_distortion import Sized
-from anim.show.plots.rate_distortion_plot import tradeoff
+from anim.optimize.rate_distortion import RatePoint
+from anim.show.plots.rate_distortion_plot import rate_distortion_plot
 from tests.anim.show.reading import png_size, words
 
 SIZES = [
-    Sized(0, 160_000, 0, 60_400),
-    Sized(2e-4, 141_234, 1.9e-4, 41_234),
-    Sized(2e-3, 130_000, 1.9e-3, 30_000),
-    Sized(2e-2, 112_500, 1e-2, 12_500),
+    RatePoint(0, 160_000, 0, 60_400),
+    RatePoint(2e-4, 141_234, 1.9e-4, 41_234),
+    RatePoint(2e-3, 130_000, 1.9e-3, 30_000),
+    RatePoint(2e-2, 112_500, 1e-2, 12_500),
 ]
 
 
 def test_every_size_and_bound_is_written_out() -> None:
-    said = words(tradeoff(SIZES, 2.0, title="Fox", kind="svg"))
+    said = words(rate_distortion_plot(SIZES, 2.0, title="Fox", kind="svg"))
     for expected in ("Fox", "41.2 kB", "30 kB", "12.5 kB", "0.01 %", "0.1 %", "1 %"):
         assert expected in said, expected
 
 
 def test_the_same_picture_twice_and_another_for_other_sizes() -> None:
-    one, again = (tradeoff(SIZES, 2.0, title="Fox", kind="png") for _ in range(2))
+    one, again = (rate_distortion_plot(SIZES, 2.0, title="Fox", kind="png") for _ in range(2))
     assert one == again
-    assert one != tradeoff(SIZES[:2], 2.0, title="Fox", kind="png")
+    assert one != rate_distortion_plot(SIZES[:2], 2.0, title="Fox", kind="png")
     assert min(png_size(one)) > 300
 
 
 def test_one_size() -> None:
-    assert "41.2 kB" in words(tradeoff(SIZES[1:2], 2.0, title="", kind="svg"))
+    assert "41.2 kB" in words(rate_distortion_plot(SIZES[1:2], 2.0, title="", kind="svg"))
 
 
 def test_source_and_floor_are_marked() -> None:
-    said = words(tradeoff(SIZES, 2.0, title="Fox", kind="svg", source=250_000))
+    said = words(rate_distortion_plot(SIZES, 2.0, title="Fox", kind="svg", source=250_000))
     for expected in ("source  250 kB", "without loss  60.4 kB", "floor  12.5 kB"):
         assert expected in said, expected
-    plain = words(tradeoff(SIZES[1:], 2.0, title="Fox", kind="svg"))
+    plain = words(rate_distortion_plot(SIZES[1:], 2.0, title="Fox", kind="svg"))
     assert not any(text.startswith(("source", "without")) for text in plain)
 
 
 def test_other_kinds_are_refused() -> None:
     with pytest.raises(RangeError):
-        tradeoff(SIZES, 2.0, title="", kind="bmp")
+        rate_distortion_plot(SIZES, 2.0, title="", kind="bmp")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from anim.gltf.authoring import author
+from anim.gltf.authoring import build_document
 from anim.model import Clip, Interpolation
 from anim.ops.selection import Selection
-from anim.show.plots.rotations import COMPONENTS, FROM_REST, degrees, lock_line, rotation_curve
-from anim.show.plots.track_plot import plot
-from anim.show.plots.track_selection import choose
+from anim.show.plots.rotations import COMPONENTS, FROM_REST, degrees, gimbal_distance_line, rotation_curve
+from anim.show.plots.track_plot import track_plot
+from anim.show.plots.track_selection import select_tracks
 from tests import clips
 from tests.anim.show.reading import words
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, track
@@ -43,14 +43,14 @@ def test_keys_lie_on_their_curve(interpolation: Interpolation) -> None:
 
 def test_the_distance_to_lock_is_that_of_the_middle_angle() -> None:
     """ZXY locks where X is a quarter turn: 70° to 110° passes it half-way."""
-    found = lock_line(track("rotation", [0, 1], about("x", [70, 110])), order="ZXY")
+    found = gimbal_distance_line(track("rotation", [0, 1], about("x", [70, 110])), order="ZXY")
     assert np.degrees(found.values[0, 0]) == pytest.approx(20, abs=1e-4)
     assert found.times[found.values[:, 0].argmin()] == pytest.approx(0.5, abs=0.05)
 
 
 def _words(view: str, *tracks: object) -> list[str]:
-    document = author(clips.skeleton([-1, 0, 1]), [Clip("wave", tracks)])  # type: ignore[arg-type]
-    return words(plot(choose(document, Selection(), limit=9, view=view).shown, title="t", kind="svg"))
+    document = build_document(clips.skeleton([-1, 0, 1]), [Clip("wave", tracks)])  # type: ignore[arg-type]
+    return words(track_plot(select_tracks(document, Selection(), limit=9, view=view).shown, title="t", kind="svg"))
 
 
 def test_words_of_each_view() -> None:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from anim.errors import NotFoundError
-from anim.gltf.authoring import author
+from anim.gltf.authoring import build_document
 from anim.gltf.document import Document
 from anim.model import Clip, Track
 from anim.ops.resample import resample
 from anim.ops.selection import Selection
-from anim.show.plots.track_plot import LIMIT, Names, plot
-from anim.show.plots.track_selection import Chosen, choose, compare
+from anim.show.plots.track_plot import LIMIT, Names, track_plot
+from anim.show.plots.track_selection import TrackSelection, compare, select_tracks
 from tests import clips
 from tests.anim.show.reading import png_size, words
 from tests.clips import CUBICSPLINE, STEP, about
@@ -31,16 +31,16 @@ def document(*tracks: Track, name: str = "wave", names: tuple[str, ...] = ()) ->
     if names:
         parts = skeleton.translation, skeleton.rotation, skeleton.scale
         skeleton = type(skeleton)(names, skeleton.parents, *parts)
-    return author(skeleton, [Clip(name, tracks)])
+    return build_document(skeleton, [Clip(name, tracks)])
 
 
-def drawn(chosen: Chosen, names: Names | None = None) -> list[str]:
-    return words(plot(chosen.shown, title="title", kind="svg", names=names))
+def drawn(chosen: TrackSelection, names: Names | None = None) -> list[str]:
+    return words(track_plot(chosen.shown, title="title", kind="svg", names=names))
 
 
 def test_words_of_each_kind_of_track() -> None:
     said = drawn(
-        choose(
+        select_tracks(
             document(
                 clips.track("translation", [0, 1, 2], BUMP),
                 clips.track("rotation", [0, 1, 2], about("y", [0, 50, 10]), node=1),
@@ -64,21 +64,21 @@ def test_words_of_each_kind_of_track() -> None:
 def test_still_tracks_give_way_to_moving_ones() -> None:
     still = clips.track("translation", [0, 1], [[1, 1, 1]] * 2)
     moving = clips.track("translation", [0, 1, 2], BUMP, node=1)
-    found = choose(document(still, moving), ALL, limit=LIMIT)
+    found = select_tracks(document(still, moving), ALL, limit=LIMIT)
     assert [each.target for each in found.shown] == ["1"]
     assert (found.still, found.more) == (1, 0)
-    alone = choose(document(still), ALL, limit=LIMIT)
+    alone = select_tracks(document(still), ALL, limit=LIMIT)
     assert [each.target for each in alone.shown] == ["0"]
     assert drawn(alone)
 
 
 def test_small_motion_far_away_is_drawn_from_its_first_key() -> None:
     far = clips.track("translation", [0, 1, 2], BUMP * 0.01 + [0, 50, 0])
-    assert "translation, m, from its first key  ·  linear, 3 keys" in drawn(choose(document(far), ALL, limit=1))
+    assert "translation, m, from its first key  ·  linear, 3 keys" in drawn(select_tracks(document(far), ALL, limit=1))
 
 
 def test_more_than_fit() -> None:
-    found = choose(opened_fixture("biped"), ALL, limit=5)
+    found = select_tracks(opened_fixture("biped"), ALL, limit=5)
     assert len(found.shown) == 5
     assert found.more > 10
 
@@ -86,21 +86,21 @@ def test_more_than_fit() -> None:
 def test_signs_that_mean_nothing_are_not_drawn() -> None:
     q = about("x", [0, 40, 80, 120])
     q[2] *= -1
-    shown = choose(document(clips.track("rotation", range(4), q)), ALL, limit=1).shown[0]
+    shown = select_tracks(document(clips.track("rotation", range(4), q)), ALL, limit=1).shown[0]
     np.testing.assert_allclose(shown.track.values, about("x", [0, 40, 80, 120]), atol=1e-7)
 
 
 def test_frames_are_marked_where_their_rate_is_known() -> None:
     t = np.arange(25) / 24
     walk = clips.track("translation", t, np.outer(np.sin(t), [1, 2, 3]))
-    assert "fine ticks: frames at 24 fps" in drawn(choose(document(walk), ALL, limit=1))
+    assert "fine ticks: frames at 24 fps" in drawn(select_tracks(document(walk), ALL, limit=1))
     poses = clips.track("translation", [0, 1, 2], BUMP)
-    assert not any("frames" in text for text in drawn(choose(document(poses), ALL, limit=1)))
+    assert not any("frames" in text for text in drawn(select_tracks(document(poses), ALL, limit=1)))
 
 
 def test_a_file_compared_with_itself() -> None:
     file = opened_fixture("interpolations")
-    both, alone = compare(choose(file, ALL, limit=LIMIT), file)
+    both, alone = compare(select_tracks(file, ALL, limit=LIMIT), file)
     assert alone == 0
     said = drawn(both, Names("a.glb", "b.glb"))
     assert said.count("difference: none") == len(both.shown)
@@ -111,7 +111,9 @@ def test_the_difference_is_named_with_its_place() -> None:
     before = Clip("wave", (clips.track("translation", [0, 1, 2], BUMP * 0.01),))
     after = resample(before, fps=0.5)
     skeleton = clips.skeleton([-1, 0, 1])
-    both, _ = compare(choose(author(skeleton, [before]), ALL, limit=1), author(skeleton, [after]))
+    both, _ = compare(
+        select_tracks(build_document(skeleton, [before]), ALL, limit=1), build_document(skeleton, [after])
+    )
     said = drawn(both, Names("a", "b"))
     assert "difference: at most 10 mm at 1 s" in said
     assert "translation, m, from its first key  ·  linear, 3 → 2 keys" not in said
@@ -132,14 +134,14 @@ def test_weights_are_called_by_their_targets(names: list[str] | None, shown: lis
     extras = {"extras": {"targetNames": names}} if names else {}
     meshes = [{k: v for k, v in each.items() if k != "extras"} | extras for each in file.json["meshes"]]
     named = replace(file, json={**file.json, "meshes": meshes})
-    found = choose(named, Selection(paths=("weights",)), limit=1).shown[0].labels
+    found = select_tracks(named, Selection(paths=("weights",)), limit=1).shown[0].labels
     assert list(found) == shown
 
 
 def test_partners_are_found_by_name_not_by_number() -> None:
     one = document(clips.track("translation", [0, 1, 2], BUMP, node=1), names=("a", "b", "c"))
     other = document(clips.track("translation", [0, 1, 2], BUMP, node=2), names=("c", "a", "b"))
-    both, alone = compare(choose(one, ALL, limit=1), other)
+    both, alone = compare(select_tracks(one, ALL, limit=1), other)
     assert alone == 0
     assert both.shown[0].other is not None
 
@@ -147,36 +149,36 @@ def test_partners_are_found_by_name_not_by_number() -> None:
 def test_no_partner_at_all() -> None:
     one = document(clips.track("translation", [0, 1, 2], BUMP))
     with pytest.raises(NotFoundError, match="none of the tracks") as caught:
-        compare(choose(one, ALL, limit=1), document(clips.track("translation", [0, 1, 2], BUMP), name="run"))
+        compare(select_tracks(one, ALL, limit=1), document(clips.track("translation", [0, 1, 2], BUMP), name="run"))
     assert caught.value.help == "its clips are 'run'"
 
 
 def test_nothing_selected() -> None:
     one = document(clips.track("translation", [0, 1, 2], BUMP))
     with pytest.raises(NotFoundError, match="no track"):
-        choose(one, Selection(paths=("scale",)), limit=1)
+        select_tracks(one, Selection(paths=("scale",)), limit=1)
 
 
 @pytest.mark.parametrize("name", ["$x^2$", "骨盤", "a\x1b[0m\nb", "<&>\"'", "\ud800", "🦊" * 40])
 def test_names_in_any_letters(name: str) -> None:
     file = document(clips.track("translation", [0, 1, 2], BUMP), name=name, names=(name, "", ""))
-    shown = choose(file, ALL, limit=1).shown
-    said = words(plot(shown, title=name if name.isprintable() else "", kind="svg"))
+    shown = select_tracks(file, ALL, limit=1).shown
+    said = words(track_plot(shown, title=name if name.isprintable() else "", kind="svg"))
     assert any(text[-3:] == shown[0].target[-3:] for text in said)
-    assert png_size(plot(shown, title="", kind="png"))[0] > 900
+    assert png_size(track_plot(shown, title="", kind="png"))[0] > 900
 
 
 @pytest.mark.parametrize("name", REAL)
 def test_real_files(asset: Callable[[str], Path], name: str) -> None:
-    found = choose(opened_path(asset(name)), ALL, limit=2)
-    first = plot(found.shown, title=name, kind="svg")
+    found = select_tracks(opened_path(asset(name)), ALL, limit=2)
+    first = track_plot(found.shown, title=name, kind="svg")
     said = words(first)
     assert name in said
     assert all(any(text[-12:] == each.target[-12:] for text in said) for each in found.shown)
-    assert plot(found.shown, title=name, kind="svg") == first
+    assert track_plot(found.shown, title=name, kind="svg") == first
 
 
 @pytest.mark.parametrize("name", ["interpolations", "noop", "pointer", "morph_cube"])
 def test_fixtures_as_png(name: str) -> None:
-    found = choose(opened_fixture(name), ALL, limit=4)
-    assert png_size(plot(found.shown, title=name, kind="png")) > (900, 300)
+    found = select_tracks(opened_fixture(name), ALL, limit=4)
+    assert png_size(track_plot(found.shown, title=name, kind="png")) > (900, 300)

@@ -13,12 +13,12 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Scene
 from anim.sampling.times import frame_times
 from anim.skinning.analysis.collapse import MeshCollapse, collapse
-from anim.skinning.analysis.collapse_index import Narrow
-from anim.skinning.analysis.collapsed_clips import KEPT, pinches
-from anim.skinning.analysis.enclosed_volume import closed_faces, volumes
-from anim.skinning.analysis.method_scores import Fared
-from anim.skinning.analysis.ranking import Standing, best, standings
-from anim.skinning.analysis.recommendations import Found, advice, twist_joints
+from anim.skinning.analysis.collapse_index import CollapsePoint
+from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed
+from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces
+from anim.skinning.analysis.method_scores import MethodScore
+from anim.skinning.analysis.ranking import RankedMethod, best_method, rank_methods
+from anim.skinning.analysis.recommendations import Found, recommend, twist_joints
 from anim.skinning.bake import bake
 from fixtures.shapes import cube
 from tests.anim.skinning.methods.test_linear_blend import TIMES, moving
@@ -101,10 +101,10 @@ def test_closed_parts_are_found_among_open_ones() -> None:
     turned[0] = turned[0][::-1]
     faces = np.concatenate([shape.faces, shape.faces[1:] + 36, turned + 72])
     points = np.concatenate([shape.positions, shape.positions + 3, shape.positions + 6])
-    closed = closed_faces(points, faces)
+    closed = watertight_faces(points, faces)
     assert closed.tolist() == [True] * 12 + [False] * 23
     assert volumes(points[None], faces[closed]) == pytest.approx([1])
-    assert closed_faces(points, faces[:0]).tolist() == []
+    assert watertight_faces(points, faces[:0]).tolist() == []
 
 
 def test_an_open_mesh_has_no_volume_but_an_index() -> None:
@@ -159,14 +159,14 @@ def told(axis: str, angle: float, *methods: str, clamped: bool = False) -> list[
     """The advice on a tube that is turned by an angle."""
     time, methods = np.array([1.0]), methods or ("lbs", "dqs")
     seen = collapse(tube(), turned(axis, 0, angle), times=time, methods=methods, bulge_clamp=clamped)
-    return list(advice([Found(0, "turn", each) for each in seen], clamped=clamped))
+    return list(recommend([Found(0, "turn", each) for each in seen], clamped=clamped))
 
 
 def made_up(index: float, *, closed: bool = True, **methods: tuple[float | None, float]) -> Found:
     """A mesh with an index, and of each method the volume and the bulge."""
-    worst = Narrow(index, 0, "arm", "hand", 0.0, 1.5, twist=False)
+    worst = CollapsePoint(index, 0, "arm", "hand", 0.0, 1.5, twist=False)
     fared = tuple(
-        Fared(name, None if volume is None else np.full(2, volume), bulge, 0.5, 0, "arm", 0.5)
+        MethodScore(name, None if volume is None else np.full(2, volume), bulge, 0.5, 0, "arm", 0.5)
         for name, (volume, bulge) in methods.items()
     )
     return Found(0, "turn", MeshCollapse("m", 0, 9, np.arange(2.0), np.ones(2), worst, 0, 0, float(closed), fared))
@@ -185,7 +185,7 @@ def test_advice() -> None:
     bent = told("x", 120)
     assert not any("twist" in line for line in bent)
     assert bent[-3].startswith("dqs bulges up to ")
-    assert list(advice([])) == ["there is no clip to look at"]
+    assert list(recommend([])) == ["there is no clip to look at"]
 
 
 @pytest.mark.parametrize(("angle", "is_pinched"), [(44, False), (45.6, True), (90, True)])
@@ -199,7 +199,7 @@ def test_a_tenth_of_the_volume_is_pinching_though_no_vertex_is(angle: float, is_
 
 
 def test_the_limit_of_the_volume_is_a_quarter_turn_over_three_tenths() -> None:
-    assert pytest.approx(1 - 2 / 3 * 0.3 * np.sin(np.pi / 4) ** 2) == KEPT
+    assert pytest.approx(1 - 2 / 3 * 0.3 * np.sin(np.pi / 4) ** 2) == MIN_VOLUME_FRACTION
 
 
 def test_what_every_method_loses_is_no_pinching() -> None:
@@ -209,15 +209,15 @@ def test_what_every_method_loses_is_no_pinching() -> None:
     (found,) = collapse(tube(), shrunk, times=np.array([1.0]))
     assert found.methods[0].volume is not None
     assert found.methods[0].volume[0] < 0.8
-    assert not pinches(found)
-    (line,) = advice([Found(0, "shrink", found)])
+    assert not is_collapsed(found)
+    (line,) = recommend([Found(0, "shrink", found)])
     assert "good enough" not in line
     assert line.endswith("is left at worst, and no method that was measured keeps more")
 
 
 def test_of_what_was_measured_the_best_is_recommended() -> None:
     """CesiumMan's figures: cor keeps more and bulges less, so nobody is told to bake dqs or to try cor."""
-    lines = list(advice([made_up(0.68, lbs=(0.94, 1.46), dqs=(0.96, 1.78), cor=(0.97, 1.57))]))
+    lines = list(recommend([made_up(0.68, lbs=(0.94, 1.46), dqs=(0.96, 1.78), cor=(0.97, 1.57))]))
     assert lines[1].startswith("to bake it with cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume): ")
     assert lines[2:] == [
         "cor bulges up to 1.57× at 'arm' (turn, 0.50 s)",
@@ -240,14 +240,14 @@ def test_the_best_by_volume_then_by_bulge(
     dqs: tuple[float | None, float], cor: tuple[float | None, float], chosen: str
 ) -> None:
     meshes = [made_up(0.5, lbs=(None if dqs[0] is None else 0.5, 1.0), dqs=dqs, cor=cor).mesh]
-    found = best(standings(meshes))
+    found = best_method(rank_methods(meshes))
     assert found is not None
     assert found.method == chosen
 
 
 def test_standings_are_the_worst_over_all_meshes() -> None:
     two = [made_up(0.5, dqs=(0.9, 1.0)).mesh, made_up(0.5, dqs=(0.8, 1.2)).mesh, made_up(0.5, dqs=(None, 1.1)).mesh]
-    assert standings(two) == (Standing("dqs", 0.8, 1.2),)
+    assert rank_methods(two) == (RankedMethod("dqs", 0.8, 1.2),)
 
 
 def test_only_what_was_not_measured_is_to_be_tried() -> None:
@@ -268,14 +268,14 @@ def test_only_what_was_not_measured_is_to_be_tried() -> None:
 
 
 def test_nobody_is_warned_of_a_bulge_that_nobody_needs() -> None:
-    (line,) = advice([made_up(0.71, lbs=(0.93, 1.15), dqs=(1.0, 1.6))])
+    (line,) = recommend([made_up(0.71, lbs=(0.93, 1.15), dqs=(1.0, 1.6))])
     assert line.startswith("linear blending is good enough")
     both = [made_up(0.71, lbs=(0.93, 1.0), dqs=(1.0, 1.9)), made_up(0.5, lbs=(0.8, 1.0), dqs=(1.0, 1.0))]
-    assert not any("bulges" in each for each in advice(both)), "it bulges where nothing pinches"
+    assert not any("bulges" in each for each in recommend(both)), "it bulges where nothing pinches"
 
 
 def test_a_method_that_loses_more_than_lbs_is_not_recommended() -> None:
-    lines = list(advice([made_up(0.6, lbs=(0.97, 1.0), dqs=(0.9, 1.9))]))
+    lines = list(recommend([made_up(0.6, lbs=(0.97, 1.0), dqs=(0.9, 1.9))]))
     assert lines[1:] == [
         "no other method that was measured keeps more of the volume than lbs (lbs keeps 97 %, dqs keeps 90 %)"
     ]
@@ -287,7 +287,7 @@ def test_without_lbs_nothing_is_said_of_its_volume() -> None:
         "no vertex falls below 0.7 (least 0.707); to see what linear blending leaves of the volume: "
         "gltf-anim collapse IN --method cor --method lbs --clip '#0'"
     )
-    (line,) = advice([made_up(0.8, closed=False, dqs=(None, 1.0))])
+    (line,) = recommend([made_up(0.8, closed=False, dqs=(None, 1.0))])
     assert line == "linear blending is good enough: no vertex falls below 0.7 (least 0.800)"
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from anim.model import Clip, Mesh, MeshInstance, Scene
 from anim.sampling.times import frame_times
-from anim.skinning.analysis.inbetween_error import MOST, between
-from anim.skinning.bake import Baker, baker
+from anim.skinning.analysis.inbetween_error import MAX_SAMPLES, inbetween_error
+from anim.skinning.bake import Baker, prepare_bake
 from tests.anim.skinning.methods.test_linear_blend import moving
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import STEP, clip, skeleton, track
@@ -20,7 +20,7 @@ def _rigid() -> Baker:
     """Three points on a node."""
     faces, joints, weights = np.array([[0, 1, 2]]), np.empty((3, 0), np.int64), np.empty((3, 0))
     mesh = Mesh("mesh", POINTS, faces, joints, weights, np.empty((0, 3, 3)), np.empty(0))
-    return baker(Scene(skeleton([-1]), (MeshInstance(0, mesh, None, np.empty(0)),)), rigid=True)
+    return prepare_bake(Scene(skeleton([-1]), (MeshInstance(0, mesh, None, np.empty(0)),)), rigid=True)
 
 
 def _turning(times: list[float], degrees: list[float]) -> Clip:
@@ -31,10 +31,10 @@ def _turning(times: list[float], degrees: list[float]) -> Clip:
 def test_a_turn_misses_what_an_arc_is_above_its_chord() -> None:
     """2 m from the axis, by 90° in 1 s: the middle is r (1 − cos 45°) off; the axis itself is nowhere else."""
     made = _rigid()
-    found = between(made, _turning([0, 1], [0, 90]), np.array([0.0, 1]))
+    found = inbetween_error(made, _turning([0, 1], [0, 90]), np.array([0.0, 1]))
     assert found.distance == pytest.approx(2 * (1 - np.cos(np.pi / 4)), abs=1e-6)
     assert found.time == 0.5
-    slower = between(made, _turning([0, 1, 3], [0, 10, 100]), np.array([0.0, 1, 3]))
+    slower = inbetween_error(made, _turning([0, 1, 3], [0, 10, 100]), np.array([0.0, 1, 3]))
     assert slower.distance == pytest.approx(found.distance, abs=1e-6)
     assert slower.time == 2.0
 
@@ -42,21 +42,21 @@ def test_a_turn_misses_what_an_arc_is_above_its_chord() -> None:
 def test_a_step_misses_half_its_jump() -> None:
     made = _rigid()
     jump = clip(track("translation", [0, 1], [[0, 0, 0], [0, 3, 4]], STEP))
-    assert between(made, jump, np.array([0.0, 1])).distance == pytest.approx(2.5)
+    assert inbetween_error(made, jump, np.array([0.0, 1])).distance == pytest.approx(2.5)
 
 
 def test_frames_that_are_close_miss_nothing() -> None:
     made = _rigid()
-    assert between(made, _turning([0, 1], [0, 90]), frame_times(0, 1, fps=30)).distance == 0
-    assert between(made, Clip("", ()), np.zeros(1)).distance == 0
+    assert inbetween_error(made, _turning([0, 1], [0, 90]), frame_times(0, 1, fps=30)).distance == 0
+    assert inbetween_error(made, Clip("", ()), np.zeros(1)).distance == 0
 
 
 def test_the_widest_gaps_are_looked_into() -> None:
     """Many gaps, of which one is twice as wide; against every middle of the whole, as one bake."""
     of = random_scene(3)
-    played, made = moving(of, 5), baker(of)
-    times = np.delete(np.linspace(0, 8, 4 * MOST), 30)
-    found = between(made, played, times)
+    played, made = moving(of, 5), prepare_bake(of)
+    times = np.delete(np.linspace(0, 8, 4 * MAX_SAMPLES), 30)
+    found = inbetween_error(made, played, times)
     middles = (times[1:] + times[:-1]) / 2
     frames = made.bake(played, times=times).whole().positions
     half = made.bake(played, times=middles[29:30]).whole().positions

@@ -9,8 +9,8 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Scene
 from anim.skinning.analysis.collapse import collapse
 from anim.skinning.analysis.method_deviation import deviation, linear_baker, model_size
-from anim.skinning.analysis.recommendations import Found, advice
-from anim.skinning.bake import baker
+from anim.skinning.analysis.recommendations import Found, recommend
+from anim.skinning.bake import prepare_bake
 from tests.clips import about, clip, track
 from tests.files import opened_fixture
 
@@ -21,7 +21,7 @@ TIMES = np.linspace(0, 1, 9)
 def test_a_screw_of_a_half_turn_leaves_linear_blending_by_half_its_chord() -> None:
     """Dual quaternions go along a half circle over the chord; the middle is half of the chord away from it."""
     of, played = torn()
-    made = baker(of, method="dqs")
+    made = prepare_bake(of, method="dqs")
     found = deviation(made, linear_baker(made, space="world"), played, TIMES)
     assert found.distance == pytest.approx(FAR / 2, rel=0.05)
     assert found.time == 1
@@ -35,7 +35,7 @@ def test_every_frame_is_looked_at() -> None:
     places, turns = np.tile([0, 0.5, 0], (1000, 1)), np.zeros(1000)
     places[617], turns[617] = [0, FAR, 0], 179.9
     played = clip(track("translation", times, places, node=1), track("rotation", times, about("x", turns), node=1))
-    made = baker(of, method="dqs")
+    made = prepare_bake(of, method="dqs")
     found = deviation(made, linear_baker(made, space="world"), played, times)
     assert found.distance == pytest.approx(FAR / 2, rel=0.05)
     assert found.time == times[617]
@@ -43,7 +43,7 @@ def test_every_frame_is_looked_at() -> None:
 
 def test_linear_blending_is_not_off_itself() -> None:
     of, played = torn()
-    made = baker(of)
+    made = prepare_bake(of)
     assert deviation(made, linear_baker(made, space="world"), played, TIMES).distance == 0
 
 
@@ -52,7 +52,7 @@ def test_collapse_never_advises_such_a_method() -> None:
     (mesh,) = collapse(of, played, times=TIMES, methods=("lbs", "dqs", "cor"))
     unusable = {each.method: each.unusable for each in mesh.methods}
     assert unusable == {"lbs": False, "dqs": True, "cor": False}
-    lines = list(advice([Found(0, "torn", mesh)]))
+    lines = list(recommend([Found(0, "torn", mesh)]))
     assert lines[0].startswith("dqs can't be used: a vertex is 19.7 m from")
     assert "('torn', 1.00 s)" in lines[0]
     assert not [line for line in lines if "--method dqs" in line or "dqs keeps" in line]

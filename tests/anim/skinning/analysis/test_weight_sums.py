@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from anim.skinning.analysis.weight_sums import BadSums
+from anim.skinning.analysis.weight_sums import WeightSums
 
 
 def test_sums_near_1_do_not_read_as_1() -> None:
-    (words,) = BadSums("fox", 30, 0, 0.99961, 1.00035).in_words()
+    (words,) = WeightSums("fox", 30, 0, 0.99961, 1.00035).in_words()
     assert "(0.99961 … 1.00035)" in words

@@ -7,8 +7,8 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.skinning.bake import bake
-from anim.skinning.binding import rig
-from anim.skinning.methods.bulge_clamp import links
+from anim.skinning.binding import bind_skin
+from anim.skinning.methods.bulge_clamp import bone_segments
 from tests.anim.skinning.scenes import mesh, scene
 from tests.clips import about, clip, track
 from tests.files import opened_fixture
@@ -22,7 +22,7 @@ def test_links_go_from_joint_to_joint() -> None:
     points = [[0.5, 2, 0], [0.5, 2, 0], [2.5, 2, 0], [-1, 0, 0]]
     body = mesh(points, [[0, 0], [1, 0], [2, 0], [0, 1]], [[1, 0], [1, 0], [1, 0], [0.75, 0.25]])
     of = scene(body, [-1, 0, 1], inverse_bind=binds)
-    found = links(rig(of.instances[0], of.skeleton.parents))
+    found = bone_segments(bind_skin(of.instances[0], of.skeleton.parents))
     assert found.tips.tolist() == [1, 2, 2]
     assert found.distance == pytest.approx([2, np.hypot(0.5, 2), np.hypot(0.5, 2), 1])
     assert found.share == pytest.approx([0, 0, 0, 0.75])
@@ -30,12 +30,12 @@ def test_links_go_from_joint_to_joint() -> None:
 
 def test_the_clamp_takes_the_bulge_of_a_bent_arm_and_nothing_else() -> None:
     of = reader.scene(opened_fixture("tube"))
-    made = rig(of.instances[0], of.skeleton.parents)
-    rest = links(made).distance
+    made = bind_skin(of.instances[0], of.skeleton.parents)
+    rest = bone_segments(made).distance
     bend = clip(track("rotation", [0], about("x", [90]), node=1))
     free = bake(of, bend, times=np.zeros(1), method="dqs").whole().positions[0].astype(float)
     held = bake(of, bend, times=np.zeros(1), method="dqs", bulge_clamp=True).whole().positions[0].astype(float)
-    shared = links(made).share
+    shared = bone_segments(made).share
     assert np.array_equal(free[shared == 0], held[shared == 0])
 
     before, after = (np.linalg.norm(points - _nearest(points), axis=1) for points in (free, held))

@@ -12,7 +12,7 @@ from anim.model import Scene
 from anim.skinning.analysis.enclosed_volume import volumes
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
-from anim.skinning.polar_decomposition import pivots, split
+from anim.skinning.polar_decomposition import decompose, joint_origins
 from fixtures.tube import TUBE_RINGS, TUBE_SIDES
 from tests.anim.skinning.methods.test_linear_blend import TIMES, baked, moving
 from tests.anim.skinning.scenes import mesh, random_scene, scene, skinning_matrices
@@ -76,7 +76,7 @@ def test_a_split_gives_the_matrix_back() -> None:
     matrices = skinning_matrices(of, moving(of, 2), TIMES)
     matrices[:, 3, :, :3] *= -1
     centers = np.random.default_rng(0).normal(size=(matrices.shape[1], 3))
-    parts = split(matrices, centers)
+    parts = decompose(matrices, centers)
     assert parts.stretch is not None
     assert parts.scale is not None
     assert quaternion.dot(parts.rotation, parts.rotation) == pytest.approx(1)
@@ -206,8 +206,8 @@ def test_the_sign_of_a_joints_quaternion_does_not_matter() -> None:
 
 def test_a_pivot_is_where_the_joint_was_bound() -> None:
     of = reader.scene(opened_fixture("tube"))
-    from anim.skinning.binding import rig
+    from anim.skinning.binding import bind_skin
 
-    made = rig(of.instances[0], of.skeleton.parents)
-    assert pivots(made).tolist() == [[0, 0, 0], [0, 0.5, 0]]
+    made = bind_skin(of.instances[0], of.skeleton.parents)
+    assert joint_origins(made).tolist() == [[0, 0, 0], [0, 0.5, 0]]
     assert made.above.tolist() == [-1, 0]

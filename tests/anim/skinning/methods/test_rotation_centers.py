@@ -8,8 +8,8 @@ import pytest
 from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.model import Mesh
-from anim.skinning.binding import rig
-from anim.skinning.methods.rotation_centers import WIDTH, centers
+from anim.skinning.binding import bind_skin
+from anim.skinning.methods.rotation_centers import WIDTH, find_centers
 from tests.anim.skinning.scenes import random_scene
 from tests.files import opened_fixture
 
@@ -39,7 +39,7 @@ def plainly(mesh: Mesh, joints: int) -> Floats:
 def test_centers_are_the_papers() -> None:
     of = random_scene(4, vertices=60)
     mesh = of.instances[0].mesh
-    found = centers(rig(of.instances[0], of.skeleton.parents))
+    found = find_centers(bind_skin(of.instances[0], of.skeleton.parents))
     wanted = plainly(mesh, 9)
     assert np.array_equal(np.isnan(found), np.isnan(wanted))
     assert np.isnan(found).any()
@@ -49,7 +49,7 @@ def test_centers_are_the_papers() -> None:
 def test_centers_of_a_tube_lie_on_its_axis() -> None:
     """At the height where the triangles that hang alike are: their own ring's, but for the ends."""
     of = reader.scene(opened_fixture("tube"))
-    found = centers(rig(of.instances[0], of.skeleton.parents))
+    found = find_centers(bind_skin(of.instances[0], of.skeleton.parents))
     heights = of.instances[0].mesh.positions[:, 1]
     between = (heights > 0.2) & (heights < 0.8)
     assert np.abs(found[between][:, [0, 2]]).max() < 1e-6
