@@ -63,6 +63,6 @@ def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, vo
         missed, name = max(seen)
         others = f" ({len(seen)} clips have such places)" if len(seen) > 1 else ""
         voice.warn(
-            f"between frames a vertex is up to {text.format_length(missed.distance)} off the straight way, at "
+            f"between frames a vertex is {text.format_length(missed.distance)} or more off the straight way, at "
             f"{missed.time:.3g} s of {name}{others}; --fps puts more frames there"
         )

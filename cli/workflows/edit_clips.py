@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from anim.errors import AnimError
@@ -14,7 +14,9 @@ from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.continuous_bound.largest_error import is_closed, largest_error
+from anim.measure.continuous_bound.prover import Proof, Prover
+from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.file_findings import badly_stored
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
@@ -38,7 +40,7 @@ class EditResult:
 
     before: dict[int, Clip]
     after: dict[int, Clip]
-    worst: MotionError | None
+    worst: Proof | None
     diagonal: float
     at_nodes: bool = False
 
@@ -126,16 +128,26 @@ def _measured(
         hint = f" ({error.help})" if error.help else ""
         voice.warn(f"measured at nodes, not on the surface: {error}{hint}")
         scene, at_nodes = Scene(skeleton, ()), True
-    ruler = ErrorMetric(scene)
-    worst: MotionError | None = None
+    prover = Prover(ErrorMetric(scene))
+    measured: list[Proof] = []
     _warn_of_lengths(edited, voice)
+    floor = 0.0
     for i, before in edited.before.items():
-        found = ruler.error(before, edited.after[i])
+        found = largest_error(prover, before, edited.after[i], floor=0.0 if voice.verbose else floor)
+        floor = max(floor, found.error.max_error)
+        measured.append(found)
         counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
-        voice.detail(f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, ruler.diagonal)}")
-        if worst is None or found.max_error > worst.max_error:
-            worst = found
-    return EditResult(edited.before, edited.after, worst, ruler.diagonal, at_nodes)
+        voice.detail(f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}")
+    return EditResult(edited.before, edited.after, _worst(measured), prover.ruler.diagonal, at_nodes)
+
+
+def _worst(measured: list[Proof]) -> Proof | None:
+    """The largest of all errors, and a bound for all clips."""
+    if not measured:
+        return None
+    worst = max(measured, key=lambda each: each.error.max_error)
+    bounds = [each.bound for each in measured if each.bound is not None]
+    return replace(worst, bound=max(bounds) if len(bounds) == len(measured) else None)
 
 
 def _warn_of_lengths(edited: EditResult, voice: text.Reporter) -> None:
@@ -165,9 +177,12 @@ def _summary(name: str, before: int, after: int, edited: EditResult, seconds: fl
     return ", ".join(parts) + (DRY if dry_run else "")
 
 
-def _error(error: MotionError, diagonal: float) -> str:
+def _error(found: Proof, diagonal: float) -> str:
+    """The largest error in words; "at least" where more could hide between the times that were looked at."""
+    error = found.error
+    least = "" if is_closed(found, diagonal) else "at least "
     where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = f"max {text.format_length(error.max_error)}{text.format_share(error.max_error, diagonal)}{where}"
+    words = f"max {least}{text.format_length(error.max_error)}{text.format_share(error.max_error, diagonal)}{where}"
     if error.max_pointer_error > 0:
         words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
     return words

@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.anim.measure.error.brute_force import Find
 from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Floats, Player
 from tests.fixtures.reading import decode
+from tests.judge import judge, needs_judge
 
 
 def test_the_reported_error_is_that_of_the_skin(biped: bytes, call: Call) -> None:
@@ -28,6 +30,16 @@ def test_the_reported_error_is_that_of_the_skin(biped: bytes, call: Call) -> Non
     rest = skin.positions
     diagonal = np.linalg.norm(rest.max(axis=0) - rest.min(axis=0))
     assert float(found[1]) == pytest.approx(100 * max(far) / diagonal, rel=0.05)
+
+
+@needs_judge
+@pytest.mark.parametrize("command", [["spline"], ["resample", "--fps", "24", "--interpolation", "cubicspline"]])
+@pytest.mark.parametrize("name", ["Fox.glb", pytest.param("Robot.glb", marks=pytest.mark.slow)])
+def test_three_finds_the_same_maximum(asset: Find, call: Call, tmp_path: Path, name: str, command: list[str]) -> None:
+    made = tmp_path / name
+    run = call(command[0], asset(name), made, *command[1:])
+    truth = judge(asset(name), made, rate=960)
+    assert reported(run.err) == pytest.approx(truth.max_error, rel=0.05)  # two digits are reported
 
 
 def reported(line: str) -> float:

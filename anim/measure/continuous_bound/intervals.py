@@ -69,11 +69,11 @@ class IntervalKeys:
     inside: Bools
 
 
-def merge_intervals(times: Floats, *clips: Clip) -> Intervals:
+def merge_intervals(times: Floats, *clips: Clip, longest: float = LONG) -> Intervals:
     """Return the gaps between all keys of the clips; long ones split at those of `times` (F,) in s that are in them.
 
     The first starts at the first of the times, the last ends at the last of them. times: increasing, with all keys that
-    are between them.
+    are between them. longest: s, gaps up to this length are not split.
     """
     axes = [axis for clip in clips for axis in clip.axes]
     keys = unique_sorted(np.concatenate([times[:1], *axes, times[-1:]]))
@@ -82,7 +82,7 @@ def merge_intervals(times: Floats, *clips: Clip) -> Intervals:
     if not len(lengths):
         return Intervals(keys)
     within = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(lengths) - 1)
-    return Intervals(unique_sorted(np.concatenate((keys, times[lengths[within] > LONG]))))
+    return Intervals(unique_sorted(np.concatenate((keys, times[lengths[within] > longest]))))
 
 
 def interval_keys(keys: Floats, where: Intervals) -> IntervalKeys:

@@ -11,6 +11,7 @@ from anim.arrays import Floats
 from anim.measure.continuous_bound.arcs import ARCS
 from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
 from anim.measure.continuous_bound.interval_rise import interval_rise
+from anim.measure.continuous_bound.intervals import LONG
 from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
 from anim.model import Clip
@@ -65,26 +66,30 @@ class Prover:
         looks: Mapping[str, ErrorSamples],
         *,
         enough: float | None = None,
+        floor: float = 0.0,
+        longest: float = LONG,
     ) -> Proof:
         """Return a bound on how far any vertex is displaced at any time, whoever of the players shows it.
 
         It is at most 1 % above what is seen, unless stretches between times would have to be cut too finely for that.
         times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
         `error.dense_times`. looks: what was seen there, by player. enough: m, where that is less than 1 % above what is
-        seen, the bound is to be no more than that.
+        seen, the bound is to be no more than that. floor: m, no bound below it is
+        sought. longest: s, as of `rises`.
         Nothing is proven where the scenes are not of one hierarchy, or for other players than those of `laws.LAWS`; nor
         where quaternions run through zero or turn too far between two times.
         """
         player, worst = max(((name, look.error) for name, look in looks.items()), key=lambda each: each[1].max_error)
         if not self._knows_all or not set(looks) <= set(ARCS):
             return Proof(None, worst, player)
-        bound = worst.max_error
+        bound = max(worst.max_error, floor)
         room = max(bound * BOUND_SLACK, NOISE * self.ruler.diagonal)
         aim = ProofTarget(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
         seen = RefinedMaximum()
         for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(looks))):
             stretch = slice(start, start + self._length(len(looks)) + 1)
-            closed, other = self._proven((before, after), times[stretch], _limits(looks, self._order, stretch), aim)
+            limits = _limits(looks, self._order, stretch)
+            closed, other = self._proven((before, after), times[stretch], limits, aim, longest)
             bound = max(bound, closed, other.bound)
             seen = max(seen, other, key=lambda each: each.largest)
         if seen.largest > worst.max_error:
@@ -101,11 +106,11 @@ class Prover:
         return max(BLOCK // (players * (groups + len(self.ruler.scene.skeleton)) + 1), 8)
 
     def _proven(
-        self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget
+        self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget, longest: float
     ) -> tuple[float, RefinedMaximum]:
         """What bounds all stretches that need no second look, and what that shows of the others."""
         scenes = self.ruler.scene, self.ruler.other
-        risen = interval_rise(scenes, clips, times, self._reaches, list(limits))
+        risen = interval_rise(scenes, clips, times, self._reaches, list(limits), longest=longest)
         closed, asked = 0.0, []
         for player, each in limits.items():
             tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise

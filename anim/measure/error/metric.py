@@ -95,8 +95,11 @@ class ErrorMetric:
             self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
-        """Return how far `after` is from `before`: at all keys of both, and half-way between."""
-        return self.error_at(before, after, key_and_mid_times(before, after), player=player)
+        """Return how far `after` is from `before` at the times of `dense_times`.
+
+        Between them it may be more: `anim.measure.continuous_bound.largest_error` looks there too.
+        """
+        return self.error_at(before, after, dense_times(before, after), player=player)
 
     def error_at(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> MotionError:
         """Return how far `after` is from `before` at `times` (F,) in seconds.
@@ -205,16 +208,38 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     The grid has 0 s on it, and begins with the last frame before the first key: that shows what all earlier ones do.
     Frames that only rounding keeps apart from a key are that key.
     """
+    end = max((clip.end for clip in clips), default=0.0)
+    keys = key_and_mid_times(*clips)
+    frames = frame_times(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
+    after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
+    apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
+    return unique_sorted(np.concatenate((keys, frames[apart > SAME_MOMENT], *_before_jumps(clips))))
+
+
+def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
+    """Return every key time of the clips, the last moment before each STEP key, and equal parts of all gaps between
+    neighboring keys, in seconds, increasing.
+
+    parts: of every gap at least, ≥ 1. step: s, no part is longer; > 0.
+    """
+    axes = [times for clip in clips for times in clip.axes]
+    if not axes:
+        return np.zeros(1)
+    keys = unique_sorted(np.concatenate(axes))
+    gaps = np.diff(keys)
+    counts = np.maximum(np.ceil(gaps / step).astype(np.int64), parts)
+    gap = np.repeat(np.arange(len(gaps)), counts)
+    part = np.arange(len(gap)) - np.repeat(np.cumsum(counts) - counts, counts)
+    within = keys[gap] + gaps[gap] * (part / counts[gap])
+    return unique_sorted(np.concatenate((within, keys[-1:], *_before_jumps(clips))))
+
+
+def _before_jumps(clips: Sequence[Clip]) -> list[Floats]:
+    """The last moments before STEP keys, where a clip is as far off as the jump is high."""
     steps = {
         id(track.times): track.times
         for clip in clips
         for track in clip.tracks
         if track.interpolation is Interpolation.STEP and len(track.times) > 1
     }
-    before = [np.nextafter(times[1:], 0) for times in steps.values()]
-    end = max((clip.end for clip in clips), default=0.0)
-    keys = key_and_mid_times(*clips)
-    frames = frame_times(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
-    after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
-    apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
-    return unique_sorted(np.concatenate((keys, frames[apart > SAME_MOMENT], *before)))
+    return [np.nextafter(times[1:], 0) for times in steps.values()]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.measure.error.metric import NOISE, SLACK, ErrorMetric, key_and_mid_times
+from anim.measure.error.metric import NOISE, SLACK, ErrorMetric, dense_times
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene, Track
 from anim.ops.resample import resample
@@ -50,11 +50,11 @@ def test_nothing_is_understated_and_little_is_overstated(scene_and_clip: tuple[S
     scene, before = scene_and_clip
     after = CHANGES[change](before)
     found = ErrorMetric(scene).error(before, after)
-    truth = brute(scene, before, after, key_and_mid_times(before, after))
+    truth = brute(scene, before, after, dense_times(before, after))
     noise = NOISE * diagonal(scene)
     assert found.max_error >= truth - 1e-12
     assert found.max_error <= SLACK * truth + noise
-    assert found.times == len(key_and_mid_times(before, after))
+    assert found.times == len(dense_times(before, after))
     here = brute(scene, before, after, np.array([found.time]))
     assert here >= truth / SLACK - noise  # the time that is named is one of the worst
 
