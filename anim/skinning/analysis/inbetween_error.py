@@ -13,9 +13,11 @@ from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
 
-WIDE_ANGLE_DEG = 0.05  # s; frames closer than this are as close as most clips are made
+MIN_GAP_S = 0.05  # s; frames closer than this are as close as most clips are made
 MAX_SAMPLES = 16  # gaps that are looked into, the widest
-PARTS = 8  # of a gap, with frames between them: an eased motion is on the straight way half-way, and far off elsewhere
+PARTS_PER_GAP = (
+    8  # of a gap, with frames between them: an eased motion is on the straight way half-way, and far off elsewhere
+)
 
 
 class InbetweenError(NamedTuple):
@@ -33,14 +35,16 @@ def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
     """
     gaps = np.diff(times)
     chosen = np.sort(np.argsort(-gaps, kind="stable")[:MAX_SAMPLES])
-    chosen = chosen[gaps[chosen] > WIDE_ANGLE_DEG]
+    chosen = chosen[gaps[chosen] > MIN_GAP_S]
     most = InbetweenError(0.0, 0.0)
     if not len(chosen):
         return most
     before, after = times[chosen], times[chosen + 1]
-    for part in range(1, PARTS + 1):
-        at = np.nextafter(after, before) if part == PARTS else before + (after - before) * (part / PARTS)
-        most = max(most, _missed(baker, clip, (before, at, after), part / PARTS))
+    for part in range(1, PARTS_PER_GAP + 1):
+        at = (
+            np.nextafter(after, before) if part == PARTS_PER_GAP else before + (after - before) * (part / PARTS_PER_GAP)
+        )
+        most = max(most, _missed(baker, clip, (before, at, after), part / PARTS_PER_GAP))
     return most
 
 
