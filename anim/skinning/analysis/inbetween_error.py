@@ -15,9 +15,7 @@ from anim.skinning.bake import Baker
 
 MIN_GAP_S = 0.05  # s; frames closer than this are as close as most clips are made
 MAX_SAMPLES = 16  # gaps that are looked into, the widest
-PARTS_PER_GAP = (
-    8  # of a gap, with frames between them: an eased motion is on the straight way half-way, and far off elsewhere
-)
+PARTS = 8  # of a gap, with frames between them: an eased motion is on the straight way half-way, and far off elsewhere
 
 
 class InbetweenError(NamedTuple):
@@ -40,11 +38,9 @@ def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
     if not len(chosen):
         return most
     before, after = times[chosen], times[chosen + 1]
-    for part in range(1, PARTS_PER_GAP + 1):
-        at = (
-            np.nextafter(after, before) if part == PARTS_PER_GAP else before + (after - before) * (part / PARTS_PER_GAP)
-        )
-        most = max(most, _missed(baker, clip, (before, at, after), part / PARTS_PER_GAP))
+    for part in range(1, PARTS + 1):
+        at = np.nextafter(after, before) if part == PARTS else before + (after - before) * (part / PARTS)
+        most = max(most, _missed(baker, clip, (before, at, after), part / PARTS))
     return most
 
 
