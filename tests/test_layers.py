@@ -39,6 +39,7 @@ OPENING = {  # modules of the library that may open a path
     "anim/gltf/io/gltf_files.py",
     "anim/gltf/io/images.py",
     "anim/gltf/io/source.py",
+    "anim/gltf/io/unused_buffers.py",
     "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }

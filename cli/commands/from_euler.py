@@ -137,7 +137,7 @@ def command(
         bones = converted.skeleton
         bodies = split_by_root(bones, *stick_mesh(bones, converted.ends)) if mesh is Mesh.STICKS else []
         document = authoring.build_document(bones, [converted.clip], bodies)
-        before, size = len(data), documents.write(document, output, None, dry_run=dry_run)
+        before, size = len(data), documents.write(document, output, None, dry_run=dry_run, voice=voice)
     else:
         names = pairs(alias)
         with documents.source(onto, voice) as character:
@@ -146,7 +146,7 @@ def command(
             made = named(made, character.document, name=name, replaced=taken)
             casting = CharacterOptions(names, floor, rest_at, fail_unmatched, taken)
             made, document = put_on_character(made, character, casting, voice)
-            before, size = character.size, documents.write(document, output, character, dry_run=dry_run)
+            before, size = character.size, documents.write(document, output, character, dry_run=dry_run, voice=voice)
     for each in from_euler_report.warnings(made):
         voice.warn(each)
     if format is Format.JSON:

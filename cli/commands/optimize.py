@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.gltf.io.gltf_files import GLTF_SUFFIXES
+from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from anim.measure.error.surface import is_measured_at
 from anim.optimize.optimize import Optimized
 from anim.optimize.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
@@ -179,7 +179,7 @@ def command(
         optimize_report.check(found, work.clips, request, work.scale)
         about = _about(work, request, found, began)
         with _report(about, voice, report, dry_run=dry_run):
-            documents.write(about.after, output, source, dry_run=dry_run)
+            documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
     _say(about, voice, dry_run=dry_run)
     if not dry_run:
         note_images(about.after, source, output, voice)

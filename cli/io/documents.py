@@ -15,8 +15,10 @@ import numpy as np
 from anim.errors import AnimError, FormatError, OutputError
 from anim.files import atomic, links, resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
-from anim.gltf.io import container, gltf_files, uri
+from anim.gltf.io import container, uri
 from anim.gltf.io.source import Opener, Source, glb_pieces, open_bytes, open_file, write_file
+from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
+from cli import tables
 from cli.errors import UsageError
 from cli.io import output_names, stdout
 from cli.text import Reporter
@@ -68,15 +70,29 @@ def note_mended(document: Document, name: str, voice: Reporter) -> None:
 
 
 def write(
-    document: Document, path: str, source: Source | None, *, unchanged: Bytes | None = None, dry_run: bool = False
+    document: Document,
+    path: str,
+    source: Source | None,
+    *,
+    unchanged: Bytes | None = None,
+    dry_run: bool = False,
+    voice: Reporter = AUDIBLE,
 ) -> int:
     """Write a document to a file or, for "-", as a GLB to stdout; return its size in bytes.
 
     Files as `anim.gltf.io.source.write_file` does. source: the input that the document comes from. unchanged: bytes
-    that say the same already (`Source.bytes_of`), written where they do as they are.
+    that say the same already (`Source.bytes_of`), written where they do as they are. voice: says which buffers of a
+    replaced .gltf stay.
     """
     if path != PIPE:
-        return write_file(document, path, source, unchanged=unchanged, dry_run=dry_run)
+        return write_file(
+            document,
+            path,
+            source,
+            unchanged=unchanged,
+            dry_run=dry_run,
+            note=lambda words: voice.say(f"note: {tables.escape_control(words)}"),
+        )
     content = glb_pieces(document, unchanged)
     if not dry_run:
         write_bytes(content, path)
@@ -119,13 +135,13 @@ def check_output(path: str) -> None:
     A name without ending is a GLB; what is no plain file (/dev/null, a named pipe) may be called anything.
     """
     check_binary(path)
-    if path == PIPE or (ending := Path(path).suffix).lower() in ("", *gltf_files.GLTF_SUFFIXES):
+    if path == PIPE or (ending := Path(path).suffix).lower() in ("", *GLTF_SUFFIXES):
         return
     target = links.resolve_links(Path(path))
     if target.exists() and not target.is_file():
         return
-    near = difflib.get_close_matches(ending.lower(), gltf_files.GLTF_SUFFIXES, n=1)
-    expected = " or ".join((", ".join(gltf_files.GLTF_SUFFIXES[:-1]), gltf_files.GLTF_SUFFIXES[-1]))
+    near = difflib.get_close_matches(ending.lower(), GLTF_SUFFIXES, n=1)
+    expected = " or ".join((", ".join(GLTF_SUFFIXES[:-1]), GLTF_SUFFIXES[-1]))
     raise UsageError(
         f"{path}: glTF is no {ending.lower()} (expected {expected}, or a name without ending)",
         help=f"did you mean {PurePath(path).with_suffix(near[0])}?" if near else "",

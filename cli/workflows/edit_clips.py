@@ -94,7 +94,7 @@ def edit_clips(
         else:
             for i, clip in edited.before.items():
                 voice.detail(f"  {reader.clip_label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
-        size = documents.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run)
+        size = documents.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run, voice=voice)
     if not dry_run:
         note_images(result, source, output, voice)
     name = source.name if output == documents.PIPE else output

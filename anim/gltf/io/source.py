@@ -72,7 +72,13 @@ def open_bytes(data: Bytes, name: str, opener: Opener = container.read) -> Sourc
 
 
 def write_file(
-    document: Document, path: str, source: Source | None, *, unchanged: Bytes | None = None, dry_run: bool = False
+    document: Document,
+    path: str,
+    source: Source | None,
+    *,
+    unchanged: Bytes | None = None,
+    dry_run: bool = False,
+    note: gltf_files.Note = lambda words: None,
 ) -> int:
     """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
 
@@ -81,7 +87,7 @@ def write_file(
     files is ever removed. In another folder images are copied beside the output, and no file is overwritten. Files
     appear whole or not at all, and only if their bytes differ from what is there; else the time of the file at `path`
     is updated. unchanged: bytes that say the same already (`Source.bytes_of`), written where they do as they are.
-    Raises OutputError.
+    note: is told of files that were buffers of a replaced .gltf and stay. Raises OutputError.
     """
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and not source.is_beside(path):
@@ -97,7 +103,9 @@ def write_file(
     same_folder = source is not None and source.is_beside(path)
     spared = [] if source is None or source.is_at(path) else list(_files_beside(source))
     text = None if unchanged is None or unchanged[:4].tobytes() == container.MAGIC else unchanged
-    size = gltf_files.write(document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run)
+    size = gltf_files.write(
+        document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run, note=note
+    )
     return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
 
 

@@ -1,0 +1,136 @@
+"""Buffers that a replaced .gltf no longer names: those that we wrote go, others stay for their owner to decide.
+
+Ours are called after the .gltf (`walk.bin` of walk.gltf) or after their content (`walk-1a2b3c4d.bin`). They go if no
+glTF in the folder or in the one above names them too, whatever that is called (walk.gltf.bak), and no link leads there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import mmap
+import os
+import posixpath
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from anim.errors import AnimError
+from anim.gltf.document import Bytes, Document, json_array
+from anim.gltf.io import container, uri
+
+GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
+DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name, for as long as others have the shorter ones
+_HEAD = 64  # bytes that tell a glTF from other files
+_BLANK = b"\xef\xbb\xbf \t\r\n"
+
+
+def external_buffers(path: Path) -> tuple[str, ...]:
+    """Return names of the buffers that the .gltf at `path` has as files, "" for others; none where there is none."""
+    try:
+        return tuple(_file_of(buffer.uri) for buffer in _opened(path).buffers)
+    except (AnimError, OSError, RecursionError):
+        return ()
+
+
+def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared: Sequence[Path]) -> list[str]:
+    """Remove those of the buffers `old` that the .gltf at `path` no longer names and nothing else is known to need.
+
+    text: of the .gltf. spared: files that others need. Returns names of unused files that stay: we did not make them.
+    """
+    left = []
+    needed = [*(path.parent / each for each in _named(container.read(np.concatenate(text)))), *spared]
+    for name in sorted({*old} - {""}):
+        there = path.parent / name
+        if not there.is_file() or any(each.exists() and each.samefile(there) for each in needed):
+            continue
+        if _is_needed_elsewhere(there, path):
+            continue
+        if PurePath(name).name == name and not there.is_symlink() and _is_ours(there, path.stem):
+            with suppress(OSError):
+                there.unlink()
+        else:
+            left.append(name)
+    return left
+
+
+def _is_ours(buffer: Path, stem: str) -> bool:
+    """Whether a buffer is called after its .gltf or after its content."""
+    lengths = "|".join(f"[0-9a-f]{{{length}}}" for length in DIGEST_LENGTHS)
+    if re.fullmatch(rf"{re.escape(stem)}(-\d+){{0,2}}(-({lengths}))?\.bin", buffer.name):
+        return True
+    found = re.fullmatch(rf".+-({lengths})\.bin", buffer.name, re.DOTALL)
+    if found is None:
+        return False
+    with buffer.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest().startswith(found[1])
+
+
+def _is_needed_elsewhere(buffer: Path, path: Path) -> bool:
+    """Whether a glTF in the folder or the one above needs the file, or can't be asked, or a link leads to it."""
+    folder = path.parent.resolve()
+    name = posixpath.normpath(buffer.relative_to(path.parent).as_posix())
+    for place, address in ((folder, name), (folder.parent, f"{folder.name}/{name}")):
+        try:
+            others = sorted(place.iterdir())
+        except OSError:
+            return True
+        if any(other != folder / path.name and _needs(other, buffer, address) for other in others):
+            return True
+    return False
+
+
+def _needs(other: Path, buffer: Path, address: str) -> bool:
+    """Whether a file is a glTF that names the buffer, or a link to it. address: from the file's folder."""
+    try:
+        if other.is_symlink() and other.name != buffer.name and other.samefile(buffer):
+            return True
+    except OSError:  # a link to nowhere
+        return False
+    is_called_so = any(suffix in other.name.lower() for suffix in GLTF_SUFFIXES)
+    try:
+        if not other.is_file() or not (is_called_so or _begins_like_gltf(other)):
+            return False
+        return _may_name(_mapped(other), buffer.name) and address in _named(_opened(other))
+    except (AnimError, OSError, RecursionError):
+        return is_called_so
+
+
+def _begins_like_gltf(path: Path) -> bool:
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    return head.startswith(container.MAGIC) or head.lstrip(_BLANK).startswith(b"{")
+
+
+def _may_name(data: mmap.mmap | bytes, name: str) -> bool:
+    """Return False where the name does not occur in the JSON: quick, in folders of many files."""
+    is_glb = data[:4] == container.MAGIC
+    end = 20 + int.from_bytes(data[12:16], "little") if is_glb else len(data)
+    is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and data.find(b"%", 0, end) < 0
+    return not is_plain or data.find(name.encode(), 0, end) >= 0
+
+
+def _named(document: Document) -> set[str]:
+    """Names of all files that a document refers to."""
+    addresses = [buffer.uri for buffer in document.buffers] + [
+        i.get("uri") for i in json_array(document.json, "images")
+    ]
+    return {_file_of(address) for address in addresses} - {""}
+
+
+def _file_of(address: str | None) -> str:
+    try:
+        return "" if address is None or uri.is_data(address) else posixpath.normpath(uri.relative_path(address))
+    except AnimError:
+        return ""
+
+
+def _opened(path: Path) -> Document:
+    return container.read(np.frombuffer(_mapped(path), np.uint8))
+
+
+def _mapped(path: Path) -> mmap.mmap | bytes:
+    with path.open("rb") as file:
+        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if os.fstat(file.fileno()).st_size else b""
