@@ -18,6 +18,7 @@ from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS, reader_for
 from anim.caches.sniffing import HEAD, sniff_format
 from anim.caches.storage import Memory, suffix
+from anim.files import resolver
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
@@ -76,6 +77,15 @@ def command(
         typer.Option("--checker", help="Draw squares that are fixed to the rest pose: they show twist and stretch."),
     ] = False,
     wire: Annotated[bool, typer.Option("--wire", help="Draw the edges of the triangles.")] = False,
+    textures: Annotated[
+        bool | None,
+        typer.Option(
+            "--textures/--no-textures",
+            help="Textures, vertex colors and transparency, or plain colors. Default: plain with --heat, --checker and "
+            "--wire.",
+            show_default=False,
+        ),
+    ] = None,
     mesh: mesh_selection.Meshes = None,
     hide: mesh_selection.Hidden = None,
     follow: Annotated[
@@ -98,9 +108,10 @@ def command(
     """Draw a clip as a filmstrip, or as a moving .webp, .gif or .apng.
 
     Meshes are skinned and flat-shaded under one camera framed on the whole motion, on a ground under the feet; a
-    skeleton without a mesh is drawn as sticks. Where a figure travels, the camera goes along, and the distance stands
-    beside the time. Several clips come one under the other, several methods in rows of each; side by side in a film.
-    Without --clip it is the first one.
+    skeleton without a mesh is drawn as sticks. Materials show their base color: factor, texture (PNG, JPEG, WebP) and
+    vertex colors; MASK cuts holes, BLEND is drawn in nine steps of transparency. Where a figure travels, the camera
+    goes along, and the distance stands beside the time. Several clips come one under the other, several methods in
+    rows of each; side by side in a film. Without --clip it is the first one.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()
@@ -110,9 +121,9 @@ def command(
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
     when = FrameSelection(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
-    with _opened(input, voice) as (seen, name):
+    with _opened(input, voice) as (seen, name, beside):
         if isinstance(seen, VertexCache):
-            given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide}
+            given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide, "textures": textures}
             if unknown := next((name for name, value in given.items() if value), None):
                 raise UsageError(f"--{unknown} means nothing to a vertex cache")
             found = clips.of_cache(seen, when)
@@ -126,7 +137,16 @@ def command(
                 seen, name, voice, nodes=lambda scene: mesh_selection.visible_meshes(scene, mesh, hide)
             )
             nodes = mesh_selection.visible_meshes(scene, mesh, hide)
-            found = clips.of_document(seen, numbers, [str(each) for each in method or ()], when, nodes=nodes)
+            found = clips.of_document(
+                seen,
+                numbers,
+                [str(each) for each in method or ()],
+                when,
+                nodes=nodes,
+                textures=not (heat or checker or wire) if textures is None else textures,
+                resolve=beside,
+                note=lambda words: voice.say(f"note: {name}: {words}"),
+            )
         rows, extent = clips.build_strips(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
         look = ViewOptions(size, azimuth, elevation, checker, wire)
@@ -155,8 +175,10 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str]]:
-    """Give a glTF document or a vertex cache, and what messages call it: by its ending, of a pipe by its bytes.
+def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, container.Resolve | None]]:
+    """Give a glTF document or a vertex cache, what messages call it, and what opens files beside it.
+
+    Which it is says its ending, of a pipe its bytes.
 
     voice: says what readers found.
     """
@@ -164,22 +186,23 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
                 voice.warn(words)
-            yield loaded.cache, loaded.name
+            yield loaded.cache, loaded.name, None
     elif path != documents.PIPE:
         with documents.source(path, voice) as source:
-            yield gltf.pages(source.document) or source.document, source.name
+            beside = None if source.folder is None else resolver.CompanionFiles(source.folder).open
+            yield gltf.pages(source.document) or source.document, source.name, beside
     else:
         with documents.content(path) as (data, name):
             head = data[:HEAD].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data)
                 documents.note_mended(document, name, voice)
-                yield gltf.pages(document) or document, name
+                yield gltf.pages(document) or document, name, resolver.missing
             else:
                 ending = sniff_format(head, len(data))
                 cache_files.check_pipe(name, ending)
                 reader = reader_for(ending)
-                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=voice.warn)), name
+                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=voice.warn)), name, None
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) -> FrameSelection:
@@ -191,7 +214,7 @@ def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) 
 
 
 def _one_clip(found: Sequence[FilmstripClip]) -> str:
-    return found[0].clip if len({shot.clip for shot in found}) == 1 else ""
+    return found[0].name if len({shot.clip for shot in found}) == 1 else ""
 
 
 def _rate(times: Floats) -> float:

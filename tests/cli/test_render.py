@@ -201,6 +201,42 @@ def test_what_nothing_is_left_of(args: list[str], words: str, fixture: Fixture, 
     assert words in refusal(call("render", fixture("arm"), tmp_path / "a.png", *args), 5)
 
 
+def test_materials_are_shown_unless_surfaces_are(asset: Find, call: Call) -> None:
+    def drawn(*options: str) -> bytes:
+        return bytes(call("render", asset("Fox.glb"), "-", "--frames", "1", *SMALL, *options).product())
+
+    def is_orange(picture: bytes) -> bool:
+        pixels = np.asarray(Image.open(io.BytesIO(picture))).astype(int)
+        return bool(((pixels[..., 0] > 180) & (pixels[..., 2] < 60)).sum() > 20)
+
+    assert is_orange(drawn())
+    assert drawn() == drawn("--textures")
+    assert not is_orange(drawn("--no-textures"))
+    for look in ("--checker", "--wire", "--heat"):
+        assert drawn(look) == drawn(look, "--no-textures")
+    assert drawn("--checker") != drawn("--checker", "--textures")
+
+
+def test_textures_lie_beside_the_file_and_never_elsewhere(asset: Find, call: Call, tmp_path: Path) -> None:
+    path = asset("CesiumMan-gltf/CesiumMan.gltf")
+    one = ("-", "--frames", "1", *SMALL)
+    run = call("render", path, *one)
+    assert "note" not in run.err
+    assert run.product() != call("render", path, *one, "--no-textures").product()
+    piped = call("render", *one, stdin=call("convert", path, "-").product())
+    assert "note: stdin: image 0: 'CesiumMan_img0.jpg' lies beside the file, but the input is a pipe" in piped.err
+    assert "note" not in call("render", *one, stdin=call("convert", path, "-", "--embed").product()).err
+    (tmp_path / "in").mkdir()
+    (image,) = path.parent.glob("*.jpg")
+    (tmp_path / "up.jpg").write_bytes(image.read_bytes())
+    for each in (*path.parent.glob("*.bin"), path):
+        (tmp_path / "in" / each.name).write_bytes(each.read_bytes().replace(image.name.encode(), b"../up.jpg"))
+    run = call("render", tmp_path / "in" / path.name, *one)
+    assert "image 0: URI '../up.jpg' leaves the file's folder" in run.err
+    assert run.err.count("note: ") == 1
+    assert run.product()
+
+
 @pytest.mark.parametrize("option", ["--checker", "--wire", "--follow", "--heat"])
 def test_what_is_drawn_on_the_surface(option: str, fixture: Fixture, call: Call) -> None:
     args = ("render", fixture("tube"), "-", "--clip", "twist180", "--frames", "3", *SMALL)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import base64
 import binascii
 import re
+from collections.abc import Sequence
 from urllib.parse import quote, unquote, unquote_to_bytes
 
 from anim.errors import FormatError
 
 BUFFER_TYPES = ("application/octet-stream", "application/gltf-buffer")  # glTF 2.0, 3.6.1.1
+IMAGE_TYPES = ("image/png", "image/jpeg", "image/jpg", "image/webp")  # the third is wrong, and frequent
 _DATA = re.compile(r"data:([\w.+-]+/[\w.+-]+)?((?:;[\w.+-]+=[^;,]*)*)(;base64)?,", re.ASCII | re.IGNORECASE)
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.ASCII | re.IGNORECASE)
 
@@ -19,18 +21,18 @@ def is_data(uri: str) -> bool:
     return uri[:5].lower() == "data:"
 
 
-def decode_data(uri: str) -> bytes:
-    """Return the bytes of a data URI of a buffer.
+def decode_data(uri: str, types: Sequence[str] = BUFFER_TYPES) -> bytes:
+    """Return the bytes of a data URI.
 
-    Raises FormatError for a broken one, or a media type that glTF doesn't allow for buffers.
+    types: media types that it may have; glTF's for buffers. Raises FormatError for a broken one, or another type.
     decode_data("data:application/octet-stream;base64,AAE=") → b"\\0\\1"
     """
     match = _DATA.match(uri)
     if match is None:
         raise FormatError(f"broken data URI ({_short(uri)})")
     media = (match[1] or "").lower()
-    if media not in BUFFER_TYPES:
-        raise FormatError(f"data URI has media type '{media}' (expected {' or '.join(BUFFER_TYPES)})")
+    if media not in types:
+        raise FormatError(f"data URI has media type '{media}' (expected {' or '.join(types)})")
     try:
         payload = unquote_to_bytes(uri[match.end() :])
     except UnicodeEncodeError:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,13 +12,17 @@ from anim.caches.transforms import resample, up_axis
 from anim.caches.transforms.resample import SAME
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import stick_mesh
-from anim.gltf.document import Document, json_array
+from anim.gltf.document import Document
+from anim.gltf.io.container import Resolve
 from anim.gltf.reading import reader
+from anim.gltf.reading.materials import read_materials
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
 from anim.sampling import frame_times
 from anim.show.filmstrip import heat_map, palette, root_path
 from anim.show.filmstrip.filmstrip import MOST_POINTS, Extent, Strip
 from anim.show.filmstrip.ground import ground_height
+from anim.show.filmstrip.materials import MaterialReader
+from anim.show.filmstrip.surface import Surface
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
@@ -76,17 +80,20 @@ class FrameSelection:
 
 @dataclass(frozen=True, slots=True)
 class FilmstripClip:
-    """One motion. clip, method: what it is, or empty. cache: its chosen frames; path: some frames of all of it.
+    """One motion. clip: its index in the file, −1 for none. name, method: what it is, or empty.
 
-    colors: (T, 3) linear, of the faces. body: (V,) vertices that a skin moves, or None where that is unknown.
+    cache: its chosen frames; path: some frames of all of it. colors: (T, 3) linear, of the faces. surface: materials
+    that multiply them, or None. body: (V,) vertices that a skin moves, or None where that is unknown.
     """
 
-    clip: str
+    clip: int
+    name: str
     method: str
     cache: VertexCache
     path: VertexCache
     colors: Floats
     body: Bools | None = None
+    surface: Surface | None = None
 
 
 def of_document(
@@ -96,22 +103,32 @@ def of_document(
     when: FrameSelection,
     *,
     nodes: Collection[int] | None = None,
+    textures: bool = True,
+    resolve: Resolve | None = None,
+    note: Callable[[str], None] = lambda _: None,
 ) -> list[FilmstripClip]:
     """Return a shot for each clip by number and each skinning method; without clips one of the rest pose.
 
     nodes: only meshes on these; None for all. A file without a mesh is shown as sticks from joint to joint.
+    textures: show base color textures, vertex colors and alpha. resolve: gives the bytes of a file beside the input by
+    its relative path, for images; None where there is no such place. note: called with what can't be shown.
     Raises NotFoundError for a file without anything.
     """
     for name in methods:
         if name not in SKINNING_METHODS:
             raise RangeError(f"method is '{name}' (expected {', '.join(SKINNING_METHODS)})")
-    scene = _visible(reader.scene(document), nodes)
+    whole_scene = reader.scene(document)
+    scene = _visible(whole_scene, nodes)
+    is_drawn = any(len(instance.mesh.faces) for instance in whole_scene.instances)
+    materials = MaterialReader(document, resolve, note) if textures and is_drawn else None
     known = reader.clips(document)
-    chosen = [(known[i].name, known[i]) for i in clips] or [("", Clip("", ()))]
+    chosen = [(i, known[i]) for i in clips] or [(-1, Clip("", ()))]
     moving = [clip for _, clip in chosen if clip.tracks]
+    surface: Surface | None = None
+    colors: Floats = np.empty((0, 3))
     when.check(min((clip.start for clip in moving), default=0.0), max((clip.end for clip in moving), default=0.0))
-    found = []
-    for name, clip in chosen:
+    found: list[FilmstripClip] = []
+    for number, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
         times, path = when.times(start, end), _spread(start, end)
         if not len(times):
@@ -119,8 +136,12 @@ def of_document(
         for method in methods or ("lbs",):
             cache = bake(scene, clip, times=times, method=method, rigid=True)
             whole = bake(scene, clip, times=path, method=method, rigid=True)
-            colors = palette.face_colors(cache, _materials(document))
-            found.append(FilmstripClip(name, method if methods else "", cache, whole, colors, _body(scene, cache)))
+            if not found and materials is not None:
+                surface, colors = materials.surface(cache)
+            elif not found:
+                colors = palette.face_colors(cache, _factors(document))
+            kind = method if methods else ""
+            found.append(FilmstripClip(number, clip.name, kind, cache, whole, colors, _body(scene, cache), surface))
     if not found:
         raise RangeError(f"no clip has a frame at {', '.join(f'{time:g} s' for time in when.at)}")
     return found
@@ -135,7 +156,7 @@ def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
     when.check(start, end)
     chosen = resample.resample_frames(cache, when.times(start, end))
     whole = resample.resample_frames(cache, _spread(start, end))
-    return [FilmstripClip("", "", chosen, whole, palette.face_colors(cache))]
+    return [FilmstripClip(-1, "", "", chosen, whole, palette.face_colors(cache))]
 
 
 def build_strips(
@@ -160,10 +181,22 @@ def build_strips(
             way = root_path.root_path(shot.path) if goes else None
         alone = sum(other.clip == shot.clip for other in shots) == 1
         distances = _distances(shot, positions, reference, alone, shot is first) if heated else None
-        heading = (shot.clip or "(no name)") if several_clips else ""
+        heading = reader.clip_name(shot.name, shot.clip) if several_clips else ""
         cache = shot.cache
         found.append(
-            Strip(shot.method, cache.times, positions, cache.faces, shot.colors, distances, heading, way, cache.rest)
+            Strip(
+                shot.method,
+                cache.times,
+                positions,
+                cache.faces,
+                shot.colors,
+                distances,
+                heading,
+                way,
+                cache.rest,
+                shot.surface,
+                shot.clip,
+            )
         )
         points += [_places(each, way) for each in (shot.path, shot.cache)]
     ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
@@ -223,13 +256,10 @@ def _ends(skeleton: Skeleton) -> frozenset[int]:
     return frozenset(i for i in range(len(skeleton)) if i not in parents and skeleton.parents[i] >= 0)
 
 
-def _materials(document: Document) -> list[tuple[float, float, float]]:
-    found = []
-    for material in json_array(document.json, "materials"):
-        surface = material.get("pbrMetallicRoughness", {})
-        color = (1.0, 1.0, 1.0) if "baseColorTexture" in surface else surface.get("baseColorFactor", (1.0, 1.0, 1.0))
-        found.append((float(color[0]), float(color[1]), float(color[2])))
-    return found
+def _factors(document: Document) -> list[tuple[float, float, float]]:
+    """Base colors of the materials; white where a texture says more, so that parts get colors of their own."""
+    materials = read_materials(document)
+    return [(1.0, 1.0, 1.0) if each.texture is not None else each.factor[:3] for each in materials]
 
 
 def _spread(start: float, end: float) -> Floats:

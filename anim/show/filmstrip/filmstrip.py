@@ -16,6 +16,7 @@ from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, fit_camera
 from anim.show.filmstrip.captions import FAINT, LINE
 from anim.show.filmstrip.renderer import SceneView, mark_spacing, moved, render_frame, setup_view, to_srgb
 from anim.show.filmstrip.root_path import RootPath
+from anim.show.filmstrip.surface import Surface
 from anim.show.filmstrip.surface_pattern import Checker, SurfaceMarks, edges
 
 HEIGHT = 240  # pixels of a frame
@@ -38,8 +39,9 @@ class Strip:
     """One strip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
 
     distances: (F, V) m, shown as heat instead of the colors where there are any. label: of the row, "dqs".
-    heading: of all rows of one clip, which stand together, "Walk". way: for a camera that goes with the figure.
-    rest: (V, 3) m, what a checker is fixed to.
+    heading: over all rows of one clip, "Walk". way: for a camera that goes with the figure.
+    rest: (V, 3) m, what a checker is fixed to. surface: materials; None for plain colors.
+    clip: which one it is of; rows of one clip stand together.
     """
 
     label: str
@@ -51,6 +53,8 @@ class Strip:
     heading: str = ""
     way: RootPath | None = None
     rest: AnyArray | None = None
+    surface: Surface | None = None
+    clip: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +88,7 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     scenery = _scenery(extent, look)
     width, height = scenery.camera.width, scenery.camera.height
     most, header = _max_extent(rows), _header_height(rows, title)
-    clips = [list(each) for _, each in groupby(rows, key=lambda row: row.heading)]
+    clips = [list(each) for _, each in groupby(rows, key=lambda row: row.clip)]
     per_line, pitch = _grid(width)
     columns = max(_columns(row, per_line)[0] for row in rows)
     across = max(columns * pitch - GAP, _header_width(rows, title))
@@ -250,7 +254,8 @@ def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> I
             place = row.way.at(row.times[f])
             seen[:, [0, 2]] -= place
             now = moved(scenery, place, row.way.milestones(row.times[f], mark_spacing(scenery)))
-        yield to_srgb(render_frame(now, seen, row.faces, colors, marks))
+        picture = render_frame(now, seen, row.faces, colors, marks, row.surface, tinted=row.distances is None)
+        yield to_srgb(picture)
 
 
 def _marks(row: Strip, look: ViewOptions) -> list[SurfaceMarks]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -23,11 +23,17 @@ PARTS = (
 DARKEST = 0.035  # so that black things still have a shape
 
 
-def face_colors(cache: VertexCache, materials: Sequence[tuple[float, float, float]] = ()) -> Floats:
-    """Return a linear color (T, 3) for every face. materials: base colors by number; white counts as none."""
+def face_colors(
+    cache: VertexCache, materials: Sequence[tuple[float, float, float]] = (), painted: Collection[int] = ()
+) -> Floats:
+    """Return a linear color (T, 3) for every face. materials: base colors by number; white counts as none.
+
+    painted: parts by number whose color is multiplied by a texture or vertex colors, so that it stays as it is.
+    """
     colors = np.tile(np.array(CLAY), (len(cache.faces), 1))
     for i, part in enumerate(cache.parts):
         color = materials[part.material] if 0 <= part.material < len(materials) else (1.0, 1.0, 1.0)
-        is_plain = min(color) > 0.95
-        colors[slice(*part.faces)] = PARTS[i % len(PARTS)] if is_plain else np.maximum(color, DARKEST)
+        is_plain = min(color) > 0.95 and i not in painted
+        darkest = 0.0 if i in painted else DARKEST
+        colors[slice(*part.faces)] = PARTS[i % len(PARTS)] if is_plain else np.maximum(color, darkest)
     return colors

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 
 BATCH = 1 << 20  # rows of triangles drawn at a time
 EDGE = 1e-9  # pixels by which a middle may lie outside, so that neighbors leave no gap
 FLAT = 1e-12  # pixels²; triangles of less area are seen from the side
 
+# (triangles (S,), columns (S,), rows (S,) of pixels) → whether each is drawn there (S,)
+AlphaTest: TypeAlias = Callable[[Ints, Ints, Ints], Bools]
 
-def visible_faces(corners: Floats, *, width: int, height: int) -> Ints:
+
+def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: AlphaTest | None = None) -> Ints:
     """Return the number of the nearest triangle at each pixel (height, width), −1 where there is none.
 
     corners: (T, 3, 3): x and y in pixels from the top left, and nearness, which grows toward the eye and is linear on
     the screen (1 / distance). A pixel belongs to a triangle that its middle lies in. Both sides are seen.
+    alpha_test: says which pixels of which triangles are drawn; None for all.
     Each triangle is cut into rows, each row into the pixels between its edges; the nearest of all stays.
     """
     seen: Ints = np.full(height * width, -1, np.int64)
@@ -33,7 +40,7 @@ def visible_faces(corners: Floats, *, width: int, height: int) -> Ints:
         some = slice(start, stop)
         which = np.repeat(np.arange(start, stop), rows[some])
         line = first[which] + np.arange(len(which)) - np.repeat(ends[some] - rows[some] - done, rows[some])
-        _draw(which, line, shares, near, chosen, seen, nearest, width)
+        _draw(which, line, shares, near, chosen, seen, nearest, width, alpha_test)
         start = stop
     return seen.reshape(height, width)
 
@@ -57,7 +64,15 @@ def _planes(corners: Floats) -> tuple[Floats, Floats, Ints]:
 
 
 def _draw(
-    which: Ints, line: Ints, shares: Floats, near: Floats, chosen: Ints, seen: Ints, nearest: Floats, width: int
+    which: Ints,
+    line: Ints,
+    shares: Floats,
+    near: Floats,
+    chosen: Ints,
+    seen: Ints,
+    nearest: Floats,
+    width: int,
+    alpha_test: AlphaTest | None,
 ) -> None:
     """Draw rows `line` of triangles `which`, each between its edges."""
     low, high = np.full(len(which), -np.inf), np.full(len(which), np.inf)
@@ -78,6 +93,9 @@ def _draw(
     level = plane[:, 1] * middle + plane[:, 2] + plane[:, 0] * 0.5
     depth = level[row] + plane[row, 0] * x
     pixel = (line * width)[row] + x
+    if alpha_test is not None:
+        drawn = alpha_test(chosen[which[row]], x, line[row])
+        row, pixel, depth = row[drawn], pixel[drawn], depth[drawn]
     np.maximum.at(nearest, pixel, depth)
     won = depth == nearest[pixel]
     seen[pixel[won]] = chosen[which[row[won]]]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from anim.arrays import Bools, Floats, Ints
 from anim.show.filmstrip.camera import Camera
 from anim.show.filmstrip.rasterizer import visible_faces
 from anim.show.filmstrip.surface_pattern import SurfaceMarks
+
+if TYPE_CHECKING:
+    from anim.show.filmstrip.surface import Surface
 
 SAMPLES = 3  # across and down in each pixel
 BAND = 1 << 22  # samples that are drawn at a time, about: they take 60 bytes each
@@ -73,30 +78,49 @@ def mark_spacing(stage: SceneView) -> float:
 
 
 def render_frame(
-    stage: SceneView, positions: Floats, faces: Ints, colors: Floats, marks: Sequence[SurfaceMarks] = ()
+    stage: SceneView,
+    positions: Floats,
+    faces: Ints,
+    colors: Floats,
+    marks: Sequence[SurfaceMarks] = (),
+    surface: Surface | None = None,
+    *,
+    tinted: bool = True,
 ) -> Floats:
     """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces.
 
-    marks: drawn on the surface, each over the one before.
+    marks: drawn on the surface, each over the one before. surface: materials, whose alpha always counts; their colors
+    multiply the others where the picture is `tinted`.
     """
     camera = stage.camera
     corners = _enlarge(camera, SAMPLES).project(positions)[faces]
     painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
-    picture: Floats = stage.background * (1 - _shadow(stage, positions, faces)[..., None] * (1 - SHADOW))
+    picture: Floats = stage.background * (1 - _shadow(stage, positions, faces, surface)[..., None] * (1 - SHADOW))
     rows = max(BAND // (camera.width * SAMPLES**2), 1)
     for top in range(0, camera.height, rows):
-        _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted, marks)
+        _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted, marks, surface, tinted=tinted)
     return picture
 
 
-def _paint(band: Floats, corners: Floats, painted: Floats, marks: Sequence[SurfaceMarks]) -> None:
+def _paint(
+    band: Floats,
+    corners: Floats,
+    painted: Floats,
+    marks: Sequence[SurfaceMarks],
+    surface: Surface | None,
+    *,
+    tinted: bool,
+) -> None:
     """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
     height, width = band.shape[:2]
-    seen = visible_faces(corners, width=width * SAMPLES, height=height * SAMPLES)
+    alpha_test = None if surface is None else partial(surface.is_drawn, corners)
+    seen = visible_faces(corners, width=width * SAMPLES, height=height * SAMPLES, alpha_test=alpha_test)
     shape = (height, SAMPLES, width, SAMPLES)
     cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
     colors = painted[seen]
     y, x = np.nonzero(seen >= 0)
+    if surface is not None and tinted:
+        colors[y, x] *= surface.tint(corners, np.stack((x + 0.5, y + 0.5), axis=1), seen[y, x])
     for mark in marks:
         chosen = seen[y, x]
         shown = corners[chosen] * (1 / SAMPLES, 1 / SAMPLES, 1)
@@ -174,7 +198,7 @@ def nice(length: float) -> float:
     return max(factor * power for factor in (1, 2, 5) if factor * power <= length * 1.0001)
 
 
-def _shadow(stage: SceneView, positions: Floats, faces: Ints) -> Floats:
+def _shadow(stage: SceneView, positions: Floats, faces: Ints, surface: Surface | None) -> Floats:
     """How dark (H, W) the ground is: what the key light finds in its way, made soft."""
     camera = stage.camera
     if camera.eye[1] <= stage.ground:
@@ -184,7 +208,9 @@ def _shadow(stage: SceneView, positions: Floats, faces: Ints) -> Floats:
     above = np.maximum(positions[:, 1] - stage.ground, 0)
     fallen = positions - (above / light[1])[:, None] * light
     fallen[:, 1] = stage.ground
-    mask = visible_faces(camera.project(fallen)[faces], width=camera.width, height=camera.height) >= 0
+    corners = camera.project(fallen)[faces]
+    alpha_test = None if surface is None else partial(surface.is_drawn, corners)
+    mask = visible_faces(corners, width=camera.width, height=camera.height, alpha_test=alpha_test) >= 0
     return SHADOW_DEPTH * _blur(mask, max(round(SHADOW_BLUR * camera.height), 1))
 
 

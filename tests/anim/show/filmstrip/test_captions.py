@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,9 +35,9 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
     return found
 
 
-def row(heading: str, count: int, label: str = "") -> Strip:
+def row(heading: str, count: int, label: str = "", clip: int = 0) -> Strip:
     positions = np.repeat(EXTENT.points[None], count, axis=0)
-    return Strip(label, np.arange(count) / 10, positions, FACE, np.full((1, 3), 0.5), heading=heading)
+    return Strip(label, np.arange(count) / 10, positions, FACE, np.full((1, 3), 0.5), heading=heading, clip=clip)
 
 
 @pytest.mark.parametrize(
@@ -61,6 +62,19 @@ def test_a_name_without_marks_is_broken_anywhere() -> None:
     assert captions.wrapped("xxx", 1) == ["x", "x", "x"], "a letter that is too wide stands alone"
 
 
+def test_clips_of_one_name_come_one_after_the_other_too(written: list[tuple[str, int, int]]) -> None:
+    """Rows of one clip are interleaved line by line, so that methods can be compared: not those of two clips."""
+    document = opened_fixture("biped")
+    animations = [{**each, "name": "same"} for each in document.json["animations"]]
+    renamed = replace(document, json={**document.json, "animations": animations})
+    rows, extent = clips.build_strips(clips.of_document(renamed, [0, 1], ("lbs",), FrameSelection(count=40)))
+    assert [each.clip for each in rows] == [0, 1]
+    filmstrip(rows, extent, look=SMALL)
+    places = sorted((y, x, text) for text, x, y in written if text.endswith(" s"))
+    times = [float(text[:-2]) for _, _, text in places]
+    assert times == [*np.round(rows[0].times, 2), *np.round(rows[1].times, 2)]
+
+
 @pytest.mark.parametrize("text", ["Gehen für später", "Прыжок", "歩く", "a\nb", "\ud83d", "\0", "👋🏽", ""])
 def test_names_in_any_script_are_written(text: str) -> None:
     """Letters that the font lacks are boxes; nothing is an error, and the same text gives the same pixels."""
@@ -79,7 +93,7 @@ def test_what_lies_outside_is_cut_off(x: int, y: int) -> None:
 
 
 def test_clips_come_one_after_the_other(written: list[tuple[str, int, int]]) -> None:
-    filmstrip([row("first", 60), row("second", 60)], EXTENT, look=SMALL)
+    filmstrip([row("first", 60), row("second", 60, clip=1)], EXTENT, look=SMALL)
     names = [text for text, _, _ in written if not text.endswith(" s")]
     assert names == ["", "first", "second"]
     (y,) = (y for text, _, y in written if text == "second")

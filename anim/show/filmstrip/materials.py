@@ -1,0 +1,104 @@
+"""Document + baked mesh → Surface: materials of the file on the faces of a cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError
+from anim.gltf.document import Document, Json, json_array
+from anim.gltf.io.container import Resolve
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.image_data import image_data
+from anim.gltf.reading.materials import Material, read_materials
+from anim.gltf.reading.vertex_colors import VertexColors, no_vertex_colors, read_vertex_colors, vertex_count
+from anim.model import MeshPart, VertexCache
+from anim.show.filmstrip import palette
+from anim.show.filmstrip.surface import OPAQUE, Coating, Surface
+from anim.show.filmstrip.texture import Texels, TextureSampler, decode_image
+
+
+class MaterialReader:
+    """Reads the surfaces of one document; images are decoded once. note: called with what can't be shown, a line each.
+
+    resolve: gives the bytes of a file beside the input by its relative path; None where there is no such place.
+    """
+
+    def __init__(self, document: Document, resolve: Resolve | None, note: Callable[[str], None]) -> None:
+        self._document, self._resolve, self._note = document, resolve, note
+        self._accessors = Accessors(document)
+        self._materials = read_materials(document, note)
+        self._images: dict[int, Texels | None] = {}
+        self._read: dict[str, VertexColors] = {}
+
+    def surface(self, cache: VertexCache) -> tuple[Surface, Floats]:
+        """Return the materials on a cache of the document, and the base colors (T, 3) that they multiply."""
+        texcoords, colors = np.zeros((cache.vertex_count, 2)), np.ones((cache.vertex_count, 4))
+        coating = np.zeros(len(cache.faces), np.int64)
+        coatings: list[Coating] = []
+        painted: set[int] = set()
+        for i, (part, found) in enumerate(self._primitives(cache)):
+            vertices = slice(*part.vertices)
+            texcoords[vertices], colors[vertices] = found.texcoords, found.colors
+            made = self._coating(self._material(part.material), textured=found.has_texcoords)
+            if made.texture is not None or found.has_colors:
+                painted.add(i)
+            coating[slice(*part.faces)] = len(coatings)
+            coatings.append(made)
+        factors = [material.factor[:3] for material in self._materials]
+        has_colors = bool((colors != 1).any())
+        surface = Surface(cache.faces, coating, tuple(coatings), texcoords, colors if has_colors else None)
+        return surface, palette.face_colors(cache, factors, painted)
+
+    def _primitives(self, cache: VertexCache) -> Iterator[tuple[MeshPart, VertexColors]]:
+        """Yield the parts of a cache, and their colors; empty primitives are no parts."""
+        nodes, meshes = json_array(self._document.json, "nodes"), json_array(self._document.json, "meshes")
+        for node, parts in groupby(cache.parts, key=lambda part: part.node):
+            mesh = nodes[node]["mesh"]
+            numbered = iter(enumerate(meshes[mesh]["primitives"]))
+            for part in parts:
+                index, primitive = next(each for each in numbered if vertex_count(each[1], self._accessors))
+                where = f"mesh {mesh}: primitive {index}"
+                if where not in self._read:
+                    self._read[where] = self._vertex_colors(primitive, self._material(part.material), where)
+                yield part, self._read[where]
+
+    def _vertex_colors(self, primitive: Json, material: Material, where: str) -> VertexColors:
+        try:
+            found = read_vertex_colors(self._document, primitive, self._accessors, material.texture)
+        except AnimError as error:
+            self._note(f"{error.at(where, ': ')}: drawn without texture and vertex colors")
+            return no_vertex_colors(vertex_count(primitive, self._accessors))
+        if found.has_colors and found.has_texcoords and _is_black(found.colors):
+            self._note(f"{where}: most vertex colors are black, so they are taken for other data and not drawn")
+            return replace(found, colors=np.ones_like(found.colors), has_colors=False)
+        return found
+
+    def _material(self, index: int) -> Material:
+        return self._materials[index] if 0 <= index < len(self._materials) else Material()
+
+    def _coating(self, material: Material, *, textured: bool) -> Coating:
+        cutoff = {"MASK": material.alpha_cutoff, "BLEND": None}.get(material.alpha_mode, OPAQUE)
+        texture = material.texture
+        texels = self._image(texture.image) if texture is not None and textured else None
+        if texture is None or texels is None:
+            return Coating(None, material.factor[3], cutoff)
+        return Coating(TextureSampler(texels, texture.wrap, texture.nearest), material.factor[3], cutoff)
+
+    def _image(self, index: int) -> Texels | None:
+        if index not in self._images:
+            try:
+                self._images[index] = decode_image(image_data(self._document, index, self._accessors, self._resolve))
+            except AnimError as error:
+                self._note(f"{error.at(f'image {index}', ': ')}: drawn without it")
+                self._images[index] = None
+        return self._images[index]
+
+
+def _is_black(colors: Floats) -> bool:
+    """Whether most vertices are black: a game's masks, which would hide the texture."""
+    return bool(np.median(colors[:, :3].max(axis=1)) == 0)

@@ -1,0 +1,94 @@
+"""Materials of a mesh as they are drawn: base color textures, vertex colors and alpha at samples of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import AnyArray, Bools, Floats, Ints
+from anim.show.filmstrip.surface_pattern import barycentric
+from anim.show.filmstrip.texture import TextureSampler
+
+SAMPLES_AT_A_TIME = 1 << 18
+COVERAGE = (np.array([[0, 7, 3], [6, 5, 2], [4, 1, 8]]) + 0.5) / 9  # alpha that each of 3 × 3 samples asks for
+OPAQUE = -1.0  # a cutoff that every alpha passes
+
+
+@dataclass(frozen=True, slots=True)
+class Coating:
+    """What a primitive is drawn with. texture: None for none. alpha: of the base color factor.
+
+    cutoff: alpha below which nothing is drawn; OPAQUE for no test; None for blending, by the samples of a pixel that
+    are drawn (alpha to coverage), which needs no order of faces.
+    """
+
+    texture: TextureSampler | None = None
+    alpha: float = 1.0
+    cutoff: float | None = OPAQUE
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Materials on the faces (T, 3) of a mesh. coating: (T,) index of each face's coating among `coatings`.
+
+    texcoords: (V, 2). colors: (V, 4) linear RGBA of vertices, or None where all are white.
+    """
+
+    faces: Ints
+    coating: Ints
+    coatings: tuple[Coating, ...]
+    texcoords: AnyArray
+    colors: AnyArray | None
+
+    def tint(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
+        """Return the linear RGB (S, 3) that multiplies the base color, at samples (S, 2) in pixels of faces (S,).
+
+        corners: (T, 3, 3) of all faces on the screen: x, y and nearness.
+        """
+        return self._rgba(corners, samples, faces)[:, :3]
+
+    def is_drawn(self, corners: Floats, faces: Ints, x: Ints, y: Ints) -> Bools:
+        """Return whether faces (S,) are drawn at the samples in columns x and rows y, by their alpha.
+
+        corners: (T, 3, 3) of all faces on the screen, in the same unit as x and y.
+        """
+        result = np.ones(len(faces), bool)
+        cutoffs = np.array([np.nan if each.cutoff is None else each.cutoff for each in self.coatings])[self.coating]
+        tested = np.flatnonzero(cutoffs[faces] != OPAQUE)
+        if len(tested):
+            faces, x, y = faces[tested], x[tested], y[tested]
+            alpha = self._rgba(corners, np.stack((x + 0.5, y + 0.5), axis=1), faces)[:, 3]
+            limit = np.where(np.isnan(cutoffs[faces]), COVERAGE[y % 3, x % 3], cutoffs[faces])
+            result[tested] = alpha >= limit
+        return result
+
+    def _rgba(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
+        """Texture times vertex colors, with the whole alpha."""
+        result = np.empty((len(faces), 4))
+        for start in range(0, len(faces), SAMPLES_AT_A_TIME):
+            some = slice(start, start + SAMPLES_AT_A_TIME)
+            result[some] = self._of_some(corners[faces[some]], samples[some], faces[some])
+        return result
+
+    def _of_some(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
+        shares = barycentric(corners, samples) * corners[:, :, 2]  # on the screen → in space
+        shares /= shares.sum(axis=1, keepdims=True)
+        vertices, coating = self.faces[faces], self.coating[faces]
+        result = np.ones((len(faces), 4))
+        if self.colors is not None:
+            result[:] = np.einsum("sc,sci->si", shares, self.colors[vertices])
+        for i, chosen in _groups(coating):
+            texture = self.coatings[i].texture
+            if texture is not None:
+                places = np.einsum("sc,sci->si", shares[chosen], self.texcoords[vertices[chosen]].astype(np.float64))
+                result[chosen] *= texture.sample(places)
+            result[chosen, 3] *= self.coatings[i].alpha
+        return result
+
+
+def _groups(indices: Ints) -> Iterator[tuple[int, Ints]]:
+    """Yield each index that is there, and where it is."""
+    for i in np.unique(indices).tolist():
+        yield i, np.flatnonzero(indices == i)

@@ -1,0 +1,87 @@
+"""Textures: images decoded by Pillow, sampled at texture coordinates as glTF says (origin at the top left)."""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anim.arrays import Bytes, Floats, Ints
+from anim.errors import FormatError
+from anim.gltf.reading.materials import CLAMP_TO_EDGE, MIRRORED_REPEAT
+from anim.show.filmstrip.renderer import GAMMA
+
+MAX_SIDE = 1024  # texels; larger images are reduced, since frames have a few hundred pixels
+MAX_PIXELS = 1 << 27  # of an image in the file
+BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # what decoders raise
+FORMATS = ("PNG", "JPEG", "WEBP")
+LINEAR = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)  # light of each byte: what `encoded` turns back
+
+Texels = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class TextureSampler:
+    """Texels (H, W, 4) as stored, RGB in sRGB. wrap: modes along u and v. nearest: no interpolation."""
+
+    texels: Texels
+    wrap: tuple[int, int]
+    nearest: bool = False
+
+    def sample(self, texcoords: Floats) -> Floats:
+        """Return linear RGBA (S, 4) at texture coordinates (S, 2): u to the right, v down, 1 the whole image."""
+        height, width = self.texels.shape[:2]
+        places = texcoords * (width, height) - (0.0 if self.nearest else 0.5)
+        corner = np.floor(places)
+        fractions = (places - corner).astype(np.float32)
+        x, y = (corner[:, i].astype(np.int64) for i in (0, 1))
+        if self.nearest:
+            return self._fetch(x, y).astype(np.float64)
+        right, down = fractions[:, :1], fractions[:, 1:]
+        top = self._fetch(x, y) * (1 - right) + self._fetch(x + 1, y) * right
+        bottom = self._fetch(x, y + 1) * (1 - right) + self._fetch(x + 1, y + 1) * right
+        return np.asarray(top * (1 - down) + bottom * down, np.float64)
+
+    def _fetch(self, x: Ints, y: Ints) -> NDArray[np.float32]:
+        height, width = self.texels.shape[:2]
+        found = self.texels[_wrap(y, height, self.wrap[1]), _wrap(x, width, self.wrap[0])]
+        rgba = LINEAR[found]
+        rgba[:, 3] = found[:, 3] / np.float32(255)
+        return rgba
+
+
+def decode_image(data: Bytes) -> Texels:
+    """Return the texels (H, W, 4) of an encoded image, reduced where it has more than 1024 on a side.
+
+    Raises FormatError for what is no PNG, JPEG or WebP, is damaged, or has more pixels than memory should hold.
+    """
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of sizes (checked below) and of odd metadata
+            image = Image.open(io.BytesIO(data.tobytes()), formats=FORMATS)
+            if image.width * image.height > MAX_PIXELS:
+                raise FormatError(f"has {image.width} × {image.height} pixels (limit {MAX_PIXELS // 10**6} million)")
+            image.draft("RGB", (MAX_SIDE, MAX_SIDE))
+            pixels = image.convert("RGBA")
+            pixels.thumbnail((MAX_SIDE, MAX_SIDE))
+            return np.array(pixels)
+    except Image.UnidentifiedImageError:
+        raise FormatError(f"is no PNG, JPEG or WebP that can be decoded (starts with {data[:8].tobytes()!r})") from None
+    except (*BROKEN, Image.DecompressionBombError) as error:
+        raise FormatError(f"can't be decoded ({str(error).lower()})") from None
+
+
+def _wrap(index: Ints, size: int, mode: int) -> Ints:
+    """Indices within 0 … size − 1; a mode that glTF doesn't know repeats."""
+    if mode == CLAMP_TO_EDGE:
+        return np.clip(index, 0, size - 1)
+    if mode == MIRRORED_REPEAT:
+        index = index % (2 * size)
+        return np.minimum(index, 2 * size - 1 - index)
+    return index % size
