@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Any, TypeAlias
 from weakref import WeakValueDictionary
 
@@ -25,7 +26,7 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     """Return `values` as a read-only float64 array of the named shape, every number finite.
 
     shape: one word per axis, a number for a fixed length and a letter for any: "K 3", "F N 4", "K C".
-    An array that its owner can write to is copied; one that is read-only already is shared.
+    An array that anybody can write to is copied, also a read-only view of one; what nobody can write to is shared.
     Raises ShapeError for a wrong shape or type, RangeError for NaN or infinity.
     floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
     """
@@ -37,10 +38,10 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     if not _is_finite(array):
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise RangeError(f"{name} holds {array[at]} at {list(at)} (expected finite numbers)")
-    if not array.flags.writeable:
+    if _is_frozen(array):
         return array
     fresh = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.dtype != array.dtype)
-    return read_only(array) if fresh else own(array)
+    return freeze(array) if fresh else own(array)
 
 
 def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
@@ -89,7 +90,7 @@ def _is_finite(array: AnyArray) -> bool:
 
 def own(array: NDArray[Any]) -> NDArray[Any]:
     """Return `array` itself if it is read-only, else a read-only copy, which later writes by its owner don't reach."""
-    return read_only(array.copy(order="K") if array.flags.writeable else array)
+    return array if _is_frozen(array) else freeze(array.copy(order="K"))
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -98,3 +99,28 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
         array = array.view()
         array.flags.writeable = False
     return array
+
+
+def freeze(array: NDArray[Any]) -> NDArray[Any]:
+    """Make an array that nobody else holds read-only, with what it is a view of, and return it."""
+    owner: object = array
+    while isinstance(owner, np.ndarray):
+        owner.flags.writeable = False
+        owner = owner.base
+    return array
+
+
+def restore_fields(instance: Any, state: list[Any]) -> None:
+    """Set the fields of a frozen dataclass that was pickled or copied, its arrays read-only as they were."""
+    for field, value in zip(fields(instance), state, strict=True):
+        object.__setattr__(instance, field.name, freeze(value) if isinstance(value, np.ndarray) else value)
+
+
+def _is_frozen(array: AnyArray) -> bool:
+    """Whether nobody can write to the memory of `array`, neither through it nor through what it is a view of."""
+    owner: object = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return False
+        owner = owner.base
+    return not isinstance(owner, bytearray)

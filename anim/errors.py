@@ -72,3 +72,10 @@ class OutputError(AnimError):
 def not_written(name: object, error: OSError) -> OutputError:
     """Return the error for an output, `name`, that the system does not let us write."""
     return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")
+
+
+def check_type(value: object, expected: type, name: str, *, help: str = "") -> None:
+    """Raise ShapeError where `value`, called `name`, is no `expected`."""
+    if not isinstance(value, expected):
+        got = "None" if value is None else type(value).__name__
+        raise ShapeError(f"{name} is {got} (expected {expected.__name__})", help=help)

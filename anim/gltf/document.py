@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeAlias
 
+import numpy as np
+
+from anim import arrays
 from anim.arrays import Bytes as Bytes
 from anim.errors import FormatError
 
@@ -36,6 +39,14 @@ class Buffer:
         self._load = load
         self._where = where
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Buffer:
+        return self  # nothing in it changes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the bytes themselves, for other processes: what loads them may be tied to this one."""
+        data = np.array(self.data) if self.has_data else None
+        return _restored, (self.byte_length, self.uri, data, self._where, self.replaced)
+
     @property
     def has_data(self) -> bool:
         """Whether there are bytes behind it: a fallback buffer of compressed views has none."""
@@ -55,6 +66,11 @@ class Buffer:
                 f"holds {len(data)} bytes (expected at least its byteLength, {self.byte_length})", where=self._where
             )
         return data[: self.byte_length]
+
+
+def _restored(byte_length: int, uri: str | None, data: Bytes | None, where: str, replaced: bool) -> Buffer:
+    load = None if data is None else partial(arrays.freeze, data)
+    return Buffer(byte_length, uri, load, where=where, replaced=replaced)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,3 +107,16 @@ def json_array(json: Json, key: str) -> list[Json]:
     """Return the objects of a top-level array, empty where the file has none."""
     found: list[Json] = json.get(key, [])
     return found
+
+
+def copy_json(json: Json) -> Json:
+    """Return a copy that shares no object and no list with `json`, however deep it is nested."""
+    result = dict(json)
+    stack: list[Any] = [result]
+    while stack:
+        parent = stack.pop()
+        for key, value in list(parent.items()) if isinstance(parent, dict) else enumerate(parent):
+            if isinstance(value, dict | list):
+                parent[key] = value.copy()
+                stack.append(parent[key])
+    return result

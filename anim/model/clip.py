@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from anim.arrays import Floats
-from anim.errors import FormatError
+from anim.errors import FormatError, ShapeError
 from anim.model.track import Track
 
 
@@ -20,6 +21,12 @@ class Clip:
     tracks: tuple[Track, ...]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ShapeError(f"name is {self.name!r} (expected text, empty for none)")
+        if not isinstance(self.tracks, tuple):
+            object.__setattr__(self, "tracks", _as_tuple(self.tracks))
+        if strange := next((each for each in self.tracks if not isinstance(each, Track)), None):
+            raise ShapeError(f"tracks hold {type(strange).__name__} (expected Track)")
         targets = [(track.node, track.path) for track in self.tracks if track.node is not None]
         if len(set(targets)) < len(targets):
             node, path = next(target for target in targets if targets.count(target) > 1)
@@ -42,3 +49,10 @@ class Clip:
 
     def __repr__(self) -> str:
         return f"Clip({self.name!r}, tracks={len(self.tracks)}, start_s={self.start:.6g}, end_s={self.end:.6g})"
+
+
+def _as_tuple(tracks: Iterable[Track]) -> tuple[Track, ...]:
+    try:
+        return tuple(tracks)
+    except TypeError:
+        raise ShapeError(f"tracks is {type(tracks).__name__} (expected a sequence of Track)") from None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from anim.arrays import Floats
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pose:
     """Local transforms of all nodes at F times.
 

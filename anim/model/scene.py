@@ -14,7 +14,7 @@ from anim.model.skeleton import Skeleton
 SUM_TOLERANCE = 1e-3  # how far a vertex's skin weights may be from adding up to 1: more than rounding leaves
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Skin:
     """Joints of a skin and the matrices that take mesh space to each joint's space at bind time.
 
@@ -41,7 +41,7 @@ class PrimitiveRange:
     material: int = -1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
     """Vertices of all primitives of a glTF mesh, one after another.
 
@@ -85,7 +85,7 @@ class Mesh:
         return f"Mesh({self.name!r}, {counts})"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MeshInstance:
     """A mesh on a node; with a skin, the joints place the vertices and the node does not count.
 
@@ -101,7 +101,7 @@ class MeshInstance:
         return f"MeshInstance(node={self.node}, {self.mesh!r}, {self.skin!r})"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """The skeleton and every mesh instance, in depth-first order of nodes."""
 

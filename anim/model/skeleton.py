@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.errors import FormatError, ShapeError
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Skeleton:
     """Every node, by its number in the file; joints of skins are some of them.
 
@@ -20,6 +21,7 @@ class Skeleton:
     translation (N, 3) m, rotation (N, 4) unit xyzw, scale (N, 3): the rest pose, in the parent's space.
     sheared: (X,) numbers of the nodes whose `matrix` no translation, rotation and scale give; they can't be animated.
     sheared_local: (X, 3, 4) local matrices of those.
+    Equal is a skeleton only to itself.
     """
 
     names: tuple[str, ...]
@@ -29,6 +31,9 @@ class Skeleton:
     scale: Floats
     sheared: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     sheared_local: Floats = field(default_factory=lambda: np.empty((0, 3, 4)))
+
+    def __setstate__(self, state: list[Any]) -> None:
+        arrays.restore_fields(self, state)
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,9 @@ class Track:
     out_tangents: Floats | None = None
     pointer: str | None = None
     storage: AccessorFormat = field(default=FLOAT32)
+
+    def __setstate__(self, state: list[Any]) -> None:
+        arrays.restore_fields(self, state)
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__

@@ -13,7 +13,7 @@ from anim.arrays import AnyArray, Floats, Ints
 from anim.errors import ShapeError
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FrameChunk:
     """Some frames in a row: `first` is the number of the first, positions (n, V, 3) m, normals and
     tangents (n, V, 3), all float32."""
@@ -50,7 +50,7 @@ class MeshPart:
 Chunks: TypeAlias = Callable[[], Iterator[FrameChunk]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class VertexCache:
     """F frames of V vertices, always in the same order, with the triangles that join them.
 

@@ -15,7 +15,7 @@ from anim.sampling.track import sample as sampled
 SPACES = ("local", "world")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PoseTable:
     """All nodes at F times, in their parents' space or in the world's.
 

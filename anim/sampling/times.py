@@ -33,12 +33,12 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     sliver = max(SLIVER, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)
     times = start + np.arange(whole, dtype=np.float64) / fps
-    return arrays.read_only(np.append(times, end)) if whole else arrays.read_only(np.array([start], np.float64))
+    return arrays.freeze(np.append(times, end)) if whole else arrays.freeze(np.array([start], np.float64))
 
 
 def key_times(seconds: Floats) -> Floats:
     """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
-    return arrays.read_only(arrays.unique_sorted(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
+    return arrays.freeze(arrays.unique_sorted(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
 
 
 def distinct_float32(seconds: Floats) -> Ints:

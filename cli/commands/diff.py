@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import PurePath
@@ -13,7 +14,7 @@ import typer
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
-from anim.measure.compare.name_matching import match_by_name
+from anim.measure.compare.name_matching import ambiguous_names, match_by_name
 from anim.measure.error.error_curve import error_curve
 from anim.measure.error.metric import FPS, ErrorMetric
 from anim.measure.error.surface import diagonal, is_measured_at
@@ -101,6 +102,8 @@ def command(
     report = DiffReport(one.file, other.file, found, *_names(one, other), who, fps, radius, is_measured_at(one.scene))
     if report.are_strangers:
         voice.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
+    for words in _ambiguous(one.file, other.file, chosen):
+        voice.warn(words)
     if format is Format.JSON:
         documents.write_text(diff_report.as_json(report, warnings=voice.warnings))
     elif not quiet:
@@ -151,6 +154,18 @@ def _names(one: _Side, other: _Side) -> tuple[int, bool]:
     nodes = one.scene.skeleton.names, other.scene.skeleton.names
     are_named = all(any((*side.file.clips, *names)) for side, names in zip((one, other), nodes, strict=True))
     return int((match_by_name(*nodes) >= 0).sum()), are_named
+
+
+def _ambiguous(one: File, other: File, chosen: Sequence[int] | None) -> Iterator[str]:
+    """Yield what to know of clips whose name is not equally often in both files. chosen: numbers of those of A."""
+    looked_at = set(one.clips if chosen is None else (one.clips[i] for i in chosen))
+    for name in ambiguous_names(one.clips, other.clips):
+        if name in looked_at:
+            counts = one.clips.count(name), other.clips.count(name)
+            yield (
+                f"{one.name} has {plural(counts[0], 'clip')} named '{name}' and {other.name} has {counts[1]}: "
+                "they are matched in their order, which may be wrong"
+            )
 
 
 def _kind(path: str) -> str:

@@ -80,13 +80,11 @@ def test_checked_times_are_the_same_object_again() -> None:
     assert arrays.as_key_times(once) is once
 
 
-def test_read_only_leaves_the_callers_array_alone() -> None:
-    mine = np.zeros(3)
-    theirs = arrays.read_only(mine)
+def test_a_frozen_array_has_no_writable_memory() -> None:
+    mine = np.zeros((3, 2))
+    assert arrays.freeze(mine[:, 0]).base is mine
     with pytest.raises(ValueError, match="read-only"):
-        theirs[0] = 1
-    mine[0] = 1
-    assert arrays.read_only(theirs) is theirs
+        mine[0] = 1
 
 
 @pytest.mark.parametrize("gate", [lambda mine: arrays.as_floats(mine, "K"), arrays.as_key_times])
@@ -97,6 +95,16 @@ def test_later_writes_of_the_owner_change_nothing(gate: Any) -> None:
     assert found.tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("gate", [lambda mine: arrays.as_floats(mine, "K"), arrays.as_key_times, arrays.own])
+def test_later_writes_through_the_array_of_a_view_change_nothing(gate: Any) -> None:
+    mine = np.arange(3.0)
+    view = mine.view()
+    view.flags.writeable = False
+    found = gate(view)
+    mine[:] = 9
+    assert found.tolist() == [0, 1, 2]
+
+
 def test_what_is_read_only_already_is_shared() -> None:
-    mine = arrays.read_only(np.arange(3.0))
+    mine = arrays.freeze(np.arange(3.0))
     assert arrays.as_floats(mine, "K") is mine

@@ -259,13 +259,13 @@ def _saved(path: Path, document: Document) -> Path:
 
 
 def test_the_moment_before_a_key_counts(tmp_path: Path, call: Call) -> None:
-    """Quaternions 1 % too long, played as three.js does: an arc as it is, too large, up to a key; from it on the chord,
+    """Quaternions too long, played as three.js does: an arc as it is, too large, up to a key; from it on the chord,
     normalized. No time that is looked at first shows the end of the arc."""
     document = opened_fixture("biped")
     joint = next(t.node for t in reader.clips(document)[0].tracks if t.path == "rotation")
     keys = about("z", [0, 60, 61, 62])
     true = clip(track("rotation", [0, 0.5, 1, 1.5], keys, node=joint), name="walk")
-    long = clip(track("rotation", [0, 0.5, 1, 1.5], keys * [[1], [1.01], [1.01], [1]], node=joint), name="walk")
+    long = clip(track("rotation", [0, 0.5, 1, 1.5], keys * [[1], [1.007], [1.007], [1]], node=joint), name="walk")
     paths = [
         _saved(tmp_path / f"{i}.glb", writer.replace_clips(document, {0: each})) for i, each in enumerate((true, long))
     ]
@@ -306,3 +306,19 @@ def test_one_file_as_two_players_show_it(fixture: Fixture, call: Call, tmp_path:
 )
 def test_players_that_can_t_be_compared(args: list[str], problem: str, fixture: Fixture, call: Call) -> None:
     assert problem in refusal(call("diff", fixture("arm"), *args), 2)
+
+
+@pytest.mark.parametrize(("lost", "said"), [(0, True), (1, True), (None, False)])
+def test_clips_of_one_name_are_said_to_be_matched_in_order(
+    lost: int | None, said: bool, tmp_path: Path, call: Call
+) -> None:
+    document = opened_fixture("arm")
+    clips = [{**each, "name": "c0"} for each in document.json["animations"]]
+    left = [each for i, each in enumerate(clips) if i != lost]
+    one, other = (
+        _saved(tmp_path / f"{name}.glb", replace(document, json={**document.json, "animations": animations}))
+        for name, animations in (("a", clips), ("b", left))
+    )
+    run = call("diff", one, other, "--format", "json", "-q")
+    assert bool(run.json["warnings"]) is said
+    assert ("2 clips named 'c0'" in run.err) is said

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from anim.arrays import Floats, read_only
+from anim.arrays import Floats, freeze
 from anim.curves.easing.function import Easing
 from anim.curves.fitting.hermite_fit import FitTarget, fit_end_slopes, fit_errors
 from anim.curves.fitting.subdivision import subdivide
@@ -84,14 +84,14 @@ def fit_rotation_segments(easing: Easing, angle: float, tolerance: float) -> tup
     edges = (0.0, *easing.breakpoints, 1.0)
     if angle == 0:
         none = np.zeros(len(edges) - 1)
-        return read_only(np.array(edges)), none, none, 0.0
+        return freeze(np.array(edges)), none, none, 0.0
     path = _circle(easing, angle)
 
     def turn_errors(a: Floats, b: Floats) -> Floats:
         wide = np.abs(easing.value(b) - easing.value(a)) * angle > MAX_ANGLE_RAD + 1e-9
         return np.where(wide, np.inf, fit_errors(path, a, b))
 
-    ends = read_only(np.array(subdivide(turn_errors, edges, tolerance)))
+    ends = freeze(np.array(subdivide(turn_errors, edges, tolerance)))
     rate0, rate1 = fit_end_slopes(path, ends[:-1], ends[1:])
     return ends, rate0, rate1, _error(easing, angle, ends, rate0, rate1)
 

@@ -55,7 +55,7 @@ class Reader:
             raise FormatError("CUBICSPLINE with one key (expected at least two)")
         values = self._values.get(sampler["output"])
         if values is None:
-            values = arrays.read_only(self._accessors.unchecked(sampler["output"]))
+            values = arrays.freeze(self._accessors.unchecked(sampler["output"]))
             self._values[sampler["output"]] = values
         rows = len(times) * (3 if cubic else 1)
         if width is None:  # a pointer: an array of elements per key where the count says so
@@ -86,7 +86,7 @@ class Reader:
                 got = f"{about['type']} of {about['componentType']}"
                 raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
             try:
-                found = arrays.as_key_times(arrays.read_only(self._accessors.floats(index))[:, 0])
+                found = arrays.as_key_times(arrays.freeze(self._accessors.floats(index))[:, 0])
             except AnimError as error:
                 raise FormatError(error.problem, where=error.where, help=error.help) from None
             self._times[index] = found

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
+from types import MappingProxyType
 
 from anim.gltf.document import Json
 
@@ -11,13 +12,17 @@ class IndexAllocator:
     """Numbers for new objects in a list: freed ones first, then beyond its end.
 
     named: for each new object, how often its number will be written: the shortest numbers go to those named most.
+    fixed: freed numbers that are given out already, by new object.
     """
 
-    def __init__(self, length: int, freed: Set[int], named: Sequence[int]) -> None:
-        ordered, count = sorted(freed), len(named)
+    def __init__(
+        self, length: int, freed: Set[int], named: Sequence[int], *, fixed: Mapping[int, int] = MappingProxyType({})
+    ) -> None:
+        ordered, count = sorted(freed - set(fixed.values())), len(named) - len(fixed)
         taken = ordered[:count] + list(range(length, length + count - len(ordered)))
-        self.numbers = [0] * count
-        for number, i in zip(taken, sorted(range(count), key=lambda i: -named[i]), strict=True):
+        self.numbers = [fixed.get(i, 0) for i in range(len(named))]
+        others = (i for i in range(len(named)) if i not in fixed)
+        for number, i in zip(taken, sorted(others, key=lambda i: -named[i]), strict=True):
             self.numbers[i] = number
         self._holes = ordered[count:]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence, Set
 
 from anim.gltf.document import Document, Json, json_array
@@ -26,10 +27,12 @@ def insert_accessors(
     replaced: Set[int],
     contents: Sequence[AccessorData],
     packing: AccessorStorage = UNCOMPRESSED,
+    sources: Sequence[Set[int]] = (),
 ) -> Document:
     """Return the document with these animations, whose samplers name `contents` by Place, else accessors as before.
 
-    replaced: numbers of the animations of `document` that are no longer there as they were.
+    replaced: numbers of the animations of `document` that are no longer there as they were. sources: for each content,
+    the accessors that it takes the place of: its name, extras and number stay where that is one for one.
     """
     outside = references.references_outside(document.json, replaced)
     old_views = json_array(document.json, "bufferViews")
@@ -42,15 +45,19 @@ def insert_accessors(
     view_slots = IndexAllocator(len(old_views), unused, [0] * len(store.views))
     views = [compaction.relocate_view(view, store.shift) for view in old_views]
     view_slots.fill(views, store.views, {"buffer": store.target, "byteLength": 1})
+    kept = _kept_words(json_array(document.json, "accessors"), freed, sources)
     accessor_slots = IndexAllocator(
-        len(json_array(document.json, "accessors")), freed, _name_key(animations, len(contents))
+        len(json_array(document.json, "accessors")),
+        freed,
+        _name_key(animations, len(contents)),
+        fixed={i: number for i, (number, _) in kept.items()},
     )
     accessors = [
         compaction.relocate_accessor(about, old_views, store.shift) for about in json_array(document.json, "accessors")
     ]
     new = [
-        each.accessor(view_slots.numbers[view], offset)
-        for each, (view, offset) in zip(contents, layout.places, strict=True)
+        {**each.accessor(view_slots.numbers[view], offset), **kept.get(i, (0, {}))[1]}
+        for i, (each, (view, offset)) in enumerate(zip(contents, layout.places, strict=True))
     ]
     accessor_slots.fill(accessors, new, EMPTY_ACCESSOR)
 
@@ -61,6 +68,18 @@ def insert_accessors(
     _set_list(json, "buffers", store.described)
     fallback_buffer.name_extensions(json, document.json, packing.extension)
     return Document(json, store.buffers, document.chunks, document.indent)
+
+
+def _kept_words(accessors: list[Json], freed: Set[int], sources: Sequence[Set[int]]) -> dict[int, tuple[int, Json]]:
+    """By content, the one accessor whose place it alone takes, with its name and extras; where it has any."""
+    uses = Counter(number for each in sources for number in each)
+    kept: dict[int, tuple[int, Json]] = {}
+    for i, each in enumerate(sources):
+        number = next(iter(each)) if len(each) == 1 else None
+        if number is not None and number in freed and uses[number] == 1:
+            words: Json = {key: accessors[number][key] for key in ("name", "extras") if key in accessors[number]}
+            kept.update({i: (number, words)} if words else {})
+    return kept
 
 
 def _accessors_of(json: Json, animations: Set[int]) -> set[int]:

@@ -7,17 +7,18 @@ smallest legal placeholder, so that no other number moves.
 
 from __future__ import annotations
 
+import operator
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 
-from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
-from anim.gltf.document import Document, Json, json_array
+from anim.errors import AnimError, NotFoundError, RangeError, ShapeError, check_type
+from anim.gltf.document import Document, Json, copy_json, json_array
 from anim.gltf.meshopt.storage import UNCOMPRESSED, AccessorStorage, FilteredValues
 from anim.gltf.reading import reader
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import channel_targets
-from anim.gltf.writing import encoding
+from anim.gltf.writing import encoding, unit_rotations
 from anim.gltf.writing.encoding import AccessorData
 from anim.gltf.writing.insertion import PendingIndex, insert_accessors
 from anim.model import Clip, Interpolation, Track
@@ -28,34 +29,50 @@ _SAMPLER_KEYS = ("input", "output", "interpolation")
 def replace_clips(
     document: Document, clips: Mapping[int, Clip], *, packing: AccessorStorage = UNCOMPRESSED
 ) -> Document:
-    """Return the document with the animations numbered in `clips` replaced; all others stay as they are.
+    """Return a new document with the animations numbered in `clips` replaced; all others stay as they are.
+
+    Its JSON is a copy, which can be edited without a change of the old document. Without clips it is the document
+    itself.
 
     Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
     channel get one, and their nodes TRS in place of a `matrix`. Names, extras and extensions of animations, channels
-    and samplers stay.
+    and samplers stay; name, extras and number of an accessor where its keys become those of one other.
+    Rotation keys off unit length are normalized, with their tangents, unless the track was off in the document before.
     packing: how the new numbers are stored, see `pack`.
-    Raises RangeError where keys fall together in float32, no channel is left, or weights are not as many as the node's
-    morph targets; NotFoundError for a number that no animation or node has.
+    Raises RangeError where keys fall together in float32, a rotation is zero, no channel is left, or weights are not as
+    many as the node's morph targets; NotFoundError for a number that no animation or node has.
     replace_clips(document, {0: clip}): the first animation becomes `clip`
     """
     if not clips:
         return document
     count = len(json_array(document.json, "animations"))
-    for number in clips:
-        if not isinstance(number, int):
-            raise ShapeError(
-                f"clips has the key {number!r} (expected the number of an animation)",
-                help="gltf.read.names(document) lists the names in the order of the numbers",
-            )
-        if not 0 <= number < count:
-            raise NotFoundError(f"there is no clip #{number} (the file has {count}, from #0 on)")
+    clips = {_checked_number(number, count): clip for number, clip in clips.items()}
+    for clip in clips.values():
+        check_type(clip, Clip, "a clip")
+    clips = unit_rotations.normalize_new(document, clips, skipped=packing.filtered)
     pool = _Pool(packing.filtered)
     animations = [
         _named_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
         for i, animation in enumerate(json_array(document.json, "animations"))
     ]
-    written = insert_accessors(document, animations, set(clips), pool.numbers, packing)
-    return replace(written, json=expand_matrices(written.json)[0])
+    written = insert_accessors(document, animations, set(clips), pool.numbers, packing, pool.sources)
+    return replace(written, json=copy_json(expand_matrices(written.json)[0]))
+
+
+def _checked_number(number: object, count: int) -> int:
+    """The number of an animation as a plain integer. Raises ShapeError or NotFoundError."""
+    try:
+        if isinstance(number, bool):
+            raise TypeError
+        found = operator.index(number)  # type: ignore[arg-type]
+    except TypeError:
+        raise ShapeError(
+            f"clips has the key {number!r} (expected the number of an animation)",
+            help="gltf.read.names(document) lists the names in the order of the numbers",
+        ) from None
+    if not 0 <= found < count:
+        raise NotFoundError(f"there is no clip #{found} (the file has {count}, from #0 on)")
+    return found
 
 
 class _Pool:
@@ -63,6 +80,7 @@ class _Pool:
 
     def __init__(self, filtered: Mapping[int, FilteredValues]) -> None:
         self.numbers: list[AccessorData] = []
+        self.sources: list[set[int]] = []  # for each content, the accessors of the samplers that it replaces
         self._filtered = filtered
         self._places: dict[AccessorData, int] = {}
         self._axes: dict[int, int] = {}
@@ -72,6 +90,7 @@ class _Pool:
         if place is None:
             place = self._places[numbers] = len(self.numbers)
             self.numbers.append(numbers)
+            self.sources.append(set())
         elif self.numbers[place].filtered is None:  # codes do for an equal content without
             self.numbers[place] = numbers
         return place
@@ -141,6 +160,9 @@ class _Samplers:
             times, values = self._pool.axis(track), self._pool.values(track)
         except AnimError as error:
             raise error.at(_label(track)) from None
+        if old is not None:
+            self._pool.sources[times].add(self._old[old]["input"])
+            self._pool.sources[values].add(self._old[old]["output"])
         own = {} if old is None else {k: v for k, v in self._old[old].items() if k not in _SAMPLER_KEYS}
         sampler: Json = {"input": PendingIndex(times), "output": PendingIndex(values), **own}
         if track.interpolation is not Interpolation.LINEAR:

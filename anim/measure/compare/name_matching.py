@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,6 +22,15 @@ def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
         waiting[name].append(i)
     waiting[""].clear()
     return np.array([waiting[name].pop(0) if waiting.get(name) else -1 for name in old], np.int64)
+
+
+def ambiguous_names(old: Sequence[str], new: Sequence[str]) -> list[str]:
+    """Return the names in both that are not equally often in both: which of them belong together is a guess.
+
+    ambiguous_names(["run", "run", "walk"], ["walk", "run"]) → ["run"]
+    """
+    before, after = Counter(old), Counter(new)
+    return [name for name, count in before.items() if name and after[name] not in (0, count)]
 
 
 def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from typing import Any
+
 import pytest
 
-from anim.errors import FormatError
+from anim.errors import FormatError, ShapeError
+from anim.model import Clip
 from tests.clips import clip, track
 
 
@@ -24,3 +29,31 @@ def test_a_property_has_one_track() -> None:
 def test_a_pointer_may_have_two_since_real_files_do() -> None:
     one = track("/materials/0/alphaCutoff", [0], [[1]])
     assert len(clip(one, one).tracks) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((None, ()), "name is None .expected text, empty for none"),
+        ((5, ()), "name is 5 "),
+        (("walk", track("scale", [0], [[1, 1, 1]])), "tracks is Track .expected a sequence of Track"),
+        (("walk", ["hip"]), "tracks hold str "),
+    ],
+)
+def test_what_is_no_clip_is_refused(arguments: Any, message: str) -> None:
+    with pytest.raises(ShapeError, match=message):
+        Clip(*arguments)
+
+
+def test_tracks_become_a_tuple() -> None:
+    one = track("scale", [0], [[1, 1, 1]])
+    assert Clip("walk", [one]).tracks == (one,)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, copy.copy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_copies_are_equal_and_read_only(copied: Any) -> None:
+    walk = clip(track("scale", [0, 1], [[1, 1, 1]] * 2), name="walk")
+    found = copied(walk)
+    assert found == walk
+    assert not found.tracks[0].values.flags.writeable
+    assert not found.tracks[0].times.flags.writeable

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import fields, replace
 
 import numpy as np
@@ -62,3 +63,12 @@ def test_nobody_writes_into_a_skeleton() -> None:
     assert [array.flags.writeable for array in arrays] == [False] * len(arrays)
     with pytest.raises(ShapeError, match="sheared_local has 2 matrices for 1 nodes"):
         replace(tree, sheared_local=np.zeros((2, 3, 4)))
+
+
+def test_copies_are_read_only_and_comparison_is_by_identity() -> None:
+    one = skeleton([-1, 0])
+    other = pickle.loads(pickle.dumps(one))
+    assert not other.translation.flags.writeable
+    assert one == one
+    assert one != other
+    assert len({one, other}) == 2

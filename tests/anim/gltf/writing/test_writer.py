@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import json
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +14,15 @@ import numpy as np
 import pytest
 
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
+from anim.gltf.document import Buffer, Document
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
 from anim.model import AccessorFormat, Clip, Track
 from fixtures.broken.pieces import animated, text
 from tests.anim.gltf.writing.documents import check_same, rewritten, viewed
-from tests.clips import STEP, track
-from tests.files import opened, opened_fixture
+from tests.clips import CUBICSPLINE, STEP, track
+from tests.files import glb_of, opened, opened_fixture
 
 Json = dict[str, Any]
 Find = Callable[[str], Path]
@@ -96,13 +100,14 @@ def test_normalized_integers_stay_integers_until_a_value_is_none(component: int,
     scale = {INT8: 127, UINT8: 255, INT16: 32767}[component]
     values = np.maximum(np.array(stored) / scale, -1.0)[None]
     storage = AccessorFormat(component, normalized=True, element="VEC4")
-    document = opened(text(animated() | {"nodes": [{}]}))
-    new = track("rotation", [0.0], values, storage=storage)
+    document = opened(text(animated() | {"materials": [{}]}))
+    color = "/materials/0/pbrMetallicRoughness/baseColorFactor"
+    new = track(color, [0.0], values, storage=storage)
     after = writer.replace_clips(document, {0: Clip("walk", (new,))})
     assert after.json["accessors"][1]["componentType"] == component
     assert after.json["accessors"][1]["normalized"] is True
     np.testing.assert_array_equal(reader.clips(after)[0].tracks[0].values, values)
-    moved = track("rotation", [0.0], values * 0.999, storage=storage)
+    moved = track(color, [0.0], values * 0.999, storage=storage)
     after = writer.replace_clips(document, {0: Clip("walk", (moved,))})
     assert after.json["accessors"][1]["componentType"] == FLOAT
     np.testing.assert_array_equal(reader.clips(after)[0].tracks[0].values, (values * 0.999).astype("f4"))
@@ -274,3 +279,88 @@ def test_clips_are_replaced_by_number() -> None:
     document = opened_fixture("interpolations")
     with pytest.raises(ShapeError, match="key 'walk'"):
         writer.replace_clips(document, {"walk": reader.clips(document)[0]})  # type: ignore[dict-item]
+
+
+def _named(document: Document, names: Mapping[int, str]) -> Document:
+    """The document with names and extras of accessors."""
+    accessors = [
+        {**about, "name": names[i], "extras": [i]} if i in names else about
+        for i, about in enumerate(document.json["accessors"])
+    ]
+    return replace(document, json={**document.json, "accessors": accessors})
+
+
+def test_name_extras_and_number_of_an_accessor_stay_where_its_track_is_replaced() -> None:
+    document = _named(opened(text(animated())), {0: "times", 1: "path"})
+    new = track("translation", [0.0, 1.0, 3.0], [[7, 7, 7], [8, 8, 8], [9, 9, 9]])
+    after = writer.replace_clips(document, {0: Clip("walk", (new,))})
+    assert [(each["name"], each["extras"]) for each in after.json["accessors"]] == [("times", [0]), ("path", [1])]
+    assert [each["count"] for each in after.json["accessors"]] == [3, 3]
+
+
+def test_names_of_accessors_go_where_two_become_one() -> None:
+    content = animated()
+    content["animations"] *= 2
+    content["accessors"] *= 2
+    content["animations"][1] = {**content["animations"][1], "samplers": [{"input": 2, "output": 3}]}
+    document = _named(opened(text(content)), {1: "one", 3: "other"})
+    after = rewritten(document)
+    assert len(after.json["accessors"]) == 2
+    assert not any("name" in each for each in after.json["accessors"])
+
+
+def test_the_new_json_is_nobody_elses() -> None:
+    document = opened(text(animated() | {"extras": {"by": [{"me": 1}]}}))
+    before = json.dumps(document.json)
+    after = rewritten(document)
+    after.json["extras"]["by"][0]["me"] = 2
+    after.json["nodes"][0]["name"] = "new"
+    after.json["asset"]["generator"] = "new"
+    after.json["animations"][0]["channels"][0]["target"]["path"] = "scale"
+    assert json.dumps(document.json) == before
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_documents_can_be_sent_to_other_processes(copied: Callable[[Document], Document]) -> None:
+    for name in ("arm", "gltf_embedded", "gltf_external"):
+        document = opened_fixture(name)
+        for each in (document, rewritten(document)):
+            assert glb_of(copied(each)) == glb_of(each)
+
+
+def test_new_rotations_are_normalized_with_their_tangents() -> None:
+    document = opened(text(animated()))
+    sides = (np.full((2, 4), 4.0), np.full((2, 4), 2.0))
+    new = track("rotation", [0, 1], [[0, 0, 0, 2], [0, 0, 0, 1]], CUBICSPLINE, tangents=sides)
+    (made,) = reader.clips(writer.replace_clips(document, {0: Clip("turn", (new,))}))[0].tracks
+    assert made.values.tolist() == [[0, 0, 0, 1]] * 2
+    assert made.in_tangents is not None
+    assert made.in_tangents[:, 0].tolist() == [2, 4]
+
+
+def test_rotations_that_were_off_in_the_file_stay() -> None:
+    """Nobody asked for another motion in players that take them as they are."""
+    off = track("rotation", [0, 1], [[0, 0, 0, 2]] * 2)
+    unit = track("rotation", [0, 1], [[0, 0, 1, 0]] * 2)
+    written = writer.replace_clips(opened(text(animated())), {0: Clip("", (unit,))})
+    data = np.array(written.buffers[0].data)
+    data[-32:] = np.array([[0, 0, 0, 2]] * 2, "<f4").view(np.uint8).ravel()
+    spoiled = replace(written, buffers=(Buffer(len(data), None, lambda: data),))
+    assert reader.clips(spoiled)[0].tracks[0].values.tolist() == off.values.tolist()
+    assert reader.clips(rewritten(spoiled))[0].tracks[0].values.tolist() == off.values.tolist()
+
+
+def test_a_rotation_of_no_length_is_refused() -> None:
+    new = track("rotation", [0, 1], [[0, 0, 0, 1], [0, 0, 0, 0]])
+    with pytest.raises(RangeError, match="clip 'turn', rotation of node 0: key 1 is zero"):
+        writer.replace_clips(opened(text(animated())), {0: Clip("turn", (new,))})
+
+
+def test_clips_are_asked_for_by_whole_numbers() -> None:
+    document = opened(text(animated()))
+    (clip,) = reader.clips(document)
+    assert writer.replace_clips(document, {np.int64(0): clip}).json["animations"]  # type: ignore[dict-item]
+    with pytest.raises(ShapeError, match="clips has the key True"):
+        writer.replace_clips(document, {True: clip})
+    with pytest.raises(ShapeError, match="a clip is None"):
+        writer.replace_clips(document, {0: None})  # type: ignore[dict-item]

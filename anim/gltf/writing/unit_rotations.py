@@ -1,0 +1,68 @@
+"""Rotation keys of unit length, as glTF wants them, in tracks that were not off in the file before."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError, RangeError
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.model import Clip, Track
+
+MAX_OFF_UNIT = 0.00769  # of a length, by the Khronos validator: what normalized bytes leave
+
+
+def normalize_new(document: Document, clips: Mapping[int, Clip], *, skipped: Container[int]) -> Mapping[int, Clip]:
+    """Return the clips, by number, with rotations of unit length; those of tracks that were off before stay.
+
+    skipped: ids of tracks to leave as they are. Raises RangeError for a rotation of length 0.
+    """
+    off = {
+        i: [n for n, track in enumerate(clip.tracks) if id(track) not in skipped and _is_off(track)]
+        for i, clip in clips.items()
+    }
+    if not any(off.values()):
+        return clips
+    before = _tracks_off(document)
+    return {i: _normalized(clip, i, off[i], before.get(i, set())) for i, clip in clips.items()}
+
+
+def _tracks_off(document: Document) -> dict[int, set[tuple[int | None, str]]]:
+    """By clip, the targets of the tracks that are off unit length in the document."""
+    try:
+        clips = reader.clips(document)
+    except AnimError:  # animations that can't be read are replaced as a whole
+        return {}
+    return {i: {track.target for track in clip.tracks if _is_off(track)} for i, clip in enumerate(clips)}
+
+
+def _normalized(clip: Clip, number: int, off: list[int], before: set[tuple[int | None, str]]) -> Clip:
+    tracks = list(clip.tracks)
+    for n in off:
+        lengths = _lengths(tracks[n])
+        if not lengths.all():
+            where = f"{reader.clip_label(clip.name, number)}, rotation of node {tracks[n].node}"
+            raise RangeError(f"key {int(lengths.argmin())} is zero (expected a unit quaternion)", where=where)
+        if tracks[n].target not in before:
+            tracks[n] = _divided(tracks[n], lengths[:, None])
+    return replace(clip, tracks=tuple(tracks))
+
+
+def _is_off(track: Track) -> bool:
+    return track.path == "rotation" and bool((np.abs(_lengths(track) - 1) > MAX_OFF_UNIT).any())
+
+
+def _lengths(track: Track) -> Floats:
+    lengths: Floats = np.sqrt(np.einsum("kc,kc->k", track.values, track.values))
+    return lengths
+
+
+def _divided(track: Track, lengths: Floats) -> Track:
+    if track.in_tangents is None or track.out_tangents is None:
+        return replace(track, values=track.values / lengths)
+    before, after = track.in_tangents / lengths, track.out_tangents / lengths
+    return replace(track, values=track.values / lengths, in_tangents=before, out_tangents=after)
