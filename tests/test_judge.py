@@ -16,7 +16,7 @@ from anim.gltf.writing import writer
 from anim.measure.error.metric import SLACK, ErrorMetric, key_and_mid_times
 from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, Scene
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from tests.clips import about, clip, track

@@ -22,10 +22,10 @@ LEVELS = (
     {"gltf", "sampling"},
     {"curves"},
     {"measure"},
-    {"ops", "exchange", "skinning", "simulation", "caches", "optimize"},
+    {"operations", "exchange", "skinning", "simulation", "caches", "optimization"},
     {"show"},
 )
-NEIGHBORS = {("caches", "skinning"), ("optimize", "skinning"), ("simulation", "skinning")}
+NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning"), ("simulation", "skinning")}
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 
 MODULES = sorted((ROOT / "anim").rglob("*.py"))

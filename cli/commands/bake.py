@@ -17,7 +17,7 @@ from anim.caches.transforms import bounds, up_axis
 from anim.caches.transforms import vertex_order as orders
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene, VertexCache
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.sampling.times import frame_times
 from anim.skinning.analysis.inbetween_error import InbetweenError, inbetween_error
 from anim.skinning.analysis.method_deviation import Deviation, deviation, linear_baker

@@ -10,7 +10,7 @@ import typer
 
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.sampling.times import frame_times
 from anim.show.plots.collapse_plot import collapse_plot as picture_of
 from anim.skinning.analysis.collapse import Comparison

@@ -21,7 +21,7 @@ from anim.measure.error.surface import diagonal, is_measured_at
 from anim.measure.inspect.storage_cost import StorageCost, storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip, Scene
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
 from anim.show.plots import error_plot as picture
 from anim.show.plots.figure import FORMATS

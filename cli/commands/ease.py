@@ -14,9 +14,9 @@ from anim.curves.easing.function import Easing
 from anim.curves.easing.table import EASING_FACTORIES, EASINGS, parse, sparkline
 from anim.gltf.reading import reader
 from anim.model import Clip, Track
-from anim.ops import ease as by_segment
-from anim.ops import time_warp as by_range
-from anim.ops.selection import Selection
+from anim.operations import ease as by_segment
+from anim.operations import time_warp as by_range
+from anim.operations.selection import Selection
 from cli import units
 from cli.errors import UsageError
 from cli.io import documents

@@ -20,7 +20,7 @@ from anim.measure.inspect import file_findings
 from anim.measure.inspect.file_findings import Finding, Severity
 from anim.measure.inspect.inspect import inspect as facts_of
 from anim.measure.inspect.report import Facts
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from cli import errors, tables
 from cli.errors import CheckError
 from cli.io import documents

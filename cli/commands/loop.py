@@ -17,8 +17,8 @@ from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge_
 from anim.measure.loops.recommendations import recommend
 from anim.measure.loops.seam import SkinMotion
 from anim.model import Clip, Scene
-from anim.ops import loop as closing
-from anim.ops.selection import Selection
+from anim.operations import loop as closing
+from anim.operations.selection import Selection
 from cli import tables
 from cli.errors import UsageError
 from cli.io import documents, scenes

@@ -14,11 +14,11 @@ import typer
 
 from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from anim.measure.error.surface import is_measured_at
-from anim.optimize.optimize import Optimized
-from anim.optimize.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
-from anim.optimize.rate_distortion import MOST, SHARES, curve
-from anim.optimize.request import Request
-from anim.optimize.verification import PLAYERS
+from anim.optimization.optimize import Optimized
+from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
+from anim.optimization.rate_distortion import MOST, SHARES, curve
+from anim.optimization.request import Request
+from anim.optimization.verification import PLAYERS
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common

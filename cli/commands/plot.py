@@ -12,7 +12,7 @@ import typer
 from anim.arrays import Floats
 from anim.curves.easing.table import parse
 from anim.maths.euler import check_order
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.show.plots import track_plot as tracks
 from anim.show.plots.easing_plot import easing_plot
 from anim.show.plots.rotations import COMPONENTS, FROM_REST

@@ -23,7 +23,7 @@ from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.model import VertexCache
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.show.filmstrip import clips, filmstrip, image_file
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION
 from anim.show.filmstrip.clips import FilmstripClip, FrameSelection

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from anim.ops.resample import INTERPOLATIONS, KEEP
-from anim.ops.resample import resample as resampled
-from anim.ops.selection import Selection
+from anim.operations.resample import INTERPOLATIONS, KEEP
+from anim.operations.resample import resample as resampled
+from anim.operations.selection import Selection
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter

@@ -8,9 +8,9 @@ import typer
 
 from anim.curves.easing.table import parse
 from anim.model import Clip
-from anim.ops.retime import retime as retimed
-from anim.ops.selection import Selection
-from anim.ops.time_warp import warp
+from anim.operations.retime import retime as retimed
+from anim.operations.selection import Selection
+from anim.operations.time_warp import warp
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter

@@ -15,7 +15,7 @@ from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.sampling.sample import SPACES, PoseTable
 from anim.sampling.sample import sample as sampled
 from anim.sampling.times import frame_times

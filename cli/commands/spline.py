@@ -13,10 +13,10 @@ from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.recommendations import closing_command
 from anim.model import Clip, Scene
-from anim.ops.loop import open_tracks
-from anim.ops.selection import Selection
-from anim.ops.spline import max_key_change
-from anim.ops.spline import spline as splined
+from anim.operations.loop import open_tracks
+from anim.operations.selection import Selection
+from anim.operations.spline import max_key_change
+from anim.operations.spline import spline as splined
 from cli.io import documents
 from cli.options import common
 from cli.text import Reporter

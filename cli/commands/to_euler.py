@@ -20,7 +20,7 @@ from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.maths.euler import AxesConvention
 from anim.model import Clip
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import documents

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from anim.ops.selection import Selection
-from anim.ops.trim import trim as trimmed
+from anim.operations.selection import Selection
+from anim.operations.trim import trim as trimmed
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter

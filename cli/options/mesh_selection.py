@@ -8,7 +8,7 @@ import typer
 
 from anim.exchange.retarget.ground_contact import at_or_below
 from anim.model import Scene
-from anim.ops.selection import match_names
+from anim.operations.selection import match_names
 
 Meshes = Annotated[
     list[str] | None,

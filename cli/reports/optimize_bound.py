@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from anim.optimize.options import Reference
-from anim.optimize.request import Request
-from anim.optimize.verification import FLOAT_NOISE, Verification
+from anim.optimization.options import Reference
+from anim.optimization.request import Request
+from anim.optimization.verification import FLOAT_NOISE, Verification
 from cli.text import format_length
 
 NOT_PROVEN = "not proven between the times looked at"

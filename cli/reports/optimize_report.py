@@ -14,13 +14,13 @@ from anim.gltf.writing.references import extensions_naming_keys
 from anim.measure.inspect.storage_cost import storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip
-from anim.optimize.fingerprint import KEY
-from anim.optimize.optimize import Optimized
-from anim.optimize.options import Drop
-from anim.optimize.rate_distortion import RatePoint
-from anim.optimize.request import Request
-from anim.optimize.search.solution import Solution
-from anim.optimize.verification import FLOAT_NOISE, Verification
+from anim.optimization.fingerprint import KEY
+from anim.optimization.optimize import Optimized
+from anim.optimization.options import Drop
+from anim.optimization.rate_distortion import RatePoint
+from anim.optimization.request import Request
+from anim.optimization.search.solution import Solution
+from anim.optimization.verification import FLOAT_NOISE, Verification
 from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_length, format_share, plural

@@ -17,7 +17,7 @@ from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Scene
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from cli import tables, text
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes

@@ -20,7 +20,7 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.file_findings import badly_stored
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes

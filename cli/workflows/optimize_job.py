@@ -15,10 +15,10 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
-from anim.ops.selection import Selection
-from anim.optimize.optimize import Optimized, optimize
-from anim.optimize.rate_distortion import MOST, RatePoint, smallest_error
-from anim.optimize.request import Request
+from anim.operations.selection import Selection
+from anim.optimization.optimize import Optimized, optimize
+from anim.optimization.rate_distortion import MOST, RatePoint, smallest_error
+from anim.optimization.request import Request
 from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress

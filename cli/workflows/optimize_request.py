@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from anim.measure.error.surface import diagonal
 from anim.model import Scene
-from anim.ops.selection import Selection
-from anim.optimize.options import Bounds
+from anim.operations.selection import Selection
+from anim.optimization.options import Bounds
 from cli import units
 from cli.errors import UsageError
 

@@ -19,7 +19,7 @@ WATCHED = (
     ("anim.gltf.reading.reader", "clips", "read clips (before and after)"),
     ("anim.gltf.reading.reader", "skeleton", "read the skeleton"),
     ("anim.gltf.reading.reader", "scene", "read meshes and skins"),
-    ("anim.ops.resample", "resample", "resample"),
+    ("anim.operations.resample", "resample", "resample"),
     ("anim.gltf.writing.writer", "replace_clips", "write clips into the document"),
     ("anim.gltf.io.container", "glb", "serialize"),
     ("cli.io.documents", "_replace", "write the file"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from anim.optimize.options import EFFORTS, Effort
+from anim.optimization.options import EFFORTS, Effort
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import refusal

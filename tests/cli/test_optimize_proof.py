@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from anim.measure.error.metric import MotionError
-from anim.optimize.options import Bounds, Policy, Reference
-from anim.optimize.request import Request
-from anim.optimize.verification import Verification
+from anim.optimization.options import Bounds, Policy, Reference
+from anim.optimization.request import Request
+from anim.optimization.verification import Verification
 from cli.reports import optimize_bound
 
 REQUEST = Request(Bounds(1e-3, 0.01))

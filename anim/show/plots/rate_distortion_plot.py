@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from anim.optimize.rate_distortion import RatePoint
+from anim.optimization.rate_distortion import RatePoint
 from anim.show.plots.figure import ACCENT, HAIR, INK, SMALL, SOFT, TITLE, Figure, format_number, separate_labels, style
 
 if TYPE_CHECKING:

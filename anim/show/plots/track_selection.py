@@ -16,7 +16,7 @@ from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.inspect import frame_rate
 from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
 
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])

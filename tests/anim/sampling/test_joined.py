@@ -9,7 +9,7 @@ from anim.sampling import joined as module
 from anim.sampling.joined import concatenate
 from anim.sampling.track import sample
 from tests import clips
-from tests.anim.ops.tracks import TRACKS
+from tests.anim.operations.tracks import TRACKS
 from tests.clips import CUBICSPLINE
 
 SINGLE = clips.track("translation", [2.0], [[1.0, 2.0, 3.0]])

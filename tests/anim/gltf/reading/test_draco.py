@@ -21,7 +21,7 @@ from anim.gltf.io.json_text import dump
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Mesh
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from tests.draco import BITS, EXTENSION, compressed
 from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.khronos import errors, needs_validator, validate

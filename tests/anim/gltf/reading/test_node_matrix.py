@@ -21,7 +21,7 @@ from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.maths import matrix
 from anim.model import Clip, Interpolation, Track
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from fixtures.broken.pieces import animated, text
 from tests.files import opened
 from tests.judge import judge, needs_judge

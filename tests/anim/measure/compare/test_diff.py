@@ -10,7 +10,7 @@ import pytest
 from anim.measure.compare.diff import diff
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from tests.clips import about, clip, skeleton, track
 
 SCENE = Scene(skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]]), ())

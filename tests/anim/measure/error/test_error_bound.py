@@ -12,7 +12,7 @@ from anim.gltf.reading import reader
 from anim.measure.error.metric import NOISE, SLACK, ErrorMetric, dense_times
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene, Track
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from tests.anim.measure.error.brute_force import Find, brute, clip_of, with_track
 from tests.clips import clip, track
 from tests.files import opened_fixture, opened_path

@@ -9,7 +9,7 @@ from anim.gltf.reading import reader
 from anim.measure.error.error_curve import JOINTS, error_curve
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Scene
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from tests.clips import clip, skeleton
 from tests.files import opened_fixture
 

@@ -13,7 +13,7 @@ from anim.measure.error.point_matrix import CARRIED, PointMatrix, sample_points,
 from anim.measure.error.surface import surfaces
 from anim.model import Scene
 from anim.sampling import rest_pose, world_matrices
-from tests.anim.optimize.making import JOINTS, every_point, scene
+from tests.anim.optimization.making import JOINTS, every_point, scene
 from tests.anim.skinning.scenes import looped, mesh
 from tests.anim.skinning.scenes import scene as made
 from tests.clips import skeleton

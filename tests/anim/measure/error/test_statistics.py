@@ -17,7 +17,7 @@ from anim.measure.error.displacement import MorphedDisplacement
 from anim.measure.error.metric import ErrorMetric, dense_times, key_and_mid_times
 from anim.measure.error.statistics import FRAMES, SLACK, Peak, speed_error, statistics
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Track
-from anim.ops.resample import resample
+from anim.operations.resample import resample
 from anim.sampling.times import frame_times
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
 from tests.files import opened_fixture, opened_path

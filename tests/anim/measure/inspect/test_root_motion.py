@@ -7,7 +7,7 @@ import pytest
 from anim.measure.inspect.root_motion import RootMotion, root_motion_node, root_motions
 from anim.model import Clip, Skeleton
 from tests import clips
-from tests.anim.ops.tracks import TRACKS
+from tests.anim.operations.tracks import TRACKS
 
 ARM = clips.skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]])  # its size is 1 m
 WALK = clips.clip(clips.track("translation", [0, 4], [[0, 0, 0], [2, 0, 0]]))

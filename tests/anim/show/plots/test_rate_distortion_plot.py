@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anim.errors import RangeError
-from anim.optimize.rate_distortion import RatePoint
+from anim.optimization.rate_distortion import RatePoint
 from anim.show.plots.rate_distortion_plot import rate_distortion_plot
 from tests.anim.show.reading import png_size, words
 

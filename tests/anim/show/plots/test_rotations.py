@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from anim.gltf.authoring import build_document
 from anim.model import Clip, Interpolation
-from anim.ops.selection import Selection
+from anim.operations.selection import Selection
 from anim.show.plots.rotations import COMPONENTS, FROM_REST, degrees, gimbal_distance_line, rotation_curve
 from anim.show.plots.track_plot import track_plot
 from anim.show.plots.track_selection import select_tracks

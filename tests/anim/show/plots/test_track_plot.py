@@ -13,8 +13,8 @@ from anim.errors import NotFoundError
 from anim.gltf.authoring import build_document
 from anim.gltf.document import Document
 from anim.model import Clip, Track
-from anim.ops.resample import resample
-from anim.ops.selection import Selection
+from anim.operations.resample import resample
+from anim.operations.selection import Selection
 from anim.show.plots.track_plot import LIMIT, Names, track_plot
 from anim.show.plots.track_selection import TrackSelection, compare, select_tracks
 from tests import clips

@@ -1,0 +1,135 @@
+"""The same keys with another tempo between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.curves.easing.function import Easing
+from anim.curves.fitting import adaptive_keys
+from anim.curves.fitting.easing_fit import fit_linear, fit_segments
+from anim.errors import RangeError
+from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.operations.cubic_segments import to_cubicspline, to_step, with_keys
+from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
+from anim.sampling import segment
+
+TOLERANCE = 1e-3  # of a piece's range
+ANGLE_TOLERANCE = math.radians(0.05)
+OUTPUTS = ("cubicspline", "linear")
+MIN_TOLERANCE = 2e-7  # of an ease; float64 fits get no nearer
+EDGE = 1e-6  # s; a piece that starts this little before --from still counts as inside
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerances:
+    """How near keys must follow an ease that no cubic is: share of a piece's range, and radians for rotations."""
+
+    share: float = TOLERANCE
+    angle: float = ANGLE_TOLERANCE
+
+
+def ease(
+    clip: Clip,
+    *,
+    easing: Easing,
+    start: float = -math.inf,
+    end: float = math.inf,
+    tolerances: Tolerances = Tolerances(),
+    interpolation: str = "cubicspline",
+    tracks: frozenset[int] | None = None,
+) -> Clip:
+    """Return the clip with every key-to-key piece eased: same keys, same path between them, new tempo.
+
+    A piece from v0 to v1 becomes v0 + e(u)(v1 − v0); rotations turn along the slerp arc by e(u) of its angle, and a
+    CUBICSPLINE piece is run through at e(u). Eases that overshoot go on beyond the keys. STEP tracks and tracks with
+    one key have no tempo and stay as they are. What is not eased in an eased track keeps its shape.
+
+    start, end: seconds; only pieces between are eased.
+    interpolation: "cubicspline", exact where the ease is cubic, or "linear". Steps become STEP, or jumps within one
+    float32 time where only a part is eased.
+    tracks: numbers of the tracks to ease, None for all. Raises RangeError for another interpolation.
+    (keys 0, 1 s: 0, 1; quad-in) → keys 0, 1 s with in tangent 2 at 1 s
+    """
+    if interpolation not in OUTPUTS:
+        raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
+    job = _Job(easing, start, end, tolerances, interpolation)
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    return Clip(clip.name, tuple(job.eased(t) if i in chosen else t for i, t in enumerate(clip.tracks)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    easing: Easing
+    start: float
+    end: float
+    tolerances: Tolerances
+    interpolation: str
+
+    def eased(self, track: Track) -> Track:
+        inside = (track.times[:-1] >= self.start - EDGE) & (track.times[1:] <= self.end + EDGE)
+        if track.interpolation is Interpolation.STEP or not inside.any() or self.easing.name == "linear":
+            return track
+        if self.easing.stepped:
+            pieces = ease_steps(track, inside, self.easing, angle_tolerance=self.tolerances.angle)
+            return to_step(track, pieces) if inside.all() else to_cubicspline(track, pieces)
+        straight = track.interpolation is Interpolation.LINEAR
+        if self.interpolation == "linear":
+            lines = straight and track.kind is not ValueKind.ROTATION
+            return self._lines(track, inside) if lines else self._sampled(track, inside)
+        return self._exact(track, inside) if straight else self._followed(track, inside)
+
+    def _exact(self, track: Track, inside: Bools) -> Track:
+        tolerances = (self.tolerances.share, self.tolerances.angle)
+        return to_cubicspline(track, ease_segments(track, inside, self.easing, *tolerances))
+
+    def _lines(self, track: Track, inside: Bools) -> Track:
+        u = fit_linear(self.easing.value, self.easing.breakpoints, self.tolerances.share)[1:-1]
+        shares = self.easing.value(u)
+        times, values = [track.times[:1]], [track.values[:1]]
+        for k in range(len(track.times) - 1):
+            if inside[k]:
+                times.append(track.times[k] + (track.times[k + 1] - track.times[k]) * u)
+                values.append(segment.evaluate(track, np.full(len(u), k), shares))
+            times.append(track.times[k + 1 : k + 2])
+            values.append(track.values[k + 1 : k + 2])
+        return with_keys(track, np.concatenate(times), np.concatenate(values), Interpolation.LINEAR)
+
+    def _followed(self, track: Track, inside: Bools) -> Track:
+        motion, corners, tolerance = self._motion(track, inside)
+        return adaptive_keys.to_cubicspline(track, adaptive_keys.cubic_keys(motion, corners, tolerance=tolerance))
+
+    def _sampled(self, track: Track, inside: Bools) -> Track:
+        motion, corners, tolerance = self._motion(track, inside)
+        keys = adaptive_keys.linear_keys(motion, corners, tolerance=tolerance)
+        return with_keys(track, keys.times, keys.values, Interpolation.LINEAR)
+
+    def _motion(self, track: Track, inside: Bools) -> tuple[adaptive_keys.TrackFunction, Floats, float]:
+        """The eased track as functions of time, with the times where it is not smooth, and how near to follow it."""
+        allowed, speed = self._allowed(track, inside)
+        near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
+        near = 2.0 ** math.floor(math.log2(near))  # few different fits for many tracks
+        cubics = fit_segments(self.easing, tolerance=max(near, MIN_TOLERANCE))
+        breaks = np.array([p.start for p in cubics[1:]])
+        starts, durations = track.times[:-1][inside], np.diff(track.times)[inside]
+        corners = np.concatenate((track.times, (starts[:, None] + durations[:, None] * breaks).reshape(-1)))
+        eased = EasedTrack(track, inside, cubics)
+        return (
+            adaptive_keys.TrackFunction(eased.values, eased.rates, track.kind is ValueKind.ROTATION),
+            np.sort(corners),
+            allowed / 2,
+        )
+
+    def _allowed(self, track: Track, inside: Bools) -> tuple[float, float]:
+        """How far keys may be off, and how fast the track changes per share of a piece: an ease's error times that."""
+        speed = segment.max_rate(track, np.flatnonzero(inside))
+        if track.kind is ValueKind.ROTATION:
+            return self.tolerances.angle, speed
+        ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]
+        moving = ranges[ranges > 0]
+        return adaptive_keys.float32_tolerance(
+            track, self.tolerances.share * float(moving.min() if len(moving) else 1.0)
+        ), speed

@@ -1,0 +1,139 @@
+"""A part of a clip, with exact new ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.curves.fitting import adaptive_keys
+from anim.errors import RangeError
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.operations.retime import shift_time
+from anim.sampling.derivatives import rates
+from anim.sampling.track import sample
+
+ANGLE_TOLERANCE = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
+
+
+def trim(
+    clip: Clip,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    rebase: bool = False,
+    tracks: frozenset[int] | None = None,
+) -> Clip:
+    """Return what the clip shows from `start` to `end` seconds; keys between stay, those at the ends are exact.
+
+    New end keys have the value, and under CUBICSPLINE the tangent, that the track has there; a cut piece of a rotation
+    spline gets keys more where renormalized cubics need them. A track with no key in between becomes one key.
+    start, end: by default the clip's own; times beyond it are brought back to it, others rounded to float32, as keys
+    are. Where both are left out, or the clip is one moment, nothing is cut.
+    rebase: move all so that the part starts at 0 s. Raises RangeError for an empty part.
+    (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
+    """
+    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    if (start is not None or end is not None) and clip.end > clip.start:
+        clip = _cut(clip, start, end, chosen)
+    first = min((float(clip.tracks[i].times[0]) for i in chosen), default=0.0)
+    if not rebase or first == 0:
+        return clip
+    return Clip(clip.name, tuple(shift_time(t, -first) if i in chosen else t for i, t in enumerate(clip.tracks)))
+
+
+def _cut(clip: Clip, start: float | None, end: float | None, chosen: frozenset[int]) -> Clip:
+    first = clip.start if start is None else max(float(np.float32(start)), clip.start)
+    last = clip.end if end is None else min(float(np.float32(end)), clip.end)
+    if not last > first:
+        raise RangeError(_nothing_left(clip, start, end))
+    new = [_trimmed(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
+    return Clip(clip.name, tuple(new))
+
+
+def _nothing_left(clip: Clip, start: float | None, end: float | None) -> str:
+    has = f"the clip has {clip.start:g} s to {clip.end:g} s"
+    if start is not None and start >= clip.end:
+        return f"nothing is left from {start:g} s on ({has})"
+    if end is not None and end <= clip.start:
+        return f"nothing is left up to {end:g} s ({has})"
+    return f"nothing is left from {start or 0.0:g} s to {end or 0.0:g} s (expected an end after the start; {has})"
+
+
+def _trimmed(track: Track, start: float, end: float) -> Track:
+    inner = (track.times > start) & (track.times < end)
+    if len(track.times) == 1 or not (inner.any() or _changes(track, start, end)):
+        return _single(track, start)
+    if track.interpolation is Interpolation.CUBICSPLINE:
+        return _cut_spline(track, start, end, inner)
+    times = np.concatenate(([start], track.times[inner], [end]))
+    values = np.concatenate((sample(track, times[:1]), track.values[inner], sample(track, times[-1:])))
+    if track.kind is ValueKind.ROTATION:
+        values = quaternion.align_signs(values)
+    return replace(track, times=times, values=values)
+
+
+def _changes(track: Track, start: float, end: float) -> bool:
+    """Whether a track without a key in between differs between its ends or moves there."""
+    ends = sample(track, np.array([start, end]))
+    moving = track.interpolation is not Interpolation.STEP and bool(rates(track, np.array([start]), before=False).any())
+    return moving or bool((ends[0] != ends[1]).any())
+
+
+def _single(track: Track, start: float) -> Track:
+    values = sample(track, np.array([start]))
+    linear = Interpolation.LINEAR if track.interpolation is Interpolation.CUBICSPLINE else track.interpolation
+    return replace(
+        track, interpolation=linear, times=np.array([start]), values=values, in_tangents=None, out_tangents=None
+    )
+
+
+def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Track:
+    times = np.concatenate(([start], track.times[inner], [end]))
+    if track.kind is ValueKind.ROTATION:
+        times = _with_cuts(track, times)
+    values = sample(track, times)
+    before, after = rates(track, times, before=True), rates(track, times, before=False)
+    if track.kind is ValueKind.ROTATION:
+        values = quaternion.align_signs(values)
+        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    exact = np.isin(times, track.times)
+    _restore(track, times, exact, values, before, after)
+    before[0], after[-1] = 0.0, 0.0
+    return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)
+
+
+def _with_cuts(track: Track, times: Floats) -> Floats:
+    """The times with more of them in the cut pieces at both ends, where a rotation's cubic is normalized anew."""
+    motion = adaptive_keys.TrackFunction(
+        lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
+    )
+    parts = [times]
+    for piece in (times[:2], times[-2:]):
+        if not np.isin(piece, track.times).all():
+            parts.append(adaptive_keys.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE).times)
+    return np.unique(np.concatenate(parts))
+
+
+def _restore(
+    track: Track,
+    times: Floats,
+    exact: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    values: Floats,
+    before: Floats,
+    after: Floats,
+) -> None:
+    """Keys that were there keep what they had, to the bit but for signs; on the side of a cut the tangent is new."""
+    assert track.in_tangents is not None
+    assert track.out_tangents is not None
+    at = np.searchsorted(track.times, times[exact])
+    signs = np.ones(len(at))
+    if track.kind is ValueKind.ROTATION:
+        signs = np.where(quaternion.dot(values[exact], track.values[at]) < 0, -1.0, 1.0)
+    values[exact] = track.values[at] * signs[:, None]
+    whole_before, whole_after = exact & np.insert(exact[:-1], 0, False), exact & np.append(exact[1:], False)
+    before[whole_before] = (track.in_tangents[at] * signs[:, None])[whole_before[exact]]
+    after[whole_after] = (track.out_tangents[at] * signs[:, None])[whole_after[exact]]

@@ -1,0 +1,113 @@
+"""A document whose animations take fewer bytes, and whose motion stays within bounds that are measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.measure.error.surface import has_vertices
+from anim.model import Clip, Scene
+from anim.optimization import fingerprint
+from anim.optimization.clip import Task
+from anim.optimization.clip_optimizer import ClipOptimizer, optimize_clip, verify_solution
+from anim.optimization.process_pool import process_pool
+from anim.optimization.request import Request
+from anim.optimization.rest_pose import rebase
+from anim.optimization.search.solution import Solution
+from anim.optimization.shared_constants import find_constants
+from anim.optimization.tracks.redundant_keys import drop_redundant_keys
+from anim.optimization.verification import Verification
+from anim.optimization.writing import changed_clips, write_solutions
+
+MARGIN = 0.985  # of the bound, that a search may use
+
+
+@dataclass(frozen=True, slots=True)
+class Optimized:
+    """The new document, and by number of the clip what became of it and how far it is from its source.
+
+    moved: (node, path) of rest values that moved. without_loss: numbers of the clips that no lossy way was found for.
+    unchanged: whether the input is the output of the same request.
+    """
+
+    document: Document
+    solutions: Mapping[int, Solution]
+    verdicts: Mapping[int, Verification]
+    moved: tuple[tuple[int, str], ...] = ()
+    without_loss: tuple[int, ...] = ()
+    unchanged: bool = False
+
+
+def optimize(
+    document: Document,
+    scene: Scene,
+    clips: Sequence[Clip],
+    request: Request,
+    *,
+    chosen: Sequence[int] | None = None,
+    workers: int = 1,
+    start: str = "spawn",
+    detailed: bool = False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Optimized:
+    """Return the document with its animations in fewer bytes, each within the bounds as measured on what was written.
+
+    scene, clips: of the document. chosen: numbers of the clips to optimize, all by default. workers: processes; the
+    result is the same for any number. start: how they start, as `multiprocessing` calls it. detailed: verdicts with
+    statistics. progress: called with the share done.
+    A clip for which no lossy way holds all bounds is kept without loss. Output of the same request comes back as it is.
+    """
+    chosen = range(len(clips)) if chosen is None else chosen
+    options = f"{request.name} {tuple(chosen)}"
+    if fingerprint.has_mark(document, clips, options):
+        return Optimized(document, {}, {}, unchanged=True)
+    request = _visible_clips(request, scene)
+    base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
+    site = ClipOptimizer(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
+    tasks = _tasks(site, chosen)
+    solutions: dict[int, Solution] = {}
+    verdicts: dict[int, Verification] = {}
+    without_loss: list[int] = []
+
+    def name(item: tuple[int, object]) -> str:
+        return reader.clip_label(clips[item[0]].name, item[0])
+
+    with process_pool(min(workers, len(tasks)), site, start=start) as workforce:
+        results = workforce.each(optimize_clip, tasks, label=name)
+        for (number, _), each in zip(tasks, results, strict=True):
+            solutions[number], verdicts[number] = each.solution, each.verdict
+            without_loss += [number] if each.without_loss else []
+            progress(len(solutions) / len(tasks))
+        lossy = {i: each for i, each in solutions.items() if i not in without_loss}
+        slimmer = drop_redundant_keys(lossy, site.after.skeleton, request)
+        items = [(i, each.clip) for i, each in slimmer.items()]
+        for (number, _), found in zip(items, workforce.each(verify_solution, items, label=name), strict=True):
+            if found.holds:
+                solutions[number], verdicts[number] = slimmer[number], found
+    new = write_solutions(base.document if base else document, solutions, request.packing)
+    read_back = reader.clips(new)
+    for number in changed_clips(read_back, solutions):
+        verdicts[number] = site.judged(number, read_back[number])
+    done = fingerprint.add_mark(new, read_back, options)
+    return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
+
+
+def _visible_clips(request: Request, scene: Scene) -> Request:
+    """The request, for a scene without a vertex as if nothing were invisible: nodes are all that it shows."""
+    if has_vertices(scene):
+        return request
+    return replace(request, policy=replace(request.policy, drop_invisible=False))
+
+
+def _tasks(site: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:
+    shared = find_constants(site.setting(), site.clips)
+    tasks = []
+    for i in chosen:
+        clip = site.clips[i]
+        targets = [(-1 if track.node is None else track.node, track.path) for track in clip.tracks]
+        values = tuple(shared.values.get(target, ()) for target in targets)
+        unused = tuple(target in shared.unused for target in targets)
+        tasks.append((i, Task(clip, values, unused, MARGIN * site.request.bounds.max_error)))
+    return tasks

@@ -1,0 +1,121 @@
+"""How the keyed tracks of a clip come to their time axes: by bytes, all on one, or every so many frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.optimization.search.segment_errors import SegmentErrors, fits
+from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.time_axes import SharedAxis, merge_axes
+from anim.optimization.tracks.key_reduction import greedy_keys, joint_greedy_keys
+from anim.optimization.tracks.quantization import Encoding
+
+STILL = 0.1  # of the bound: a track that is less off its middle value gets no table
+ASKED = 4.0  # of the bound: larger budgets are hardly ever asked for
+
+
+class TimeAxisSearch:
+    """Time axes for one clip; what was found for a track and a budget is kept.
+
+    bound: m, the largest error of all: tracks that stay far below it by themselves are hardly ever keyed.
+    """
+
+    def __init__(self, truth: SourceMotion, coding: Encoding, bound: float) -> None:
+        self.grid = truth.grid
+        self.own = truth.own
+        self.coding = coding
+        self.key_bytes = np.array([coding.key_bytes(each.path) for each in truth.moving])
+        self._scaled = _scaled(truth)
+        moved = np.array([each.from_middle for each in truth.moving])
+        self._tabled = np.flatnonzero(moved > STILL * bound)
+        if not fits(len(self._tabled), truth.grid):
+            self._tabled = np.empty(0, np.int64)
+        self._segments = SegmentErrors(self._scaled[self._tabled], truth.grid, ASKED * bound)
+        self._rows: dict[tuple[int, float], Bools] = {}
+
+    def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+        """Return the axes of the tracks `keyed` under their budgets (G,) in metres, by the layout of that name."""
+        return LAYOUTS[name](self, keyed, budgets) if len(keyed) else []
+
+    def scaled(self, keyed: Ints, budgets: Floats) -> Floats:
+        """Return the values of tracks on the grid (k, K, 4) in units of their budgets."""
+        return np.asarray(self._scaled[keyed] / budgets[keyed][:, None, None])
+
+    def needed(self, keyed: Ints, budgets: Floats) -> Bools:
+        """Return which keys (k, K) each track must keep by itself."""
+        names = [(i, float(budgets[i])) for i in keyed.tolist()]
+        new = [k for k, name in enumerate(names) if name not in self._rows]
+        if new:
+            found = self._searched(keyed[new], budgets)
+            self._rows.update((names[k], row) for k, row in zip(new, found, strict=True))
+        return np.array([self._rows[name] for name in names])
+
+    def _searched(self, keyed: Ints, budgets: Floats) -> Bools:
+        """The same, from the table for the tracks in it, else anew."""
+        rows = np.searchsorted(self._tabled, keyed)
+        there = np.isin(keyed, self._tabled)
+        found = np.zeros((len(keyed), len(self.grid)), np.bool_)
+        if there.any():
+            found[there] = self._segments.needed(rows[there], budgets[keyed[there]])
+        if not there.all():
+            found[~there] = greedy_keys(self.scaled(keyed[~there], budgets), self.grid)
+        return found
+
+    def merged(self, keyed: Ints, keep: Bools) -> list[SharedAxis]:
+        """Return the axes of fewest bytes for tracks that need the keys `keep` (k, K)."""
+        prices, width = self.coding.prices, self.key_bytes[keyed]
+        axes = merge_axes(keep, width, axis_bytes=prices.axis, time_bytes=self.coding.time_bytes)
+        return [SharedAxis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+
+
+def _merge_by_bytes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+    return layouts.merged(keyed, layouts.needed(keyed, budgets))
+
+
+def _own(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+    """Keys that the source has too: players that mix by components cut the same corners."""
+    kinds, kind = np.unique(layouts.own[keyed], axis=0, return_inverse=True)
+    axes = []
+    for number, mask in enumerate(kinds):
+        members = keyed[kind.reshape(-1) == number]
+        keep = np.zeros((len(members), len(mask)), np.bool_)
+        keep[:, mask] = greedy_keys(layouts.scaled(members, budgets)[:, mask], layouts.grid[mask])
+        axes += layouts.merged(members, keep)
+    return axes
+
+
+def _one_axis(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+    keys = joint_greedy_keys(layouts.scaled(keyed, budgets), layouts.grid)
+    return [SharedAxis(keys, tuple(keyed.tolist()))]
+
+
+def _even_axis(nth: int) -> Layout:
+    def layout(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+        keys = np.zeros(len(layouts.grid), np.bool_)
+        keys[::nth] = keys[-1] = True
+        return [SharedAxis(keys, tuple(keyed.tolist()))]
+
+    return layout
+
+
+Layout: TypeAlias = Callable[[TimeAxisSearch, Ints, Floats], list[SharedAxis]]
+LAYOUTS: dict[str, Layout] = {
+    "merged": _merge_by_bytes,
+    "own": _own,
+    "joint": _one_axis,
+    "full": _even_axis(1),
+    "second": _even_axis(2),
+    "third": _even_axis(3),
+}
+
+
+def _scaled(truth: SourceMotion) -> Floats:
+    """Values on the grid, in metres, padded to four components (G, K, 4)."""
+    scaled = np.zeros((len(truth.moving), len(truth.grid), 4))
+    for i, each in enumerate(truth.moving):
+        scaled[i, :, : each.values.shape[1]] = each.values[truth.on_grid] * each.meters
+    return scaled

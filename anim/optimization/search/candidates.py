@@ -1,0 +1,128 @@
+"""Tracks on time axes: the keys they get there, as stored, and what players show of them between."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.optimization.options import Packing
+from anim.optimization.search import playback
+from anim.optimization.search.key_fit import KeyFit
+from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
+from anim.optimization.search.time_axes import SharedAxis
+from anim.optimization.tracks import quantization
+from anim.optimization.tracks.loop_closure import close_ends
+from anim.optimization.tracks.quantization import EncodedKeys, Form
+from anim.sampling.track import KeyInterval, find_interval
+
+MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One track with its keys. shown: (W, C), along arcs or lines, at the times to measure at."""
+
+    stored: EncodedKeys
+    shown: Floats
+
+
+class Candidates:
+    """Candidates for the tracks of one clip: each made once, and kept for the next trial that asks for it."""
+
+    def __init__(self, truth: SourceMotion, packing: Packing) -> None:
+        self._truth = truth
+        self._packing = packing
+        self._paths = [PATHS.index(each.path) for each in truth.moving]
+        self._closures = np.array([each.closure for each in truth.moving])
+        self._places: dict[bytes, KeyInterval] = {}
+        self._fits: dict[bytes, KeyFit] = {}
+        self._keys: dict[tuple[bytes, int], Floats] = {}
+        self._made: dict[tuple[bytes, int, Form], Candidate] = {}
+        self._kept = 0
+
+    def of(self, axis: SharedAxis, misses: Sequence[float]) -> Iterable[tuple[int, Candidate]]:
+        """Return every member of an axis with its candidate. misses: (G,) what storing may miss, in units of values."""
+        self._make_room()
+        name = axis.keys.tobytes()
+        self._fit(axis, name)
+        forms = {
+            i: quantization.choose_format(self._keys[name, i], PATHS[self._paths[i]], misses[i], self._packing)
+            for i in axis.members
+        }
+        new = [i for i in axis.members if (name, i, forms[i]) not in self._made]
+        for path in range(len(PATHS)):
+            self._make(axis, name, [i for i in new if self._paths[i] == path], forms, rotations=path == ROTATION)
+        return [(i, self._made[name, i, forms[i]]) for i in axis.members]
+
+    def aimed(self, axis: SharedAxis, members: Sequence[int], aims: Floats, misses: Sequence[float]) -> list[Candidate]:
+        """Return rotations for the `members` of an axis that aim at others (W, G, 4) than the tracks' own."""
+        self._make_room()
+        place = self._place(axis, axis.keys.tobytes())
+        keys = aims[self._truth.on_grid[axis.keys]]
+        if not axis.keys.all():
+            keys = self._fit_on(axis, axis.keys.tobytes()).rotations(aims, keys)
+        by_track = list(np.moveaxis(close_ends(keys, self._closures[list(members)]), 1, 0))
+        forms = [
+            quantization.choose_format(by_track[k], "rotation", misses[i], self._packing) for k, i in enumerate(members)
+        ]
+        return _candidates(quantization.encode_all(by_track, forms), place, rotations=True)
+
+    def by_chords(self, axis: SharedAxis, rotations: Sequence[EncodedKeys]) -> Floats:
+        """Return what players that mix by components show of rotations on an axis, (W, G, 4)."""
+        keys = np.stack([each.values for each in rotations], axis=1)
+        return playback.nlerp(keys, self._place(axis, axis.keys.tobytes()))
+
+    def _make(
+        self, axis: SharedAxis, name: bytes, members: list[int], forms: dict[int, Form], *, rotations: bool
+    ) -> None:
+        if not members:
+            return
+        stored = quantization.encode_all([self._keys[name, i] for i in members], [forms[i] for i in members])
+        made = _candidates(stored, self._place(axis, name), rotations=rotations)
+        self._made.update(((name, i, forms[i]), each) for i, each in zip(members, made, strict=True))
+        self._kept += sum(each.shown.size + each.stored.values.size for each in made)
+
+    def _fit(self, axis: SharedAxis, name: bytes) -> None:
+        """Keys of members that are new on the axis: their own values where it has every key, else fitted ones."""
+        at = self._truth.on_grid[axis.keys]
+        for path in range(len(PATHS)):
+            new = [i for i in axis.members if self._paths[i] == path and (name, i) not in self._keys]
+            if not new:
+                continue
+            values = np.stack([self._truth.moving[i].values for i in new], axis=1)
+            keys = values[at]
+            if not axis.keys.all():
+                fit = self._fit_on(axis, name)
+                keys = fit.rotations(values, keys) if path == ROTATION else fit.vectors(values)
+            keys = close_ends(keys, self._closures[new])
+            for k, i in enumerate(new):
+                self._keys[name, i] = keys[:, k]
+
+    def _make_room(self) -> None:
+        if self._kept <= MOST_KEPT:
+            return
+        for kept in (self._places, self._fits, self._keys, self._made):
+            kept.clear()
+        self._kept = 0
+
+    def _fit_on(self, axis: SharedAxis, name: bytes) -> KeyFit:
+        if name not in self._fits:
+            self._fits[name] = fit = KeyFit(self._place(axis, name), int(axis.keys.sum()))
+            self._kept += fit.numbers
+        return self._fits[name]
+
+    def _place(self, axis: SharedAxis, name: bytes) -> KeyInterval:
+        if name not in self._places:
+            self._places[name] = find_interval(self._truth.grid[axis.keys], self._truth.at)
+            self._kept += 4 * len(self._truth.at)
+        return self._places[name]
+
+
+def _candidates(stored: Sequence[EncodedKeys], place: KeyInterval, *, rotations: bool) -> list[Candidate]:
+    keys = np.stack([each.values for each in stored], axis=1)
+    way = playback.slerp_raw if rotations and len(keys) > 1 else playback.linear_error
+    shown = way(keys, place)
+    return [Candidate(each, shown[:, k]) for k, each in enumerate(stored)]

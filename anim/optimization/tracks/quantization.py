@@ -1,0 +1,192 @@
+"""How values are stored, and what that makes of them: int16 or float32 in core glTF, filters under meshopt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import repeat
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.gltf.meshopt import codec, storage
+from anim.optimization.options import Objective, Packing
+
+INT16 = 32767.0
+FEW = 2  # keys up to which float32 takes no more bytes than int16 with its longer JSON
+INT16_MISS = 2.5e-5  # quaternion units that rounding to int16 may miss, and be worth it
+FILTER_MISS = 4e-5  # the same for meshopt's quaternion filter, whose output is int16 too
+FILTER_BITS = (5, 16)
+FILTER_STEP = 2.45 / 4  # what that filter may miss, times its largest integer: √3 components by half a step, and √2 / 2
+EXPONENT_STEP = 1.5 / 2  # what meshopt's exponential filter may miss, in its powers of two
+MANTISSA_BITS = 22  # of meshopt's exponential filter, without the sign
+
+
+Form: TypeAlias = tuple[str, int]  # a name of Stored.form, and its bits per component or power of two
+
+
+@dataclass(frozen=True, slots=True)
+class ByteCosts:
+    """Bytes of JSON that a search counts with.
+
+    track: for a track with an output of its own: channel, sampler and accessor. repeated: for one that has the same
+    keys as another: its channel. held: for a track with a single key, whose accessor others may share. axis: for the
+    accessor of a time axis.
+    """
+
+    track: float
+    repeated: float
+    held: float
+    axis: float
+
+
+# Mean lengths in minified JSON; after gzip they are a tenth of that (measured on Fox, Robot and Knight).
+BYTE_COSTS = {Objective.FILE: ByteCosts(175, 56, 95, 120), Objective.GZIP: ByteCosts(18, 6, 14, 14)}
+
+
+@dataclass(frozen=True, slots=True)
+class Encoding:
+    """How keys are stored, and what that costs."""
+
+    packing: Packing
+    prices: ByteCosts
+
+    @property
+    def time_bytes(self) -> float:
+        """Bytes of one key time."""
+        return 4.0 if self.packing is Packing.CORE else 2.5
+
+    def key_bytes(self, path: str) -> float:
+        """Bytes of one key's value."""
+        if self.packing is Packing.CORE:
+            return 8.0 if path == "rotation" else 12.0
+        return 4.5
+
+    def size(self, keys: Sequence[EncodedKeys]) -> float:
+        """Return the bytes of the keys of several tracks."""
+        if self.packing is not Packing.CORE:
+            streams: dict[tuple[str, int], list[EncodedKeys]] = {}
+            for each in keys:
+                streams.setdefault((each.form, each.values.shape[1]), []).append(each)
+            return compressed_size(list(streams.values()), self.packing)
+        return sum(each.values.size * (2 if each.form == "int16" else 4) for each in keys)
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedKeys:
+    """Keys as they will be stored.
+
+    values: (K, C) as they decode. form: "int16", "float32", "quaternion" or "exponent", the last two meshopt's
+    filters. codes: their filtered bytes, 8 a key or 4 a component. miss: in units of the values, by how much filtering
+    may have missed them.
+    """
+
+    values: Floats
+    form: str
+    codes: bytes = b""
+    miss: float = 0.0
+
+    @property
+    def name(self) -> bytes:
+        """What is the same of two tracks that are stored alike."""
+        return self.codes or self.values.tobytes()
+
+    def only(self, keep: Bools) -> EncodedKeys:
+        """Return the keys of a mask (K,)."""
+        rows = np.frombuffer(self.codes, np.uint8).reshape(len(keep), -1)[keep]
+        return replace(self, values=self.values[keep], codes=rows.tobytes())
+
+    def exact(self) -> Floats:
+        """Return the values as meshopt itself decodes them: its filter computes in float32, a search needn't."""
+        if self.form != "quaternion":
+            return self.values
+        return storage.decompress_document(storage.FilteredValues("QUATERNION", self.codes), 4)
+
+
+def choose_format(values: Floats, path: str, miss: float, packing: Packing) -> Form:
+    """Return the smallest form that misses keys (K, C) by about `miss` at most, in units of the values."""
+    if packing is Packing.CORE:
+        return ("int16", 0) if path == "rotation" and miss >= INT16_MISS and len(values) > FEW else ("float32", 0)
+    if path == "rotation" and miss >= FILTER_MISS:
+        return "quaternion", filter_bits(miss)
+    return "exponent", exponent(values, miss)
+
+
+def encode(values: Floats, form: Form) -> EncodedKeys:
+    """Return keys (K, C) in a form."""
+    kind, number = form
+    if kind == "int16":
+        return EncodedKeys(np.rint(values * INT16) / INT16, kind)
+    if kind == "float32":
+        return EncodedKeys(values.astype(np.float32).astype(np.float64), kind)
+    if kind == "quaternion":
+        return encode_all([values], [form])[0]
+    mantissa = np.rint(values * 2.0**-number)
+    return EncodedKeys(mantissa * 2.0**number, kind, _exponent_codes(mantissa, number), EXPONENT_STEP * 2.0**number)
+
+
+def encode_all(values: Sequence[Floats], forms: Sequence[Form]) -> list[EncodedKeys]:
+    """Return the keys (K, C) of each track in its form: all quaternions are decoded in one go."""
+    filtered = [i for i, (kind, _) in enumerate(forms) if kind == "quaternion"]
+    codes = [_quaternion_codes(values[i], forms[i][1]) for i in filtered]
+    decoded = np.split(_decoded(b"".join(codes)), np.cumsum([len(each) // 8 for each in codes])[:-1])
+    misses = [FILTER_STEP / ((1 << (forms[i][1] - 1)) - 1) for i in filtered]
+    found = dict(zip(filtered, map(EncodedKeys, decoded, repeat("quaternion"), codes, misses), strict=True))
+    return [found[i] if i in found else encode(values[i], forms[i]) for i in range(len(forms))]
+
+
+def constant_cost(value: Floats) -> EncodedKeys:
+    """Return a single key (1, C) at `value` (C,): float32, whose JSON is shorter than that of integers."""
+    return EncodedKeys(value[None].astype(np.float32).astype(np.float64), "float32")
+
+
+def filter_bits(miss: float) -> int:
+    """Return the bits per component at which the quaternion filter misses by `miss` at most."""
+    return min(max(math.ceil(1 + math.log2(1 + FILTER_STEP / miss)), FILTER_BITS[0]), FILTER_BITS[1])
+
+
+def exponent(values: Floats, miss: float) -> int:
+    """Return the power of two whose multiples miss values by `miss` at most, and still fit a mantissa of 23 bits."""
+    wanted = math.floor(math.log2(miss / EXPONENT_STEP)) if miss > 0 else -40
+    largest = float(np.abs(values).max(initial=1e-9)) or 1e-9
+    return max(wanted, math.ceil(math.log2(largest)) - MANTISSA_BITS)
+
+
+def compressed_size(streams: Sequence[Sequence[EncodedKeys]], packing: Packing) -> int:
+    """Return the bytes of keys under meshopt's codec, one stream per list."""
+    from meshopt import encode_gltf_buffer
+
+    total = 0
+    for keys in streams:
+        stride = 8 if keys[0].form == "quaternion" else codec.row_size(4 * keys[0].values.shape[1], 4)
+        rows = np.frombuffer(b"".join(each.codes for each in keys), np.uint8).reshape(-1, stride)
+        total += len(encode_gltf_buffer(rows, "ATTRIBUTES", 1 if packing is Packing.KHR else 0))
+    return total
+
+
+def _quaternion_codes(values: Floats, bits: int) -> bytes:
+    """Rows of 8 bytes: the smallest three components of unit quaternions (K, 4)."""
+    from meshopt import encode_filter_quat
+
+    return bytes(np.ascontiguousarray(encode_filter_quat(values.astype(np.float32), 8, bits)).view(np.uint8))
+
+
+def _decoded(codes: bytes) -> Floats:
+    """Unit quaternions (K, 4) as the filter gives them back: through int16, so not exactly unit."""
+    rows = np.frombuffer(codes, "<i2").reshape(-1, 4).astype(np.int64)
+    three = rows[:, :3] * (1 / math.sqrt(2) / (rows[:, 3] | 3))[:, None]
+    largest = rows[:, 3] & 3
+    every = np.arange(len(rows))
+    result = np.empty((len(rows), 4))
+    result[every, largest] = np.sqrt(np.maximum(0, 1 - (three * three).sum(axis=1)))
+    for k in range(3):
+        result[every, (largest + 1 + k) % 4] = three[:, k]
+    return np.asarray(np.rint(result * INT16) / INT16)
+
+
+def _exponent_codes(mantissa: Floats, power: int) -> bytes:
+    """4 bytes per component: a mantissa of 24 bits under one exponent."""
+    whole = mantissa.astype(np.int64)
+    return ((whole & 0xFFFFFF) | ((power & 255) << 24)).astype("<u4").tobytes()

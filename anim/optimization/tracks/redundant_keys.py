@@ -1,0 +1,85 @@
+"""Keys that rounding made redundant: storing puts some of them where their neighbors lead anyway."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, as_key_times
+from anim.measure.inspect.track_statistics import removable_keys
+from anim.model import Clip, Skeleton, Track
+from anim.optimization.request import Request
+from anim.optimization.search.solution import Solution
+from anim.optimization.tracks.quantization import EncodedKeys
+
+
+def drop_redundant_keys(solutions: Mapping[int, Solution], skeleton: Skeleton, request: Request) -> dict[int, Solution]:
+    """Return the solutions, by number of the clip, that take fewer bytes without redundant keys; no others.
+
+    Redundant is what `removable_keys` of `anim.measure.inspect.track_statistics` finds in all clips together, as
+    `inspect` counts it; first and last keys stay. The motion changes by about a millionth of each track's range: judge
+    it again. Tracks that must stay exact keep all keys.
+    """
+    places = [(n, k) for n, each in solutions.items() for k in range(len(each.stored))]
+    free = [(n, k) for n, k in places if not _is_exact(solutions[n].clip.tracks[k], request)]
+    old = [(solutions[n].clip.tracks[k], solutions[n].stored[k]) for n, k in free]
+    new = _drop_from(old, skeleton)
+    changed = {place: pair for place, pair, was in zip(free, new, old, strict=True) if pair[1] is not was[1]}
+    return {n: _changed_solution(solutions[n], n, changed) for n in sorted({n for n, _ in changed})}
+
+
+def _is_exact(track: Track, request: Request) -> bool:
+    if track.node is None:
+        return request.bounds.max_pointer_error == 0
+    return request.bounds.max_error == 0 or track.node in request.policy.keep
+
+
+def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -> list[tuple[Track, EncodedKeys]]:
+    """The tracks with their keys as stored, without redundant ones; those that lose none keep their `Stored`."""
+    axes: dict[bytes, Floats] = {}
+    while True:  # a key that goes may make others needed
+        tracks = _share_axes([track for track, _ in pairs], axes)
+        masks = [_every_other(mask) for mask in removable_keys(tracks, skeleton)]
+        if not any(mask.any() for mask in masks):
+            return [(track, stored) for track, (_, stored) in zip(tracks, pairs, strict=True)]
+        pairs = [
+            (_only(track, ~mask), stored.only(~mask)) if mask.any() else (track, stored)
+            for track, (_, stored), mask in zip(tracks, pairs, masks, strict=True)
+        ]
+
+
+def _share_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
+    """The tracks with equal times in one array, as one accessor of the file holds them."""
+    shared = [axes.setdefault(track.times.tobytes(), as_key_times(track.times)) for track in tracks]
+    return [
+        track if track.times is axis else replace(track, times=axis) for track, axis in zip(tracks, shared, strict=True)
+    ]
+
+
+def _every_other(mask: Bools) -> Bools:
+    """The first, third, … key of every run: a key is judged by its neighbors, which must not go with it."""
+    if not mask.any():
+        return mask
+    begins = np.flatnonzero(mask & ~np.concatenate(([False], mask[:-1])))
+    at = np.arange(len(mask))
+    run = np.searchsorted(begins, at, side="right") - 1
+    since = at - begins[run]
+    return np.asarray(mask & (since % 2 == 0))
+
+
+def _only(track: Track, keep: Bools) -> Track:
+    arriving, leaving = (None if part is None else part[keep] for part in (track.in_tangents, track.out_tangents))
+    return replace(
+        track, times=track.times[keep], values=track.values[keep], in_tangents=arriving, out_tangents=leaving
+    )
+
+
+def _changed_solution(
+    solution: Solution, number: int, changed: Mapping[tuple[int, int], tuple[Track, EncodedKeys]]
+) -> Solution:
+    pairs = zip(solution.clip.tracks, solution.stored, strict=True)
+    new = [changed.get((number, k), pair) for k, pair in enumerate(pairs)]
+    clip = Clip(solution.clip.name, tuple(track for track, _ in new))
+    return Solution(clip, tuple(stored for _, stored in new), solution.dropped)

@@ -1,0 +1,145 @@
+"""Loops: what kind a clip is, and that closing it leaves no seam."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fixtures
+from anim.curves.tangents.table import TANGENTS
+from anim.errors import RangeError
+from anim.gltf.reading import reader
+from anim.maths import quaternion
+from anim.measure.inspect.root_motion import root_motion_node
+from anim.measure.loops.loop_analysis import LoopKind, best_ranges
+from anim.measure.loops.loop_analysis import analyze_loop as judged
+from anim.measure.loops.seam import SkinMotion
+from anim.model import Clip, Scene, Track
+from anim.operations.loop import append_first_frame, loop
+from anim.operations.spline import spline
+from anim.operations.trim import trim
+from anim.sampling.derivatives import rates
+from anim.sampling.track import sample
+from tests.anim.operations.tracks import TRACKS
+from tests.clips import LINEAR, about, track
+from tests.files import opened
+
+
+def _walk() -> tuple[Scene, Clip]:
+    document = opened(fixtures.build("biped"))
+    return reader.scene(document), next(clip for clip in reader.clips(document) if clip.name == "walk")
+
+
+SCENE, WALK = _walk()
+SKELETON = SCENE.skeleton
+SKIN = SkinMotion(SCENE)
+
+
+def test_the_walk_is_closed() -> None:
+    assert judged(SCENE, WALK).kind is LoopKind.CLOSED
+
+
+def test_without_its_last_frame_it_is_open_by_one() -> None:
+    cut = trim(WALK, end=23 / 24)
+    found = judged(SCENE, cut)
+    assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
+    closed = append_first_frame(cut, fps=found.fps)
+    assert closed.end == pytest.approx(1.0, abs=1e-6)
+    assert judged(SCENE, closed).kind is LoopKind.CLOSED
+    assert judged(SCENE, closed).seam < 1e-6
+
+
+def test_half_a_walk_is_no_loop() -> None:
+    assert judged(SCENE, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
+
+
+def test_blend_closes_it() -> None:
+    half = trim(WALK, end=0.5)
+    closed = loop(half, blend=0.25)
+    assert judged(SCENE, closed).seam < 1e-9
+    early = np.linspace(0, 0.24, 50)
+    for old, new in zip(half.tracks, closed.tracks, strict=True):
+        np.testing.assert_allclose(sample(new, early), sample(old, early), atol=1e-9)
+
+
+@pytest.mark.parametrize("key", ["cubic", "turning", "linear", "slerp", "step"])
+def test_ends_meet_in_value_and_splines_in_speed(key: str) -> None:
+    new = loop(Clip("", (TRACKS[key],)), blend=1.0).tracks[0]
+    first, last = sample(new, np.array([0.0, 3.0]))
+    assert min(np.abs(first - last).max(), np.abs(first + last).max()) < 1e-9
+    if key != "step":
+        start, end = rates(new, np.array([0.0]), before=False), rates(new, np.array([3.0]), before=True)
+        np.testing.assert_allclose(end, start, atol=0.05 * np.abs(start).max() if key == "turning" else 1e-9)
+
+
+@pytest.mark.parametrize("count", [2, 9, 40])
+@pytest.mark.parametrize("blend", [0.3, 1.0])
+def test_linear_tracks_end_at_the_speed_that_they_start_with(count: int, blend: float) -> None:
+    """However few keys, or however many: the last piece goes on as the first one does."""
+    times = np.linspace(0, 2, count)
+    rise = track("translation", times, np.stack((times**2, np.sin(times), 0 * times), axis=1), LINEAR)
+    turn = track("rotation", times, about("z", 80 * times**2), LINEAR)
+    for new in loop(Clip("", (rise, turn)), blend=blend).tracks:
+        start, end = rates(new, np.array([0.0]), before=False), rates(new, np.array([2.0]), before=True)
+        np.testing.assert_allclose(end, start, atol=1e-6)
+
+
+def test_a_track_that_starts_late_rests_at_the_seam() -> None:
+    late = track("translation", [0.5, 1.5], np.array([[3.0, 0, 0], [5, 0, 0]]), LINEAR, node=0)
+    other = track("translation", [0, 2], np.zeros((2, 3)), LINEAR, node=1)
+    new = loop(Clip("", (late, other)), blend=0.3).tracks[0]
+    np.testing.assert_allclose(rates(new, np.array([2.0]), before=True), 0, atol=1e-9)
+    assert np.diff(sample(new, np.linspace(1.7, 2, 100))[:, 0]).max() <= 0
+
+
+def test_keys_that_jump_before_the_blend_stay() -> None:
+    jump = track("translation", [0, 0.5, 0.5 + 2.0**-22, 2], np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0]]))
+    new = loop(Clip("", (jump,)), blend=0.5).tracks[0]
+    np.testing.assert_array_equal(new.times[:3], jump.times[:3])
+
+
+def test_a_jump_in_the_last_moment_goes() -> None:
+    jump = track("translation", [0, 2 - 2.0**-22, 2], np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0]]), LINEAR)
+    new = loop(Clip("", (jump,)), blend=0.5).tracks[0]
+    np.testing.assert_allclose(new.values, 0, atol=1e-9)
+
+
+def test_blend_longer_than_the_clip_is_refused() -> None:
+    with pytest.raises(RangeError, match="blend"):
+        loop(WALK, blend=1.5)
+
+
+def test_the_best_part_of_two_walks_is_one_walk() -> None:
+    twice = Clip("", tuple(Track(t.node, t.path, t.interpolation, _lap(t.times), _again(t)) for t in WALK.tracks))
+    best = best_ranges(SKIN, twice, shortest=0.8)[0]
+    assert best.end - best.start == pytest.approx(1.0, abs=1e-3)
+    assert best.seam < 1e-4
+
+
+def test_a_root_that_walks_on_travels_and_one_that_sways_does_not() -> None:
+    assert root_motion_node(SKELETON, WALK) == -1
+    hips = next(i for i, t in enumerate(WALK.tracks) if t.path == "translation")
+    track = WALK.tracks[hips]
+    on = track.values + np.array([0, 0, 1.4]) * track.times[:, None]
+    moved = Track(track.node, track.path, track.interpolation, track.times, on)
+    walking = Clip("", (*WALK.tracks[:hips], moved, *WALK.tracks[hips + 1 :]))
+    root = root_motion_node(SKELETON, walking)
+    assert root == track.node
+    found = judged(SCENE, walking, root=root)
+    assert found.kind is LoopKind.CLOSED
+    assert found.travel == pytest.approx(1.4, abs=1e-6)
+
+
+def _lap(times: np.ndarray) -> np.ndarray:
+    return times if len(times) == 1 else np.concatenate((times, times[1:] + 1.0))
+
+
+def _again(track: Track) -> np.ndarray:
+    values = track.values if len(track.times) == 1 else np.concatenate((track.values, track.values[1:]))
+    return quaternion.align_signs(values) if track.path == "rotation" else values
+
+
+def test_a_seam_without_a_corner_has_no_speed() -> None:
+    smooth = spline(WALK, tangents=TANGENTS["natural"], cyclic=True)
+    assert judged(SCENE, WALK).speed_seam > 0.1
+    assert judged(SCENE, smooth).speed_seam < 0.01

@@ -1,0 +1,114 @@
+"""The fewest keys, against every choice of keys and against plain lines."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from anim.arrays import Bools, Floats
+from anim.optimization.search import segment_errors
+from anim.optimization.search.segment_errors import SPANS, SegmentErrors, fits
+from anim.optimization.tracks.key_reduction import greedy_keys
+
+
+def _missed(values: Floats, times: Floats, keep: Bools) -> float:
+    """How far lines between the kept keys are off, at most."""
+    lines = [np.interp(times, times[keep], column[keep]) for column in values.T]
+    return float(np.linalg.norm(np.transpose(lines) - values, axis=1).max())
+
+
+def _random(seed: int, count: int, tracks: int = 4) -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(seed)
+    return np.cumsum(rng.normal(size=(tracks, count, 3)), axis=1), np.cumsum(rng.uniform(0.1, 1, count))
+
+
+def _chosen(count: int, inner: tuple[int, ...]) -> Bools:
+    keep = np.zeros(count, np.bool_)
+    keep[[0, *inner, -1]] = True
+    return keep
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 70), st.floats(0.1, 10))
+def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, budget: float) -> None:
+    values, times = _random(seed, count)
+    budgets = budget * np.array([1.0, 0.5, 2, 0.01])
+    keep = SegmentErrors(values, times, np.inf).needed(np.arange(4), budgets)
+    assert keep[:, [0, -1]].all()
+    for track in range(4):
+        assert _missed(values[track], times, keep[track]) <= budgets[track] * (1 + 1e-5)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_no_choice_of_fewer_keys_does(seed: int) -> None:
+    """Tried are all of them."""
+    values, times = _random(seed, 9)
+    keep = SegmentErrors(values, times, np.inf).needed(np.arange(4), np.full(4, 1.5))
+    for track in range(4):
+        count = int(keep[track].sum())
+        fewer = (_chosen(9, inner) for inner in combinations(range(1, 8), max(count - 3, 0)))
+        assert count == 2 or all(_missed(values[track], times, each) > 1.5 for each in fewer)
+
+
+def test_among_the_fewest_the_one_that_misses_least() -> None:
+    """A bow in two lines: the middle key misses least."""
+    times = np.linspace(0, 1, 11)
+    bow = (times**2)[None, :, None]
+    keep = SegmentErrors(bow, times, np.inf).needed(np.array([0]), np.array([0.08]))
+    assert np.flatnonzero(keep[0]).tolist() == [0, 5, 10]
+
+
+def test_some_tracks_of_many() -> None:
+    values, times = _random(3, 40)
+    table = SegmentErrors(values, times, np.inf)
+    every = table.needed(np.arange(4), np.array([1.0, 2, 3, 4]))
+    some = table.needed(np.array([3, 1]), np.array([4.0, 2]))
+    assert (some == every[[3, 1]]).all()
+
+
+def test_never_more_keys_than_greedy_ones() -> None:
+    values, times = _random(5, 60, tracks=30)
+    fewest = SegmentErrors(values, times, np.inf).needed(np.arange(30), np.full(30, 2.0)).sum(axis=1)
+    greedy = greedy_keys(values / 2.0, times).sum(axis=1)
+    assert (fewest <= greedy).all()
+    assert fewest.sum() < greedy.sum()
+
+
+def test_long_lines_have_a_key_now_and_then() -> None:
+    times = np.arange(300.0)
+    keep = SegmentErrors(times[None, :, None] * np.ones(3), times, np.inf).needed(np.array([0]), np.array([1e-3]))
+    at = np.flatnonzero(keep[0])
+    assert np.diff(at).max() <= SPANS[0]
+    assert len(at) == 2 + (299 - 1) // SPANS[0]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_and_two_keys_stay(count: int) -> None:
+    values, times = _random(1, count)
+    assert SegmentErrors(values, times, np.inf).needed(np.arange(4), np.full(4, 1e9)).all()
+
+
+def test_tables_are_kept_within_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fits(100, np.arange(2000) / 30)
+    assert not fits(2000, np.arange(20_000) / 30)
+    assert not fits(400, np.arange(2000) / 240)
+    monkeypatch.setattr(segment_errors, "MOST", 10)
+    assert not fits(2, np.arange(4.0))
+
+
+def test_segments_beyond_the_limit_are_not_looked_at() -> None:
+    """Budgets within it lead to the same keys; a noisy track has no long segments, a straight one has all of them."""
+    values, times = _random(8, 40)
+    values[3] = times[:, None] * np.ones(3)
+    whole, limited = SegmentErrors(values, times, np.inf), SegmentErrors(values, times, 2.0)
+    budgets = np.full(4, 1.9)
+    expected = whole.needed(np.arange(4), budgets)
+    assert (limited.needed(np.arange(4), budgets) == expected).mean() > 0.98
+    assert limited.needed(np.arange(4), budgets)[3].sum() == 3  # 40 keys are more than one segment spans
+    for track in range(4):
+        keep = limited.needed(np.array([track]), np.array([10.0]))[0]
+        assert _missed(values[track], times, keep) <= 10

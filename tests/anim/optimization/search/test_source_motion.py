@@ -1,0 +1,151 @@
+"""What a clip truly does, against chains of plain matrices, and how far a change can carry a point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.measure.error.point_matrix import PointMatrix, stack_points
+from anim.model import Scene
+from anim.optimization.options import Reference
+from anim.optimization.search.source_motion import PATHS, key_grid, moments
+from anim.optimization.search.world_matrices import level_world_matrices, needed_levels
+from anim.sampling import sample_pose, world_matrices
+from tests.anim.optimization.making import every_point, scene, truth_of, turning, waving
+from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
+
+RNG = np.random.default_rng(2)
+NO_TANGENTS = (np.zeros((2, 3)), np.zeros((2, 3)))
+
+
+def test_keys_may_lie_on_every_key_and_within_splines() -> None:
+    line = track("translation", [0, 0.125, 1], np.zeros((3, 3)))
+    assert key_grid([line]).tolist() == line.times.tolist()
+    spline = track("scale", [0.5, 1.5], np.ones((2, 3)), CUBICSPLINE, tangents=NO_TANGENTS)
+    grid = key_grid([line, spline])
+    assert set(line.times) | set(spline.times) <= set(grid)
+    assert np.diff(grid[(grid >= 0.5) & (grid <= 1.5)]).max() <= 1 / 60 + 1e-6
+    assert (grid.astype(np.float32) == grid).all()
+    assert key_grid([]).tolist() == [0]
+
+
+def test_moments_lie_on_keys_between_them_and_before_jumps() -> None:
+    steps = track("translation", [0, 0.25, 2], np.zeros((3, 3)), STEP)
+    at = moments(np.array([0.0, 1, 2]), [steps])
+    assert at.tolist() == [0, np.nextafter(0.25, 0), 0.25, 0.5, 1, 1.5, 2]
+
+
+def test_levels_hold_what_points_hang_on_and_no_more() -> None:
+    nodes = skeleton([-1, 0, 1, 1, -1, 4])
+    assert [level.tolist() for level in needed_levels(nodes, np.array([3]))] == [[0], [1], [3]]
+    assert [level.tolist() for level in needed_levels(nodes, np.array([5, 0]))] == [[0, 4], [5], []]
+
+
+def _chained(of: Scene, node: int, local: tuple[Floats, Floats, Floats], frame: int) -> Floats:
+    """world_from_node (4, 4) as a product of matrices, turns as stored: their length scales, as in players."""
+    translation, rotation, scale = (part[node, frame] for part in local)
+    x, y, z, w = rotation
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.eye(3) + 2 * (w * cross + cross @ cross)
+    own = np.eye(4)
+    own[:3, :3], own[:3, 3] = turn * scale, translation
+    parent = int(of.skeleton.parents[node])
+    return own if parent < 0 else np.asarray(_chained(of, parent, local, frame) @ own)
+
+
+def test_worlds_are_products_of_matrices_with_turns_as_stored() -> None:
+    of = scene(stretch=0.3)
+    count = len(of.skeleton)
+    local = (RNG.normal(size=(count, 3, 3)), 1.01 * quaternion.normalize(RNG.normal(size=(count, 3, 4))),
+             RNG.uniform(0.5, 2, (count, 3, 3)))  # fmt: skip
+    found = level_world_matrices(of.skeleton, local, of.skeleton.levels())
+    for node in range(count):
+        for frame in range(3):
+            assert found[node, frame] == pytest.approx(_chained(of, node, local, frame)[:3], abs=1e-9)
+
+
+def test_columns_are_the_sampled_pose() -> None:
+    of, what = scene(), waving()
+    points = every_point(of)
+    truth = truth_of(of, what, points)
+    assert (truth.at[truth.on_grid] == truth.grid).all()
+    expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, truth.at)).swapaxes(0, 1)
+    assert truth.columns == pytest.approx(stack_points(expected, points.nodes), abs=1e-12)
+
+
+def test_keys_only() -> None:
+    truth = truth_of(scene(), waving(), every_point(scene()), Reference.KEYS)
+    assert (truth.at == truth.grid).all()
+
+
+def test_rest_and_middle_are_off_by_what_they_say() -> None:
+    of, what = scene(), waving()
+    for each in truth_of(of, what, every_point(of)).moving:
+        own = what.tracks[each.number]
+        assert (each.node, each.path) == own.target
+        rest = getattr(of.skeleton, each.path)[each.node]
+        off = np.linalg.norm(each.values - rest, axis=1)
+        if each.path == "rotation":
+            off = np.minimum(off, np.linalg.norm(each.values + rest, axis=1))
+            assert np.linalg.norm(each.middle) == pytest.approx(1)
+        assert each.from_rest == pytest.approx(off.max() * each.meters, abs=1e-9)
+        assert each.from_middle == pytest.approx(np.linalg.norm(each.values - each.middle, axis=1).max() * each.meters)
+    held = truth_of(of, what, every_point(of)).moving[4]
+    assert (held.from_middle, held.from_rest > 0) == (0, True)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("stretch", "slack"), [(0.0, 1.01), (0.2, 1.5)])
+def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int, stretch: float, slack: float) -> None:
+    """Each track, changed at random by a little: no answering vertex moves more than it says, but for shear."""
+    of = scene(seed, stretch=stretch)
+    what = waving()
+    points = every_point(of)
+    truth = truth_of(of, what, points)
+    rng = np.random.default_rng(seed)
+    before = points.places(level_world_matrices(of.skeleton, truth.local, truth.levels))
+    for g, each in enumerate(truth.moving):
+        local = tuple(part.copy() for part in truth.local)
+        change = 1e-4 * rng.normal(size=each.values.shape)
+        changed = each.values + change
+        if each.path == "rotation":
+            changed = quaternion.normalize(changed)
+            change = changed - each.values
+        local[PATHS.index(each.path)][each.node] = changed
+        after = points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), truth.levels))
+        moved = np.linalg.norm(after - before, axis=2)
+        allowed = each.meters * np.linalg.norm(change, axis=1).max()
+        assert moved[truth.answering[g]].max(initial=0.0) <= slack * allowed
+        assert moved.max() > 0.05 * allowed  # and it says no more than it must
+
+
+def test_chords_count_only_where_they_leave_the_arc() -> None:
+    of = scene()
+    points = every_point(of)
+
+    def both(*tracks: Floats) -> bool:
+        times = np.linspace(0, 2, len(tracks[0]))
+        truth = truth_of(of, clip(track("rotation", times, tracks[0], node=1)), points)
+        return truth.by_chord is not truth.columns
+
+    assert not both(turning(0.2))
+    assert both(about("z", [0, 90]))
+
+
+def test_chords_are_normalized_mixes() -> None:
+    """A point at x = 1, a quarter of the way through 120° in one step."""
+    of = Scene(skeleton([-1]), ())
+    points = PointMatrix(np.array([0]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
+    rotation = track("rotation", [0, 1], about("z", [0, 120]))
+    quarters = track("scale", [0, 0.25, 1], np.ones((3, 3)))
+    truth = truth_of(of, clip(rotation, quarters), points)
+    x_axis = truth.by_chord.reshape(4, 3, -1)[0].T
+    quarter = int(np.searchsorted(truth.at, 0.25))
+    mix = 0.75 * about("z", 0) + 0.25 * about("z", 120)
+    assert truth.at[quarter] == 0.25
+    assert x_axis[quarter] == pytest.approx(Rotation.from_quat(mix).as_matrix()[:, 0])
+    along_arc = truth.columns.reshape(4, 3, -1)[0].T
+    assert along_arc[quarter] == pytest.approx([np.cos(np.radians(30)), 0.5, 0])

@@ -1,0 +1,155 @@
+"""One trial: what it says of error and bytes, against the ruler of `anim.measure` and plain sums."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.point_matrix import PointMatrix
+from anim.model import Clip, Scene
+from anim.optimization.options import Bounds
+from anim.optimization.search import axis_layouts
+from anim.optimization.search.axis_layouts import LAYOUTS
+from anim.optimization.search.bound_usage import BoundUsage
+from anim.optimization.search.plan import Plan, TrackAction, TrialResult
+from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.trial import TrialRunner
+from anim.sampling import sample_pose
+from tests.anim.optimization.making import CORE, every_point, scene, truth_of, turning, waving
+from tests.clips import clip, track
+
+OF = scene()
+POINTS = every_point(OF)
+BOUND = 0.02
+
+
+def _bench(
+    what: Clip, *, bounds: Bounds | None = None, droppable: bool = True, shared: Floats | None = None, of: Scene = OF
+) -> TrialRunner:
+    points: PointMatrix = every_point(of)
+    truth: SourceMotion = truth_of(of, what, points)
+    count = len(truth.moving)
+    strains = BoundUsage(of.skeleton, truth, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
+    values = [() if shared is None else (shared,)] * count
+    return TrialRunner(of.skeleton, truth, strains, CORE, np.full(count, droppable), values)
+
+
+def _plan(bench: TrialRunner, budget: float = BOUND / 3, **more: object) -> Plan:
+    count = len(bench.truth.moving)
+    plan = Plan(np.full(count, budget), 0.0, "merged", np.ones(count))
+    return replace(plan, **more)  # type: ignore[arg-type]
+
+
+def _clip(what: Clip, bench: TrialRunner, outcome: TrialResult) -> Clip:
+    """What the outcome says would be written."""
+    tracks = []
+    for k, moving in enumerate(bench.truth.moving):
+        if outcome.fates[k] == TrackAction.DROPPED:
+            continue
+        at = bench.truth.grid[outcome.on[k]] if k in outcome.on else [0.0]
+        tracks.append(track(moving.path, at, outcome.keys[k].values, node=moving.node))
+    return clip(*tracks, name=what.name)
+
+
+@pytest.mark.parametrize("axes", LAYOUTS)
+def test_the_error_is_the_rulers(axes: str) -> None:
+    what = waving()
+    bench = _bench(what)
+    outcome = bench.run(_plan(bench, axes=axes))
+    ruler = ErrorMetric(OF)
+    arcs, chords = (
+        ruler.error_at(what, _clip(what, bench, outcome), bench.truth.at, player=player).max_error
+        for player in ("raw", "nlerp")
+    )
+    expected = arcs if outcome.worst > 1 else max(arcs, chords)
+    assert BOUND * outcome.worst == pytest.approx(expected, rel=0.02)
+    assert BOUND * outcome.worst >= arcs * 0.998
+
+
+def test_the_size_is_keys_and_json() -> None:
+    bench = _bench(waving(), droppable=False)
+    outcome = bench.run(_plan(bench))
+    assert outcome.fates.tolist() == [
+        TrackAction.KEYED,
+        TrackAction.KEYED,
+        TrackAction.KEYED,
+        TrackAction.HELD,
+        TrackAction.HELD,
+    ]
+    axes = {on.tobytes(): int(on.sum()) for on in outcome.on.values()}
+    data = sum(4 * count for count in axes.values())
+    for i in range(3):
+        keys = outcome.keys[i]
+        data += keys.values.size * {"int16": 2, "float32": 4}[keys.form]
+    text = 3 * CORE.prices.track + 2 * CORE.prices.held + len(axes) * CORE.prices.axis
+    assert outcome.size == data + text
+
+
+def test_what_rests_is_dropped_only_where_it_may_be() -> None:
+    kept, dropped = (bench.run(_plan(bench)) for bench in (_bench(waving(), droppable=False), _bench(waving())))
+    assert (kept.fates[3], dropped.fates[3]) == (TrackAction.HELD, TrackAction.DROPPED)
+    assert (kept.fates[4], dropped.fates[4]) == (TrackAction.HELD, TrackAction.HELD)
+    assert kept.keys[3].values.tolist() == [[1, 1, 1]]
+    assert kept.keys[4].values.tolist() == [[0.75, 0.75, 0.75]]
+    assert 3 not in dropped.keys
+
+
+def test_held_as_other_clips_hold_it() -> None:
+    bench = _bench(
+        clip(track("scale", [0, 1], [[1.2, 1.2, 1.2], [1.2001, 1.2, 1.2]], node=4)), shared=np.full(3, 1.2002)
+    )
+    outcome = bench.run(_plan(bench))
+    assert outcome.fates.tolist() == [TrackAction.HELD]
+    assert outcome.keys[0].values[0] == pytest.approx([1.2002] * 3, rel=1e-6)
+
+
+def test_chords_are_asked_where_they_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """150° in a step or two would do along arcs; players that mix components cut the corner."""
+    monkeypatch.setattr(axis_layouts, "ASKED", math.inf)
+    times = np.linspace(0, 2, 49)
+    angles = np.radians(150) * times / 2
+    values = np.stack((0 * angles, 0 * angles, np.sin(angles / 2), np.cos(angles / 2)), axis=1)
+    bench = _bench(clip(track("rotation", times, values, node=1)))
+    plan = _plan(bench, budget=2.0)
+    cheap, thorough = bench.run(plan, smaller_than=0.0), bench.run(plan)
+    assert cheap.worst < 0.2
+    assert thorough.worst > 1
+    assert cheap.size == thorough.size
+    assert int(thorough.on[0].sum()) <= 3
+
+
+def test_a_bound_on_angles() -> None:
+    what = clip(track("rotation", np.linspace(0, 2, 25), turning(1.0), node=1))
+    bench = _bench(what, bounds=Bounds(BOUND, 0.0, max_angle=math.radians(0.2)))
+    outcome = bench.run(_plan(bench, budget=0.2))
+    written = _clip(what, bench, outcome)
+    a, b = (sample_pose(OF.skeleton, each, bench.truth.at).rotation for each in (what, written))
+    turned = np.degrees(quaternion.angle_between(a, b)[:, 1].max())
+    assert float(outcome.own[0]) * 0.2 == pytest.approx(turned, rel=0.01)
+
+
+def test_a_bound_on_speed() -> None:
+    what = waving()
+    plain = _bench(what)
+    strict = _bench(what, bounds=Bounds(BOUND, 0.0, max_speed_error=0.01))
+    slow, fast = plain.run(_plan(plain)), strict.run(_plan(strict))
+    assert slow.worst <= 1
+    assert fast.worst > slow.worst
+    finer = strict.run(_plan(strict, budget=BOUND / 300))
+    assert finer.worst < fast.worst
+
+
+def test_tracks_stored_alike_count_once() -> None:
+    """Joints 1 and 2 turn alike: the second costs but its channel."""
+    times = np.linspace(0, 2, 25)
+    both = _bench(clip(*(track("rotation", times, turning(1.0), node=node) for node in (1, 2))))
+    alone = _bench(clip(track("rotation", times, turning(1.0), node=1)))
+    pair, one = (bench.run(_plan(bench, axes="full")) for bench in (both, alone))
+    assert pair.fates.tolist() == [TrackAction.KEYED, TrackAction.KEYED]
+    assert pair.size - one.size == CORE.prices.repeated

@@ -1,0 +1,44 @@
+"""Work in processes: the same results in the same order, however many there are."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from anim.optimization.process_pool import process_pool
+
+
+def _product(shared: int, task: int) -> tuple[int, int]:
+    return shared * task, os.getpid()
+
+
+def _refused(shared: int, task: int) -> int:
+    if task == 2:
+        raise ValueError(f"task {task}")
+    return task
+
+
+def test_one_process_is_this_one() -> None:
+    with process_pool(1, 10) as workforce:
+        found = list(workforce.each(_product, range(4), label=str))
+    assert found == [(10 * i, os.getpid()) for i in range(4)]
+
+
+def test_two_processes_keep_the_order() -> None:
+    with process_pool(2, 10) as workforce:
+        found = list(workforce.each(_product, range(6), label=str))
+        again = list(workforce.each(_product, [7], label=str))  # on the same processes
+    assert [product for product, _ in [*found, *again]] == [0, 10, 20, 30, 40, 50, 70]
+    assert os.getpid() not in {number for _, number in found}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_error_is_the_callers(workers: int) -> None:
+    with process_pool(workers, 0) as workforce, pytest.raises(ValueError, match="task 2"):
+        list(workforce.each(_refused, range(5), label=str))
+
+
+def test_none_where_there_is_nothing_to_do() -> None:
+    with process_pool(0, None) as workforce:
+        assert list(workforce.each(_product, [], label=str)) == []
