@@ -1,0 +1,1 @@
+"""The command `gltf-anim`: private, not an API. Scripts import `anim`."""

@@ -24,15 +24,20 @@ LEVELS = (
     {"measure"},
     {"operations", "exchange", "skinning", "simulation", "caches", "optimization"},
     {"show"},
+    {"ops", "clip_list"},  # the facade, which `anim` offers as its own
+    {"asset"},
+    {"api"},
 )
 NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning"), ("simulation", "skinning")}
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 
-MODULES = sorted((ROOT / "anim").rglob("*.py"))
+MODULES = sorted(path for path in (ROOT / "anim").rglob("*.py") if path.name != "__main__.py")  # which runs the command
 COMMANDS = sorted((ROOT / "cli").rglob("*.py"))
 KERNELS = [path for path in MODULES if path.parent.name == "kernels" and path.stem not in ("__init__", "layout")]
 TERMINAL = {"typer", "click", "rich", "argparse"}
 OPENING = {  # modules of the library that may open a path
+    "anim/asset.py",
+    "anim/caches/cache_file.py",
     "anim/files/atomic.py",
     "anim/files/links.py",
     "anim/files/resolver.py",

@@ -44,8 +44,8 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     into before it.
     """
     target, temporary = links.resolve_links(path), None
-    with temporaries() as made:
-        with named_errors(path):
+    with temporary_files() as made:
+        with name_errors(path):
             check_writable(path)
             if target.exists() and not target.is_file():
                 with target.open("wb") as file:
@@ -53,7 +53,7 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
             elif not has_bytes(target, pieces):
                 temporary = write_temporary(target, pieces, made)
         yield
-        with named_errors(path):
+        with name_errors(path):
             if temporary is not None:
                 os.replace(temporary, target)
             elif target.is_file():
@@ -94,7 +94,7 @@ class AtomicOutputs:
         Where the main file is none of them (a sequence of numbered frames) the first one counts as it.
         """
         main = self.main if self.main in self.files else min(self.files)
-        with locked(self.folder):
+        with lock_folder(self.folder):
             new = {}
             for name, temporary in self.files.items():
                 path = self.folder / name
@@ -115,7 +115,7 @@ class AtomicOutputs:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Keep other runs from changing sets of files in this folder meanwhile, where the system has locks for folders.
 
     The lock leaves no file behind and ends with the process. After 5 s it goes on without.
@@ -143,7 +143,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def named_errors(path: Path) -> Iterator[None]:
+def name_errors(path: Path) -> Iterator[None]:
     """Turn errors of the system into ours, which name the output."""
     try:
         yield
@@ -152,7 +152,7 @@ def named_errors(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def temporaries() -> Iterator[list[Path]]:
+def temporary_files() -> Iterator[list[Path]]:
     """Give a list of files of which those that are still there at the end are removed."""
     made: list[Path] = []
     try:
@@ -167,7 +167,7 @@ def temporaries() -> Iterator[list[Path]]:
 def write_temporary(path: Path, pieces: Iterable[Bytes], made: list[Path]) -> Path:
     """Write pieces to a neighbor of `path` that is to take its place, with its permissions; return where it is.
 
-    made: of `temporaries`; gets it as soon as it is there.
+    made: of `temporary_files`; gets it as soon as it is there.
     """
     handle, temporary = create_temporary(path)
     made.append(temporary)
@@ -184,7 +184,7 @@ def create_temporary(path: Path, suffix: str = ".tmp") -> tuple[int, Path]:
 
 
 def move_to_free(temporary: Path, path: Path) -> None:
-    """Give a finished file of `temporaries` a name that is free, in one step. Raises FileExistsError where none is."""
+    """Give a finished temporary file a name that is free, in one step. Raises FileExistsError where none is."""
     try:
         os.link(temporary, path)
     except FileExistsError:
@@ -244,7 +244,7 @@ def _replace_several(new: Mapping[Path, Path], main: Path) -> None:
     companions = [path for path in new if path != main]
     old: dict[Path, Path] = {}
     placed: list[Path] = []
-    with temporaries() as made:
+    with temporary_files() as made:
         try:
             for path in (main, *companions):
                 if path.is_file():

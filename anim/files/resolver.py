@@ -23,11 +23,11 @@ class CompanionFiles:
     def open(self, address: str) -> Bytes:
         """Return the bytes of a file. Raises FormatError for one that is not there, or not below the folder."""
         if address not in self._files:
-            self._files[address] = opened(self._folder, address)
+            self._files[address] = open_relative(self._folder, address)
         return self._files[address]
 
 
-def mapped(path: Path, ending: str = ".glb") -> Bytes:
+def map_file(path: Path, ending: str = ".glb") -> Bytes:
     """Return the bytes of a file. ending: of the files that are meant, for the hint where `path` is a folder."""
     try:
         if path.is_dir():
@@ -50,23 +50,23 @@ def _in_folder(folder: Path, ending: str) -> str:
     return f"name a file in it, such as {name if name[0] != '-' else f'./{name}'}"  # or it would be an option
 
 
-def opened(folder: Path, address: str) -> Bytes:
+def open_relative(folder: Path, address: str) -> Bytes:
     """Return the bytes of a file in or below the folder. Raises FormatError."""
-    path = place(folder, address)
+    path = locate(folder, address)
     try:
-        return mapped(path)
+        return map_file(path)
     except FormatError as error:
         raise error.at(f"'{address}'", " ") from None
 
 
-def missing(address: str) -> Bytes:
+def refuse_relative(address: str) -> Bytes:
     """Raise FormatError: an input that comes through a pipe has no files beside it."""
     raise FormatError(
         f"'{address}' lies beside the file, but the input is a pipe", help="give the file's path, or pipe a GLB"
     )
 
 
-def place(folder: Path, address: str) -> Path:
+def locate(folder: Path, address: str) -> Path:
     """Return where a file in or below the folder lies; links that lead out of it are refused. Raises FormatError."""
     path = folder / address
     try:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
+from anim.curves.easing import table
 from anim.curves.easing.function import Easing
 from anim.curves.fitting import adaptive_keys
 from anim.curves.fitting.easing_fit import fit_linear, fit_segments
@@ -35,7 +36,7 @@ class Tolerances:
 def ease(
     clip: Clip,
     *,
-    easing: Easing,
+    easing: Easing | str,
     start: float = -math.inf,
     end: float = math.inf,
     tolerances: Tolerances = Tolerances(),
@@ -48,6 +49,7 @@ def ease(
     CUBICSPLINE piece is run through at e(u). Eases that overshoot go on beyond the keys. STEP tracks and tracks with
     one key have no tempo and stay as they are. What is not eased in an eased track keeps its shape.
 
+    easing: one of EASINGS, or a text that names it: "smoothstep", "cubic-bezier(.2, 0, 0, 1)".
     start, end: seconds; only pieces between are eased.
     interpolation: "cubicspline", exact where the ease is cubic, or "linear". Steps become STEP, or jumps within one
     float32 time where only a part is eased.
@@ -56,6 +58,7 @@ def ease(
     """
     if interpolation not in OUTPUTS:
         raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
+    easing = table.parse(easing) if isinstance(easing, str) else easing
     job = _Job(easing, start, end, tolerances, interpolation)
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(clip.name, tuple(job.eased(t) if i in chosen else t for i, t in enumerate(clip.tracks)))

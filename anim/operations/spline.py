@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from anim.curves.tangents.rule import TangentRule
-from anim.curves.tangents.table import CLOSED, apply_rotation_tangents, apply_tangents, check_closed
+from anim.curves.tangents.table import CLOSED, DEFAULT, apply_rotation_tangents, apply_tangents, check_closed, parse
 from anim.errors import AnimError, RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
@@ -20,7 +20,7 @@ NEAR = 1e-6  # of the clip's end: times in float32 that mean the same
 def spline(
     clip: Clip,
     *,
-    tangents: TangentRule,
+    tangents: TangentRule | str = DEFAULT,
     cyclic: bool = False,
     root: int = -1,
     tracks: frozenset[int] | None = None,
@@ -30,6 +30,7 @@ def spline(
 
     Rotations get theirs from angular velocities, so that they are those of a turning thing. STEP tracks hold on purpose
     and stay; so do tracks with one key. Values stay too, but under a rule that approximates (bspline).
+    tangents: one of TANGENTS, or a text that names it: "natural", "tcb(0, 0, 0.5)".
     cyclic: a loop: the first and the last key are neighbors, so value and speed have no seam. A track that starts late
     or ends early stands still at the seam: its keys are not neighbors.
     root: the node whose translation goes on from lap to lap, −1 for none.
@@ -38,14 +39,15 @@ def spline(
     starts with.
     (keys 0, 1, 2 s: 0, 1, 0; time-aware) → tangents 2, 0, −2
     """
+    rule = parse(tangents) if isinstance(tangents, str) else tangents
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     new = list(clip.tracks)
     for i in sorted(chosen):
         track = new[i]
         try:
-            new[i] = _splined(track, tangents, cyclic=cyclic and _spans(track, clip))
+            new[i] = _splined(track, rule, cyclic=cyclic and _spans(track, clip))
             travels = track.node == root and track.path == "translation"
-            if (cyclic or tangents.loop) and new[i] is not track and not travels:
+            if (cyclic or rule.loop) and new[i] is not track and not travels:
                 _check_closed(track)
         except AnimError as error:
             target = track.pointer if track.node is None else f"{label(track.node)}, {track.path}"

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from anim.arrays import Floats, unique_sorted
+from anim.curves.easing import table
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.fitting import adaptive_keys
 from anim.curves.fitting.easing_fit import fit_segments
@@ -32,7 +33,7 @@ MIN_TOLERANCE = 2e-7  # of an ease; float64 fits get no nearer
 def warp(
     clip: Clip,
     *,
-    easing: Easing,
+    easing: Easing | str,
     start: float | None = None,
     end: float | None = None,
     tolerance: float = TOLERANCE,
@@ -42,6 +43,7 @@ def warp(
 ) -> Clip:
     """Return the clip with one ease over a whole range: at start + u·d it shows what it showed at start + e(u)·d.
 
+    easing: one of EASINGS, or a text that names it: "sine-in-out".
     start, end: seconds, by default the clip's own; before and after nothing changes. An ease that overshoots runs into
     the motion beyond the range and back; beyond the clip's ends it holds.
     STEP keys move to where the map reaches them, exactly. Others become CUBICSPLINE: exact for LINEAR vectors under a
@@ -49,6 +51,7 @@ def warp(
     "linear" LINEAR, within the same.
     Raises RangeError for an empty range, or an ease that jumps.
     """
+    easing = table.parse(easing) if isinstance(easing, str) else easing
     first = clip.start if start is None else start
     last = clip.end if end is None else end
     if easing.stepped:

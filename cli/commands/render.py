@@ -197,7 +197,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data)
                 documents.note_mended(document, name, voice)
-                yield gltf.pages(document) or document, name, resolver.missing
+                yield gltf.pages(document) or document, name, resolver.refuse_relative
             else:
                 ending = sniff_format(head, len(data))
                 cache_files.check_pipe(name, ending)

@@ -52,7 +52,7 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
     """
     name = called(path)
     try:
-        yield _stdin() if path == PIPE else resolver.mapped(Path(path), ending), name
+        yield _stdin() if path == PIPE else resolver.map_file(Path(path), ending), name
     except (UsageError, OutputError):
         raise
     except AnimError as error:
@@ -200,6 +200,6 @@ def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]
         if folder is None or address is None or uri.is_data(address):
             continue
         try:
-            resolver.place(folder, uri.relative_path(address))
+            resolver.locate(folder, uri.relative_path(address))
         except FormatError as error:
             yield f"image {i}", error.problem

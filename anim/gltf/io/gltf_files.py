@@ -42,13 +42,13 @@ def write(
     named, path = path, links.resolve_links(path)
     if path.exists() and not path.is_file():
         raise OutputError(f"{named}: is no plain file (a .gltf needs a folder for its buffers)", help="write a .glb")
-    with nullcontext() if dry_run else atomic.locked(path.parent):
+    with nullcontext() if dry_run else atomic.lock_folder(path.parent):
         names = _Names(path.parent, unused_buffers.external_buffers(path))
         files = container.gltf(document, path.stem, keep_external=same_folder, choose=names.choose)
         made = files.pop(f"{path.stem}.gltf")
         content = made if text is None or files else [text]
         if not dry_run:
-            with atomic.named_errors(named):
+            with atomic.name_errors(named):
                 atomic.check_writable(path)
                 new = {path.parent / name: pieces for name, pieces in files.items() if name not in names.reused}
                 _commit(path, content, new)
@@ -95,11 +95,11 @@ def _candidates(preferred: str, data: Bytes) -> Iterator[str]:
 
 def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> None:
     """Put new buffers where nothing is, then the .gltf; where that fails, they are gone again."""
-    with atomic.temporaries() as made:
+    with atomic.temporary_files() as made:
         waiting = {place: atomic.write_temporary(place, pieces, made) for place, pieces in new.items()}
         is_there = atomic.has_bytes(path, text)
         main = None if is_there else atomic.write_temporary(path, text, made)
-        with signals.hold_signals(), atomic.temporaries() as placed:
+        with signals.hold_signals(), atomic.temporary_files() as placed:
             for place, temporary in waiting.items():
                 atomic.move_to_free(temporary, place)
                 placed.append(place)

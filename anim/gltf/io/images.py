@@ -36,10 +36,10 @@ def along(document: Document, folder: Path, target: Path) -> tuple[Document, dic
 def write_copies(copies: Mapping[Path, Bytes]) -> None:
     """Write images where nothing is; one that is there already is the same. Raises OutputError."""
     for path, data in copies.items():
-        with atomic.named_errors(path):
+        with atomic.name_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             if not path.exists():
-                with atomic.temporaries() as made:
+                with atomic.temporary_files() as made:
                     atomic.move_to_free(atomic.write_temporary(path, [data], made), path)
 
 
@@ -64,7 +64,7 @@ def read_image(folder: Path | None, image: Json) -> Bytes | None:
     if not address or folder is None:
         return None
     try:
-        return resolver.opened(folder, uri.relative_path(address))
+        return resolver.open_relative(folder, uri.relative_path(address))
     except FormatError:
         return None
 

@@ -54,7 +54,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     real = links.resolve_links(Path(path))
     for _ in range(MAX_TRIES):
         before = _stamp(real)
-        data, buffers = resolver.mapped(real), resolver.CompanionFiles(real.parent)
+        data, buffers = resolver.map_file(real), resolver.CompanionFiles(real.parent)
         document = opener(data, buffers.open)
         outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
         for address in outside:
@@ -67,7 +67,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
 
 def open_bytes(data: Bytes, name: str, opener: Opener = container.read) -> Source:
     """Return the document in `data`, with nothing beside it. name: what messages call it. Raises FormatError."""
-    document = opener(data, resolver.missing)
+    document = opener(data, resolver.refuse_relative)
     return Source(document, name, len(data) + external_size(document), None, data)
 
 

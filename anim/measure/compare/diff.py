@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -55,6 +56,15 @@ class Diff:
     missing_nodes: tuple[str, ...]
     added_nodes: tuple[str, ...]
     by_vertex: bool
+
+    @property
+    def max_error(self) -> float:
+        """The largest distance between any two clips, in m; infinite where the new file lacks one."""
+        return math.inf if self.missing_clips else max((each.error.max_error for each in self.clips), default=0.0)
+
+    def __repr__(self) -> str:
+        counts = f"clips={len(self.clips)}, missing={len(self.missing_clips)}, added={len(self.added_clips)}"
+        return f"Diff(max_error={self.max_error:.6g}, {counts})"
 
 
 def diff(

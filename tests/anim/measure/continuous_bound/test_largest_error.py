@@ -14,8 +14,8 @@ from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.measure.error.metric import ErrorMetric, cut_times, dense_times
 from anim.model import Clip, Scene
-from anim.ops.resample import resample
-from anim.ops.spline import spline
+from anim.operations.resample import resample
+from anim.operations.spline import spline
 from tests.anim.measure.error.brute_force import Find, brute, points_on_a_node
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, track
 from tests.files import opened_path

@@ -1,0 +1,288 @@
+"""What most scripts need, on assets and names of clips; `anim` offers it as its own.
+
+Here lengths may have units, as on the command line: "0.5mm", "2cm", "0.1%" of the diagonal of the model's bounding box;
+numbers are metres.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from anim import units
+from anim.arrays import Floats
+from anim.asset import Asset, PathName, as_asset
+from anim.caches import cache_file
+from anim.caches.options import WriteOptions
+from anim.caches.transforms import bounds, up_axis, vertex_order
+from anim.errors import AnimError, RangeError
+from anim.gltf.document import Document
+from anim.gltf.io import container
+from anim.gltf.reading import reader
+from anim.measure.compare import diff as compare
+from anim.measure.compare.diff import Diff
+from anim.measure.error.metric import FPS, ErrorMetric
+from anim.measure.error.surface import diagonal
+from anim.model import Clip, VertexCache
+from anim.operations.selection import Selection, match_names
+from anim.optimization import optimize as search
+from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy
+from anim.optimization.request import Request
+from anim.sampling.sample import PoseTable
+from anim.sampling.sample import sample as sample_table
+from anim.sampling.times import frame_times
+from anim.skinning import bake as skinning
+
+AssetLike: TypeAlias = Asset | Document | PathName
+ClipKey: TypeAlias = Clip | str | int
+Length: TypeAlias = str | float
+SHELL = "1%"  # of the diagonal: how far around nodes without vertices errors count
+MAX_POINTER_ERROR = 1e-4  # of the range of a track that moves no node
+
+
+@dataclass(frozen=True, slots=True)
+class OptimizeResult:
+    """An asset in fewer bytes.
+
+    asset: what to save. max_error: m, farthest that any vertex is from where it was, as measured on what is saved, in
+    any clip. errors: the same by the name of each clip that was optimized, in the order of the file.
+    """
+
+    asset: Asset
+    max_error: float
+    errors: dict[str, float]
+
+    def save(self, path: PathName) -> None:
+        """Write the asset, as `anim.save` does."""
+        self.asset.save(path)
+
+
+class BakedCache(VertexCache):
+    """A vertex cache that can be saved. Its frames are baked while they are asked for: `load_all()` gives them all."""
+
+    __slots__ = ()
+
+    def save(
+        self,
+        path: PathName,
+        *,
+        up: str = "y",
+        order: str = "file",
+        max_error: Length | None = None,
+        quantize: bool = False,
+        layout: str = "morph",
+        preset: str = "plain",
+        depth: str = "float",
+        rest: str = ".ply",
+    ) -> None:
+        """Write the cache in the format of the path's ending: .npz, .usdc, .glb, .pc2, … (`anim.CACHE_FORMATS`).
+
+        Options as of `gltf-anim bake`. Raises UnsupportedError for another ending or a package that is missing,
+        RangeError for an option that the format doesn't take, OutputError where nothing can be written.
+        """
+        cache = up_axis.to_up_axis(vertex_order.reorder(self, order), up)
+        limit = None if max_error is None else _meters(max_error, "max_error", lambda: bounds.diagonal(cache))
+        cache_file.save(cache, os.fspath(path), WriteOptions(limit, quantize, layout, preset, depth, rest))
+
+
+def optimize(
+    asset: AssetLike,
+    *,
+    max_error: Length = "0.01%",
+    clips: str | Sequence[str] | None = None,
+    max_angle: str | float | None = None,
+    max_speed_error: Length | None = None,
+    keep_nodes: Sequence[str] = (),
+    drop: str = "unused",
+    rebase_rest: bool = False,
+    meshopt: str | None = None,
+    effort: str = "balanced",
+    workers: int = 1,
+    progress: Callable[[float], None] = lambda _: None,
+) -> OptimizeResult:
+    """Return the asset with its animations in fewer bytes, no vertex farther off than `max_error` at any time.
+
+    max_error: "0.5mm", "0.01%", or metres; 0 loses nothing. clips: globs, all by default.
+    max_angle: of any node's own rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
+    keep_nodes: globs for nodes whose motion stays exact. drop: "rest", "unused" or "never", channels at rest that go.
+    meshopt: "ext" or "khr" to compress the numbers. effort: "fast", "balanced" or "max".
+    workers: processes; a script that asks for more than one needs `if __name__ == "__main__":`.
+    The asset itself comes back where nothing gets smaller.
+    optimize("walk.glb", max_error="0.5mm").save("small.glb")
+    """
+    asset = as_asset(asset)
+    scale = diagonal(asset.scene)
+
+    def length(value: Length, name: str) -> float:
+        return _meters(value, name, lambda: scale, at_least=0.0)
+
+    limits = Bounds(
+        length(max_error, "max_error"),
+        length(SHELL, "shell"),
+        MAX_POINTER_ERROR,
+        units.parse_angle(max_angle, "max_angle") if isinstance(max_angle, str) else max_angle,
+        None if max_speed_error is None else length(max_speed_error, "max_speed_error"),
+    )
+    kept = Selection((), keep_nodes).chosen_nodes(asset.skeleton) if keep_nodes else ()
+    _check_choice("effort", effort, tuple(EFFORTS))
+    _check_choice("drop", drop, tuple(Drop))
+    _check_choice("meshopt", meshopt or "ext", ("ext", "khr"))
+    request = Request(
+        limits,
+        Policy(Drop(drop), rebase_rest=rebase_rest, keep=frozenset(kept)),
+        Packing.CORE if meshopt is None else Packing(meshopt),
+        effort=effort,
+        given=(str(max_error), str(max_angle), str(max_speed_error)),
+    )
+    globs = [clips] if isinstance(clips, str) else list(clips or ())
+    found = search.optimize(
+        asset.document,
+        asset.scene,
+        tuple(asset.clips),
+        request,
+        chosen=match_names(globs, asset.clips.names, "clip"),
+        workers=workers,
+        progress=progress,
+    )
+    return _optimized(asset, found, limits)
+
+
+def bake(
+    asset: AssetLike,
+    clip: ClipKey = 0,
+    *,
+    method: str = "lbs",
+    fps: float | None = None,
+    times: ArrayLike | None = None,
+    blend: float | None = None,
+    bulge_clamp: bool = False,
+    space: str = "world",
+    normals: bool = False,
+    tangents: bool = False,
+    rigid: bool = False,
+    meshes: Sequence[str] = (),
+) -> BakedCache:
+    """Return where every vertex is at every frame while a clip plays, skinned by a method of choice.
+
+    method: "lbs", "dqs", "cor", …, a name in `anim.SKINNING_METHODS`. fps: frames per second; or times, in seconds;
+    without both a frame per key. space: "world" or "mesh". normals, tangents: bake those too.
+    rigid: meshes that only nodes move, too. meshes: globs for names of meshes; all by default.
+    bake("walk.glb", "walk", method="dqs", fps=24).save("walk.usdc")
+    """
+    asset = as_asset(asset)
+    scene = asset.scene if not (normals or tangents) else reader.scene(asset.document, normals=True, tangents=tangents)
+    names = [each.mesh.name or f"#{i}" for i, each in enumerate(scene.instances)]
+    nodes = [scene.instances[i].node for i in match_names(list(meshes), names, "mesh")] if meshes else None
+    playing = _clip(asset, clip)
+    cache = skinning.bake(
+        scene,
+        playing,
+        times=_times(playing, fps, times),
+        method=method,
+        blend=blend,
+        bulge_clamp=bulge_clamp,
+        space=space,
+        normals=normals or tangents,
+        tangents=tangents,
+        rigid=rigid,
+        nodes=nodes,
+    )
+    return BakedCache(**{each.name: getattr(cache, each.name) for each in fields(cache)})
+
+
+def diff(
+    old: AssetLike,
+    new: AssetLike,
+    *,
+    clips: str | Sequence[str] | None = None,
+    player: str = "spec",
+    fps: float = FPS,
+) -> Diff:
+    """Return how far the motion of two assets is apart, in metres on the surface; worst clip first.
+
+    `max_error` of it is the largest distance of all, infinite where `new` lacks a clip. clips: globs for names in
+    `old`. player: who plays both, or two, "spec,nlerp". fps: of the grid looked at besides all keys.
+    """
+    old, new = as_asset(old), as_asset(new)
+    globs = [clips] if isinstance(clips, str) else list(clips or ())
+    chosen = match_names(globs, old.clips.names, "clip") if globs else None
+    metric = ErrorMetric(old.scene, new.scene)
+    return compare.diff(metric, tuple(old.clips), tuple(new.clips), chosen=chosen, player=player, fps=fps)
+
+
+def sample(asset: AssetLike, clip: ClipKey = 0, *, fps: float | None = None, times: ArrayLike | None = None) -> Floats:
+    """Return the positions of all joints in the world while a clip plays: (F, N, 3) m.
+
+    Columns are the nodes of `asset.skeleton`, in its order. fps: frames per second, from the clip's start to its exact
+    end; or times, in seconds; without both at the clip's own keys. `sample_poses` gives rotations and times too.
+    sample("walk.glb", "walk", fps=30).shape → (31, 22, 3)
+    """
+    return sample_poses(asset, clip, fps=fps, times=times).translation
+
+
+def sample_poses(
+    asset: AssetLike,
+    clip: ClipKey = 0,
+    *,
+    fps: float | None = None,
+    times: ArrayLike | None = None,
+    space: str = "world",
+) -> PoseTable:
+    """Return the transform of every node while a clip plays: times, translation, rotation (x, y, z, w), scale.
+
+    space: "world", then also the matrices as `world`, or "local", in the parent's space. Else as `sample`.
+    """
+    asset = as_asset(asset)
+    playing = _clip(asset, clip)
+    return sample_table(asset.skeleton, playing, _times(playing, fps, times), space=space)
+
+
+def _optimized(asset: Asset, found: search.Optimized, limits: Bounds) -> OptimizeResult:
+    bad = [i for i, each in found.verdicts.items() if not each.holds]
+    if bad:
+        off = found.verdicts[bad[0]].error
+        label = reader.clip_label(asset.clips[bad[0]].name, bad[0])
+        raise AnimError(f"{label}: {off.max_error:g} m at {off.time:g} s (bound {limits.max_error:g} m)")
+    names = asset.clips.names
+    errors = {names[i]: each.error.max_error for i, each in sorted(found.verdicts.items())}
+    smaller = replace(asset, document=found.document)
+    if found.unchanged or _size(smaller) >= _size(asset):
+        return OptimizeResult(asset, 0.0, dict.fromkeys(errors, 0.0))
+    return OptimizeResult(smaller, max(errors.values(), default=0.0), errors)
+
+
+def _size(asset: Asset) -> int:
+    """Bytes as a GLB."""
+    return sum(len(piece) for piece in container.glb(asset.document))
+
+
+def _clip(asset: Asset, key: ClipKey) -> Clip:
+    return key if isinstance(key, Clip) else asset.clips[key]
+
+
+def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
+    if fps is not None and times is not None:
+        raise RangeError("fps and times exclude each other")
+    if times is not None:
+        return np.atleast_1d(np.asarray(times, np.float64))
+    if fps is not None:
+        return frame_times(clip.start, clip.end, fps=fps)
+    return np.unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+
+
+def _meters(value: Length, name: str, scale: Callable[[], float], *, at_least: float | None = None) -> float:
+    if isinstance(value, str):
+        return units.parse_length(value, name, scale)
+    if not np.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
+        raise RangeError(f"{name} is {value} (expected metres above 0, or a length like '0.5mm' or '0.1%')")
+    return float(value)
+
+
+def _check_choice(name: str, value: str, known: Sequence[str]) -> None:
+    if value not in known:
+        raise RangeError(f"{name} is '{value}' (expected {', '.join(known)})")

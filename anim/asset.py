@@ -1,0 +1,183 @@
+"""Asset: a glTF file in memory, with views of what is in it. It never changes: `map_clips` returns another one."""
+
+from __future__ import annotations
+
+import difflib
+import io
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path, PurePath
+from typing import BinaryIO, TypeAlias
+
+import numpy as np
+
+from anim.arrays import Bytes
+from anim.clip_list import Clips
+from anim.errors import AnimError, RangeError, ShapeError
+from anim.files import links
+from anim.gltf.document import Document, json_array
+from anim.gltf.io.source import Source, glb_pieces, open_bytes, open_file, write_file
+from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
+from anim.model import Clip, Scene, Skeleton
+from anim.operations.selection import match_names
+
+PathName: TypeAlias = str | os.PathLike[str]
+RawBytes: TypeAlias = bytes | bytearray | memoryview | Bytes
+RAW_BYTES = (bytes, bytearray, memoryview, np.ndarray)
+
+
+@dataclass(frozen=True, eq=False)
+class Asset:
+    """A glTF file: its document as it is written, and views of what is in it, read when they are first asked for.
+
+    document: JSON and buffers. source: the input that it comes from; None where it was made from nothing.
+    """
+
+    document: Document
+    source: Source | None = None
+
+    @cached_property
+    def clips(self) -> Clips:
+        """The animations, by name or index. Raises FormatError with the place of the first fault."""
+        return Clips(reader.clips(self.document))
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """All nodes in their rest pose; a node's index is its place in the file."""
+        return reader.skeleton(self.document)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The skeleton with every mesh on it. Raises UnsupportedError where vertices can't be had."""
+        return reader.scene(self.document)
+
+    @property
+    def name(self) -> str:
+        """What messages call it: the path it was loaded from."""
+        return self.source.name if self.source is not None else "asset"
+
+    def map_clips(self, change: Callable[[Clip], Clip], *, clips: str | Sequence[str] | None = None) -> Asset:
+        """Return the asset with clips replaced by what `change` makes of them; all else stays as it is.
+
+        change: Clip → Clip, such as `lambda clip: anim.ops.resample(clip, fps=30)`. A new name is written too.
+        clips: globs for names, "run*" or several; all by default. Raises NotFoundError where one matches none.
+        """
+        globs = [clips] if isinstance(clips, str) else list(clips or ())
+        new = {}
+        for i in match_names(globs, self.clips.names, "clip"):
+            old = self.clips[i]
+            try:
+                changed = change(old)
+                if not isinstance(changed, Clip):
+                    raise ShapeError(f"change returns {type(changed).__name__} (expected a Clip)")
+            except AnimError as error:
+                raise error.at(reader.clip_label(old.name, i)) from None
+            if changed is not old:
+                new[i] = changed
+        if not new:
+            return self
+        document = writer.replace_clips(self.document, new)
+        return replace(self, document=_rename(document, {i: clip.name for i, clip in new.items()}))
+
+    def save(self, path: PathName | BinaryIO) -> None:
+        """Write the asset, as `anim.save` does."""
+        save(self, path)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(
+            f"{key}={len(json_array(self.document.json, key))}" for key in ("animations", "nodes", "meshes")
+        )
+        is_changed = self.source is not None and self.document is not self.source.document
+        return f"Asset({self.name!r}, {counts}{', changed' if is_changed else ''})"
+
+
+def load(file: PathName | RawBytes | BinaryIO) -> Asset:
+    """Return the glTF asset in a .glb or .gltf file.
+
+    file: a path, the bytes of a file, or a binary file that is open for reading. Buffers beside a .gltf are read where
+    they lie in or below its folder, and only for a path: bytes have no folder.
+    Raises FormatError for what can't be read or is no valid glTF, UnsupportedError for an extension that it requires.
+    load("walk.glb").clips["walk"] → Clip('walk', …)
+    """
+    if isinstance(file, Document | Asset):
+        raise ShapeError(f"file is {type(file).__name__} (expected a path or bytes)", help="it is loaded already")
+    if isinstance(file, str | os.PathLike):
+        path = os.fspath(file)
+        return _named(path, lambda: open_file(path))
+    name = "bytes" if isinstance(file, RAW_BYTES) else str(getattr(file, "name", "file"))
+    data = _bytes_of(file)
+    return _named(name, lambda: open_bytes(data, name))
+
+
+def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
+    """Write an asset: a GLB or, where the path ends in .gltf, text with its .bin beside it.
+
+    path: a name that ends in .glb, .gltf, .vrm or .vrma, or a binary file that is open for writing and gets a GLB.
+    Files take their place whole or not at all; the input may be its own output. An asset that did not change keeps its
+    bytes. In another folder external images are copied beside the output.
+    Raises OutputError where nothing can be written, RangeError for another ending.
+    """
+    asset = Asset(asset) if isinstance(asset, Document) else asset
+    if not isinstance(asset, Asset):
+        raise ShapeError(f"asset is {type(asset).__name__} (expected an Asset)", help="save(result.asset, path)")
+    unchanged = asset.source.bytes_of(asset.document) if asset.source is not None else None
+    if not isinstance(path, str | os.PathLike):
+        for piece in glb_pieces(asset.document, unchanged):
+            path.write(piece.data)
+        return
+    name = os.fspath(path)
+    _check_ending(name)
+    write_file(asset.document, name, asset.source, unchanged=unchanged)
+
+
+def as_asset(value: Asset | Document | PathName) -> Asset:
+    """Return an asset as it is, and one for a document or a path."""
+    if isinstance(value, Asset):
+        return value
+    return Asset(value) if isinstance(value, Document) else load(value)
+
+
+def _named(name: str, read: Callable[[], Source]) -> Asset:
+    try:
+        source = read()
+    except AnimError as error:
+        raise error.at(name, ": ") from None
+    return Asset(source.document, source)
+
+
+def _bytes_of(file: RawBytes | BinaryIO) -> Bytes:
+    if not isinstance(file, RAW_BYTES) and not hasattr(file, "read"):
+        raise ShapeError(f"file is {type(file).__name__} (expected a path, bytes or a binary file)")
+    if isinstance(file, io.TextIOBase):
+        raise ShapeError("file is open for text (expected a binary file)", help='open it with "rb"')
+    data: object = file if isinstance(file, RAW_BYTES) else file.read()
+    if isinstance(data, np.ndarray):
+        return data
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise ShapeError(f"file gives {type(data).__name__} (expected bytes)")
+    return np.frombuffer(data, np.uint8)
+
+
+def _check_ending(path: str) -> None:
+    ending = PurePath(path).suffix.lower()
+    target = links.resolve_links(Path(path))
+    if ending in GLTF_SUFFIXES or (target.exists() and not target.is_file() and not target.is_dir()):  # /dev/null
+        return
+    near = difflib.get_close_matches(ending, GLTF_SUFFIXES, n=1)
+    expected = ", ".join(GLTF_SUFFIXES)
+    raise RangeError(
+        f"{path}: '{ending}' is no ending of a glTF file (expected {expected})",
+        help=f"did you mean {PurePath(path).with_suffix(near[0])}?" if near else "bakes and caches have their own save",
+    )
+
+
+def _rename(document: Document, names: dict[int, str]) -> Document:
+    animations = list(json_array(document.json, "animations"))
+    for i, name in names.items():
+        if animations[i].get("name", "") != name:
+            animations[i] = {**animations[i], "name": name}
+    return replace(document, json={**document.json, "animations": animations})

@@ -1,0 +1,40 @@
+"""A vertex cache written to a path, in the format that its ending names."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+from anim.caches.options import WriteOptions, WriteResult
+from anim.caches.registry import CACHE_FORMATS, writer_for
+from anim.caches.storage import suffix
+from anim.errors import RangeError, not_written
+from anim.files import links
+from anim.files.atomic import AtomicOutputs
+from anim.model import VertexCache
+
+DEFAULTS = WriteOptions()
+
+
+def save(cache: VertexCache, path: str, options: WriteOptions = DEFAULTS) -> WriteResult:
+    """Write a cache, and what goes beside it, whole or not at all.
+
+    Raises UnsupportedError for an ending that no format has, RangeError for options that mean nothing to it,
+    OutputError where nothing can be written.
+    """
+    ending = suffix(path)
+    write = writer_for(ending)
+    takes = CACHE_FORMATS[ending].takes
+    for each in fields(options):
+        if each.name not in takes and getattr(options, each.name) != getattr(DEFAULTS, each.name):
+            raise RangeError(f"{each.name} means nothing to {ending}")
+    place = links.resolve_links(Path(path))
+    staged = AtomicOutputs(place.parent, place.name)
+    try:
+        written = write(cache, staged, options)
+        staged.commit()
+    except OSError as error:
+        raise not_written(path, error) from None
+    finally:
+        staged.clear()
+    return written

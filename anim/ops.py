@@ -1,0 +1,43 @@
+"""Operations: Clip → Clip, one verb each. What a clip has beside the change stays, and the clip given is not touched.
+
+    from anim import ops
+    asset.map_clips(lambda clip: ops.resample(clip, fps=30))
+    asset.map_clips(lambda clip: ops.ease(ops.trim(clip, start=0.5, rebase=True), easing="smoothstep"))
+
+All take `tracks`, the indices of the tracks to change; all by default. `select_tracks` gives those of some nodes.
+
+    resample            keys at a frame rate
+    ease, warp          another tempo between keys, or over a range; easings by name: anim.EASINGS, "cubic-bezier(…)"
+    retime              speed, duration, reverse, ping-pong, offset
+    trim                a part, with exact ends
+    loop                bend the end so that it meets the start
+    append_first_frame  a loop that lacks its last frame
+    spline              smooth curves through the keys; rules by name: anim.TANGENTS, "tcb(0, 0, 0.5)"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from anim.model import Clip, Skeleton
+from anim.operations.ease import ease
+from anim.operations.loop import append_first_frame, loop
+from anim.operations.resample import resample
+from anim.operations.retime import retime
+from anim.operations.selection import Selection
+from anim.operations.spline import spline
+from anim.operations.time_warp import warp
+from anim.operations.trim import trim
+
+__all__ = ["append_first_frame", "ease", "loop", "resample", "retime", "select_tracks", "spline", "trim", "warp"]
+
+
+def select_tracks(
+    clip: Clip, skeleton: Skeleton, *, nodes: Sequence[str] = (), paths: Sequence[str] = ()
+) -> frozenset[int]:
+    """Return the indices of the tracks of some nodes, by globs, and of some paths: "translation", "rotation", ….
+
+    Raises NotFoundError for a glob that matches no node.
+    ops.resample(clip, fps=30, tracks=ops.select_tracks(clip, skeleton, nodes=["*Hand*"]))
+    """
+    return Selection((), nodes, paths).chosen_tracks(clip, skeleton)

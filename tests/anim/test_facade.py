@@ -1,0 +1,329 @@
+"""`import anim`: what it loads, opens, saves and refuses, against bytes and figures that are not its own."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import json
+import pydoc
+import struct
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import anim
+import fixtures
+from anim import ops
+
+Array = NDArray[np.float64]
+ROOT = Path(__file__).resolve().parents[2]
+MAX_MAP_LINES = 60
+NAMES = [name for name in fixtures.FIXTURES if name in ("biped", "tube", "cubes", "noop")]
+
+
+@pytest.fixture
+def biped(tmp_path: Path) -> Path:
+    path = tmp_path / "biped.glb"
+    path.write_bytes(fixtures.build("biped"))
+    return path
+
+
+# Loading and saving.
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_was_only_loaded_is_saved_with_its_bytes(name: str, tmp_path: Path) -> None:
+    data = fixtures.build(name)
+    (tmp_path / "in.glb").write_bytes(data)
+    anim.save(anim.load(tmp_path / "in.glb"), tmp_path / "out.glb")
+    assert (tmp_path / "out.glb").read_bytes() == data
+
+
+def test_paths_bytes_and_files_load_alike(biped: Path) -> None:
+    data = biped.read_bytes()
+    for given in (str(biped), data, bytearray(data), memoryview(data), np.frombuffer(data, np.uint8), io.BytesIO(data)):
+        out = io.BytesIO()
+        anim.save(anim.load(given), out)
+        assert out.getvalue() == data
+
+
+def test_a_gltf_gets_its_bin_beside_it_and_loads_from_there(biped: Path, tmp_path: Path) -> None:
+    asset = anim.load(biped)
+    asset.save(tmp_path / "walk.gltf")
+    again = anim.load(tmp_path / "walk.gltf")
+    assert {path.name for path in tmp_path.iterdir()} == {"biped.glb", "walk.gltf", "walk.bin"}
+    assert anim.diff(asset, again).max_error == 0
+    other = tmp_path / "other"
+    other.mkdir()
+    again.save(other / "copy.gltf")
+    assert {path.name for path in other.iterdir()} == {"copy.gltf", "copy.bin"}
+
+
+@pytest.mark.parametrize("address", ["../secret.bin", "/etc/hostname", "link.bin", "%2e%2e/secret.bin"])
+def test_buffers_stay_in_the_folder_of_a_gltf(address: str, biped: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    anim.load(biped).save(folder / "walk.gltf")
+    (folder / "walk.bin").rename(tmp_path / "secret.bin")
+    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
+    content = json.loads((folder / "walk.gltf").read_text())
+    content["buffers"][0]["uri"] = address
+    (folder / "walk.gltf").write_text(json.dumps(content))
+    with pytest.raises(anim.FormatError):
+        list(anim.load(folder / "walk.gltf").clips)
+
+
+def test_bytes_have_no_folder(biped: Path, tmp_path: Path) -> None:
+    anim.load(biped).save(tmp_path / "walk.gltf")
+    with pytest.raises(anim.FormatError, match="lies beside"):
+        list(anim.load((tmp_path / "walk.gltf").read_bytes()).clips)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "said"),
+    [
+        (lambda folder: anim.load(folder / "nope.glb"), anim.FormatError, "nope.glb: can't be read"),
+        (lambda folder: anim.load(io.StringIO("{}")), anim.ShapeError, "text"),  # type: ignore[arg-type]
+        (lambda folder: anim.load(5), anim.ShapeError, "int"),  # type: ignore[arg-type]
+        (lambda folder: anim.load(anim.load(folder / "biped.glb")), anim.ShapeError, "Asset"),  # type: ignore[arg-type]
+        (lambda folder: anim.load(folder / "biped.glb").save(folder / "x.gtlf"), anim.RangeError, "gtlf"),
+        (lambda folder: anim.load(folder / "biped.glb").save(folder / "no" / "x.glb"), anim.OutputError, "x.glb"),
+        (lambda folder: anim.save(3, folder / "x.glb"), anim.ShapeError, "int"),  # type: ignore[arg-type]
+    ],
+)
+def test_slips_are_told(wrong: Callable[[Path], object], error: type[anim.AnimError], said: str, biped: Path) -> None:
+    with pytest.raises(error, match=said):
+        wrong(biped.parent)
+
+
+# Clips.
+
+
+def test_clips_are_taken_by_name_and_index(biped: Path) -> None:
+    clips = anim.load(biped).clips
+    assert clips.names == ("walk", "wave", "jump")
+    assert clips["wave"] is clips[1] is clips["#1"] is clips[-2]
+    assert clips[:2] == (clips[0], clips[1])
+    assert ("walk" in clips, "run" in clips, len(clips), len(list(clips))) == (True, False, 3, 3)
+    with pytest.raises(anim.NotFoundError) as caught:
+        clips["wlak"]
+    assert caught.value.help == "did you mean 'walk'?"
+    with pytest.raises(anim.NotFoundError, match="walk, wave, jump"):
+        clips[3]
+
+
+def test_a_name_that_stands_twice_is_not_guessed(biped: Path) -> None:
+    asset = anim.load(biped).map_clips(lambda clip: replace(clip, name="same"), clips="w*")
+    assert asset.clips.names == ("same", "same", "jump")
+    with pytest.raises(anim.NotFoundError) as caught:
+        asset.clips["same"]
+    assert "[0, 1]" in caught.value.help
+
+
+def test_map_clips_changes_the_chosen_and_leaves_the_asset(biped: Path) -> None:
+    asset = anim.load(biped)
+    before = json.dumps(asset.document.json)
+    slow = asset.map_clips(lambda clip: ops.retime(clip, speed=0.5), clips="wa*")
+    assert [clip.end for clip in slow.clips] == [2 * asset.clips[0].end, 2 * asset.clips[1].end, asset.clips[2].end]
+    assert json.dumps(asset.document.json) == before
+    assert asset.map_clips(lambda clip: clip) is asset
+    with pytest.raises(anim.ShapeError, match="'walk': change returns int"):
+        asset.map_clips(lambda clip: 3)  # type: ignore[arg-type, return-value]
+
+
+def test_operations_take_easings_and_tangents_by_name(biped: Path) -> None:
+    clip = anim.load(biped).clips["walk"]
+    assert ops.ease(clip, easing="quad-in").tracks[0].interpolation == "CUBICSPLINE"
+    assert ops.spline(clip, tangents="natural").tracks[0].interpolation == "CUBICSPLINE"
+    assert ops.warp(clip, easing="sine-in-out").end == clip.end
+    with pytest.raises(anim.RangeError, match="smothstep"):
+        ops.ease(clip, easing="smothstep")
+
+
+def test_tracks_are_selected_by_node_and_path(biped: Path) -> None:
+    asset = anim.load(biped)
+    clip = asset.clips["walk"]
+    chosen = ops.select_tracks(clip, asset.skeleton, nodes=["hips"], paths=["rotation"])
+    assert [(clip.tracks[i].node, clip.tracks[i].path) for i in chosen] == [(0, "rotation")]
+    changed = ops.resample(clip, fps=7, tracks=chosen)
+    assert [i for i, (a, b) in enumerate(zip(clip.tracks, changed.tracks, strict=True)) if a is not b] == list(chosen)
+
+
+# Figures.
+
+
+def test_positions_are_those_of_forward_kinematics(biped: Path) -> None:
+    content, binary = _glb(biped.read_bytes())
+    found = anim.sample(biped, "walk", fps=30)
+    times = np.append(np.arange(30) / 30, 1.0)
+    assert found.shape == (31, len(content["nodes"]), 3)
+    for frame, time in enumerate(times):
+        np.testing.assert_allclose(found[frame], _positions(content, binary, "walk", time), atol=1e-6)
+
+
+def test_times_may_be_given(biped: Path) -> None:
+    asset = anim.load(biped)
+    moments = [0.25, 0.5]
+    np.testing.assert_allclose(anim.sample(asset, 0, times=moments), anim.sample(asset, "walk", fps=4)[1:3])
+    assert anim.sample(asset, asset.clips["wave"]).shape[0] == len(asset.clips["wave"].tracks[0].times)
+    assert anim.sample_poses(asset, "walk", fps=4, space="local").rotation.shape == (5, 22, 4)
+    with pytest.raises(anim.RangeError, match="exclude"):
+        anim.sample(asset, times=moments, fps=3)
+
+
+def test_an_optimized_asset_keeps_its_bound_and_is_smaller(biped: Path, tmp_path: Path) -> None:
+    result = anim.optimize(biped, max_error="1mm", effort="fast")
+    result.save(tmp_path / "small.glb")
+    assert (tmp_path / "small.glb").stat().st_size < biped.stat().st_size
+    assert list(result.errors) == ["walk", "wave", "jump"]
+    assert 0 < anim.diff(biped, tmp_path / "small.glb").max_error <= 0.001
+    for _ in range(2):  # and a second time: its own room must not take the name
+        assert callable(anim.optimize)
+    with pytest.raises(anim.RangeError, match="bananas"):
+        anim.optimize(biped, max_error="5 bananas")
+
+
+def test_a_missing_clip_is_infinitely_far(biped: Path) -> None:
+    asset = anim.load(biped)
+    one = {**asset.document.json, "animations": asset.document.json["animations"][:1]}
+    assert anim.diff(asset, replace(asset.document, json=one)).max_error == float("inf")
+    assert anim.diff(asset, asset, clips="wave").max_error == 0
+
+
+def test_a_bake_is_saved_by_its_ending(biped: Path, tmp_path: Path) -> None:
+    baked = anim.bake(biped, "walk", method="dqs", fps=4)
+    baked.save(tmp_path / "walk.npz")
+    with np.load(tmp_path / "walk.npz") as saved:
+        assert max(saved[name].shape[0] for name in saved.files if saved[name].ndim == 3) == 5
+    baked.save(tmp_path / "walk.pc2", up="z", order="blender")
+    assert (tmp_path / "walk.pc2-rest.ply").is_file()
+    with pytest.raises(anim.UnsupportedError, match="xyz"):
+        baked.save(tmp_path / "walk.xyz")
+    with pytest.raises(anim.RangeError, match="preset"):
+        baked.save(tmp_path / "walk.npz", preset="godot")
+    with pytest.raises(anim.OutputError):
+        baked.save(tmp_path / "no" / "walk.npz")
+    assert {path.name for path in tmp_path.iterdir()} == {"biped.glb", "walk.npz", "walk.pc2", "walk.pc2-rest.ply"}
+
+
+# The package.
+
+
+def test_import_loads_nothing_until_it_is_used() -> None:
+    script = "import anim, sys; dir(anim); print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert {name for name in loaded if name.startswith("anim")} == {"anim"}
+    assert not loaded & {"numpy", "scipy", "typer", "cli", "asyncio", "inspect"}
+
+
+def test_every_name_is_there_and_on_the_map() -> None:
+    text = inspect.getdoc(anim) or ""
+    assert len(text.splitlines()) <= MAX_MAP_LINES
+    for name in anim.__all__:
+        assert getattr(anim, name) is not None
+        assert name in text or name in ("BakedCache", "OptimizeResult", "Interpolation")
+    assert set(anim.__all__) <= set(dir(anim))
+    assert "anim.load(" in pydoc.plain(pydoc.render_doc(anim))
+    with pytest.raises(AttributeError, match="'lode'"):
+        anim.lode  # noqa: B018
+
+
+def test_the_hints_for_type_checkers_name_the_same() -> None:
+    lines = [line.split() for line in inspect.getsource(anim).splitlines() if line.startswith("    from anim")]
+    assert {line[-1]: line[1] for line in lines if line[-1] != "ops"} == anim._HOMES
+    assert (ROOT / "anim" / "py.typed").is_file()
+
+
+def test_functions_keep_their_names_when_rooms_are_imported() -> None:
+    """A room of the same name would take the place of a function when it is first imported."""
+    rooms = {path.name for path in (ROOT / "anim").iterdir() if path.is_dir()}
+    assert not rooms & set(anim.__all__)
+    assert {path.stem for path in (ROOT / "anim").glob("*.py")} & set(anim.__all__) == {"ops"}
+
+
+def test_the_module_runs_the_command() -> None:
+    run = subprocess.run([sys.executable, "-m", "anim", "--version"], cwd=ROOT, capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert anim.__version__ in run.stdout
+
+
+# Forward kinematics of a GLB, as the specification says it, from its bytes.
+
+
+def _glb(data: bytes) -> tuple[dict[str, Any], bytes]:
+    size = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def _accessor(content: dict[str, Any], binary: bytes, index: int) -> Array:
+    about = content["accessors"][index]
+    view = content["bufferViews"][about["bufferView"]]
+    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[about["type"]]
+    assert about["componentType"] == 5126
+    assert "byteStride" not in view
+    start = view.get("byteOffset", 0) + about.get("byteOffset", 0)
+    numbers = np.frombuffer(binary, "<f4", about["count"] * width, start)
+    return numbers.reshape(-1, width).astype(float)
+
+
+def _positions(content: dict[str, Any], binary: bytes, name: str, time: float) -> Array:
+    nodes = [dict(node) for node in content["nodes"]]
+    animation = next(each for each in content["animations"] if each["name"] == name)
+    for channel in animation["channels"]:
+        sampler = animation["samplers"][channel["sampler"]]
+        assert sampler.get("interpolation", "LINEAR") == "LINEAR"
+        times = _accessor(content, binary, sampler["input"])[:, 0]
+        values = _accessor(content, binary, sampler["output"])
+        k = int(np.clip(np.searchsorted(times, time, "right") - 1, 0, max(len(times) - 2, 0)))
+        after = min(k + 1, len(times) - 1)
+        u = float(np.clip((time - times[k]) / (times[after] - times[k]), 0, 1)) if after > k else 0.0
+        mix = _slerp if channel["target"]["path"] == "rotation" else _lerp
+        nodes[channel["target"]["node"]][channel["target"]["path"]] = mix(values[k], values[after], u)
+    world: dict[int, Array] = {}
+    parents = {child: i for i, node in enumerate(nodes) for child in node.get("children", ())}
+
+    def matrix(i: int) -> Array:
+        if i not in world:
+            local = _matrix(nodes[i])
+            world[i] = matrix(parents[i]) @ local if i in parents else local
+        return world[i]
+
+    return np.array([matrix(i)[:3, 3] for i in range(len(nodes))])
+
+
+def _lerp(a: Array, b: Array, u: float) -> Array:
+    return a + (b - a) * u
+
+
+def _slerp(a: Array, b: Array, u: float) -> Array:
+    b = b if a @ b >= 0 else -b
+    angle = np.arccos(min(float(a @ b), 1.0))
+    if angle < 1e-7:
+        return _lerp(a, b, u)
+    mixed: Array = (np.sin((1 - u) * angle) * a + np.sin(u * angle) * b) / np.sin(angle)
+    return mixed
+
+
+def _matrix(node: dict[str, Any]) -> Array:
+    if "matrix" in node:
+        return np.array(node["matrix"], float).reshape(4, 4).T
+    x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), float) / np.linalg.norm(
+        node.get("rotation", (0, 0, 0, 1))
+    )
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    found = np.eye(4)
+    found[:3, :3] = np.array(rows) * np.array(node.get("scale", (1, 1, 1)), float)
+    found[:3, 3] = node.get("translation", (0, 0, 0))
+    return found
