@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from anim import __version__
-from cli.typer_options import quicken
+from cli.typer_options import Command, Parsing, set_parsers
 
 PROGRAM = "gltf-anim"
 
@@ -170,7 +170,7 @@ COMMANDS = {
 }
 
 
-class LazyGroup(TyperGroup):
+class LazyGroup(Parsing, TyperGroup):
     """A group whose commands live in `cli.commands`, one module each, imported on use only."""
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -186,8 +186,8 @@ class LazyGroup(TyperGroup):
         function = importlib.import_module(f"cli.commands.{name}").command
         single = typer.Typer(add_completion=False, rich_markup_mode=None)
         examples = "\n".join(f"  {example}" for example in row.examples)
-        single.command(cmd_name, epilog=f"\b\nExamples:\n{examples}", no_args_is_help=False)(function)
-        return quicken(typer.main.get_command(single))
+        single.command(cmd_name, cls=Command, epilog=f"\b\nExamples:\n{examples}")(set_parsers(function))
+        return typer.main.get_command(single)
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
         """Return the commands and options that begin so; the words beside a command are the table's, none imported."""
@@ -255,7 +255,7 @@ def run(args: list[str]) -> int:
     """Run one command line and return its exit code; whatever goes wrong is said on stderr."""
     from cli import errors
 
-    command = quicken(typer.main.get_command(app))
+    command = typer.main.get_command(app)
     return errors.run_guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False), args)
 
 

@@ -1,74 +1,58 @@
-"""Option values without pydantic: typer loads it for the first value of any command, which doubles our start-up.
-
-The values that our commands take are strings, numbers, choices and lists of them; those are converted here, with
-messages in our own words. A parameter of any other type is left to typer.
-"""
+"""Values of options and arguments, refused in our words: parsers and metavars for typer, set by an option's type."""
 
 from __future__ import annotations
 
 import difflib
 import math
-import types
 import typing
+from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
 import typer
 from typer import TyperException
+from typer.core import TyperCommand
+from typer.models import ArgumentInfo, OptionInfo
 
 from anim.errors import not_written
 
+METAVARS = {str: "TEXT", int: "N", float: "N"}
 
-class Plain:
-    """Converts the value of one parameter: what typer asks of its own converters."""
 
-    def __init__(self, kind: type, *, many: bool, limits: tuple[float | None, float | None] = (None, None)) -> None:
-        self._kind = kind
-        self._many = many
-        self._least, self._most = limits
+class Parsing:
+    """What our group and our commands have in common: whole help pages, and errors that know their command."""
 
-    def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Return `value` as the parameter's type, a list where it may be repeated; None stays None."""
-        if value is None or (self._many and not value):
-            return [] if self._many and param.required else None
-        if self._many:
-            return [self._one(each, param, ctx) for each in value]
-        return self._one(value, param, ctx)
+    def get_help_option(self, ctx: Any) -> Any:
+        """Return the option --help, its page written whole, or with one line that says why not."""
+        option = super().get_help_option(ctx)  # type: ignore[misc]
+        if option is not None:
+            option.callback = _show_help
+        return option
 
-    def _one(self, value: Any, param: Any, ctx: Any) -> Any:
-        if isinstance(value, self._kind):
-            return value
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words behind the command's name."""
         try:
-            converted = self._kind(value)
-        except ValueError:
-            raise typer.BadParameter(_refusal(value, self._kind), ctx=ctx, param=param) from None
-        if isinstance(converted, float) and not math.isfinite(converted):
-            raise typer.BadParameter(f"'{value}' is no finite number", ctx=ctx, param=param)
-        if self._least is not None and converted < self._least:
-            raise typer.BadParameter(f"{value} is too small (expected at least {self._least:g})", ctx=ctx, param=param)
-        if self._most is not None and converted > self._most:
-            raise typer.BadParameter(f"{value} is too large (expected at most {self._most:g})", ctx=ctx, param=param)
-        return converted
+            parsed: list[str] = super().parse_args(ctx, args)  # type: ignore[misc]
+        except TyperException as error:
+            if getattr(error, "ctx", None) is None:
+                error.ctx = ctx  # type: ignore[attr-defined]
+            raise
+        except OSError as error:  # of typer's own --show-completion and --install-completion
+            raise not_written(error.filename or "stdout", error) from None
+        return parsed
 
 
-def quicken(command: Any) -> Any:
-    """Return the command, its parameters of plain types, and its --help, made to convert themselves.
+class Command(Parsing, TyperCommand):
+    """A command whose help shows arguments without a type."""
 
-    What --help says of their types is made plain too, and every refusal knows which command it is about.
-    """
-    for param in command.params:
-        _quickened(param)
-    help_option, parse = command.get_help_option, command.parse_args
-    command.get_help_option = lambda ctx: _with_our_stdout(_quickened(help_option(ctx)))
-    command.parse_args = lambda ctx, args: _parsed(parse, ctx, args)
-    return command
-
-
-def _with_our_stdout(help_option: Any) -> Any:
-    """The option --help, its page written as every other product is: whole, or one line that says why not."""
-    if help_option is not None:
-        help_option.callback = _show_help
-    return help_option
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the tables of arguments and options."""
+        for heading, kind in (("Arguments", "argument"), ("Options", "option")):
+            rows = [(each, each.get_help_record(ctx)) for each in self.get_params(ctx) if each.param_type_name == kind]
+            shown = [(each.metavar if kind == "argument" else row[0], row[1]) for each, row in rows if row]
+            if shown:
+                with formatter.section(heading):
+                    formatter.write_dl(shown)
 
 
 def _show_help(ctx: Any, param: Any, wanted: bool) -> None:
@@ -79,53 +63,53 @@ def _show_help(ctx: Any, param: Any, wanted: bool) -> None:
         ctx.exit()
 
 
-def _parsed(parse: Any, ctx: Any, args: list[str]) -> Any:
-    try:
-        return parse(ctx, args)
-    except TyperException as error:
-        if getattr(error, "ctx", None) is None:
-            error.ctx = ctx  # type: ignore[attr-defined]
-        raise
-    except OSError as error:  # of typer's own --show-completion and --install-completion
-        raise not_written(error.filename or "stdout", error) from None
+def set_parsers(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give every option of a command that is text, a number or a choice its parser, and a metavar if it has none."""
+    function.__annotations__ = typing.get_type_hints(function, include_extras=True)
+    for hint in function.__annotations__.values():
+        kind, *extras = typing.get_args(hint) or (hint,)
+        for info in extras:
+            if isinstance(info, OptionInfo | ArgumentInfo):
+                _set_parser(info, _value_type(kind))
+    return function
 
 
-def _quickened(param: Any) -> Any:
-    descriptor = getattr(param, "type_descriptor", None)
-    plain = _plain(descriptor) if descriptor is not None else None
-    if plain is None:
-        return param
-    shown = param.display_type_rich
-    is_argument = param.param_type_name == "argument"
-    param.get_runtime_param = lambda: plain
-    param.display_type_rich = lambda ctx: "" if is_argument else _type_shown(shown(ctx))
-    return param
-
-
-def _type_shown(words: str) -> str:
-    """What --help calls a type: "<list[a|b]>" → "<a|b>", "<float>" → "N"."""
-    plain = words.replace("list[", "").replace("]", "")
-    return {"<str>": "TEXT", "<int>": "N", "<float>": "N"}.get(plain, plain)
-
-
-def _plain(descriptor: Any) -> Plain | None:
-    annotation, about = descriptor.annotation, descriptor.parameter_info
-    kinds = [annotation]
-    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
-        kinds = [kind for kind in typing.get_args(annotation) if kind is not type(None)]
-    if len(kinds) != 1:
-        return None
-    kind, many = kinds[0], False
-    if typing.get_origin(kind) is list:
-        kind, many = typing.get_args(kind)[0], True
-    known = isinstance(kind, type) and (kind in (str, int, float, bool) or issubclass(kind, Enum))
-    return Plain(kind, many=many, limits=(about.min, about.max)) if known and not about.clamp else None
-
-
-def _refusal(value: str, kind: type) -> str:
+def _set_parser(info: OptionInfo | ArgumentInfo, kind: Any) -> None:
     if issubclass(kind, Enum):
-        choices = [str(member.value) for member in kind]
+        choices = {str(member.value): member for member in kind}
+        info.parser = lambda value: _choice(value, choices)
+        info.metavar = info.metavar or f"<{'|'.join(choices)}>"
+    elif kind in METAVARS:
+        if kind is not str:
+            info.parser = lambda value: _number(value, kind, info.min, info.max)
+        info.metavar = info.metavar or METAVARS[kind]
+
+
+def _value_type(hint: Any) -> Any:
+    """The type of one value: `float` of `float | None`, `str` of `list[str] | None`."""
+    kinds = [each for each in typing.get_args(hint) if each is not type(None)]
+    return _value_type(kinds[0]) if kinds else hint
+
+
+def _choice(value: Any, choices: dict[str, Enum]) -> Enum:
+    if isinstance(value, Enum):  # a default
+        return value
+    if value not in choices:
         near = difflib.get_close_matches(value, choices, n=1)
         hint = f" Did you mean '{near[0]}'?" if near else ""
-        return f"'{value}' is none of {', '.join(choices)}.{hint}"
-    return f"'{value}' is no {'whole number' if kind is int else 'number'}"
+        raise typer.BadParameter(f"'{value}' is none of {', '.join(choices)}.{hint}")
+    return choices[value]
+
+
+def _number(value: Any, kind: type, low: float | None, high: float | None) -> float:
+    try:
+        number: float = kind(value)
+    except ValueError:
+        raise typer.BadParameter(f"'{value}' is no {'whole number' if kind is int else 'number'}") from None
+    if not math.isfinite(number):
+        raise typer.BadParameter(f"'{value}' is no finite number")
+    if low is not None and number < low:
+        raise typer.BadParameter(f"{value} is too small (expected at least {low:g})")
+    if high is not None and number > high:
+        raise typer.BadParameter(f"{value} is too large (expected at most {high:g})")
+    return number

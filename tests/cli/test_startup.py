@@ -21,8 +21,6 @@ sys.stdout.flush()
 print(json.dumps([code, sorted(sys.modules)]), file=sys.stderr)
 """
 NEVER = {
-    "pydantic",
-    "pydantic_core",
     "rich",
     "trimesh",
     "pygltflib",
