@@ -32,7 +32,6 @@ class CacheFormat:
     """One format. about: for --help. takes: the fields of Reading and Writing that mean something to it.
 
     holds: "normals" and "tangents", where there is a place for them beside positions. files: which ones a cache is.
-    library: the module of others that reads and writes it, "" for none.
     """
 
     about: str
@@ -41,7 +40,6 @@ class CacheFormat:
     takes: frozenset[str] = frozenset()
     holds: frozenset[str] = frozenset()
     files: Files = Files.ONE
-    library: str = ""
 
 
 NORMALS = frozenset(("normals",))
@@ -51,18 +49,16 @@ RATE = frozenset(("read_fps",))
 
 def _frames(ending: str, about: str, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
     read, write = partial(mesh_sequence.read, ending=ending), partial(mesh_sequence.write, ending=ending)
-    return CacheFormat(about, read, write, RATE, holds, Files.FRAMES, "trimesh")
+    return CacheFormat(about, read, write, RATE, holds, Files.FRAMES)
 
 
 def _usd(ending: str, about: str) -> CacheFormat:
-    return CacheFormat(
-        about, usd_reader.read, partial(usd_writer.write, ending=ending), RATE, BOTH, library="pxr.UsdGeom"
-    )
+    return CacheFormat(about, usd_reader.read, partial(usd_writer.write, ending=ending), RATE, BOTH)
 
 
-def _texture(ending: str, about: str, *takes: str, library: str = "") -> CacheFormat:
+def _texture(ending: str, about: str, *takes: str) -> CacheFormat:
     write = partial(writer.write, ending=ending)
-    return CacheFormat(about, reader.read, write, frozenset(takes), NORMALS, Files.SEVERAL, library)
+    return CacheFormat(about, reader.read, write, frozenset(takes), NORMALS, Files.SEVERAL)
 
 
 CACHE_FORMATS: dict[str, CacheFormat] = {
@@ -78,7 +74,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         frozenset(("read_fps", "max_error", "quantize", "layout")),
         BOTH,
     ),
-    ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", "preset", "depth", library="OpenEXR"),
+    ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", "preset", "depth"),
     ".png": _texture(".png", "vertex animation texture, 16 bit", "preset"),
     ".ply": _frames(".ply", "a mesh a frame"),
     ".obj": _frames(".obj", "a mesh a frame, as text"),

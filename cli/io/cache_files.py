@@ -15,7 +15,6 @@ from anim.caches.sniffing import sniff_format
 from anim.caches.storage import suffix
 from anim.errors import AnimError, FormatError, OutputError, not_written
 from anim.model import VertexCache
-from cli import loading
 from cli.errors import UsageError
 from cli.io import cache_folders, documents
 from cli.reports import cache_notes
@@ -61,7 +60,6 @@ def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
             if path == documents.PIPE:
                 check_pipe(name, ending)
             read = registry.reader_for(ending)
-            loading.load(CACHE_FORMATS[ending].library)
             cache = read(inputs, replace(reading, note=notes.append))
             yield LoadedCache(cache, name, ending, tuple(notes), inputs)
         except (UsageError, OutputError):
@@ -109,8 +107,6 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
             f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
             help="convert-cache --at takes one of them",
         )
-    has_rest = writing.rest and "rest" in CACHE_FORMATS[ending].takes
-    loading.load("trimesh" if has_rest else CACHE_FORMATS[ending].library)
     with tempfile.TemporaryDirectory() as away:
         staged = cache_folders.outputs(path, away, dry_run=dry_run)
         try:
