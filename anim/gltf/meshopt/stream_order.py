@@ -13,11 +13,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.gltf.meshopt import codec
 
-SEED = 2026
 STARTS = 8  # contents that a chain is begun with, in turn
 COMPARED = 500_000  # pairs of contents for all of these chains together, but for the first
-TRIES = 1500  # of moving a content elsewhere
-ENCODED = 20_000_000  # bytes for all of these tries together
 # Of a byte that differs by 0, ±1, … from the one before: about the bytes that it takes (none, 2 bits, 4 bits, a byte).
 PRICES = np.select([np.arange(256) == 0, np.arange(256) < 3, np.arange(256) < 15], [0.0, 0.3, 0.8], 1.3)
 
@@ -31,8 +28,7 @@ def ordered(codes: Sequence[bytes], stride: int, extension: str) -> list[int]:
     count = len(codes)
     starts = range(min(count, max(1, min(STARTS, COMPARED // count**2))))
     orders = [list(range(count)), *(stream.chained(start) for start in starts)]
-    best = min(orders, key=stream.size)
-    return stream.improved(best) if count > 2 else best
+    return min(orders, key=stream.size)
 
 
 class _Stream:
@@ -56,20 +52,6 @@ class _Stream:
         while len(left) > 1:
             left = left[left != order[-1]]
             order.append(int(left[_apart(firsts[left], lasts[order[-1]]).argmin()]))
-        return order
-
-    def improved(self, order: list[int]) -> list[int]:
-        """Return an order that takes no more bytes, found by moving contents at random; always the same numbers."""
-        count = len(order)
-        tries = min(TRIES, ENCODED // sum(rows.size for rows in self._rows))
-        chance = np.random.default_rng(SEED)
-        least = self.size(order)
-        for a, b in chance.integers(0, count, (tries, 2)).tolist():
-            moved = order[:a] + order[a + 1 :]
-            moved.insert(b, order[a])
-            size = self.size(moved)
-            if size <= least:
-                least, order = size, moved
         return order
 
 

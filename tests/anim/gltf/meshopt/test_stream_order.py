@@ -32,7 +32,7 @@ def test_neighbors_are_alike(extension: str) -> None:
     assert sorted(order) == list(range(24))
     changes = sum(a % 2 != b % 2 for a, b in pairwise(order))
     assert changes == 1
-    assert _size(codes, order, extension) < 0.85 * _size(codes, list(range(24)), extension)
+    assert _size(codes, order, extension) < 0.87 * _size(codes, list(range(24)), extension)
     assert stream_order.ordered(codes, 8, extension) == order
 
 
