@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.gltf import overlap
 from anim.gltf.document import Json
 from anim.gltf.io import json_text
 from anim.gltf.meshopt import codec, stream_order
@@ -62,11 +61,9 @@ def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, ov
 
     overhead: bytes that the first compressed view costs beside its own JSON and data.
     """
-    aliases = overlap.inside(contents)
-    own = [i for i in range(len(contents)) if i not in aliases]
-    streams = _worth_sharing(contents, own, packing, overhead) if packing.extension else []
+    streams = _worth_sharing(contents, packing, overhead) if packing.extension else []
     apart = {i for stream in streams for i in stream.members}
-    rest = tuple(i for i in own if i not in apart)
+    rest = tuple(i for i in range(len(contents)) if i not in apart)
     if rest:
         data = b"".join(_pad_rows(contents[i].data) for i in rest)
         streams = [_Stream(View(data, len(data)), rest), *streams]
@@ -76,19 +73,14 @@ def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, ov
         for i in stream.members:
             places[i] = (number, at)
             at += len(_pad_rows(contents[i].data))
-    for i, (owner, offset) in aliases.items():
-        number, at = places[owner]
-        places[i] = (number, at + offset)
     return Layout(tuple(each.view for each in streams), tuple(places[i] for i in range(len(contents))))
 
 
-def _worth_sharing(
-    contents: Sequence[AccessorData], own: Sequence[int], packing: AccessorStorage, overhead: int
-) -> list[_Stream]:
+def _worth_sharing(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> list[_Stream]:
     """The compressed streams with which all data and JSON take fewest bytes."""
     groups: dict[tuple[str, int], list[int]] = {}
-    for i in own:
-        groups.setdefault(_kind(contents[i]), []).append(i)
+    for i, content in enumerate(contents):
+        groups.setdefault(_kind(content), []).append(i)
     streams = [s for members in groups.values() for s in _streams(contents, members, packing.extension)]
     gains = [stream.view.length - _price(stream.view, packing.extension) for stream in streams]
     good = [stream for stream, gain in zip(streams, gains, strict=True) if gain > 0]
