@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
 from anim.gltf.io import json_text
 
 SCHEMA = "euler-curves/1"
+MULTILINE_LIST = re.compile(rb"\[\n\s*([^][{}]*?)\s*\]")  # of numbers or words
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
@@ -25,7 +27,11 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
         "unit": str(convention.unit),
         "nodes": nodes,
     }
-    return json_text.dump(content, indent=1) + b"\n"
+    return MULTILINE_LIST.sub(_on_one_line, json_text.dump(content, indent=1)) + b"\n"
+
+
+def _on_one_line(found: re.Match[bytes]) -> bytes:
+    return b"[" + b" ".join(found[1].split()) + b"]"
 
 
 def _node_json(node: EulerNode, motion: EulerMotion, convention: Convention) -> dict[str, Any]:

@@ -139,9 +139,12 @@ def test_a_fault_is_told_with_its_place(path: str, value: object, problem: str) 
         _read(_changed(path, value))
 
 
-def test_a_number_beyond_any_float_is_refused() -> None:
-    content = plain_json.dumps(_changed("nodes/0/curves/rotation.x/values", [0, 7.25])).replace("7.25", "1e999")
-    with pytest.raises(FormatError, match=r"values holds a number beyond 1e\+15"):
+@pytest.mark.parametrize(
+    ("number", "problem"), [("1e300", r"values holds a number beyond 1e\+15"), ("1e999", "too large for float64")]
+)
+def test_a_number_beyond_any_use_is_refused(number: str, problem: str) -> None:
+    content = plain_json.dumps(_changed("nodes/0/curves/rotation.x/values", [0, 7.25])).replace("7.25", number)
+    with pytest.raises(FormatError, match=problem):
         json_reader.read(content.encode(), UNSPECIFIED)
 
 

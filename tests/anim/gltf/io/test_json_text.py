@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import json
-import math
-import pickle
+import re
 from typing import Any
 
 import pytest
@@ -29,7 +27,8 @@ def test_layout_by_hand() -> None:
     content = {"a": [1, 2.5], "b": {}, "c": [{"d": "é"}, []], "e": []}
     assert json_text.dump(content) == '{"a":[1,2.5],"b":{},"c":[{"d":"é"},[]],"e":[]}'.encode()
     assert json_text.dump(content, 2).decode() == (
-        '{\n  "a": [1, 2.5],\n  "b": {},\n  "c": [\n    {\n      "d": "é"\n    },\n    []\n  ],\n  "e": []\n}'
+        '{\n  "a": [\n    1,\n    2.5\n  ],\n  "b": {},\n'
+        '  "c": [\n    {\n      "d": "é"\n    },\n    []\n  ],\n  "e": []\n}'
     )
 
 
@@ -56,30 +55,10 @@ def test_a_lone_surrogate_survives_as_an_escape() -> None:
     assert json.loads(json_text.dump(json_text.parse(raw), 2)) == json.loads(raw)
 
 
-BEYOND = '{"a":[1,1e999,-2.5E+400],"é":{"c":-1e309,"d":0.5},"e":[{"f":1E310}]}'
-
-
-def test_numbers_beyond_any_float_stay_as_they_were() -> None:
-    """Readers take them for infinite; what is in extras is not ours to judge."""
-    content = json_text.parse(BEYOND.encode())
-    assert content["a"] == [1, math.inf, -math.inf]
-    assert json_text.dump(content) == BEYOND.encode()
-    laid_out = json_text.dump(content, 2)
-    assert b'  "a": [1, 1e999, -2.5E+400],\n' in laid_out
-    assert b'    "c": -1e309,\n' in laid_out
-    assert json_text.dump(json_text.parse(laid_out)) == BEYOND.encode()
-
-
-def test_numbers_beyond_any_float_beside_a_lone_surrogate() -> None:
-    raw = b'{"name":"\\ud800","extras":[1e999]}'
-    assert json_text.dump(json_text.parse(raw)) == raw
-    assert json_text.dump(json_text.parse(raw), 1) == b'{\n "name": "\\ud800",\n "extras": [1e999]\n}'
-
-
-def test_numbers_beyond_any_float_survive_copies() -> None:
-    content = json_text.parse(b'{"a":1e999}')
-    for copied in (copy.deepcopy(content), pickle.loads(pickle.dumps(content))):
-        assert json_text.dump(copied) == b'{"a":1e999}'
+@pytest.mark.parametrize("literal", ["1e999", "-2.5E+400", "-1e309"])
+def test_numbers_beyond_float64_are_refused(literal: str) -> None:
+    with pytest.raises(FormatError, match=f"JSON holds a number too large for float64 .got {re.escape(literal)}"):
+        json_text.parse(f'{{"extras":[{literal}]}}'.encode())
 
 
 @pytest.mark.parametrize("raw", [b'{"a":NaN}', b'{"a":Infinity}', b'{"a":-Infinity}', b"[1]", b"1", b"null", b"", b"{"])
@@ -90,8 +69,7 @@ def test_what_is_no_json_object_is_refused(raw: bytes) -> None:
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
 def test_what_json_can_not_hold_is_refused(number: float) -> None:
-    """Nor beside one that was read so."""
-    for content in ({"a": number}, {"a": [number]}, {**json_text.parse(b'{"b":1e999}'), "a": number}):
+    for content in ({"a": number}, {"a": [number]}):
         for indent in (None, 2):
             with pytest.raises(FormatError, match="JSON"):
                 json_text.dump(content, indent)
