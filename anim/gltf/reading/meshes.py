@@ -85,7 +85,8 @@ class Meshes:
         about = primitive.get("targets", ())
         targets = self._displacements(about, "POSITION", len(positions))
         faces = self._faces(primitive, len(positions)) if faces is None else faces
-        part = PrimitiveRange(len(positions), len(faces), primitive.get("material", -1))
+        material = primitive.get("material")
+        part = PrimitiveRange(len(positions), len(faces), material if type(material) is int else -1)
         return Mesh(
             "",
             positions,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -113,7 +112,7 @@ def _paint(
 ) -> None:
     """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
     height, width = band.shape[:2]
-    alpha_test = None if surface is None else partial(surface.is_drawn, corners)
+    alpha_test = None if surface is None else surface.alpha_test(corners)
     seen = visible_faces(corners, width=width * SAMPLES, height=height * SAMPLES, alpha_test=alpha_test)
     shape = (height, SAMPLES, width, SAMPLES)
     cover = (seen >= 0).reshape(shape).mean(axis=(1, 3))[..., None]
@@ -209,7 +208,7 @@ def _shadow(stage: SceneView, positions: Floats, faces: Ints, surface: Surface |
     fallen = positions - (above / light[1])[:, None] * light
     fallen[:, 1] = stage.ground
     corners = camera.project(fallen)[faces]
-    alpha_test = None if surface is None else partial(surface.is_drawn, corners)
+    alpha_test = None if surface is None else surface.alpha_test(corners)
     mask = visible_faces(corners, width=camera.width, height=camera.height, alpha_test=alpha_test) >= 0
     return SHADOW_DEPTH * _blur(mask, max(round(SHADOW_BLUR * camera.height), 1))
 

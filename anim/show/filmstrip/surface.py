@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from anim.arrays import AnyArray, Bools, Floats, Ints
+from anim.show.filmstrip.rasterizer import AlphaTest
 from anim.show.filmstrip.surface_pattern import barycentric
 from anim.show.filmstrip.texture import TextureSampler
 
@@ -49,7 +51,12 @@ class Surface:
         """
         return self._rgba(corners, samples, faces)[:, :3]
 
-    def is_drawn(self, corners: Floats, faces: Ints, x: Ints, y: Ints) -> Bools:
+    def alpha_test(self, corners: Floats) -> AlphaTest | None:
+        """Return the test of which faces are drawn where, None for all everywhere. corners: (T, 3, 3) on the screen."""
+        is_opaque = all(each.cutoff == OPAQUE for each in self.coatings)
+        return None if is_opaque else partial(self._is_drawn, corners)
+
+    def _is_drawn(self, corners: Floats, faces: Ints, x: Ints, y: Ints) -> Bools:
         """Return whether faces (S,) are drawn at the samples in columns x and rows y, by their alpha.
 
         corners: (T, 3, 3) of all faces on the screen, in the same unit as x and y.

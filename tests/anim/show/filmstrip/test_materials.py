@@ -369,6 +369,14 @@ def test_primitives_have_materials_of_their_own_and_empty_ones_none() -> None:
     assert seen(document) == ["red", "green", "blue", "yellow"]
 
 
+@pytest.mark.parametrize("number", ["x", None, 1.5, -3, 99])
+def test_a_material_that_is_none_is_not_drawn(number: Any) -> None:
+    document = square()
+    document.json["meshes"][0]["primitives"][0]["material"] = number
+    for textures in (True, False):
+        assert len(set(seen(document, textures=textures))) == 1
+
+
 def test_a_skeleton_on_a_node_with_points_is_drawn_as_sticks() -> None:
     document = square()
     document.json["meshes"][0]["primitives"][0]["mode"] = 0
