@@ -10,8 +10,9 @@ import pytest
 from pygltflib import Animation, AnimationChannel, AnimationChannelTarget, AnimationSampler, Mesh, Node
 
 from anim.arrays import Floats
-from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive
+from anim.caches.formats.gltf_stream import GlbFile, primitive
 from anim.caches.storage import Memory
+from anim.gltf.authoring_parts import VERTICES
 from tests.blender import needs_blender, vertices
 
 pytestmark = [pytest.mark.slow, needs_blender]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-import anim
-from anim.arrays import Floats
+from anim.arrays import AnyArray, Floats
+from anim.gltf.authoring_parts import INDICES, VERTICES, add_accessor, create_document, create_material
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.io import container
 from anim.gltf.writing import writer
@@ -19,12 +19,6 @@ from anim.model import Clip, Mesh, Skeleton, Skin
 if TYPE_CHECKING:
     from pygltflib import GLTF2
 
-GENERATOR = f"gltf-anim {anim.__version__}"
-BYTE, SHORT, INT, FLOAT = 5121, 5123, 5125, 5126
-VERTICES, INDICES = 34962, 34963  # targets of buffer views
-TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-COLOR = (0.8, 0.55, 0.25, 1.0)  # of bodies, linear RGBA
-
 
 def build_document(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[tuple[Mesh, Skin]] = ()) -> Document:
     """Return a new document with the nodes of the skeleton, then a node for each body, and the clips.
@@ -32,11 +26,11 @@ def build_document(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[t
     Node numbers are those of the skeleton, which the clips and skins use. Parts of nodes that are the identity are
     left out. bodies: a mesh and its skin; joints of the mesh are places among the skin's joints.
     """
-    from pygltflib import GLTF2, Asset, Node, Scene
+    from pygltflib import Node
 
-    gltf = GLTF2(asset=Asset(generator=GENERATOR, version="2.0"), scene=0, scenes=[Scene(nodes=[])])
+    gltf = create_document()
     for number, name in enumerate(skeleton.names):
-        gltf.nodes.append(Node(name=name or None, **_place_clips(skeleton, number)))
+        gltf.nodes.append(Node(name=name or None, **_transform_json(skeleton, number)))
     for number, parent in enumerate(skeleton.parents.tolist()):
         (gltf.scenes[0].nodes if parent < 0 else gltf.nodes[parent].children).append(number)
     blob = bytearray()
@@ -58,7 +52,7 @@ def add_clips(document: Document, clips: Sequence[Clip]) -> Document:
     return writer.replace_clips(longer, {len(there) + i: clip for i, clip in enumerate(clips)})
 
 
-def _place_clips(skeleton: Skeleton, number: int) -> dict[str, list[float]]:
+def _transform_json(skeleton: Skeleton, number: int) -> dict[str, list[float]]:
     parts = {
         "translation": (skeleton.translation[number], (0.0, 0.0, 0.0)),
         "rotation": (skeleton.rotation[number], (0.0, 0.0, 0.0, 1.0)),
@@ -72,27 +66,26 @@ def _place_clips(skeleton: Skeleton, number: int) -> dict[str, list[float]]:
 
 
 def _add_body(gltf: GLTF2, blob: bytearray, mesh: Mesh, skin: Skin) -> None:
-    from pygltflib import Attributes, Material, Node, PbrMetallicRoughness, Primitive
+    from pygltflib import Attributes, Node, Primitive
     from pygltflib import Mesh as GltfMesh
     from pygltflib import Skin as GltfSkin
 
     wide = len(skin.joints) > 256
     joints = mesh.joints.astype("<u2" if wide else "<u1")
     attributes = Attributes(
-        POSITION=_add(gltf, blob, mesh.positions.astype("<f4"), FLOAT, VERTICES, bounds=True),
-        JOINTS_0=_add(gltf, blob, joints, SHORT if wide else BYTE, VERTICES),
-        WEIGHTS_0=_add(gltf, blob, mesh.weights.astype("<f4"), FLOAT, VERTICES),
+        POSITION=_add(gltf, blob, mesh.positions.astype("<f4"), VERTICES, bounds=True),
+        JOINTS_0=_add(gltf, blob, joints, VERTICES),
+        WEIGHTS_0=_add(gltf, blob, mesh.weights.astype("<f4"), VERTICES),
     )
     if mesh.normals is not None:
-        attributes.NORMAL = _add(gltf, blob, mesh.normals.astype("<f4"), FLOAT, VERTICES)
+        attributes.NORMAL = _add(gltf, blob, mesh.normals.astype("<f4"), VERTICES)
     large = len(mesh.positions) > 65535
     faces = mesh.faces.reshape(-1, 1).astype("<u4" if large else "<u2")
-    indices = _add(gltf, blob, faces, INT if large else SHORT, INDICES)
-    surface = PbrMetallicRoughness(baseColorFactor=list(COLOR), metallicFactor=0.0, roughnessFactor=0.7)
-    gltf.materials.append(Material(name=mesh.name, pbrMetallicRoughness=surface))
+    indices = _add(gltf, blob, faces, INDICES)
+    gltf.materials.append(create_material(mesh.name))
     primitive = Primitive(attributes=attributes, indices=indices, material=len(gltf.materials) - 1)
     gltf.meshes.append(GltfMesh(name=mesh.name, primitives=[primitive]))
-    bind = _add(gltf, blob, _columns(skin.inverse_bind), FLOAT)
+    bind = _add(gltf, blob, _columns(skin.inverse_bind))
     gltf.skins.append(GltfSkin(name=mesh.name, joints=skin.joints.tolist(), inverseBindMatrices=bind))
     gltf.nodes.append(Node(name=mesh.name, mesh=len(gltf.meshes) - 1, skin=len(gltf.skins) - 1))
     gltf.scenes[0].nodes.append(len(gltf.nodes) - 1)
@@ -105,29 +98,12 @@ def _columns(matrices: Floats) -> NDArray[np.float32]:
     return whole.transpose(0, 2, 1).reshape(-1, 16).astype("<f4")
 
 
-def _add(
-    gltf: GLTF2,
-    blob: bytearray,
-    rows: NDArray[Any],
-    component: int,
-    target: int | None = None,
-    *,
-    bounds: bool = False,
-) -> int:
+def _add(gltf: GLTF2, blob: bytearray, rows: AnyArray, target: int | None = None, *, bounds: bool = False) -> int:
     """Append rows (n, C) to the blob and return the number of their accessor."""
-    from pygltflib import Accessor, BufferView
-
     data = np.ascontiguousarray(rows).tobytes()
-    gltf.bufferViews.append(BufferView(buffer=0, byteOffset=len(blob), byteLength=len(data), target=target))
+    offset = len(blob)
     blob += data + bytes(-len(data) % 4)
-    kind = TYPES[rows.shape[1]]
-    accessor = Accessor(
-        bufferView=len(gltf.bufferViews) - 1, componentType=component, count=len(rows), type=kind, byteOffset=None
-    )
-    if bounds:
-        accessor.min, accessor.max = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
-    gltf.accessors.append(accessor)
-    return len(gltf.accessors) - 1
+    return add_accessor(gltf, rows, offset=offset, length=len(data), target=target, bounds=bounds)
 
 
 def _document(gltf: GLTF2, blob: bytes) -> Document:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
-from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive, signed
+from anim.caches.formats.gltf_stream import GlbFile, primitive, signed
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
+from anim.gltf.authoring_parts import VERTICES
 from anim.model import FrameChunk, VertexCache
 
 NAME = "flipbook"

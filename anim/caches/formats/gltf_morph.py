@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
-from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive, signed
+from anim.caches.formats.gltf_stream import GlbFile, primitive, signed
 from anim.caches.formats.morph_encoding import SHORT, MorphEncoding, encode_morphs
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
@@ -21,6 +21,7 @@ from anim.caches.transforms import bounds
 from anim.caches.transforms.frame_reduction import reduce_frames
 from anim.caches.transforms.pca import fit_basis
 from anim.errors import RangeError, UnsupportedError
+from anim.gltf.authoring_parts import VERTICES
 from anim.model import FrameChunk, VertexCache
 
 DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given

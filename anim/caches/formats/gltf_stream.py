@@ -10,35 +10,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import anim
 from anim.arrays import AnyArray, Floats
 from anim.caches.storage import COPY_BYTES, Outputs
 from anim.errors import UnsupportedError
+from anim.gltf.authoring_parts import INDICES, VERTICES, add_accessor, create_document, create_material
 from anim.gltf.io.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB
 
 if TYPE_CHECKING:
     from pygltflib import GLTF2
-
-GENERATOR = f"gltf-anim {anim.__version__}"
-COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-VERTICES, INDICES = 34962, 34963  # targets of buffer views
-COLOR = (0.8, 0.55, 0.25, 1.0)  # of the body, linear RGBA
 
 
 class GlbFile:
     """What a document needs to become a GLB. gltf: pygltflib's object, to which nodes, meshes and clips are added."""
 
     def __init__(self) -> None:
-        from pygltflib import GLTF2, Asset, Material, PbrMetallicRoughness, Scene
-
-        surface = PbrMetallicRoughness(baseColorFactor=list(COLOR), metallicFactor=0.0, roughnessFactor=0.7)
-        self.gltf: GLTF2 = GLTF2(
-            asset=Asset(generator=GENERATOR, version="2.0"),
-            scene=0,
-            scenes=[Scene(nodes=[])],
-            materials=[Material(pbrMetallicRoughness=surface, doubleSided=True)],
-        )
+        self.gltf: GLTF2 = create_document()
+        self.gltf.materials.append(create_material(double_sided=True))
         self.size = 0
         self._bin = tempfile.TemporaryFile()  # noqa: SIM115  closed by write()
 
@@ -55,10 +42,8 @@ class GlbFile:
 
         width: bytes from vertex to vertex where that is more than the row itself (rows of 3 shorts stand 8 apart).
         """
-        from pygltflib import Accessor, BufferView
-
         rows = np.ascontiguousarray(rows)
-        kind, stride = rows.dtype.str[1:], None
+        stride = None
         row_bytes = rows.shape[1] * rows.dtype.itemsize
         if target == VERTICES and row_bytes % 4:
             stride = row_bytes + -row_bytes % 4
@@ -67,22 +52,19 @@ class GlbFile:
             data = wide.tobytes()
         else:
             data = rows.tobytes()
-        view = BufferView(buffer=0, byteOffset=self.size, byteLength=len(data), byteStride=stride, target=target)
-        self.gltf.bufferViews.append(view)
+        offset = self.size
         self._bin.write(data + bytes(-len(data) % 4))
         self.size += len(data) + -len(data) % 4
-        accessor = Accessor(
-            bufferView=len(self.gltf.bufferViews) - 1,
-            byteOffset=None,
-            componentType=COMPONENTS[kind],
-            normalized=True if normalized else None,
-            count=len(rows),
-            type=TYPES[rows.shape[1]],
+        return add_accessor(
+            self.gltf,
+            rows,
+            offset=offset,
+            length=len(data),
+            stride=stride,
+            target=target,
+            normalized=normalized or None,
+            bounds=bounds,
         )
-        if bounds:
-            accessor.min, accessor.max = _numbers(rows.min(axis=0)), _numbers(rows.max(axis=0))
-        self.gltf.accessors.append(accessor)
-        return len(self.gltf.accessors) - 1
 
     def add_indices(self, faces: AnyArray, vertices: int) -> int | None:
         """Append triangles (T, 3) and return the number of their accessor, None where there are none."""
@@ -123,7 +105,3 @@ def primitive(attributes: dict[str, int], indices: int | None, targets: Sequence
     if targets:
         found.targets = list(targets)
     return found
-
-
-def _numbers(values: AnyArray) -> list[float]:
-    return [float(value) for value in values.tolist()]

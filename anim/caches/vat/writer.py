@@ -23,13 +23,14 @@ import numpy as np
 from anim.arrays import AnyArray, Floats
 from anim.caches import rest_mesh
 from anim.caches.formats import exr, png
-from anim.caches.formats.gltf_stream import VERTICES, GlbFile, primitive
+from anim.caches.formats.gltf_stream import GlbFile, primitive
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs, companion_name
 from anim.caches.transforms import frame_spacing
 from anim.caches.vat import metadata, presets
 from anim.caches.vat.presets import Preset
 from anim.errors import RangeError
+from anim.gltf.authoring_parts import VERTICES
 from anim.model import VertexCache
 
 MAX_WIDTH, MAX_HEIGHT = 4096, 8192  # pixels that desktop engines take
