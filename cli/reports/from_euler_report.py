@@ -53,6 +53,7 @@ def warnings(made: ConversionReport) -> Iterator[str]:
         yield f"{moved}: that pose is taken for the rest"
     if made.onto is not None:
         yield from _guesses(made.onto)
+        yield from _lying(*made.onto.up_axes)
 
 
 def lines(made: ConversionReport, *, verbose: bool) -> Iterator[str]:
@@ -158,6 +159,17 @@ def _onto_lines(made: ConversionReport, onto: CharacterClip, character: Skeleton
         yield f"onto: path × {onto.scale:.3g}{moved}"
     if verbose:
         yield from (f"  {names[a]} → {character.names[b]}" for a, b in onto.matching.pairs.items())
+
+
+def _lying(motion: str, character: str) -> Iterator[str]:
+    """Which of two figures lies at rest while the other one stands; "" for an axis that is not known."""
+    if not motion or not character or motion == character or "Y" not in (motion, character):
+        return
+    where = f"at rest the motion's figure stands along {motion}, the character along {character}"
+    hint = "; is the motion Z-up? (--up z)" if motion == "Z" else ""
+    if motion == "Y":
+        hint = f"; is its file {character}-up? (export it with Y up, as glTF asks)"
+    yield f"{where}: it will lie{hint}"
 
 
 def _guesses(onto: CharacterClip) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,8 @@ from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
 from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
-from tests.cli.running import Run, help_line, refusal, shell
-from tests.files import opened, opened_path
+from tests.cli.running import Run, built, help_line, refusal, shell
+from tests.files import glb_of, opened, opened_fixture, opened_path
 
 SMALL = b"""HIERARCHY
 ROOT hip
@@ -141,6 +142,26 @@ def test_onto_a_character(call: Call, asset: Find, fixture: Fixture) -> None:
     assert [clip.name for clip in reader.clips(document)] == ["walk", "wave", "jump", "cmu_01_01"]
     assert "onto: 21 of 31 joints matched; not: 'LHipJoint', 'RHipJoint'" in run.err
     assert "LeftUpLeg → left_upper_leg" in run.err
+
+
+@pytest.mark.parametrize("axis", ["Z", "X"])
+def test_a_character_that_lies_at_rest_is_warned_of(axis: str, call: Call, asset: Find) -> None:
+    """The biped's nodes, without its skin, below a node that is turned by 90°."""
+    document = opened_fixture("biped")
+    nodes = [{key: each[key] for key in each if key not in ("mesh", "skin")} for each in document.json["nodes"]]
+    turn = [0.5**0.5, 0, 0, 0.5**0.5] if axis == "Z" else [0, 0, 0.5**0.5, 0.5**0.5]
+    nodes.append({"name": "armature", "rotation": turn, "children": document.json["scenes"][0]["nodes"]})
+    rest = {key: each for key, each in document.json.items() if key not in ("skins", "meshes")}
+    json = {**rest, "nodes": nodes, "scenes": [{"nodes": [len(nodes) - 1]}]}
+    lying = glb_of(replace(document, json=json))
+    run = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", "-", stdin=lying)
+    run.product()
+    words = f"the motion's figure stands along Y, the character along {axis}: it will lie; is its file {axis}-up?"
+    assert words in run.err
+    standing = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", "-", stdin=built("biped"))
+    assert "it will lie" not in standing.err
+    turned = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--up", "z", "--onto", "-", stdin=built("biped"))
+    assert "it will lie" in turned.err
 
 
 def test_without_legs_and_feet_the_path_is_by_height_and_nothing_is_floored(

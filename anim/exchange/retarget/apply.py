@@ -14,6 +14,7 @@ from anim.exchange.retarget.joint_matching import JointMatch, match_joints
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.retarget import GroundMode, retarget
 from anim.exchange.retarget.same_hierarchy import is_same_hierarchy
+from anim.exchange.retarget.up_axis import up_axis
 from anim.model import Clip, Scene
 
 
@@ -25,6 +26,7 @@ class CharacterClip:
     measure: what the scale is taken from; None for curves that are the nodes' own. without: what of a person the path
     and the floor need and is not matched, "hips", "legs" or "feet".
     num_bound: joints whose rest was taken from the skins, because the nodes rest elsewhere.
+    up_axes: along which the figures of the motion and of the character stand at rest, see `up_axis`; "" if not known.
     """
 
     clip: Clip
@@ -34,6 +36,7 @@ class CharacterClip:
     num_bound: int = 0
     measure: Measure | None = None
     without: tuple[str, ...] = ()
+    up_axes: tuple[str, str] = ("", "")
 
 
 def apply_to_character(
@@ -83,7 +86,14 @@ def apply_to_character(
         done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, rest_at=rest_at)
         clip = fill_from_parents(done.clip, bound.skeleton, target.skeleton)
         return CharacterClip(
-            clip, matching, done.scale, done.lowered, bound.num_joints, done.measure, _drop_unmatched(matching)
+            clip,
+            matching,
+            done.scale,
+            done.lowered,
+            bound.num_joints,
+            done.measure,
+            _drop_unmatched(matching),
+            (up_axis(source.skeleton, matching.source_roles), up_axis(bound.skeleton, matching.target_roles)),
         )
     tracks = [
         replace(track, node=matching.pairs[track.node])

@@ -1,0 +1,29 @@
+"""The axis along which a figure stands at rest: files that a tool wrote with another axis up lie on their back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from anim.model import Skeleton
+from anim.sampling import rest_pose, world_matrices
+
+CLEAR = 0.8  # share of the length that lies along the axis; 37°
+BELOW = ("left_foot", "right_foot")
+
+
+def up_axis(skeleton: Skeleton, roles: Mapping[str, int]) -> str:
+    """Return "X", "Y" or "Z", along which the way from the feet to the hips leads at rest in world space.
+
+    Without feet, from the hips to the head. "" where these are not known, or the way leads along no axis clearly: an
+    animal's back leads forward, its legs still point down.
+    """
+    places = world_matrices(skeleton, rest_pose(skeleton))[0, :, :3, 3]
+    feet = [places[roles[role]] for role in BELOW if role in roles]
+    if "hips" not in roles or not (feet or "head" in roles):
+        return ""
+    hips = places[roles["hips"]]
+    way = np.abs(hips - np.mean(feet, axis=0) if feet else places[roles["head"]] - hips)
+    axis = int(way.argmax())
+    return "XYZ"[axis] if way[axis] > CLEAR * np.linalg.norm(way) else ""
