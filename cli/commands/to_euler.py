@@ -58,7 +58,8 @@ def command(
         typer.Option("--tolerance", metavar="ANGLE", help="CSV, JSON: add keys where curves leave the motion by more."),
     ] = None,
     scale: Annotated[
-        float | None, typer.Option("--scale", metavar="N", help="BVH: meters per unit of length, else 0.01.")
+        float | None,
+        typer.Option("--scale", metavar="N", help="BVH: meters per unit, else 0.01; no BVH holds it."),
     ] = None,
     format: Annotated[
         Format | None, typer.Option("--format", help="Default: by OUT's ending; bvh for '-'.", show_default=False)
@@ -88,6 +89,8 @@ def command(
             source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS
         )
         data = kind.write(motion, convention)
+        if kind is TRACK_FORMATS["bvh"]:  # which has no place for its unit
+            words = f"1 unit = {scale or CENTIMETERS:g} m (from-euler --scale {scale or CENTIMETERS:g}), "
     if not dry_run:
         documents.write_text(data.decode(), output)
     if num_bound:

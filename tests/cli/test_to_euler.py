@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from anim.exchange.formats import bvh_reader
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
-from tests.files import glb_of, opened
+from tests.files import clips_of, glb_of, opened
 
 
 @pytest.mark.parametrize("suffix", ["bvh", "csv", "json"])
@@ -27,6 +28,20 @@ def test_the_ending_says_the_format(suffix: str, call: Call, fixture: Fixture, t
     }
     assert path.read_text().startswith(start[suffix])
     assert call("from-euler", path, tmp_path / "back.glb").code == 0
+
+
+@pytest.mark.parametrize("options", [(), ("--scale", "0.0254")])
+def test_a_bvh_is_read_back_with_the_scale_that_it_names(
+    options: tuple[str, ...], call: Call, fixture: Fixture, tmp_path: Path
+) -> None:
+    path, back = tmp_path / "walk.bvh", tmp_path / "back.glb"
+    run = call("to-euler", fixture("biped"), path, "--clip", "walk", "--fps", "24", *options)
+    said = re.search(r"1 unit = \S+ m \(from-euler (--scale) (\S+)\), ", run.err)
+    assert said is not None
+    assert call("from-euler", path, back, *said.groups()).code == 0
+    (hips,) = (track for track in clips_of(back.read_bytes())[0].tracks if track.path == "translation")
+    assert hips.values[0, 1] == pytest.approx(0.93, abs=0.1)
+    assert "1 unit" not in call("to-euler", fixture("biped"), tmp_path / "walk.csv", "--clip", "walk").err
 
 
 def test_bvh_on_stdout(call: Call, fixture: Fixture) -> None:
