@@ -156,11 +156,11 @@ def command(
                 raise
             finally:
                 progress.close()
-            done.append(_Done(job.file, each.name, len(times), cache.vertex_count, saved))
-            _say_notes(done, voice)
+            done.append(_Done(job.file, each.name, job.clip, job.group, len(times), cache.vertex_count, saved))
             if len(jobs) > 1:
                 voice.detail(f"  {_summary(done[-1:], method.value)}")
         at_rest = made[jobs[-1].group].rest
+    _say_notes(done, voice)
     bake_notes.frame_gap_note(missed, at_rest, voice)
     bake_notes.lost_data_notes(deviations, method.value, voice)
     bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)
@@ -179,10 +179,12 @@ class _Job:
 
 @dataclass(frozen=True, slots=True)
 class _Done:
-    """One clip that was baked into a file."""
+    """One clip that was baked into a file. number: of the clip. group: which of the meshes that share files."""
 
     file: str
     clip: str
+    number: int | None
+    group: int
     frames: int
     vertices: int
     saved: SavedCache
@@ -221,7 +223,7 @@ def _say_written(done: Sequence[_Done], voice: Reporter, *, dry_run: bool) -> No
     if done and not dry_run:
         names = ", ".join(each.file for each in done[:LISTED])
         more = f" and {len(done) - LISTED} more" if len(done) > LISTED else ""
-        voice.say(f"note: {plural(len(done), 'clip')} written before: {names}{more}")
+        voice.say(f"note: {plural(len(done), 'file')} written before: {names}{more}")
 
 
 def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
@@ -235,18 +237,22 @@ def _meters(max_error: str | None, cache: VertexCache) -> float | None:
 
 
 def _say_notes(done: list[_Done], voice: Reporter) -> None:
-    """Notes of the last file that none before it had."""
-    told = {note for each in done[:-1] for note in each.saved.written.notes}
-    for note in done[-1].saved.written.notes:
-        if note not in told:
-            voice.say(f"note: {note}")
+    """Every note once, with the files that it is about where it is not about all."""
+    files: dict[str, list[str]] = {}
+    for each in done:
+        for note in each.saved.written.notes:
+            files.setdefault(note, []).append(PurePath(each.file).name)
+    for note, names in files.items():
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        where = f"{', '.join(names[:LISTED])}{more}: " if len(names) < len(done) else ""
+        voice.say(f"note: {where}{note}")
 
 
 def _summary(done: list[_Done], method: str) -> str:
     file = "stdout" if done[0].file == documents.PIPE else done[0].file
-    name = file if len(done) == 1 else f"{plural(len(done), 'clip')}, {file} …"
+    name = file if len(done) == 1 else f"{_count(done)}, {file} …"
     frames = plural(sum(each.frames for each in done), "frame")
-    of = f" of '{done[0].clip}'" if len(done) == 1 and done[0].clip else ""
+    of = f" of '{done[0].clip}'" if len({each.number for each in done}) == 1 and done[0].clip else ""
     parts = [f"{name}  {text.format_bytes(sum(each.saved.size for each in done))}", f"{method}{of}"]
     vertices = sorted({each.vertices for each in done})
     parts.append(f"{frames} of {' to '.join(map(str, dict.fromkeys((vertices[0], vertices[-1]))))} vertices")
@@ -254,6 +260,14 @@ def _summary(done: list[_Done], method: str) -> str:
     parts += [f"max {text.format_length(max(errors))} at frames"] if errors else []
     count = sum(len(each.saved.files) for each in done)
     return ", ".join([*parts, *([plural(count, "file")] if count > len(done) else [])])
+
+
+def _count(done: list[_Done]) -> str:
+    """Return "2 clips", "2 meshes", or "2 meshes of 3 clips"."""
+    clips, meshes = plural(len({each.number for each in done}), "clip"), len({each.group for each in done})
+    if meshes == 1:
+        return clips
+    return f"{meshes} meshes of {clips}"
 
 
 def _times(clip: Clip, fps: float | None) -> Floats:

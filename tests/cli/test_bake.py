@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,28 @@ def test_several_clips_need_a_place_for_their_names(call: Call, fixture: Fixture
     assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["arm-bend.npz", "arm-twist.npz"]
     assert run.err.splitlines()[-1].startswith("2 clips, ")
     assert len(run.err.splitlines()) == 3
+
+
+def test_meshes_and_clips_are_counted_apart(call: Call, tmp_path: Path) -> None:
+    document = opened_fixture("arm")
+    node = next(node for node in document.json["nodes"] if "skin" in node)
+    nodes = [*document.json["nodes"], {**node, "name": "second"}]
+    scenes = [{"nodes": [*document.json["scenes"][0]["nodes"], len(nodes) - 1]}]
+    json = {**document.json, "nodes": nodes, "scenes": scenes}
+    (tmp_path / "two.glb").write_bytes(glb_of(Document(json, document.buffers)))
+    run = call("bake", tmp_path / "two.glb", tmp_path / "{mesh}.mdd", "--fps", 12, "--clip", "bend")
+    assert run.err.splitlines()[-1].startswith("2 meshes of 1 clip, ")
+    run = call("bake", tmp_path / "two.glb", tmp_path / "{mesh}-{clip}.mdd", "--fps", 12)
+    assert run.err.splitlines()[-1].startswith("2 meshes of 2 clips, ")
+
+
+def test_notes_say_which_file_they_are_about(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("bake", fixture("biped"), tmp_path / "{clip}.glb", "--fps", 12)
+    assert run.code == 0
+    assert re.search(r"^note: \w+\.glb(, \w+\.glb)*: \d+ morph targets? \(", run.err, re.MULTILINE)
+    assert "1 morph targets" not in run.err
+    one = call("bake", fixture("tube"), tmp_path / "one.glb", "--fps", 12, "--clip", "bend90")
+    assert re.search(r"^note: \d+ morph target", one.err, re.MULTILINE)
 
 
 def test_names_that_no_file_can_have(call: Call, tmp_path: Path) -> None:

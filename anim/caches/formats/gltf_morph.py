@@ -168,9 +168,14 @@ def _directions(normals: AnyArray | None, form: MorphEncoding) -> AnyArray | Non
 
 def _notes(form: MorphEncoding, frames: int) -> tuple[str, ...]:
     words = {"keyframes": "a target per kept frame", "basis": "shapes and weights", "both": "shapes of kept frames"}
-    notes = [f"{len(form.targets)} morph targets ({words[form.kind]}), {len(form.frames)} keys for {frames} frames"]
+    targets, keys = _counted(len(form.targets), "morph target"), _counted(len(form.frames), "key")
+    notes = [f"{targets} ({words[form.kind]}), {keys} for {_counted(frames, 'frame')}"]
     if len(form.targets) > PORTABLE_TARGETS:
         notes.append(
             f"glTF promises {PORTABLE_TARGETS} targets at a time; three.js, Babylon.js and Blender take hundreds"
         )
     return tuple(notes)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"

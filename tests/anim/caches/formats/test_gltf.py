@@ -89,8 +89,8 @@ def test_frames_that_lines_give_have_no_target() -> None:
     source = from_arrays(np.arange(7.0), still * (1 - shares) + moved * shares, FACES)
     _, said = written(source, "a.glb", WriteOptions(max_error=1e-5))
     assert said.notes[0] in (
-        "1 morph targets (shapes and weights), 7 keys for 7 frames",
-        "1 morph targets (shapes of kept frames), 3 keys for 7 frames",
+        "1 morph target (shapes and weights), 7 keys for 7 frames",
+        "1 morph target (shapes of kept frames), 3 keys for 7 frames",
     )
     assert reduce_frames(positions_of(source), source.times, 1e-5).tolist() == [0, 4, 6]
 
