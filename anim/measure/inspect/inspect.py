@@ -52,7 +52,7 @@ def inspect(
     groups = concatenate([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
-    ways = root_motion.root_motions(skeleton, looked_at, groups)
+    ways = root_motion.root_motions(skeleton, looked_at, groups, figure=root_motion.figure_nodes(json, skeleton))
     scene, hidden = _scene(document, accessors)
     skin = SkinMotion(scene or Scene(skeleton, ()))
     seams = _seams(skin, looked_at, groups)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +31,16 @@ class RootMotion:
 
 
 def root_motions(
-    skeleton: Skeleton, clips: Sequence[Clip], groups: Sequence[ConcatenatedTracks] | None = None
+    skeleton: Skeleton,
+    clips: Sequence[Clip],
+    groups: Sequence[ConcatenatedTracks] | None = None,
+    *,
+    figure: AbstractSet[int] | None = None,
 ) -> list[RootMotion]:
-    """Return one Travel per clip; a clip without time between start and end has none.
+    """Return one RootMotion per clip; a clip without time between start and end has none.
 
     groups: the tracks of all clips, `joined`, for callers that have them.
+    figure: nodes of which one can be the root, see `figure_nodes`; None for all.
     """
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
@@ -41,7 +48,27 @@ def root_motions(
     world = world_by_node(skeleton, poses_of_clips(skeleton, clips, times, groups=groups)[0])
     places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
     depth = _depths(skeleton)
-    return [_travel(clip, places[:, i, 1] - places[:, i, 0], depth) for i, clip in enumerate(clips)]
+    return [_travel(clip, places[:, i, 1] - places[:, i, 0], depth, figure) for i, clip in enumerate(clips)]
+
+
+def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
+    """Return the nodes that carry what a file shows: the joints of its skins and what is above them.
+
+    Of a file without skins the nodes of its default scene, all where it has none.
+    """
+    above = {int(joint) for skin in json.get("skins", ()) for joint in skin["joints"]}
+    if above:
+        waiting = list(above)
+        while waiting:
+            parent = int(skeleton.parents[waiting.pop()])
+            if parent >= 0 and parent not in above:
+                above.add(parent)
+                waiting.append(parent)
+        return frozenset(above)
+    scenes = json.get("scenes", ())
+    tops = scenes[json.get("scene", 0)].get("nodes", ()) if scenes else ()
+    found = {node for top in tops for node in np.flatnonzero(skeleton.below(top)).tolist()}
+    return frozenset(found or range(len(skeleton)))
 
 
 def root_motion_node(skeleton: Skeleton, clip: Clip) -> int:
@@ -64,20 +91,22 @@ def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
     return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length
 
 
-def _travel(clip: Clip, away: Floats, depth: Floats) -> RootMotion:
+def _travel(clip: Clip, away: Floats, depth: Floats, figure: AbstractSet[int] | None) -> RootMotion:
     """away: (N, 3) from start to end."""
     duration = clip.end - clip.start
     if duration <= 0:
         return RootMotion(-1, 0.0, 0.0)
-    root = _root(clip, depth)
+    root = _root(clip, depth, figure)
     distance = float(np.linalg.norm(away[root])) if root >= 0 else 0.0
     return RootMotion(root, distance, distance / duration)
 
 
-def _root(clip: Clip, depth: Floats) -> int:
+def _root(clip: Clip, depth: Floats, figure: AbstractSet[int] | None = None) -> int:
     """The moved node nearest to the root of the hierarchy: what carries a character along."""
     tracks = {track.node: track for track in clip.tracks if track.path == "translation" and track.node is not None}
-    from_root = sorted(tracks, key=lambda node: (depth[node], node))
+    from_root = sorted(
+        (node for node in tracks if figure is None or node in figure), key=lambda node: (depth[node], node)
+    )
     return next((node for node in from_root if (tracks[node].values != tracks[node].values[0]).any()), -1)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anim.measure.inspect.root_motion import RootMotion, root_motion_node, root_motions
+from anim.measure.inspect.root_motion import RootMotion, figure_nodes, root_motion_node, root_motions
 from anim.model import Clip, Skeleton
 from tests import clips
 from tests.anim.operations.tracks import TRACKS
@@ -24,6 +24,18 @@ def test_a_root_that_leads_somewhere() -> None:
 
 def test_a_node_with_nothing_on_it_leads_nowhere() -> None:
     assert root_motion_node(clips.skeleton([-1, -1]), WALK) == -1
+
+
+def test_the_root_is_one_of_the_figure() -> None:
+    """A box of another scene goes somewhere while the character, here its joint, stands still."""
+    nodes = clips.skeleton([-1, 0, -1])
+    box = clips.clip(clips.track("translation", [0, 1], [[0, 0, 0], [1, 0, 0]], node=2))
+    of_skin = figure_nodes({"skins": [{"joints": [1]}]}, nodes)
+    assert of_skin == {0, 1}
+    assert figure_nodes({"scenes": [{"nodes": [2]}, {"nodes": [0]}], "scene": 1}, nodes) == {0, 1}
+    assert figure_nodes({}, nodes) == {0, 1, 2}
+    assert root_motions(nodes, [box], figure=of_skin) == [RootMotion(-1, 0.0, 0.0)]
+    assert root_motions(nodes, [box])[0].root == 2
 
 
 def test_there_and_back_leads_nowhere() -> None:
