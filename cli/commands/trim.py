@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import typer
 
+from anim.gltf.reading import reader
 from anim.operations.selection import Selection
 from anim.operations.trim import trim as trimmed
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter
-from cli.workflows.edit_clips import edit_clips
+from cli.workflows.edit_clips import Clips, edit_clips
+
+LISTED = 4  # times in a note
 
 
 def command(
@@ -29,8 +33,9 @@ def command(
     """Keep the part of a clip from --from to --to seconds.
 
     Keys in between stay as they are; new keys at both ends have exactly the value and tangent that the motion has
-    there. Without --rebase the part stays at its seconds: players hold its first pose until then. --rebase alone cuts
-    nothing and moves clips that start late to 0 s.
+    there. Without --rebase the part stays at its seconds: players hold its first pose until then. --rebase moves
+    what is left of each clip to 0 s, one that starts later than --from by more than others; a note says so. --rebase
+    alone cuts nothing.
     """
     if start is None and end is None and not rebase:
         raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")
@@ -42,4 +47,16 @@ def command(
         Reporter(quiet, verbose),
         dry_run=dry_run,
         measure=False,
+        notes=lambda before, _: _moved_apart(before, start or 0.0) if rebase else (),
     )
+
+
+def _moved_apart(before: Clips, start: float) -> Iterator[str]:
+    """Say which clips --rebase moves by different times, where it does. start: s, of what is kept."""
+    by_time: dict[float, list[tuple[str, int]]] = {}
+    for number, clip in before.items():
+        by_time.setdefault(round(max(clip.start, start), 6), []).append((clip.name, number))
+    if len(by_time) > 1:
+        ways = [f"{reader.clip_labels(clips)} by {seconds:.4g} s" for seconds, clips in by_time.items()]
+        shown = "; ".join(ways[:LISTED]) + (" …" if len(ways) > LISTED else "")
+        yield f"--rebase moves clips that belong together apart: {shown}"

@@ -33,6 +33,14 @@ def test_rebase_alone_moves_a_late_start_to_0(call: Call, fixture: Fixture) -> N
     ]
 
 
+def test_rebase_says_which_clips_it_moves_apart(call: Call, fixture: Fixture) -> None:
+    run = call("trim", fixture("noop"), "-", "--from", "0.25", "--to", "0.8", "--rebase")
+    run.product()
+    assert "note: --rebase moves clips that belong together apart: " in run.err
+    assert "by 0.25 s; clip 'late' by 0.5 s\n" in run.err
+    assert "apart" not in call("trim", fixture("noop"), "-", "--from", "0.6", "--to", "0.8", "--rebase").err
+
+
 @pytest.mark.parametrize(
     ("options", "words"), [([], "nothing to do"), (["--from", "8"], "nothing is left from 8 s on")]
 )
