@@ -11,7 +11,13 @@ AnimError
 
 from __future__ import annotations
 
+import errno
 from typing import Self
+
+_NO_MEMORY = (
+    "cannot allocate memory",
+    "failed to map segment",
+)  # of the system's loader
 
 
 class AnimError(Exception):
@@ -70,7 +76,12 @@ class OutputError(AnimError):
 
 
 def not_written(name: object, error: OSError) -> OutputError:
-    """Return the error for an output, `name`, that the system does not let us write."""
+    """Return the error for an output, `name`, that the system does not let us write.
+
+    Raises MemoryError where no memory was left: a library that was loaded meanwhile says so as OSError, too.
+    """
+    if is_out_of_memory(error):
+        raise MemoryError
     return OutputError(f"{name}: can't be written ({(error.strerror or str(error)).lower()})")
 
 
@@ -79,3 +90,15 @@ def check_type(value: object, expected: type, name: str, *, help: str = "") -> N
     if not isinstance(value, expected):
         got = "None" if value is None else type(value).__name__
         raise ShapeError(f"{name} is {got} (expected {expected.__name__})", help=help)
+
+
+def is_out_of_memory(error: BaseException | None) -> bool:
+    """Return whether an error, or what it came from, is that of a system without memory left."""
+    while error is not None:
+        words = str(error).lower()
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+            return True
+        if isinstance(error, (OSError, ImportError)) and any(each in words for each in _NO_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -9,7 +9,15 @@ from typing import Any
 
 from typer import TyperException
 
-from anim.errors import AnimError, FormatError, NotFoundError, OutputError, RangeError, UnsupportedError
+from anim.errors import (
+    AnimError,
+    FormatError,
+    NotFoundError,
+    OutputError,
+    RangeError,
+    UnsupportedError,
+    is_out_of_memory,
+)
 from cli.tables import escape_control
 from cli.text import Reporter
 
@@ -56,10 +64,10 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
     except RecursionError:
         _say("the input is nested too deep", "")
         return FORMAT
-    except MemoryError:
-        _say("out of memory", "")
-        return UNSUPPORTED
-    except Exception:
+    except Exception as error:
+        if is_out_of_memory(error):
+            _say("out of memory", "")
+            return UNSUPPORTED
         _say_trace()
         _say("this is a bug of ours; please report the lines above", "")
         return BUG

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
 import fixtures
-from anim.errors import AnimError, FormatError, NotFoundError, OutputError, RangeError, ShapeError, UnsupportedError
+from anim.errors import (
+    AnimError,
+    FormatError,
+    NotFoundError,
+    OutputError,
+    RangeError,
+    ShapeError,
+    UnsupportedError,
+    not_written,
+)
 from cli import errors
 from tests.cli.conftest import Call, Fixture
-from tests.cli.running import built, help_line, refusal
+from tests.cli.running import built, help_line, refusal, shell
 from tests.files import glb_of, opened_fixture
+
+Failure = TypeVar("Failure", bound=Exception)
 
 # Exit codes.
 
@@ -126,6 +139,31 @@ def test_a_name_that_is_not_there_is_5(
     assert message.startswith(f"gltf-anim: {path}: ")
     assert words in message
     assert hint in help_line(run)
+
+
+def no_room(error: type[Failure]) -> Failure:
+    """What numba raises where its library finds no room: the reason is in the error that it came from."""
+    raised = error("could not find/load shared object file 'libllvmlite.so'")
+    raised.__context__ = OSError("libllvmlite.so: failed to map segment from shared object")
+    return raised
+
+
+@pytest.mark.parametrize("error", [OSError, ImportError])
+def test_no_room_for_a_library_is_out_of_memory(error: type[Exception], capsys: pytest.CaptureFixture[str]) -> None:
+    def fail() -> None:
+        raise no_room(error)
+
+    assert errors.run_guarded(fail) == 4
+    assert capsys.readouterr().err == "gltf-anim: out of memory\n"
+    with pytest.raises(MemoryError):
+        raise not_written("out.npz", no_room(OSError))
+    assert str(not_written("out.npz", OSError(28, "No space left"))) == "out.npz: can't be written (no space left)"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere memory has no such limit")
+def test_a_bake_without_memory_says_so(walk: Path, tmp_path: Path) -> None:
+    run = shell("ulimit -v 300000; gltf-anim bake walk.glb out.npz --clip walk -q", tmp_path)
+    assert refusal(run, 4) == "gltf-anim: out of memory"
 
 
 @pytest.mark.parametrize(
