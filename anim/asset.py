@@ -18,7 +18,7 @@ from anim.clip_list import Clips
 from anim.errors import AnimError, RangeError, ShapeError
 from anim.files import links
 from anim.gltf.document import Document, json_array
-from anim.gltf.io.source import Source, glb_pieces, open_bytes, open_file, write_file
+from anim.gltf.io.source import Source, glb_chunks, open_bytes, open_file, write_file
 from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
@@ -126,7 +126,7 @@ def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
         raise ShapeError(f"asset is {type(asset).__name__} (expected an Asset)", help="save(result.asset, path)")
     unchanged = asset.source.bytes_of(asset.document) if asset.source is not None else None
     if not isinstance(path, str | os.PathLike):
-        for piece in glb_pieces(asset.document, unchanged):
+        for piece in glb_chunks(asset.document, unchanged):
             path.write(piece.data)
         return
     name = os.fspath(path)

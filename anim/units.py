@@ -13,7 +13,7 @@ LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
 
-def parse_share(text: str, name: str) -> float:
+def parse_fraction(text: str, name: str) -> float:
     """Return a share of something: "0.1%" or a bare number, above 0. Raises RangeError otherwise.
 
     parse_share("0.1%", "--tolerance") → 0.001

@@ -57,19 +57,19 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
         return report_error(error)
     except TyperException as error:
         problem, hint = _usage(error)
-        _say(problem, _file_hint(error, args) or hint)
+        _print_error(problem, _file_hint(error, args) or hint)
         return USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
     except RecursionError:
-        _say("the input is nested too deep", "")
+        _print_error("the input is nested too deep", "")
         return FORMAT
     except Exception as error:
         if is_out_of_memory(error):
-            _say("out of memory", "")
+            _print_error("out of memory", "")
             return UNSUPPORTED
-        _say_trace()
-        _say("this is a bug of ours; please report the lines above", "")
+        _print_trace()
+        _print_error("this is a bug of ours; please report the lines above", "")
         return BUG
 
 
@@ -78,8 +78,8 @@ def report_error(error: AnimError) -> int:
     code = CODES.get(type(error), BUG)
     if code == BUG:
         vars(error).pop("__notes__", None)  # the help, which stands below
-        _say_trace()
-    _say(str(error), error.help)
+        _print_trace()
+    _print_error(str(error), error.help)
     return code
 
 
@@ -112,12 +112,12 @@ def _has_output(context: Any) -> bool:
     return any(param.name == "output" for param in context.command.params)
 
 
-def _say(problem: str, hint: str) -> None:
+def _print_error(problem: str, hint: str) -> None:
     voice = Reporter()  # the exit code is the same where nobody listens
-    voice.say(f"{PROGRAM}: {escape_control(problem)}")
+    voice.info(f"{PROGRAM}: {escape_control(problem)}")
     if hint:
-        voice.say(f"help: {escape_control(hint)}")
+        voice.info(f"help: {escape_control(hint)}")
 
 
-def _say_trace() -> None:
-    Reporter().say(traceback.format_exc().rstrip("\n"))
+def _print_trace() -> None:
+    Reporter().info(traceback.format_exc().rstrip("\n"))

@@ -14,4 +14,4 @@ def announce_compiling(voice: Reporter) -> None:
     from anim.skinning.kernels.jit import is_compiled
 
     if not is_compiled():
-        voice.say("compiling kernels (first run only)")
+        voice.info("compiling kernels (first run only)")

@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-LEAST_PERCENT = 1e-4
+MIN_PERCENT = 1e-4
 NEARLY_NOTHING = 1e-11  # m; what rounding leaves of nothing
 
 
@@ -21,7 +21,7 @@ class Reporter:
     verbose: bool = False
     warnings: list[str] = field(default_factory=list, compare=False)
 
-    def say(self, line: str) -> None:
+    def info(self, line: str) -> None:
         """Write a line to stderr, unless quiet."""
         if not self.quiet:
             with suppress(OSError, AttributeError):  # nobody listens
@@ -31,12 +31,12 @@ class Reporter:
         """Write "warning: words" to stderr, even when quiet, and once: for what changes the meaning of a number."""
         if words not in self.warnings:
             self.warnings.append(words)
-            Reporter().say(f"warning: {words}")
+            Reporter().info(f"warning: {words}")
 
-    def detail(self, line: str) -> None:
+    def verbose_info(self, line: str) -> None:
         """Write a line to stderr only where details are wanted."""
         if self.verbose:
-            self.say(line)
+            self.info(line)
 
 
 def format_bytes(count: int) -> str:
@@ -68,10 +68,10 @@ def format_length(meters: float) -> str:
     return f"{format_number(meters, 3)} m"
 
 
-def format_share(part: float, whole: float) -> str:
+def format_fraction(part: float, whole: float) -> str:
     """Return " (0.41 %)", or nothing where there is no whole or what is left is far below what anybody sees."""
     percent = 100 * part / whole if whole else 0.0
-    return f" ({format_number(percent, 2)} %)" if percent >= LEAST_PERCENT else ""
+    return f" ({format_number(percent, 2)} %)" if percent >= MIN_PERCENT else ""
 
 
 def format_speed(meters_per_second: float) -> str:

@@ -13,7 +13,7 @@ from cli.errors import UsageError
 def parse_share(text: str, option: str) -> float:
     """Return a share above 0: "0.1%" or a bare number. Raises UsageError otherwise."""
     with _usage_errors():
-        return units.parse_share(text, option)
+        return units.parse_fraction(text, option)
 
 
 def parse_length(text: str, option: str, diagonal: Callable[[], float]) -> float:

@@ -20,7 +20,7 @@ from anim.caches.storage import Inputs, Outputs, companion_name, read_all, suffi
 from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
-REST_ENDINGS = (".ply", ".obj", "")
+REST_EXTENSIONS = (".ply", ".obj", "")
 OURS = ("-rest.ply", "-rest.obj")  # behind the cache's whole name
 OTHERS = ("-rest.ply", "-rest.obj", ".ply", ".obj")  # behind its name without the ending, asked in this order
 
@@ -40,7 +40,7 @@ def write(cache: VertexCache, outputs: Outputs, ending: str, mark: str, *, fps: 
 
     mark: of the cache's first frame, as `raw.write` gives it.
     """
-    if ending not in REST_ENDINGS:
+    if ending not in REST_EXTENSIONS:
         raise RangeError(f"rest is '{ending}' (expected .ply, .obj or nothing)")
     if not ending:
         return

@@ -58,7 +58,7 @@ class Memory:
 
     def create(self, name: str) -> BinaryIO:
         """Return an empty file."""
-        return _Kept(self.files, name)
+        return _MemoryFile(self.files, name)
 
 
 def companion_name(name: str, ending: str) -> str:
@@ -94,7 +94,7 @@ def read_all(inputs: Inputs, name: str) -> Iterator[bytes]:
         yield file.read()
 
 
-class _Kept(io.BytesIO):
+class _MemoryFile(io.BytesIO):
     """A file in memory whose bytes are put into a dict when it is closed without an error."""
 
     def __init__(self, files: dict[str, bytes], name: str) -> None:

@@ -20,7 +20,7 @@ from anim.maths import quaternion
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ")
 GIMBAL_TOLERANCE_RAD = 5e-8  # rad from lock, below which float64 no longer tells first and third angle apart
-FULL_TURN_RAD = 2 * np.pi
+TAU = 2 * np.pi
 
 
 class AxesConvention(StrEnum):
@@ -118,7 +118,7 @@ def check_order(order: str) -> str:
 
 def wrap_angles(angles: Floats) -> Floats:
     """Return angles moved by whole turns into −π … π; those inside stay as they are."""
-    return np.asarray(angles - FULL_TURN_RAD * np.rint(angles / FULL_TURN_RAD))
+    return np.asarray(angles - TAU * np.rint(angles / TAU))
 
 
 def _axes(order: str, frame: AxesConvention) -> tuple[int, int, int, float]:
@@ -186,7 +186,7 @@ def _interpolate_in_lock(raw: Floats, half_sum: Floats, half_difference: Floats,
     total = np.where(near, _nearest(2 * half_sum, total, len(free) > 0), total)
     difference = np.where(far, _nearest(2 * half_difference, difference, len(free) > 0), difference)
     base = np.where(near, 0.0, np.pi)
-    middle = base + FULL_TURN_RAD * np.rint((about[:, 1] - base) / FULL_TURN_RAD)
+    middle = base + TAU * np.rint((about[:, 1] - base) / TAU)
     filled = np.stack(((total - difference) / 2, middle, (total + difference) / 2), axis=-1)
     filled[free] = unwound
     return filled
@@ -194,8 +194,4 @@ def _interpolate_in_lock(raw: Floats, half_sum: Floats, half_difference: Floats,
 
 def _nearest(angle: Floats, goal: Floats, has_goal: bool) -> Floats:
     """`angle` (K,) moved by whole turns next to `goal`, or next to itself where there is none."""
-    return (
-        angle + FULL_TURN_RAD * np.rint((goal - angle) / FULL_TURN_RAD)
-        if has_goal
-        else np.asarray(np.unwrap(wrap_angles(angle)))
-    )
+    return angle + TAU * np.rint((goal - angle) / TAU) if has_goal else np.asarray(np.unwrap(wrap_angles(angle)))

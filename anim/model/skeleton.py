@@ -62,7 +62,7 @@ class Skeleton:
         """Return how messages call a node: "node 7 'hip'"."""
         return f"node {node} '{self.names[node]}'" if self.names[node] else f"node {node}"
 
-    def below(self, node: int) -> Bools:
+    def descendants(self, node: int) -> Bools:
         """Return which nodes (N,) are `node` or hang on it."""
         found = np.zeros(len(self.parents), np.bool_)
         found[node] = True

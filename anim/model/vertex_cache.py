@@ -88,7 +88,7 @@ class VertexCache:
         """Whether every chunk carries tangents."""
         return self.handedness is not None
 
-    def whole(self) -> FrameChunk:
+    def load_all(self) -> FrameChunk:
         """Return all frames at once: 12 bytes times F times V, so for short or small caches only."""
         chunks = list(self.chunks())
         positions = np.concatenate([each.positions for each in chunks])

@@ -29,7 +29,7 @@ EDGE = 1e-6  # s; a piece that starts this little before --from still counts as 
 class Tolerances:
     """How near keys must follow an ease that no cubic is: share of a piece's range, and radians for rotations."""
 
-    share: float = TOLERANCE
+    fraction: float = TOLERANCE
     angle: float = ANGLE_TOLERANCE
 
 
@@ -86,11 +86,11 @@ class _Job:
         return self._exact(track, inside) if straight else self._followed(track, inside)
 
     def _exact(self, track: Track, inside: Bools) -> Track:
-        tolerances = (self.tolerances.share, self.tolerances.angle)
+        tolerances = (self.tolerances.fraction, self.tolerances.angle)
         return to_cubicspline(track, ease_segments(track, inside, self.easing, *tolerances))
 
     def _lines(self, track: Track, inside: Bools) -> Track:
-        u = fit_linear(self.easing.value, self.easing.breakpoints, self.tolerances.share)[1:-1]
+        u = fit_linear(self.easing.value, self.easing.breakpoints, self.tolerances.fraction)[1:-1]
         shares = self.easing.value(u)
         times, values = [track.times[:1]], [track.values[:1]]
         for k in range(len(track.times) - 1):
@@ -134,5 +134,5 @@ class _Job:
         ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]
         moving = ranges[ranges > 0]
         return adaptive_keys.float32_tolerance(
-            track, self.tolerances.share * float(moving.min() if len(moving) else 1.0)
+            track, self.tolerances.fraction * float(moving.min() if len(moving) else 1.0)
         ), speed

@@ -33,7 +33,7 @@ def ease_segments(
         if not len(which):
             continue
         if track.kind is ValueKind.ROTATION:
-            parts += _turns(track, which, each, angle_tolerance)
+            parts += _rotation_segments(track, which, each, angle_tolerance)
         else:
             parts.append(_moves(track, which, fit_segments(each, tolerance=tolerance)))
     return _in_order(join_segments(parts))
@@ -53,10 +53,10 @@ def ease_steps(track: Track, inside: Bools, easing: Easing, *, angle_tolerance: 
             continue
         at = track.times[k] + (track.times[k + 1] - track.times[k]) * levels[:, :2]
         values = segment.evaluate(track, np.full(len(levels), k), levels[:, 2])
-        parts.append(_still(at[:, 0], at[:, 1], values, values))
+        parts.append(_constant_segments(at[:, 0], at[:, 1], values, values))
     if inside[-1]:
         end = track.times[-1:]
-        parts.append(_still(end if inside.all() else end - JUMP, end, values[-1:], track.values[-1:]))
+        parts.append(_constant_segments(end if inside.all() else end - JUMP, end, values[-1:], track.values[-1:]))
         parts[-2].end[-1] = parts[-1].start[0]
     return join_segments(parts) if not inside.all() else _without_last_start(join_segments(parts))
 
@@ -116,7 +116,7 @@ def _moves(track: Track, left: Ints, cubics: Sequence[CubicSegment]) -> CubicSeg
     return CubicSegments(at[..., 0].reshape(-1), at[..., 1].reshape(-1), *flat)
 
 
-def _turns(track: Track, left: Ints, easing: Easing, tolerance: float) -> list[CubicSegments]:
+def _rotation_segments(track: Track, left: Ints, easing: Easing, tolerance: float) -> list[CubicSegments]:
     """The pieces left → left + 1 (S,) of a rotation track, each turned along its own arc; like angles share a fit."""
     q = quaternion.normalize(track.values)
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(q[left]), q[left + 1]))
@@ -125,11 +125,13 @@ def _turns(track: Track, left: Ints, easing: Easing, tolerance: float) -> list[C
     parts = []
     for group in (np.flatnonzero(shared == each) for each in sorted(set(shared.tolist()))):
         fitted = rotation_segments_for(easing, float(angle[group].max()), tolerance)
-        parts.append(_turned(track, q, left[group], turn[group], easing.value(fitted.u), fitted))
+        parts.append(_ease_rotations(track, q, left[group], turn[group], easing.value(fitted.u), fitted))
     return parts
 
 
-def _turned(track: Track, q: Floats, left: Ints, turn: Floats, shares: Floats, fitted: RotationFit) -> CubicSegments:
+def _ease_rotations(
+    track: Track, q: Floats, left: Ints, turn: Floats, shares: Floats, fitted: RotationFit
+) -> CubicSegments:
     duration = (track.times[left + 1] - track.times[left])[:, None]
     at = track.times[left][:, None] + duration * fitted.u
     at[:, -1] = track.times[left + 1]
@@ -150,7 +152,7 @@ def _unchanged(track: Track, k: int, angle_tolerance: float) -> CubicSegments:
     if track.interpolation is Interpolation.LINEAR:
         here = np.array([k])
         if track.kind is ValueKind.ROTATION:
-            return _turns(track, here, EASINGS["linear"], angle_tolerance)[0]
+            return _rotation_segments(track, here, EASINGS["linear"], angle_tolerance)[0]
         return _moves(track, here, LINE)
     assert track.in_tangents is not None
     assert track.out_tangents is not None
@@ -159,7 +161,7 @@ def _unchanged(track: Track, k: int, angle_tolerance: float) -> CubicSegments:
     return CubicSegments(*ends, track.out_tangents[a], track.in_tangents[b])
 
 
-def _still(start: Floats, end: Floats, value0: Floats, value1: Floats) -> CubicSegments:
+def _constant_segments(start: Floats, end: Floats, value0: Floats, value1: Floats) -> CubicSegments:
     none = np.zeros_like(value0)
     return CubicSegments(start.copy(), end.copy(), value0, value1, none, none)
 

@@ -77,7 +77,7 @@ def _closed(track: Track, clip: Clip, blend: float) -> Track:
     if len(track.times) > 2 and track.times[-2] > clip.end - SHORTEST:
         track = _without_last_jump(track)
         last = track.values[-1]
-    gap = _gap(track, first, last)
+    gap = _closing_offset(track, first, last)
     speed = rates(track, ends[:1], before=False)[0]
     change = speed - rates(track, ends[1:], before=True)[0]
     if not gap.any() and not change.any():
@@ -86,7 +86,7 @@ def _closed(track: Track, clip: Clip, blend: float) -> Track:
     if track.in_tangents is not None:
         return _bent_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
     last_piece = float(times[-1] - times[-2])
-    before_last = _gap(track, _stepped_back(track, first, speed, last_piece), sample(track, times[-2:-1])[0])
+    before_last = _closing_offset(track, _stepped_back(track, first, speed, last_piece), sample(track, times[-2:-1])[0])
     slope = _end_slope(gap, before_last, blend, last_piece)
     return _bent_lines(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
 
@@ -103,7 +103,7 @@ def _without_last_jump(track: Track) -> Track:
     )
 
 
-def _gap(track: Track, first: Floats, last: Floats) -> Floats:
+def _closing_offset(track: Track, first: Floats, last: Floats) -> Floats:
     if track.kind is ValueKind.ROTATION:
         return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(last), first))
     return first - last

@@ -100,7 +100,7 @@ class TimeMap:
         eased = self.start + (self.end - self.start) * self.value(np.clip(u, 0, 1))
         return np.where(inside, eased, times)
 
-    def tempo(self, times: Floats, *, before: bool) -> Floats:
+    def speed(self, times: Floats, *, before: bool) -> Floats:
         """Return old seconds per new second (F,), just before or just after each time; negative while it runs back."""
         u = (times - self.start) / (self.end - self.start)
         inside = (u > 0) & (u <= 1) if before else (u >= 0) & (u < 1)
@@ -154,7 +154,7 @@ def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
         return sample(track, _snapped(times.old(at), track.times))
 
     def changes(at: Floats, before: bool) -> Floats:
-        tempo = times.tempo(at, before=before)
+        tempo = times.speed(at, before=before)
         old = _snapped(times.old(at), track.times)
         # running forward, just before in new time is just before in old time; running back it is just after
         forward, back = rates(track, old, before=before), rates(track, old, before=not before)

@@ -21,7 +21,7 @@ from anim.optimization.tracks import clip_ends, lossless, morph_weights, pointer
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
 
-MORPH_SHARE = 0.4  # of the bound that morph weights may use where joints move too
+MORPH_BUDGET_FRACTION = 0.4  # of the bound that morph weights may use where joints move too
 MORPH_ALONE = 0.95
 NOT_UNIT = 0.1  # of the bound, that a rotation's length may move the farthest point in players that don't normalize
 
@@ -126,7 +126,7 @@ class _SortedTracks:
         """Morph weights have a share of the bound of their own; what they use of it the search may not."""
         setting = self._setting
         weights = [i for i, track in enumerate(self._clip.tracks) if track.path == "weights" and i not in self._done]
-        share = MORPH_SHARE if self._free else MORPH_ALONE
+        share = MORPH_BUDGET_FRACTION if self._free else MORPH_ALONE
         bound = share * self._task.bound / max(len(weights), 1)
         for i in weights:
             track = self._clip.tracks[i]
@@ -202,7 +202,7 @@ def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, 
             at = axes.setdefault(keys.tobytes(), times.key_times(found.grid[keys]))
         else:
             at = axes.setdefault(b"", times.key_times(np.array([clip.start])))
-        result[moving.number] = _new_track(clip.tracks[moving.number], at, stored), stored
+        result[moving.index] = _new_track(clip.tracks[moving.index], at, stored), stored
     return result
 
 

@@ -19,7 +19,7 @@ from anim.optimization.verification import Verification, verify
 
 TIGHTER = 0.97  # of the share that a clip was beyond its bound, for the next search
 HARDLY = 0.995  # less for the next search where the vertex that was off most had not been measured
-THINNED = 0.5  # of the source's keys; with fewer, a clip is smaller than any version without loss
+REDUCED_BUDGET = 0.5  # of the source's keys; with fewer, a clip is smaller than any version without loss
 ROUNDS = 6  # of searching and verifying; after them a clip that still fails is kept without loss
 
 
@@ -51,11 +51,11 @@ class ClipOptimizer:
         self.clips = clips
         self.detailed = detailed
 
-    def setting(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Context:
+    def context(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Context:
         """Return the setting, with some more vertices measured, (number of the surface, number of the vertex)."""
         if not extra:
-            return self._usual_setting
-        return self._setting(extra)
+            return self._default_context
+        return self._context(extra)
 
     def judged(self, number: int, after: Clip) -> Verification:
         """Return how far a new version of clip `number` is from its source."""
@@ -76,7 +76,7 @@ class ClipOptimizer:
         names = [surface.name for surface, _ in self._ruler.pairs.surfaces]
         return frozenset((i, error.vertex) for i, name in enumerate(names) if name == error.place and error.vertex >= 0)
 
-    def _setting(self, extra: frozenset[tuple[int, int]]) -> Context:
+    def _context(self, extra: frozenset[tuple[int, int]]) -> Context:
         request = self.request
         return build_context(
             self.after,
@@ -89,8 +89,8 @@ class ClipOptimizer:
         )
 
     @cached_property
-    def _usual_setting(self) -> Context:
-        return self._setting(frozenset())
+    def _default_context(self) -> Context:
+        return self._context(frozenset())
 
     @cached_property
     def _ruler(self) -> ErrorMetric:
@@ -108,10 +108,10 @@ def optimize_clip(site: ClipOptimizer, item: tuple[int, Task]) -> ClipResult:
     Splines and steps as they are compete too: lines in place of a few of them can take more.
     """
     number, task = item
-    setting = site.setting()
+    setting = site.context()
     found = [each for effort in setting.effort.all() if (each := _within(site, number, task, effort)) is not None]
     best = min(found, key=lambda each: each.solution.size(setting.coding), default=None)
-    if best is not None and _keys(best.solution.clip) < THINNED * _keys(task.clip):
+    if best is not None and _keys(best.solution.clip) < REDUCED_BUDGET * _keys(task.clip):
         return best
     exact = solve(replace(setting, bounds=replace(setting.bounds, max_error=0.0)), task)
     assert exact is not None
@@ -137,14 +137,14 @@ def _within(site: ClipOptimizer, number: int, task: Task, effort: Effort) -> Cli
     """
     extra: frozenset[tuple[int, int]] = frozenset()
     for _ in range(ROUNDS):
-        solution = solve(replace(site.setting(extra), effort=effort), task)
+        solution = solve(replace(site.context(extra), effort=effort), task)
         if solution is None:
             return None
         found = site.judged(number, solution.clip)
         if found.holds:
             return ClipResult(solution, found)
         worst = site.worst_vertex(found)
-        factor = HARDLY if worst - extra else min(TIGHTER / found.strain, TIGHTER)
+        factor = HARDLY if worst - extra else min(TIGHTER / found.usage, TIGHTER)
         extra |= worst
         task = replace(task, bound=task.bound * factor)
     return None

@@ -102,7 +102,7 @@ def _visible_clips(request: Request, scene: Scene) -> Request:
 
 
 def _tasks(site: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:
-    shared = find_constants(site.setting(), site.clips)
+    shared = find_constants(site.context(), site.clips)
     tasks = []
     for i in chosen:
         clip = site.clips[i]

@@ -87,21 +87,21 @@ class Effort:
     rounds: int
     thresholds: tuple[float, ...] = ()
     axes: tuple[str, ...] = ()
-    favoring: int = 0
+    long_track_rounds: int = 0
     leeways: tuple[float, ...] = ()
     finishing: tuple[float, ...] = (1.05,)
-    strays: int = 0
-    descent: int = 0
+    random_trials: int = 0
+    coarsen_passes: int = 0
     cycles: int = 1
-    besides: Effort | None = None
+    also_try: Effort | None = None
 
     def all(self) -> list[Effort]:
         """Return the efforts that are made one after the other: the smallest result counts."""
-        return [*(self.besides.all() if self.besides else ()), self]
+        return [*(self.also_try.all() if self.also_try else ()), self]
 
 
 FAST = Effort(5)
-BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), strays=25, descent=2)
+BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), random_trials=25, coarsen_passes=2)
 MAX = Effort(
     10,
     (0.1, 0.25, 0.4, 0.6, 0.8),
@@ -109,9 +109,9 @@ MAX = Effort(
     10,
     (0.0, 0.25, 0.5, 0.75),
     (1.2, 1.1, 1.05, 1.02),
-    strays=100,
-    descent=2,
+    random_trials=100,
+    coarsen_passes=2,
     cycles=3,
-    besides=BALANCED,
+    also_try=BALANCED,
 )
 EFFORTS = {"fast": FAST, "balanced": BALANCED, "max": MAX}

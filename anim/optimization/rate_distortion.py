@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-SHARES = tuple(10.0 ** (-exponent / 2) for exponent in range(10, 3, -1))  # of the diagonal: 1e-5 to 1e-2, two a decade
+ERROR_FRACTIONS = tuple(
+    10.0 ** (-exponent / 2) for exponent in range(10, 3, -1)
+)  # of the diagonal: 1e-5 to 1e-2, two a decade
 LEAST, MOST = 1e-6, 0.1  # of the diagonal: where a bound that fits is looked for
 STEPS = 9  # of halving the logarithm: within 2 % of the smallest such bound
 
@@ -25,7 +27,7 @@ class RatePoint:
 
 
 def curve(
-    diagonal: float, tried: Callable[[float], RatePoint], shares: Sequence[float] = SHARES
+    diagonal: float, tried: Callable[[float], RatePoint], shares: Sequence[float] = ERROR_FRACTIONS
 ) -> Iterator[RatePoint]:
     """Yield sizes at bounds from small to large. tried: makes one, for a bound in metres."""
     for share in sorted(shares):

@@ -14,7 +14,7 @@ from anim.model import Clip, Scene, Skeleton
 from anim.optimization.search.source_motion import PATHS
 
 SAME = 2e-4  # in units of the value: constants this near count as one
-STILL = 1e-4  # a track that stays this near its first value is a constant
+CONSTANT_TOLERANCE = 1e-4  # a track that stays this near its first value is a constant
 WORTH = 1e-5  # a rest value nearer than this to the constant stays
 
 
@@ -58,7 +58,7 @@ def _most_common_value(skeleton: Skeleton, clips: Sequence[Clip]) -> dict[tuple[
             node = track.node
             if node is None or track.path not in PATHS or driven[track.target] < len(clips):
                 continue
-            if np.abs(track.values - track.values[0]).max() < STILL:
+            if np.abs(track.values - track.values[0]).max() < CONSTANT_TOLERANCE:
                 constants.setdefault((node, track.path), []).append(track.values[0])
     found = {}
     for (node, path), rows in constants.items():

@@ -14,7 +14,7 @@ from anim.optimization.search.context import Context
 from anim.optimization.search.source_motion import PATHS
 from anim.optimization.tracks import morph_weights
 
-STILL = 0.5  # of the bound: a track that stays this near a value may be held at it
+CONSTANT_TOLERANCE = 0.5  # of the bound: a track that stays this near a value may be held at it
 
 Target = tuple[int, str]
 
@@ -33,7 +33,7 @@ def find_constants(setting: Context, clips: Sequence[Clip]) -> Constants:
     moved: set[Target] = set()
     seen: set[Target] = set()
     values: dict[Target, list[_Value]] = {}
-    bound = STILL * setting.bounds.max_error
+    bound = CONSTANT_TOLERANCE * setting.bounds.max_error
     for clip in clips:
         for track in clip.tracks:
             if track.node is None or track.path == "pointer":
@@ -46,7 +46,7 @@ def find_constants(setting: Context, clips: Sequence[Clip]) -> Constants:
                 continue
             unit = meters[PATHS.index(track.path)][track.node]
             seen.add(target)
-            if unit * _off(track, getattr(setting.skeleton, track.path)[track.node]) > bound:
+            if unit * _difference(track, getattr(setting.skeleton, track.path)[track.node]) > bound:
                 moved.add(target)
                 _note(values.setdefault(target, []), track, unit, bound)
     chosen = {
@@ -76,18 +76,18 @@ class _Value:
 def _note(found: list[_Value], track: Track, unit: float, bound: float) -> None:
     """Count the track for a value that is near all of its keys, its own middle where none is."""
     for each in found:
-        if unit * _off(track, each.value) <= bound:
+        if unit * _difference(track, each.value) <= bound:
             each.clips += 1
             return
     rows = quaternion.align_signs(track.values) if track.path == "rotation" else track.values
     middle = (rows.min(axis=0) + rows.max(axis=0)) / 2
     if track.path == "rotation" and np.abs(middle).max() > 1e-6:
         middle = quaternion.normalize(middle)
-    if unit * _off(track, middle) <= bound:
+    if unit * _difference(track, middle) <= bound:
         found.append(_Value(middle))
 
 
-def _off(track: Track, value: Floats) -> float:
+def _difference(track: Track, value: Floats) -> float:
     """How far the track's keys are from a value, at most, in its own units; a spline that moves, endlessly."""
     if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
         assert track.out_tangents is not None
@@ -106,7 +106,7 @@ def _meters(setting: Context) -> tuple[Floats, Floats, Floats]:
     count = len(skeleton)
     reach = np.zeros(count)
     for node in range(count):
-        mine = places[setting.points.on(skeleton.below(node))]
+        mine = places[setting.points.on(skeleton.descendants(node))]
         reach[node] = np.linalg.norm(mine - world[node, :, 3], axis=1).max(initial=0.0)
     lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max(axis=1)
     widening = np.where(skeleton.parents < 0, 1.0, lengths[skeleton.parents])

@@ -29,13 +29,13 @@ class Verification:
     error: MotionError
     player: str
     statistics: Statistics | None
-    strain: float
+    usage: float
     certified: float | None = None
 
     @property
     def holds(self) -> bool:
         """Whether all bounds hold."""
-        return self.strain <= 1
+        return self.usage <= 1
 
 
 def verify(
@@ -60,7 +60,7 @@ def verify(
         times, prover = key_and_mid_times(before)[::2], None
     else:
         times = dense_times(before, after)
-    looks = {player: ruler.look(before, after, times, player=player) for player in players}
+    looks = {player: ruler.sample_errors(before, after, times, player=player) for player in players}
     player = max(looks, key=lambda each: looks[each].error.max_error)
     error, certified = looks[player].error, None
     if prover is not None and error.max_error <= max(bounds.max_error, FLOAT_NOISE * (ruler.diagonal or 1.0)):
@@ -70,17 +70,17 @@ def verify(
     about = statistics(ruler, before, after, times=times, player=players[0]) if wanted else None
     least = FLOAT_NOISE * (ruler.diagonal or 1.0)
     shares = [
-        _share(error.max_error, bounds.max_error, least),
-        _share(error.max_pointer_error, bounds.max_pointer_error, FLOAT_NOISE),
+        _fraction(error.max_error, bounds.max_error, least),
+        _fraction(error.max_pointer_error, bounds.max_pointer_error, FLOAT_NOISE),
     ]
     if bounds.max_angle is not None and about is not None:
-        shares.append(_share(about.angle.size, bounds.max_angle, FLOAT_NOISE))
+        shares.append(_fraction(about.angle.size, bounds.max_angle, FLOAT_NOISE))
     if bounds.max_speed_error is not None and about is not None:
-        shares.append(_share(about.speed.size, bounds.max_speed_error, least))
+        shares.append(_fraction(about.speed.size, bounds.max_speed_error, least))
     if (before.start, before.end) != (after.start, after.end) or opened_tracks(before, after):
         shares.append(float("inf"))
     return Verification(error, player, about, max(shares), certified)
 
 
-def _share(size: float, bound: float, least: float) -> float:
+def _fraction(size: float, bound: float, least: float) -> float:
     return size / max(bound, least)

@@ -47,20 +47,20 @@ def derivative(track: Track, left: Ints, share: Floats) -> Floats:
 
 def max_rate(track: Track, pieces: Ints) -> float:
     """Return the greatest change per share of a piece anywhere in `pieces`: length of the vector, or angle in rad."""
-    left = np.repeat(pieces, len(_SHARES))
-    found = derivative(track, left, np.tile(_SHARES, len(pieces)))
+    left = np.repeat(pieces, len(_FRACTIONS))
+    found = derivative(track, left, np.tile(_FRACTIONS, len(pieces)))
     return float(np.sqrt((found * found).sum(axis=1)).max(initial=0.0))
 
 
 def max_rate_per_second(track: Track) -> float:
     """Return the greatest rate of change of the track per second: length of the vector, or angular speed in rad/s."""
-    left = np.repeat(np.arange(len(track.times) - 1), len(_SHARES))
-    found = derivative(track, left, np.tile(_SHARES, len(track.times) - 1))
+    left = np.repeat(np.arange(len(track.times) - 1), len(_FRACTIONS))
+    found = derivative(track, left, np.tile(_FRACTIONS, len(track.times) - 1))
     duration = track.times[left + 1] - track.times[left]
     return float((np.sqrt((found * found).sum(axis=1)) / duration).max(initial=0.0))
 
 
-_SHARES = np.linspace(0, 1, 9)
+_FRACTIONS = np.linspace(0, 1, 9)
 
 
 def _cubic(track: Track, left: Ints) -> tuple[Floats, Floats, Floats, Floats]:

@@ -25,20 +25,20 @@ class SkinBinding:
 
     nodes: Ints
     bind: Floats
-    above: Ints
+    ancestors: Ints
     points: Floats
     normals: Floats
     tangents: Floats
     start: Ints
     joint: NDArray[np.int32]
     weight: FloatArray
-    most: int
+    max_count: int
     faces: Ints
 
     @property
-    def held(self) -> Influences:
+    def influences(self) -> Influences:
         """What the vertices hang on, as kernels read it."""
-        return Influences(self.weight, self.joint, self.start, self.most)
+        return Influences(self.weight, self.joint, self.start, self.max_count)
 
 
 def bind_skin(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> SkinBinding:
@@ -58,7 +58,7 @@ def bind_skin(instance: MeshInstance, parents: Ints, *, normals: bool = False, t
     none = np.empty((0, 3))
     turned = mesh.normals if normals and mesh.normals is not None else none
     along = mesh.tangents[:, :3] if tangents and mesh.tangents is not None else none
-    above = joints_above(nodes, parents)
+    above = ancestor_joints(nodes, parents)
     return SkinBinding(
         nodes,
         bind,
@@ -87,7 +87,7 @@ def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], 
     return start, joints[used].astype(np.int32), weights[used].astype(np.float32)
 
 
-def joints_above(nodes: Ints, parents: Ints) -> Ints:
+def ancestor_joints(nodes: Ints, parents: Ints) -> Ints:
     """Return for each joint (J,) the number of the nearest joint above it, −1 where there is none."""
     number = {node: i for i, node in enumerate(nodes.tolist())}
     found = []

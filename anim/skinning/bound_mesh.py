@@ -35,7 +35,7 @@ class BoundMesh:
     at: int
     in_mesh_space: bool
     smooth: SmoothNormals | None
-    still: VertexBlock
+    is_static: VertexBlock
 
     @property
     def packed_size(self) -> int:
@@ -47,12 +47,12 @@ class BoundMesh:
         """Return what `place` needs for some of the frames."""
         return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
 
-    def place(self, packed: tuple[Any, VertexBlock], block: slice, whole: OutputSlice, first: int, last: int) -> None:
+    def skin(self, packed: tuple[Any, VertexBlock], block: slice, whole: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last, for a block of frames, into the whole."""
         parts, shape = packed
         normals = whole.normals[block] if len(shape.normals) else NOTHING
         tangents = whole.tangents[block] if len(shape.tangents) else NOTHING
-        self.skinner.place(parts, shape, OutputSlice(self.at, whole.positions[block], normals, tangents), first, last)
+        self.skinner.skin(parts, shape, OutputSlice(self.at, whole.positions[block], normals, tangents), first, last)
 
     def finish(self, frames: PoseBlock, whole: OutputSlice) -> None:
         """Bring what was placed in world space into the mesh's own, and make normals of the faces if need be."""
@@ -97,7 +97,7 @@ class BoundMesh:
     def _shape(self, frames: PoseBlock, block: slice) -> VertexBlock:
         mesh, weights = self.instance.mesh, self._weights(frames, block)
         if not weights.any():
-            return self.still
+            return self.is_static
         points = _morph(self.rig.points, mesh.targets, weights)
         normals = _morph(self.rig.normals, mesh.normal_targets, weights)
         tangents = _morph(self.rig.tangents, mesh.tangent_targets, weights)

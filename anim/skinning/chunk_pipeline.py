@@ -81,8 +81,8 @@ class ChunkPipeline:
         for future in started.futures:
             future.result()
         for layer in self.layers:
-            layer.finish(started.frames, started.whole)
-        _, positions, normals, tangents = started.whole
+            layer.finish(started.frames, started.load_all)
+        _, positions, normals, tangents = started.load_all
         return FrameChunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
 
 
@@ -91,10 +91,10 @@ class _PendingChunk:
     """A chunk that is being written."""
 
     frames: PoseBlock
-    whole: OutputSlice
+    load_all: OutputSlice
     futures: list[Future[None]]
 
 
 def _submit(share: list[Job], whole: OutputSlice) -> None:
     for layer, parts, block, first, last in share:
-        layer.place(parts, block, whole, first, last)
+        layer.skin(parts, block, whole, first, last)

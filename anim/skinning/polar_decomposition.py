@@ -23,7 +23,7 @@ class PolarDecomposition:
 
     rotation: Floats
     translation: Floats
-    stretch: Floats | None = None
+    scale_shear: Floats | None = None
     scale: Floats | None = None
 
 
@@ -41,7 +41,7 @@ def decompose(matrices: Floats, pivots: Floats) -> PolarDecomposition:
     linear = matrices[..., :3]
     if _is_rotation(linear).all():
         return PolarDecomposition(quaternion.from_matrix(linear), matrices[..., 3])
-    return _has_stretch(matrices, pivots)
+    return _has_shear(matrices, pivots)
 
 
 def decompose_after(matrices: Floats, pivots: Floats, shape: Floats) -> PolarDecomposition:
@@ -50,10 +50,10 @@ def decompose_after(matrices: Floats, pivots: Floats, shape: Floats) -> PolarDec
     pivots: (J, 3) m, stretched by it.
     """
     bound = np.concatenate((matrices[..., :3] @ np.linalg.inv(shape), matrices[..., 3:]), axis=-1)
-    parts = _has_stretch(bound, pivots)
-    assert parts.stretch is not None
-    whole = np.concatenate((parts.stretch[..., :3] @ shape, parts.stretch[..., 3:]), axis=-1)
-    return replace(parts, stretch=whole)
+    parts = _has_shear(bound, pivots)
+    assert parts.scale_shear is not None
+    whole = np.concatenate((parts.scale_shear[..., :3] @ shape, parts.scale_shear[..., 3:]), axis=-1)
+    return replace(parts, scale_shear=whole)
 
 
 def joint_origins(rig: SkinBinding) -> Floats:
@@ -78,7 +78,7 @@ def _dot(a: Sequence[Floats], b: Sequence[Floats]) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _has_stretch(matrices: Floats, pivots: Floats) -> PolarDecomposition:
+def _has_shear(matrices: Floats, pivots: Floats) -> PolarDecomposition:
     linear, moved = matrices[..., :3], matrices[..., 3]
     turn, stretch = _polar(linear, np.swapaxes(linear, -1, -2) @ linear)
     whole = np.concatenate((stretch, -_times(stretch, pivots)[..., None]), axis=-1)

@@ -21,7 +21,7 @@ class WeightedJoints:
 
     used: (U,) their numbers in the rig, increasing. shape: (3, 3) bind_from_mesh, symmetric, None where it is 1: a mesh
     bound with a non-uniform scale is stretched first. pivots: (U, 3) m, where the joints stand in bind space.
-    held: influences, by numbers into `used`. ruling: the same influences with
+    influences: by numbers into `used`. ruling: the same influences with
     the shares by which their scales make up that of the vertex.
     """
 
@@ -29,18 +29,18 @@ class WeightedJoints:
     used: Ints = field(init=False, repr=False)
     shape: Floats | None = field(init=False, repr=False)
     pivots: Floats = field(init=False, repr=False)
-    held: Influences = field(init=False, repr=False)
+    influences: Influences = field(init=False, repr=False)
     ruling: Influences = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         used = np.unique(self.rig.joint).astype(np.int64)
-        held = self.rig.held._replace(joint=np.searchsorted(used, self.rig.joint).astype(np.int32))
+        held = self.rig.influences._replace(joint=np.searchsorted(used, self.rig.joint).astype(np.int32))
         shape, places = bind_shape(self.rig), joint_origins(self.rig)[used]
         for name, value in (
             ("used", used),
             ("shape", shape),
             ("pivots", places if shape is None else places @ shape),
-            ("held", group_influences(held)),
+            ("influences", group_influences(held)),
             ("ruling", group_influences(held._replace(weight=scale_fractions(self.rig)))),
         ):
             object.__setattr__(self, name, value)
@@ -50,11 +50,11 @@ class WeightedJoints:
         mine = matrices if len(self.used) == matrices.shape[1] else matrices[:, self.used]
         return decompose(mine, self.pivots) if self.shape is None else decompose_after(mine, self.pivots, self.shape)
 
-    def stretches(self, parts: PolarDecomposition) -> ScaleShear | None:
+    def scale_shear(self, parts: PolarDecomposition) -> ScaleShear | None:
         """Return stretches as kernels read them, None of rigid parts."""
-        if parts.stretch is None or parts.scale is None:
+        if parts.scale_shear is None or parts.scale is None:
             return None
-        rows = parts.stretch.reshape(*parts.scale.shape, 12)
+        rows = parts.scale_shear.reshape(*parts.scale.shape, 12)
         places = np.broadcast_to(self.pivots, (*parts.scale.shape, 3))
         return ScaleShear(lanes(np.concatenate((rows, places), axis=-1)), lanes(parts.scale), self.ruling)
 
@@ -85,24 +85,24 @@ def scale_fractions(rig: SkinBinding) -> FloatArray:
     (hip 0.75, knee 0.25) → 1, 0
     """
     counts = np.diff(rig.start)
-    there = np.arange(rig.most) < counts[:, None]
-    places = np.where(there, rig.start[:-1, None] + np.arange(rig.most), 0)
+    there = np.arange(rig.max_count) < counts[:, None]
+    places = np.where(there, rig.start[:-1, None] + np.arange(rig.max_count), 0)
     joint = np.where(there, rig.joint[places] if len(rig.joint) else 0, 0)
     weight = np.where(there, rig.weight[places] if len(rig.joint) else 0, 0).astype(np.float64)
-    shares, above = np.zeros(weight.shape), is_above(rig.above)
-    for i in range(rig.most):
-        for k in range(i + 1, rig.most):
+    shares, above = np.zeros(weight.shape), is_ancestor(rig.ancestors)
+    for i in range(rig.max_count):
+        for k in range(i + 1, rig.max_count):
             first = 0.5 + (above[joint[:, i], joint[:, k]] - above[joint[:, k], joint[:, i]]) / 2
             amount = weight[:, i] * weight[:, k]
             shares[:, i] += amount * first
             shares[:, k] += amount * (1 - first)
     alone = shares.sum(axis=1) == 0
-    shares[alone] = np.arange(rig.most) == 0
+    shares[alone] = np.arange(rig.max_count) == 0
     shares /= np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     return shares[there].astype(np.float32)
 
 
-def is_above(above: Ints) -> Floats:
+def is_ancestor(above: Ints) -> Floats:
     """Return 1 where joint j hangs on joint i, anywhere below it (J, J), else 0. above: (J,), as in a rig.
 
     is_above([-1, 0]) → [[0, 1], [0, 0]]

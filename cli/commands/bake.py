@@ -152,20 +152,20 @@ def command(
                 writing = caches.write_options(ending, given | {"max_error": _meters(max_error, cache)})
                 saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)
             except BaseException:
-                _say_written(done, voice, dry_run=dry_run)
+                _report_written(done, voice, dry_run=dry_run)
                 raise
             finally:
                 progress.close()
             done.append(_Done(job.file, each.name, job.clip, job.group, len(times), cache.vertex_count, saved))
             if len(jobs) > 1:
-                voice.detail(f"  {_summary(done[-1:], method.value)}")
+                voice.verbose_info(f"  {_summary(done[-1:], method.value)}")
         at_rest = made[jobs[-1].group].rest
-    _say_notes(done, voice)
+    _report_notes(done, voice)
     bake_notes.frame_gap_note(missed, at_rest, voice)
     bake_notes.lost_data_notes(deviations, method.value, voice)
     bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)
     took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
-    voice.say(f"{_summary(done, method.value)}, {took}")
+    voice.info(f"{_summary(done, method.value)}, {took}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,12 +218,12 @@ def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tup
     return [_Job(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
 
 
-def _say_written(done: Sequence[_Done], voice: Reporter, *, dry_run: bool) -> None:
+def _report_written(done: Sequence[_Done], voice: Reporter, *, dry_run: bool) -> None:
     """Say which files are there already where a later one fails."""
     if done and not dry_run:
         names = ", ".join(each.file for each in done[:LISTED])
         more = f" and {len(done) - LISTED} more" if len(done) > LISTED else ""
-        voice.say(f"note: {plural(len(done), 'file')} written before: {names}{more}")
+        voice.info(f"note: {plural(len(done), 'file')} written before: {names}{more}")
 
 
 def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
@@ -236,7 +236,7 @@ def _meters(max_error: str | None, cache: VertexCache) -> float | None:
     return None if max_error is None else units.parse_length(max_error, "--max-error", lambda: bounds.diagonal(cache))
 
 
-def _say_notes(done: list[_Done], voice: Reporter) -> None:
+def _report_notes(done: list[_Done], voice: Reporter) -> None:
     """Every note once, with the files that it is about where it is not about all."""
     files: dict[str, list[str]] = {}
     for each in done:
@@ -245,7 +245,7 @@ def _say_notes(done: list[_Done], voice: Reporter) -> None:
     for note, names in files.items():
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         where = f"{', '.join(names[:LISTED])}{more}: " if len(names) < len(done) else ""
-        voice.say(f"note: {where}{note}")
+        voice.info(f"note: {where}{note}")
 
 
 def _summary(done: list[_Done], method: str) -> str:

@@ -103,4 +103,4 @@ def _draw(seen: CollapseReport, plot: str, voice: Reporter) -> None:
         collapse_report.worst_of_clips(seen.found), title=title, kind=PurePath(plot).suffix.lower()[1:]
     )
     documents.write_bytes([np.frombuffer(picture, np.uint8)], plot)
-    voice.say(f"{plot}  {format_bytes(len(picture))}")
+    voice.info(f"{plot}  {format_bytes(len(picture))}")

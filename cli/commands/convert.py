@@ -42,6 +42,6 @@ def command(
     if not dry_run and (embed or output == documents.PIPE or not source.is_beside(output)):
         copied = output != documents.PIPE
         for note in image_notes.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
-            voice.say(note)
+            voice.info(note)
     name = source.name if output == documents.PIPE else output
-    voice.say(f"{name}  {text.format_change(source.size, size)}, {text.format_duration(time.perf_counter() - began)}")
+    voice.info(f"{name}  {text.format_change(source.size, size)}, {text.format_duration(time.perf_counter() - began)}")

@@ -90,7 +90,7 @@ def command(
     for words in loaded.notes:
         voice.warn(words)
     for note in saved.written.notes:
-        voice.say(f"note: {note}")
+        voice.info(f"note: {note}")
     name = loaded.name if output == documents.PIPE else output
     parts = [
         f"{name}  {text.format_change(size, saved.size)}",
@@ -101,7 +101,7 @@ def command(
     if len(saved.files) > 1:
         parts.append(f"{len(saved.files)} files")
     parts.append(text.format_duration(time.perf_counter() - began))
-    voice.say(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
+    voice.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
 
 
 def _changed(

@@ -111,7 +111,7 @@ def command(
     if plot is not None:
         drawn = _drawn(report, ruler, one, other, kind, limit)
         documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
-        voice.say(f"{plot}  {format_bytes(len(drawn))}")
+        voice.info(f"{plot}  {format_bytes(len(drawn))}")
     if limit is not None:
         _check(report, limit)
 

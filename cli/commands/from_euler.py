@@ -152,13 +152,13 @@ def command(
     if format is Format.JSON:
         documents.write_text(from_euler_report.as_json(made, warnings=voice.warnings))
     for line in from_euler_report.lines(made, verbose=verbose):
-        voice.say(line)
+        voice.info(line)
     parts = [
         f"{called if output == documents.PIPE else output}  {text.format_change(before, size)}",
         from_euler_report.counts(made),
     ]
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.say(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
+    voice.info(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
 
 
 def _order(order: str | None) -> str | None:

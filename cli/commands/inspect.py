@@ -30,7 +30,7 @@ from cli.reports.inspect_data import Inspected, Smoothness
 from cli.text import Reporter
 
 SCHEMA = 1
-LOST = "put it there, or mend the URI"
+LOST_NOTE = "put it there, or mend the URI"
 
 
 class Format(StrEnum):
@@ -161,7 +161,7 @@ def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: boo
         chosen = selection.chosen_clips(reader.names(document)) if selection.clips else None
         facts = facts_of(document, file_bytes=source.size, chosen=chosen, tracks=tracks, broken=opener.broken)
         lost = (
-            Finding("missing-file", Severity.WARNING, *each, LOST)
+            Finding("missing-file", Severity.WARNING, *each, LOST_NOTE)
             for each in documents.missing(document, source.folder)
         )
         facts = replace(facts, findings=(*facts.findings, *lost))

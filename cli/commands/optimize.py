@@ -16,7 +16,7 @@ from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from anim.measure.error.surface import is_measured_at
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
-from anim.optimization.rate_distortion import MOST, SHARES, curve
+from anim.optimization.rate_distortion import ERROR_FRACTIONS, MOST, curve
 from anim.optimization.request import Request
 from anim.optimization.verification import PLAYERS
 from cli.errors import UsageError
@@ -180,7 +180,7 @@ def command(
         about = _about(work, request, found, began)
         with _report(about, voice, report, dry_run=dry_run):
             documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
-    _say(about, voice, dry_run=dry_run)
+    _report_result(about, voice, dry_run=dry_run)
     if not dry_run:
         note_images(about.after, source, output, voice)
 
@@ -212,13 +212,13 @@ def _report(
         yield
 
 
-def _say(about: optimize_report.OptimizeReport, voice: Reporter, *, dry_run: bool) -> None:
+def _report_result(about: optimize_report.OptimizeReport, voice: Reporter, *, dry_run: bool) -> None:
     for line in optimize_report.lines(about, dry_run=dry_run):
-        voice.say(line)
+        voice.info(line)
     for words in optimize_report.warnings(about):
         voice.warn(words)
     for line in optimize_report.details(about) if voice.verbose else ():
-        voice.detail(line)
+        voice.verbose_info(line)
 
 
 def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
@@ -246,9 +246,9 @@ def _check_report(report: str, input: str, output: str) -> None:
 
 def _draw_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
     sizes = []
-    bounds = (0.0, *SHARES, MOST)  # also what is kept without loss, and the least that any bound leaves
+    bounds = (0.0, *ERROR_FRACTIONS, MOST)  # also what is kept without loss, and the least that any bound leaves
     for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
-        voice.say(optimize_report.curve_line(sized, work.scale))
+        voice.info(optimize_report.curve_line(sized, work.scale))
         sizes.append(sized)
     if dry_run:
         return

@@ -113,7 +113,7 @@ def command(
         picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
     documents.write_bytes([np.frombuffer(picture, np.uint8)], output)
     if output != documents.PIPE:
-        voice.say(f"{output}  {format_bytes(len(picture))}")
+        voice.info(f"{output}  {format_bytes(len(picture))}")
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
@@ -166,8 +166,8 @@ def _tracks(
             chosen, alone = compared(chosen, opened.document)
         names = tracks.Names(PurePath(name).name, PurePath(opened.name).name)
         if alone:
-            voice.say(f"note: {plural(alone, 'track')} of {name} {'is' if alone == 1 else 'are'} not in {opened.name}")
-    _say_left_out(chosen, voice)
+            voice.info(f"note: {plural(alone, 'track')} of {name} {'is' if alone == 1 else 'are'} not in {opened.name}")
+    _report_left_out(chosen, voice)
     title = PurePath(name).stem
     clips = {each.clip for each in chosen.shown}
     title = f"{title}: {clips.pop()}" if len(clips) == 1 else title
@@ -178,9 +178,9 @@ def _count(chosen: TrackSelection) -> str:
     return f"{len(chosen.shown)} of {plural(len(chosen.shown) + chosen.more, 'track')}" if chosen.more else ""
 
 
-def _say_left_out(chosen: TrackSelection, voice: Reporter) -> None:
+def _report_left_out(chosen: TrackSelection, voice: Reporter) -> None:
     if chosen.more:
-        voice.say(
+        voice.info(
             f"note: drew the first {len(chosen.shown)} of {len(chosen.shown) + chosen.more} tracks that move; choose "
             "with --clip, --node and --path, or raise --limit"
         )

@@ -35,21 +35,22 @@ from cli.io import cache_files, documents, scenes
 from cli.options import common, mesh_selection
 from cli.options.skinning_methods import Method
 
-ENDINGS = (".png", *image_file.MOVING)
+EXTENSIONS = (".png", *image_file.MOVING)
 FRAMES, FPS = 8, 24.0
-MOST_FRAMES = 3000
+MAX_FRAMES = 3000
 
-Seen = Annotated[
+RenderSource = Annotated[
     str,
     typer.Argument(metavar="IN", help="A glTF file or a vertex cache, '-' for stdin.", show_default=False),
 ]
 Picture = Annotated[
-    str, typer.Argument(metavar="OUT", help=f"A {', '.join(ENDINGS)} file; '-' for stdout (PNG).", show_default=False)
+    str,
+    typer.Argument(metavar="OUT", help=f"A {', '.join(EXTENSIONS)} file; '-' for stdout (PNG).", show_default=False),
 ]
 
 
 def command(
-    input: Seen = "-",
+    input: RenderSource = "-",
     output: Picture = "-",
     *,
     at: Annotated[
@@ -57,7 +58,7 @@ def command(
     ] = None,
     count: Annotated[
         int | None,
-        typer.Option("--frames", metavar="N", help="So many frames, evenly spaced; default 8.", min=1, max=MOST_FRAMES),
+        typer.Option("--frames", metavar="N", help="So many frames, evenly spaced; default 8.", min=1, max=MAX_FRAMES),
     ] = None,
     fps: Annotated[
         float | None,
@@ -145,7 +146,7 @@ def command(
                 nodes=nodes,
                 textures=not (heat or checker or wire) if textures is None else textures,
                 resolve=beside,
-                note=lambda words: voice.say(f"note: {name}: {words}"),
+                note=lambda words: voice.info(f"note: {name}: {words}"),
             )
         rows, extent = clips.build_strips(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
@@ -159,7 +160,7 @@ def command(
     documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)
     frames = text.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == documents.PIPE else output
-    voice.say(
+    voice.info(
         f"{called}  {text.format_bytes(len(drawn))}, {frames}, {text.format_duration(time.perf_counter() - began)}"
     )
 
@@ -169,8 +170,8 @@ def _ending(output: str) -> str:
         return ".png"
     documents.check_file(output)
     ending = PurePath(output).suffix.lower()
-    if ending not in ENDINGS:
-        raise UsageError(f"{output}: no picture is called '{ending}' (expected {', '.join(ENDINGS)})")
+    if ending not in EXTENSIONS:
+        raise UsageError(f"{output}: no picture is called '{ending}' (expected {', '.join(EXTENSIONS)})")
     return ending
 
 
@@ -196,7 +197,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
             head = data[:HEAD].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data)
-                documents.note_mended(document, name, voice)
+                documents.repaired_note(document, name, voice)
                 yield gltf.pages(document) or document, name, resolver.refuse_relative
             else:
                 ending = sniff_format(head, len(data))

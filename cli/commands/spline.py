@@ -71,16 +71,16 @@ def command(
 def _notes(before: Clips, after: Clips) -> Iterator[str]:
     """How far the curve passes keys by."""
     found = {i: max_key_change(old, after[i]) for i, old in before.items()}
-    found = {i: each for i, each in found.items() if each[0] or each[1] > SEEN}
+    found = {i: each for i, each in found.items() if each[0] or each[1] > SHOWN_TRACKS}
     if found:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))
-        far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SEEN else []
+        far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SHOWN_TRACKS else []
         far += [f"other values by up to {moved:.3g}"] if moved else []
         where = reader.clip_labels([(before[i].name, i) for i in found])
         yield f"{where}: the curve passes keys by, {', '.join(far)}; --tangents natural goes through them"
 
 
-SEEN = 1e-6  # rad; turns below come from rounding
+SHOWN_TRACKS = 1e-6  # rad; turns below come from rounding
 
 
 _ABOUT = {

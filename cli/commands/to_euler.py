@@ -27,7 +27,7 @@ from cli.io import documents
 from cli.options import common
 
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
-LEAST_DEG = 1e-6  # degrees; below is what rounding leaves
+MIN_DEVIATION_DEG = 1e-6  # degrees; below is what rounding leaves
 NOTABLE = math.radians(0.5)  # that straight curves may leave the motion by before a way out is named
 CENTIMETERS = 0.01  # m per unit of a BVH, unless told
 
@@ -100,7 +100,7 @@ def command(
         voice.warn(note)
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.say(
+    voice.info(
         f"{name}  {text.format_change(source.size, len(data))}, {text.plural(len(motion.nodes), 'node')}, "
         f"{words}{text.format_duration(time.perf_counter() - began)}{ending}"
     )
@@ -182,7 +182,7 @@ def _motion(
     )
     words = (
         f"between keys off by up to {math.degrees(found.deviation):.2g}°, "
-        if math.degrees(found.deviation) > LEAST_DEG
+        if math.degrees(found.deviation) > MIN_DEVIATION_DEG
         else ""
     )
     if limit is None and found.deviation > NOTABLE:

@@ -122,9 +122,7 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
         finally:
             staged.clear()
     lost = cache_notes.unsupported_notes(cache, ending)
-    left = (
-        cache_notes.no_place_note(staged.names[:-1]) if is_pipe else cache_notes.left_behind_note(path, names, ending)
-    )
+    left = cache_notes.unwritable_note(staged.names[:-1]) if is_pipe else cache_notes.orphans_note(path, names, ending)
     return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)))
 
 

@@ -16,7 +16,7 @@ from anim.errors import AnimError, FormatError, OutputError
 from anim.files import atomic, links, resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, uri
-from anim.gltf.io.source import Opener, Source, glb_pieces, open_bytes, open_file, write_file
+from anim.gltf.io.source import Opener, Source, glb_chunks, open_bytes, open_file, write_file
 from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from cli import tables
 from cli.errors import UsageError
@@ -36,7 +36,7 @@ def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read
     name = called(path)
     try:
         found = open_bytes(_stdin(), name, opener) if path == PIPE else open_file(path, opener)
-        note_mended(found.document, name, voice)
+        repaired_note(found.document, name, voice)
         yield found
     except (UsageError, OutputError):
         raise
@@ -59,14 +59,14 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
         raise error.at(name, ": ") from None
 
 
-def note_mended(document: Document, name: str, voice: Reporter) -> None:
+def repaired_note(document: Document, name: str, voice: Reporter) -> None:
     """Say what had to be mended to read a document, nothing of most. name: of the input."""
     if not document.expanded:
         return
     first, more = document.expanded[0], len(document.expanded) - 1
     words = (f" and {more} more have", "them") if more else (" has", "it")
     problem = f"{node_label(document.json, first)}{words[0]} a matrix although a clip animates {words[1]}"
-    voice.say(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
+    voice.info(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
 
 
 def write(
@@ -91,9 +91,9 @@ def write(
             source,
             unchanged=unchanged,
             dry_run=dry_run,
-            note=lambda words: voice.say(f"note: {tables.escape_control(words)}"),
+            note=lambda words: voice.info(f"note: {tables.escape_control(words)}"),
         )
-    content = glb_pieces(document, unchanged)
+    content = glb_chunks(document, unchanged)
     if not dry_run:
         write_bytes(content, path)
     return sum(len(piece) for piece in content)

@@ -37,7 +37,7 @@ def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: R
     if joints:
         names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
         more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
-        voice.say(
+        voice.info(
             f"note: {names}{more}: uneven scale, where tools define {method} differently; here each joint stretches "
             "the mesh about its own place, then turns it"
         )

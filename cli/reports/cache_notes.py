@@ -21,12 +21,12 @@ def unsupported_notes(cache: VertexCache, ending: str) -> tuple[str, ...]:
     return (f"{' and '.join(lost)} are left out: {ending[1:]} has no place for them",) if lost else ()
 
 
-def no_place_note(names: Sequence[str]) -> tuple[str, ...]:
+def unwritable_note(names: Sequence[str]) -> tuple[str, ...]:
     """Return which files a pipe has no place for."""
     return (f"not written, since the output is a pipe: {', '.join(names)}",) if names else ()
 
 
-def left_behind_note(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
+def orphans_note(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
     """Return which frames of an earlier sequence are still beside those that were written to `path`."""
     if CACHE_FORMATS[ending].files is not Files.FRAMES:
         return ()

@@ -130,11 +130,11 @@ def _mesh(mesh: MeshCollapse) -> dict[str, Any]:
         "share_below_low": mesh.low,
         "share_inverted": mesh.inverted,
         "share_of_faces_closed": mesh.closed,
-        "methods": [_fared(each, mesh) for each in mesh.methods],
+        "methods": [_method_row(each, mesh) for each in mesh.methods],
     }
 
 
-def _fared(fared: MethodScore, mesh: MeshCollapse) -> dict[str, Any]:
+def _method_row(fared: MethodScore, mesh: MeshCollapse) -> dict[str, Any]:
     about: dict[str, Any] = {"method": fared.method}
     if fared.volume is not None:
         about |= {
@@ -148,7 +148,7 @@ def _fared(fared: MethodScore, mesh: MeshCollapse) -> dict[str, Any]:
         "bulge_joint": fared.joint,
         "bulge_time_s": fared.time,
         "share_bulging": fared.bulging,
-        "max_off_lbs_m": fared.off,
-        "max_off_lbs_time_s": fared.off_time,
+        "max_off_lbs_m": fared.max_distance,
+        "max_off_lbs_time_s": fared.max_distance_time,
         "unusable": fared.unusable,
     }

@@ -15,7 +15,7 @@ from cli.tables import Cell
 from cli.text import format_bytes, format_length, format_span, format_speed, plural
 
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
-STANDING = 1e-4  # m; a root that ends this near its start goes nowhere
+MARKS_OF_SEVERITY = 1e-4  # m; a root that ends this near its start goes nowhere
 MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
 
 
@@ -99,7 +99,7 @@ def _clips(clips: Sequence[ClipReport]) -> str:
     rows: list[list[Cell]] = []
     for clip in clips:
         seam = f"{format_length(clip.seam_m)} {format_speed(clip.seam_speed_m_per_s)}"
-        root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > STANDING else ""
+        root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > MARKS_OF_SEVERITY else ""
         rows.append(
             [
                 clip_name(clip.name, clip.index),

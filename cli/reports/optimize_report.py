@@ -23,7 +23,7 @@ from anim.optimization.search.solution import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from cli.errors import CheckError
 from cli.reports import optimize_bound
-from cli.text import format_bytes, format_change, format_duration, format_length, format_share, plural
+from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length, plural
 
 LISTED = 3  # places in the file that a note names
 LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
@@ -79,7 +79,7 @@ def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: floa
     """Raise CheckError where a clip does not keep its bounds."""
     bad = {i: each for i, each in found.verdicts.items() if not each.holds}
     if bad:
-        worst = max(bad, key=lambda i: bad[i].strain)
+        worst = max(bad, key=lambda i: bad[i].usage)
         off = bad[worst].error
         raise CheckError(
             f"{reader.clip_label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
@@ -184,7 +184,7 @@ def count_keys(clip: Clip) -> int:
 
 
 def _length(meters: float, scale: float) -> str:
-    return f"max {format_length(meters)}{format_share(meters, scale)}"
+    return f"max {format_length(meters)}{format_fraction(meters, scale)}"
 
 
 def _worst_words(about: OptimizeReport) -> str:

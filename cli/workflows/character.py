@@ -73,7 +73,7 @@ def put_on_character(
         old = reader.clips(document)[casting.replaced]
         stay, num_gone = kept_tracks(old, done)
         if stay:
-            voice.say(f"note: {text.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
+            voice.info(f"note: {text.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
         if num_gone:
             what = f"{text.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
             voice.warn(f"{what} go with it: it is another figure's motion")
@@ -90,7 +90,7 @@ def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
         ("character", scene.skeleton, moved),
     ):
         names = ", ".join(f"'{skeleton.names[node]}'" for node in sorted(nodes))
-        voice.detail(f"joints of the {what} ({len(nodes)}): {tables.escape_control(names)}")
+        voice.verbose_info(f"joints of the {what} ({len(nodes)}): {tables.escape_control(names)}")
 
 
 def pairs(path: str | None) -> dict[str, str]:

@@ -83,7 +83,7 @@ def edit_clips(
         stale = badly_stored(document.json)
         new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
         for note in notes({i: clips[i] for i in new}, new):
-            voice.say(f"note: {note}")
+            voice.info(f"note: {note}")
         result = writer.replace_clips(document, new)
         written = reader.clips(result)
         edited = EditResult({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
@@ -93,7 +93,9 @@ def edit_clips(
             edited = _measured(edited, source, accessors, skeleton, voice)
         else:
             for i, clip in edited.before.items():
-                voice.detail(f"  {reader.clip_label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys")
+                voice.verbose_info(
+                    f"  {reader.clip_label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys"
+                )
         size = documents.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run, voice=voice)
     if not dry_run:
         note_images(result, source, output, voice)
@@ -101,9 +103,9 @@ def edit_clips(
     if not new:
         why = "no track was changed" if clips else "it has no clips"
         before = text.format_bytes(size) if size == source.size else text.format_change(source.size, size)
-        voice.say(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
+        voice.info(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
-    voice.say(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
+    voice.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
@@ -137,7 +139,7 @@ def _measured(
         floor = max(floor, found.error.max_error)
         measured.append(found)
         counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
-        voice.detail(f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}")
+        voice.verbose_info(f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}")
     return EditResult(edited.before, edited.after, _worst(measured), prover.ruler.diagonal, at_nodes)
 
 
@@ -182,7 +184,7 @@ def _error(found: Proof, diagonal: float) -> str:
     error = found.error
     least = "" if is_closed(found, diagonal) else "at least "
     where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = f"max {least}{text.format_length(error.max_error)}{text.format_share(error.max_error, diagonal)}{where}"
+    words = f"max {least}{text.format_length(error.max_error)}{text.format_fraction(error.max_error, diagonal)}{where}"
     if error.max_pointer_error > 0:
         words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
     return words
@@ -196,4 +198,4 @@ def note_images(document: Document, source: Source, output: str, voice: text.Rep
     """Say which images went along to an output in another folder than its input, and which are missing there."""
     if output != documents.PIPE and not source.is_beside(output):
         for note in image_notes.notes(document, source.folder, copied=True):
-            voice.say(note)
+            voice.info(note)

@@ -42,7 +42,7 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
 
 def raw_options(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
     """Return the same as it was typed where that is a share of the diagonal, and the number of metres elsewhere."""
-    return tuple(_share(text) or f"{getattr(bounds, name)}" for name, text in said.items())
+    return tuple(_fraction(text) or f"{getattr(bounds, name)}" for name, text in said.items())
 
 
 def notes(said: Mapping[str, str | None]) -> Iterator[str]:
@@ -53,7 +53,7 @@ def notes(said: Mapping[str, str | None]) -> Iterator[str]:
             yield f"--{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
 
 
-def _share(text: str | None) -> str:
+def _fraction(text: str | None) -> str:
     number = (text or "").strip()
     return f"{float(number[:-1])}%" if number.endswith("%") else ""
 

@@ -36,7 +36,7 @@ def test_what_it_writes_is_what_the_library_bakes(call: Call, fixture: Fixture, 
     cache = baked(
         reader.scene(document, normals=True), twist, times=frame_times(0, 1, fps=24), method="dqs", normals=True
     )
-    found, whole = np.load(out), cache.whole()
+    found, whole = np.load(out), cache.load_all()
     assert np.array_equal(found["positions"], whole.positions)
     assert np.array_equal(found["normals"], whole.normals)  # type: ignore[arg-type]
     assert np.array_equal(found["faces"], cache.faces)

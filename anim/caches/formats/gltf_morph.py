@@ -44,7 +44,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
             f"{12 * cache.frame_count * cache.vertex_count / 1e9:.1f} GB of positions (at most 1.1)",
             help="choose fewer with --fps, or --layout flip-visibility, or .usdc, .npz, .pc2, .mdd: those are streamed",
         )
-    whole = cache.whole()
+    whole = cache.load_all()
     limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * bounds.diagonal(cache)
     best = _smallest_encoding(whole.positions, cache.times, limit, quantize=writing.quantize)
     if best is None:

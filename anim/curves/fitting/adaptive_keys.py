@@ -13,7 +13,7 @@ from anim.model import Interpolation, Track
 from anim.sampling.times import distinct_float32
 
 SAMPLES = np.array([0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97])  # of a piece; errors hide at ½
-WIDEST_TURN = np.radians(120)  # of one piece: beyond, players and splines of quaternions go wrong
+MAX_ANGLE_RAD = np.radians(120)  # of one piece: beyond, players and splines of quaternions go wrong
 SHORTEST = 1e-5  # s; two float32 times below a minute are still apart by more than this
 LEVELS = 24  # halvings of a piece at most
 
@@ -64,7 +64,7 @@ def cubic_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> K
 
     corners: (K,) s, increasing: where keys must lie, both ends among them; between two the motion must be smooth.
     """
-    times = _bisect(motion, corners, tolerance, _cubic_piece)
+    times = _bisect(motion, corners, tolerance, _cubic_segment)
     values = _values(motion, times)
     before, after = motion.rates(times, True), motion.rates(times, False)
     if motion.rotation:
@@ -75,7 +75,7 @@ def cubic_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> K
 
 def linear_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
     """Return LINEAR keys that follow `motion` within `tolerance`; tangents are 0 and unused."""
-    times = _bisect(motion, corners, tolerance, _straight_piece)
+    times = _bisect(motion, corners, tolerance, _linear_segment)
     values = _values(motion, times)
     return KeySet(times, values, np.zeros_like(values), np.zeros_like(values))
 
@@ -91,7 +91,7 @@ def _bisect(motion: TrackFunction, corners: Floats, tolerance: float, between: B
         start, end = start[wide], end[wide]
         if not len(start):
             break
-        bad = _off(motion, start, end, between) > tolerance
+        bad = _deviation(motion, start, end, between) > tolerance
         middle = (start[bad] + end[bad]) / 2
         done.append(middle)
         start, end = np.concatenate((start[bad], middle)), np.concatenate((middle, end[bad]))
@@ -99,7 +99,7 @@ def _bisect(motion: TrackFunction, corners: Floats, tolerance: float, between: B
     return times[distinct_float32(times)]
 
 
-def _off(motion: TrackFunction, start: Floats, end: Floats, between: Between) -> Floats:
+def _deviation(motion: TrackFunction, start: Floats, end: Floats, between: Between) -> Floats:
     """How far each piece is off at worst (P,); infinite where it turns too far."""
     at = start[:, None] + (end - start)[:, None] * SAMPLES
     true = motion.values(at.reshape(-1)).reshape(*at.shape, -1)
@@ -108,10 +108,10 @@ def _off(motion: TrackFunction, start: Floats, end: Floats, between: Between) ->
         return np.asarray(np.abs(given - true).max(axis=(1, 2), initial=0.0))
     off = quaternion.angle_between(given, true).max(axis=1)
     turned = quaternion.angle_between(true[:, 1:], true[:, :-1]).sum(axis=1)
-    return np.where(turned > WIDEST_TURN, np.inf, off)
+    return np.where(turned > MAX_ANGLE_RAD, np.inf, off)
 
 
-def _cubic_piece(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
+def _cubic_segment(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
     a, b = motion.values(start), motion.values(end)
     leaving, arriving = motion.rates(start, False), motion.rates(end, True)
     if motion.rotation:
@@ -123,7 +123,7 @@ def _cubic_piece(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
     return quaternion.normalize(result) if motion.rotation else result
 
 
-def _straight_piece(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
+def _linear_segment(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
     a, b = motion.values(start)[:, None], motion.values(end)[:, None]
     if motion.rotation:
         return quaternion.slerp(a, b, np.broadcast_to(SAMPLES, (len(start), len(SAMPLES))))

@@ -54,11 +54,11 @@ def fit_errors(path: FitTarget, a: Floats, b: Floats, rates: tuple[Floats, Float
     rates: those (B,) at both ends, if not the ones that `slopes` finds.
     """
     u = a[:, None] + (b - a)[:, None] * SAMPLES
-    fitted = _pieces(path, a, b, *(rates or fit_end_slopes(path, a, b)))
+    fitted = _segments(path, a, b, *(rates or fit_end_slopes(path, a, b)))
     return np.asarray(path.distance(fitted, path.point(u)).max(axis=1) * SAFETY)
 
 
-def _pieces(path: FitTarget, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
+def _segments(path: FitTarget, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
     """Return the points (B, S, D) of the pieces at SAMPLES."""
     m0 = ((b - a) * rate0)[:, None] * path.direction(a)
     m1 = ((b - a) * rate1)[:, None] * path.direction(b)
@@ -68,7 +68,7 @@ def _pieces(path: FitTarget, a: Floats, b: Floats, rate0: Floats, rate1: Floats)
 def _free_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Return the rates (B,) at both ends that together leave the least squared error at SAMPLES."""
     none = np.zeros_like(a)
-    left = path.point(a[:, None] + (b - a)[:, None] * SAMPLES) - _pieces(path, a, b, none, none)
+    left = path.point(a[:, None] + (b - a)[:, None] * SAMPLES) - _segments(path, a, b, none, none)
     length, s = (b - a)[:, None, None], SAMPLES[:, None]
     shape0 = length * s * (1 - s) ** 2 * path.direction(a)[:, None]
     shape1 = -length * s * s * (1 - s) * path.direction(b)[:, None]

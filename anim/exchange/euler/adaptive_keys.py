@@ -12,7 +12,7 @@ from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.errors import RangeError
 from anim.maths import quaternion
 
-MAX_TURN = np.radians(120)  # of a piece; beyond half a turn slerp goes the other way round
+MAX_ANGLE_RAD = np.radians(120)  # of a piece; beyond half a turn slerp goes the other way round
 MAX_TRAVEL = np.radians(360)  # of all axes in a piece before it is sampled, so that no turn hides between samples
 ROUNDING = 1e-4  # share of a piece that float32 times make it longer or shorter
 SAMPLES = np.arange(1, 16) / 16
@@ -94,7 +94,7 @@ def _required_keys(path: SampledPath, a: Floats, b: Floats, tolerance: float) ->
     if path.turns:
         chord = quaternion.slerp(start, end, SAMPLES[None])
         steps = quaternion.angle_between(values[:, 1:], values[:, :-1]).sum(axis=1)
-        turns = np.ceil(steps / MAX_TURN - ROUNDING)
+        turns = np.ceil(steps / MAX_ANGLE_RAD - ROUNDING)
     else:
         chord = start + (end - start) * SAMPLES[None, :, None]
         turns = np.ones(len(a))

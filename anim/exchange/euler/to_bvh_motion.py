@@ -22,7 +22,7 @@ from anim.sampling import rest_pose, sample_pose, world_matrices
 EVEN = 1e-3  # share of a frame by which frames may be off an even grid
 MAX_FRAMES = 10_000_000
 ROUNDING = 2e-7  # share of a time that float32 may be off
-STILL = 1e-6  # share of the skeleton's size by which an offset may differ and still be one
+CONSTANT_TOLERANCE = 1e-6  # share of the skeleton's size by which an offset may differ and still be one
 BRACES = "{}"
 END = "_end"  # a leaf of this name that nothing moves is where its parent ends
 
@@ -51,7 +51,7 @@ def to_bvh(
         raise UnsupportedError("there is no node to write")
     orders.check([names[node] for node in chosen])
     shown, times = _frames(clip, fps)
-    figure = _Figure(skeleton, clip, chosen, times)
+    figure = _Skeleton(skeleton, clip, chosen, times)
     nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
     notes = skipped_note(_lost_tracks(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen) + _shift_start(clip)
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
@@ -62,7 +62,7 @@ PlacedJoint = tuple[
 ]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
 
 
-class _Figure:
+class _Skeleton:
     """The nodes to write, numbered in their order, and where they are at times (F,) and at rest."""
 
     def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
@@ -82,12 +82,12 @@ class _Figure:
 
 
 def _node(
-    figure: _Figure, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
+    figure: _Skeleton, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
 ) -> EulerNode:
     """A joint with the curves that it needs; lengths in the file's unit, keys at times `shown`."""
     parent = _ancestors_outside(figure.skeleton, node, figure.numbers)
     offset, turn, path = _relative_to(figure.placed(node), figure.placed(parent))
-    moved = parent < 0 or bool(np.abs(path - offset).max() > STILL * figure.size)
+    moved = parent < 0 or bool(np.abs(path - offset).max() > CONSTANT_TOLERANCE * figure.size)
     end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
     order = orders.of(name, turn)
     angles = euler.unwrap(turn, order=order, frame=AxesConvention.INTRINSIC, lock=FILE_LOCK)

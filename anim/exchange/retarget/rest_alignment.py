@@ -14,7 +14,7 @@ from anim.exchange.retarget.rest_pose import RestPose, facing_rotation
 from anim.exchange.retarget.similarity import fit_similarity
 
 ALIKE = 1e-3  # of the radius; joints that differ less between two rest poses are those of one build
-MOST = 0.5  # share of the source's joints that must be matched for them to tell the figure's size
+MAX_SCALE_RATIO = 0.5  # share of the source's joints that must be matched for them to tell the figure's size
 HANGING = 0.1  # of the size, that the lowest joint must be below 0 for a rest pose to hang from its origin
 
 
@@ -57,7 +57,7 @@ def align_rests(source: RestPose, target: RestPose, matching: JointMatch, *, of_
     one, other = _legs(source, matching.source_roles), _legs(target, matching.target_roles)
     measure = Measure.LEGS
     if not one > 0 or not other > 0:
-        most = len(pairs) > 1 and len(pairs) >= MOST * (len(pairs) + len(matching.unmatched))
+        most = len(pairs) > 1 and len(pairs) >= MAX_SCALE_RATIO * (len(pairs) + len(matching.unmatched))
         measure = Measure.JOINTS if most else Measure.EXTENT
     if measure is Measure.JOINTS:
         one, other = _spread(source.positions[pairs[:, 0]]), _spread(target.positions[pairs[:, 1]])

@@ -14,7 +14,7 @@ from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
 
 
-def along(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Bytes]]:
+def copy_images(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Bytes]]:
     """Return a document that is to go from `folder` to `target`, and the images that it needs there, by path.
 
     They keep their relative paths, and the URIs stay. Where another file has the name, the copy is named after its

@@ -91,12 +91,12 @@ def write_file(
     """
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and not source.is_beside(path):
-        document, copies = images.along(document, source.folder, links.resolve_links(Path(path)).parent)
+        document, copies = images.copy_images(document, source.folder, links.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # some may have got other names
     if not dry_run:
         images.write_copies(copies)
     if not path.lower().endswith(".gltf"):
-        content = glb_pieces(document, unchanged)
+        content = glb_chunks(document, unchanged)
         if not dry_run:
             atomic.write_file(Path(path), content)
         return sum(len(piece) for piece in content)
@@ -109,7 +109,7 @@ def write_file(
     return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
 
 
-def glb_pieces(document: Document, unchanged: Bytes | None = None) -> list[Bytes]:
+def glb_chunks(document: Document, unchanged: Bytes | None = None) -> list[Bytes]:
     """Return the pieces of a GLB; `unchanged` as it is where that is one, with all its buffers."""
     content = container.glb(document)
     return (

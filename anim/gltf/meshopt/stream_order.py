@@ -27,7 +27,7 @@ def ordered(codes: Sequence[bytes], stride: int, extension: str) -> list[int]:
     stream = _Stream(codes, stride, extension)
     count = len(codes)
     starts = range(min(count, max(1, min(STARTS, COMPARED // count**2))))
-    orders = [list(range(count)), *(stream.chained(start) for start in starts)]
+    orders = [list(range(count)), *(stream.chain(start) for start in starts)]
     return min(orders, key=stream.size)
 
 
@@ -43,7 +43,7 @@ class _Stream:
         """Return the bytes of an order when compressed."""
         return len(codec.encode(np.concatenate([self._rows[i] for i in order]), self._extension))
 
-    def chained(self, start: int) -> list[int]:
+    def chain(self, start: int) -> list[int]:
         """Return the order that goes from each content to the one that begins most like it ends."""
         firsts = np.array([rows[0] for rows in self._rows])
         lasts = np.array([rows[-1] for rows in self._rows])

@@ -75,7 +75,7 @@ class Accessors:
             raise FormatError("holds floats (expected integers)", where=f"accessor {index}")
         return raw.astype(np.int64)
 
-    def numbers_of_things(self, index: int) -> Ints:
+    def indices(self, index: int) -> Ints:
         """Return what `integers` does. Raises FormatError for signed types, which can't number vertices or joints."""
         if self.raw(index).dtype.kind == "i":
             raise FormatError("holds signed integers (expected unsigned ones)", where=f"accessor {index}")

@@ -130,7 +130,7 @@ class Meshes:
 
     def _faces(self, primitive: Json, vertices: int) -> Ints:
         if "indices" in primitive:
-            indices = self._accessors.numbers_of_things(primitive["indices"])[:, 0]
+            indices = self._accessors.indices(primitive["indices"])[:, 0]
         else:
             indices = np.arange(vertices)
         return _triangles(indices, primitive.get("mode", TRIANGLES))

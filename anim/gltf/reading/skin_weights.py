@@ -39,7 +39,7 @@ def read_influences(accessors: Accessors, attributes: Json, vertices: int, joint
     while joint_count and f"JOINTS_{len(joints)}" in attributes and f"WEIGHTS_{len(joints)}" in attributes:
         k = len(joints)
         stored = attributes[f"WEIGHTS_{k}"]
-        joints.append(accessors.numbers_of_things(attributes[f"JOINTS_{k}"]))
+        joints.append(accessors.indices(attributes[f"JOINTS_{k}"]))
         weights.append(accessors.floats(stored))
         steps.append(_step(accessors.raw(stored).dtype))
         if joints[k].shape != (vertices, 4) or weights[k].shape != (vertices, 4):

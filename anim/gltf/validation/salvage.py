@@ -13,7 +13,7 @@ from anim.gltf.validation import structure
 from anim.gltf.writing.references import views_of
 
 MAX_FAULTS = 32  # every one of them takes a look at the whole file
-PLACE = re.compile(r"(\w+)(?:\[(\d+)\])?\.?(\w*)(?:\[(\d+)\])?")
+JSON_POINTER = re.compile(r"(\w+)(?:\[(\d+)\])?\.?(\w*)(?:\[(\d+)\])?")
 STUB: Json = {"componentType": 5121, "count": 1, "type": "SCALAR"}
 
 
@@ -66,7 +66,7 @@ class _Remaining:
 
     def remove(self, where: str) -> None:
         """Take away what a fault lies in."""
-        match = PLACE.match(where)
+        match = JSON_POINTER.match(where)
         kind, number, key, inner = match.groups() if match else ("asset", None, "", None)
         if kind == "asset":
             self.json = {k: v for k, v in self.json.items() if k not in structure.TOP_ARRAYS or type(v) is list}

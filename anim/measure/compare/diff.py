@@ -110,7 +110,7 @@ def _compare_clips(
 ) -> ClipDiff:
     before, after, ruler = old[1], new[1], prover.ruler
     times = dense_times(before, after, fps=fps)
-    look = ruler.look(before, after, times, player=player)
+    look = ruler.sample_errors(before, after, times, player=player)
     error, bound = look.error, None
     if len(set(parse_pair(player))) == 1:
         proof = prover.certified(before, after, times, {player: look})

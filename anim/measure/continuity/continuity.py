@@ -152,7 +152,7 @@ class _Analysis:
 
     def __init__(self, track: Track) -> None:
         self.track = track
-        self.still = _is_still(track)
+        self.still = _is_constant(track)
         self._speed, self._acceleration = (0.0, 0.0) if self.still else knots.root_mean_squares(track)
         self._size = float(np.abs(track.values).max())
         storage = track.storage
@@ -234,7 +234,7 @@ class _Analysis:
         return float(lengths(values.max(axis=0) - values.min(axis=0)))
 
 
-def _is_still(track: Track) -> bool:
+def _is_constant(track: Track) -> bool:
     """Whether nothing ever moves: one value, and no tangents that lead away from it."""
     tangents = (track.in_tangents, track.out_tangents)
     same = bool((track.values == track.values[0]).all())

@@ -36,7 +36,7 @@ class Knots:
 def interior_knots(track: Track) -> Knots:
     """Return the joints at the interior keys of a track. At a jump at an end both sides move as the inner one does."""
     keys, steps = track.times, np.append(np.diff(track.times), np.inf)
-    borders = np.concatenate(([-1], _pieces(track), [len(keys) - 1]))
+    borders = np.concatenate(([-1], _segments(track), [len(keys) - 1]))
     first, last = borders[:-1] + 1, borders[1:]
     inside = (last > 0) & (first < len(keys) - 1)
     first, last = first[inside], last[inside]
@@ -110,7 +110,7 @@ def accelerations(track: Track, times: Floats, *, before: bool) -> Floats:
 
 def root_mean_squares(track: Track) -> tuple[float, float]:
     """Return RMS speed and acceleration over all pieces; keys that stand for a jump take no time."""
-    pieces = _pieces(track)
+    pieces = _segments(track)
     steps = np.diff(track.times)[pieces]
     if not len(steps) or track.interpolation is Interpolation.STEP:
         return 0.0, 0.0
@@ -126,7 +126,7 @@ def lengths(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))
 
 
-def _pieces(track: Track) -> Ints:
+def _segments(track: Track) -> Ints:
     """Numbers of the pieces between keys that are no jumps: (P,)."""
     return np.flatnonzero(np.diff(track.times) > PAIR + 2 * FLOAT32 * track.times[1:])
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.measure.continuous_bound.quaternion_bounds import LEAST, QuaternionBounds, arc_mix, directed, nearest
+from anim.measure.continuous_bound.quaternion_bounds import MIN_LENGTH, QuaternionBounds, arc_mix, directed, nearest
 
 
 def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic: Bools, h: Floats) -> QuaternionBounds:
@@ -17,7 +17,7 @@ def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic:
     is_cubic: (U,). h: (G, 1) s.
     """
     own, most_own, own_rate = np.zeros_like(found.value), np.zeros_like(found.size), np.zeros_like(found.size)
-    whole = replace(found, own=own, most_own=most_own, own_rate=own_rate)
+    whole = replace(found, own=own, max_residual=most_own, residual_rate=own_rate)
     part = on_cubics(value[..., is_cubic], cubic[0][..., is_cubic], cubic[1][..., is_cubic], h)
     for name in QuaternionBounds.__slots__:
         getattr(whole, name)[..., is_cubic] = getattr(part, name)
@@ -30,8 +30,8 @@ def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Quaterni
     push = np.sqrt((bend * bend).sum(axis=1).max(axis=0))  # no |c″| is larger
     jerk = np.sqrt(((bend[1] - bend[0]) ** 2).sum(axis=0)) / h  # |c‴|, constant
     rate = np.sqrt(of.rate.max(axis=0)) + h * h / 8 * jerk
-    least, most = _least(value, h) - h * h / 8 * push, np.sqrt(of.square.max(axis=0)) + h * h / 8 * push
-    least = np.where(least > LEAST, least, np.nan)
+    least, most = _min_norm(value, h) - h * h / 8 * push, np.sqrt(of.square.max(axis=0)) + h * h / 8 * push
+    least = np.where(least > MIN_LENGTH, least, np.nan)
     drag, speed = of.along / of.square, rate / least
     most_drag = (np.abs(of.along).max(axis=0) + h / 2 * (rate * rate + most * push)) / least**2
     direction, tilt = directed(of, drag)
@@ -45,7 +45,7 @@ def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Quaterni
     return QuaternionBounds(direction, tilt, *figures, own, most_own, own_rate)
 
 
-def _least(value: Floats, h: Floats) -> Floats:
+def _min_norm(value: Floats, h: Floats) -> Floats:
     """The least length on the chord (P, G, U)."""
     chord = (value[1] - value[0]) / h
     square, along, rate = ((x * y).sum(axis=0) for x, y in ((value[0],) * 2, (value[0], chord), (chord, chord)))

@@ -16,7 +16,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.measure.continuous_bound.quaternion_bounds import ChordBounds, QuaternionBounds
 
-LEAST = 1e-3  # where less than this of sup|d″| is left on one side, nothing is said
+MIN_LENGTH = 1e-3  # where less than this of sup|d″| is left on one side, nothing is said
 
 
 def difference_bounds(
@@ -28,12 +28,12 @@ def difference_bounds(
     """
     start, rate = (np.sqrt(_squares(x, y).max(axis=0)) for x, y in ((b.value, a.value), (b.slope, a.slope)))
     pull, drag = _between_lines(*between[:2], h)
-    pull = np.where(between[2], pull, _apart(a.pull, b.pull) + h / 2 * (a.pull_rate + b.pull_rate))
-    drag = np.where(between[2], drag, _apart(a.drag, b.drag) + h / 2 * (a.drag_rate + b.drag_rate))
-    left = 1 - b.most_pull * h * h / 8 - b.most_drag * h
-    known = b.most_pull * start + pull * a.size + 2 * b.most_drag * rate + 2 * a.speed * drag + _own(a, b, h)
+    pull = np.where(between[2], pull, _apart(a.lambda_, b.lambda_) + h / 2 * (a.lambda_rate + b.lambda_rate))
+    drag = np.where(between[2], drag, _apart(a.rho, b.rho) + h / 2 * (a.rho_rate + b.rho_rate))
+    left = 1 - b.max_lambda * h * h / 8 - b.max_rho * h
+    known = b.max_lambda * start + pull * a.size + 2 * b.max_rho * rate + 2 * a.speed * drag + _own(a, b, h)
     loose = a.bend + b.bend
-    bend = np.where(left > LEAST, np.minimum(known / np.maximum(left, LEAST), loose), loose)
+    bend = np.where(left > MIN_LENGTH, np.minimum(known / np.maximum(left, MIN_LENGTH), loose), loose)
     return np.stack((start + h * h / 8 * bend, rate + h / 2 * bend, bend))
 
 
@@ -53,7 +53,7 @@ def _own(a: QuaternionBounds, b: QuaternionBounds, h: Floats) -> Floats | float:
     if a.own is None and b.own is None:
         return 0.0
     square = _squares(np.zeros_like(a.value) if b.own is None else b.own, 0.0 if a.own is None else a.own)
-    return np.asarray(np.sqrt(square.max(axis=0)) + h / 2 * (a.own_rate + b.own_rate))
+    return np.asarray(np.sqrt(square.max(axis=0)) + h / 2 * (a.residual_rate + b.residual_rate))
 
 
 def _squares(x: Floats, y: Floats | float) -> Floats:

@@ -37,7 +37,7 @@ class InfluenceRadius:
     nodes: Ints
     arms: Floats
     apart: Floats
-    share: Floats
+    fraction: Floats
     groups: Sequence[Ints]
     morphing: Morphing | None = None
 
@@ -56,7 +56,7 @@ def influence_radius(part: PointGroups) -> InfluenceRadius | None:
     arms = _arms(part, surface.points, part.old.bind, 1.0)
     apart = _arms(part, surface.points, part.new.bind - part.old.bind, 1.0)
     morphing = _morphing(part, part.old, part.new) if len(surface.targets) else None
-    return InfluenceRadius(nodes, arms, apart, np.full(len(nodes), part.share), part.reach, morphing)
+    return InfluenceRadius(nodes, arms, apart, np.full(len(nodes), part.fraction), part.reach, morphing)
 
 
 def join_reaches(reaches: Sequence[InfluenceRadius]) -> InfluenceRadius:
@@ -67,7 +67,7 @@ def join_reaches(reaches: Sequence[InfluenceRadius]) -> InfluenceRadius:
         np.concatenate([each.nodes for each in reaches]),
         np.concatenate([each.arms for each in reaches]),
         np.concatenate([each.apart for each in reaches]),
-        np.concatenate([each.share for each in reaches]),
+        np.concatenate([each.fraction for each in reaches]),
         groups,
     )
 

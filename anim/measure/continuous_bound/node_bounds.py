@@ -54,7 +54,7 @@ def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, p
 def local_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
     """Return the majorants of all nodes in their parents' spaces. Parameters as of `in_world`."""
     matrices, jumps = _rotations(first, second, where, players)
-    scales = _vectors(first, second, where, "scale", _most)
+    scales = _vectors(first, second, where, "scale", _max_norm)
     matrices, jumps = product(matrices, scales), jumps * scales[0, 1]
     origins = _vectors(first, second, where, "translation", _length)
     skewed = first.skeleton.sheared
@@ -126,7 +126,7 @@ def _length(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt((vectors * vectors).sum(axis=0)))
 
 
-def _most(vectors: Floats) -> Floats:
+def _max_norm(vectors: Floats) -> Floats:
     return np.asarray(np.abs(vectors).max(axis=0))
 
 

@@ -39,7 +39,7 @@ class ProofTarget:
     """What to prove. found: m, the largest distance so far. room: m, how far above it the bound may be."""
 
     found: float
-    room: float
+    slack: float
 
 
 class Prover:
@@ -114,13 +114,13 @@ class Prover:
         closed, asked = 0.0, []
         for player, each in limits.items():
             tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise
-            is_open = tops > aim.found + aim.room
+            is_open = tops > aim.found + aim.slack
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
-                parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.room))
+                parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.slack))
                 finest = np.clip(parts, 1, MIN_INTERVAL_S).astype(np.int64)
                 asked.append(subdivide(player, times, risen.rise, is_open, finest))
-        return closed, refine(self.ruler, clips, asked, self._parts, target=aim.found + aim.room)
+        return closed, refine(self.ruler, clips, asked, self._parts, target=aim.found + aim.slack)
 
 
 def _limits(looks: Mapping[str, ErrorSamples], order: Sequence[int], stretch: slice) -> dict[str, Floats]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 
-LEAST = 1e-3  # shorter mixes have no direction that could be relied on
+MIN_LENGTH = 1e-3  # shorter mixes have no direction that could be relied on
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,21 +30,21 @@ class QuaternionBounds:
     slope: Floats
     size: Floats
     speed: Floats
-    pull: Floats
-    most_pull: Floats
-    pull_rate: Floats
-    drag: Floats
-    most_drag: Floats
-    drag_rate: Floats
+    lambda_: Floats
+    max_lambda: Floats
+    lambda_rate: Floats
+    rho: Floats
+    max_rho: Floats
+    rho_rate: Floats
     excess: Floats
     own: Floats | None = None
-    most_own: Floats | float = 0.0
-    own_rate: Floats | float = 0.0
+    max_residual: Floats | float = 0.0
+    residual_rate: Floats | float = 0.0
 
     @property
     def bend(self) -> Floats:
         """No |q″| is larger (P, G, U)."""
-        return np.asarray(self.most_pull * self.size + 2 * self.most_drag * self.speed + self.most_own)
+        return np.asarray(self.max_lambda * self.size + 2 * self.max_rho * self.speed + self.max_residual)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
     """Return the least |c|² on a line, nan where it is next to nothing: of |c|² and c·c′ at its start, and |c′|²."""
     until = np.clip(-along / np.where(rate > 0, rate, 1.0), 0.0, h)
     least = square + until * (2 * along + until * rate)
-    return np.asarray(np.where(least > LEAST**2, least, np.nan))
+    return np.asarray(np.where(least > MIN_LENGTH**2, least, np.nan))
 
 
 def directed(of: ArcMix, drag: Floats) -> tuple[Floats, Floats]:

@@ -36,7 +36,7 @@ def second_derivative_bound(
     moved = nodes.origins[:, :, of.nodes] + product(nodes.matrices[:, :, of.nodes], points)
     jump = nodes.jumps[1, of.nodes] + nodes.jumps[0, of.nodes] * points[0, 1]
     return SecondDerivativeBound(
-        *(_by_group(of.share[:, None] * each, of) for each in (moved[2, 1] - moved[2, 0], jump))
+        *(_by_group(of.fraction[:, None] * each, of) for each in (moved[2, 1] - moved[2, 0], jump))
     )
 
 

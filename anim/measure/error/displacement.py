@@ -48,7 +48,7 @@ class BoundGroups:
     reach: Sequence[Ints]
     products: Sequence[Floats]
     corners: Floats
-    share: float = 1.0
+    fraction: float = 1.0
 
 
 class SkinnedDisplacement:
@@ -65,7 +65,7 @@ class SkinnedDisplacement:
     @cached_property
     def _bounds(self) -> Floats:
         """(J, F), nothing that a joint carries some of has a longer vector."""
-        return self._groups.share * largest_over(self._groups.corners, self._moved)
+        return self._groups.fraction * largest_over(self._groups.corners, self._moved)
 
     def rate(self, step: Floats) -> DisplacementField:
         """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""

@@ -106,14 +106,14 @@ class ErrorMetric:
 
         player: a name in PLAYERS, who plays both of them; or two, "spec,nlerp", for `before` and `after`.
         """
-        return self._looked(before, after, times, player, None)
+        return self._sample_block(before, after, times, player, None)
 
-    def look(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> ErrorSamples:
+    def sample_errors(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> ErrorSamples:
         """Return what `error_at` does, with limits for all times and groups of vertices."""
         limits = [np.zeros((len(part.groups), len(times)), np.float32) for part in self.parts]
-        return ErrorSamples(self._looked(before, after, times, player, limits), limits)
+        return ErrorSamples(self._sample_block(before, after, times, player, limits), limits)
 
-    def _looked(
+    def _sample_block(
         self, before: Clip, after: Clip, times: Floats, player: str, limits: Sequence[NDArray[np.float32]] | None
     ) -> MotionError:
         """What `error_at` returns. limits: to be filled with what `Look` has, or None."""

@@ -37,12 +37,12 @@ class MorphBounds:
 
     corners: Floats
     extents: Floats
-    share: float
+    fraction: float
 
     def sizes(self, change: Change) -> Floats:
         """Return how far any vertex that a joint carries can be displaced (J, F), in m."""
         bounds = largest_over(self._boxes(change), change.moved)
-        return np.asarray(self.share * (bounds + _norm(change.after) * self._reach(change.new - change.old)))
+        return np.asarray(self.fraction * (bounds + _norm(change.after) * self._reach(change.new - change.old)))
 
     def rates(self, change: Change, step: Floats) -> Floats:
         """Return how fast that can change from each frame to the next (J, F − 1), in m/s. step: (F − 1,) s."""
@@ -51,7 +51,7 @@ class MorphBounds:
         total += _norm(change.moved[:, :-1]) * self._reach(np.diff(change.old, axis=0))
         total += _norm(np.diff(change.after, axis=1)) * self._reach(apart[1:])
         total += _norm(change.after[:, :-1]) * self._reach(np.diff(apart, axis=0))
-        return np.asarray(self.share * total / step)
+        return np.asarray(self.fraction * total / step)
 
     def _boxes(self, change: Change) -> Floats:
         """The corners, widened by as far as any weight of the clips can carry a vertex."""

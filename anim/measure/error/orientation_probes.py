@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import Floats
 
-LEVER = 0.05  # of the skeleton's size: how far from a node its turning counts
+PROBE_DISTANCE = 0.05  # of the skeleton's size: how far from a node its turning counts
 PER_NODE = 3
 SPEED_STEP = 1e-4  # s; speeds at an end are taken over this time: what a player shows in the first moment
 
@@ -19,7 +19,7 @@ def probe_points(world: Floats) -> Floats:
     places = world[..., 3]
     two = world[..., :2]
     lengths = np.sqrt((two * two).sum(axis=-2, keepdims=True))
-    axes = LEVER * probe_size(places) * np.swapaxes(two / np.where(lengths > 0, lengths, 1), -1, -2)
+    axes = PROBE_DISTANCE * probe_size(places) * np.swapaxes(two / np.where(lengths > 0, lengths, 1), -1, -2)
     joined = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)
     return joined.reshape(-1, world.shape[1], 3)
 

@@ -114,7 +114,7 @@ class SkinnedGroups:
         self.surface = surface
         self.old = Binding(surface.nodes, surface.bind, surface.owner, surface.rest_weights)
         self.new = new or self.old
-        self.share = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
+        self.fraction = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
         carrying = surface.weights > 0
         self.used = np.array(sorted(set(surface.joints[carrying].tolist())), np.int64)
         place = np.full(len(surface.nodes), -1)
@@ -125,9 +125,9 @@ class SkinnedGroups:
         self.reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
         rest = surface.points + np.tensordot(surface.rest_weights, surface.targets, axes=1)
         products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
-        self._still = BoundGroups(self.reach, products, self._boxes(rest), self.share)
+        self._still = BoundGroups(self.reach, products, self._boxes(rest), self.fraction)
         corners = self._boxes(surface.points) if len(surface.targets) else self._still.corners
-        self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.share)
+        self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.fraction)
 
     def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
         """Return how far every vertex is displaced at every time, None where nothing carries any."""

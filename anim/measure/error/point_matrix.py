@@ -20,7 +20,7 @@ from anim.model import Scene
 CARRIED = 0.1  # a vertex answers for a node from this much weight on
 DIRECTIONS = np.vstack((np.eye(3), -np.eye(3)))
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-ALL_WAYS = np.vstack((DIRECTIONS, CORNERS))
+ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
 DENSE = 4_000_000  # numbers; a larger matrix is kept sparse
 
 
@@ -135,7 +135,7 @@ def extreme_vertices(surface: Surface) -> set[int]:
         for mine in (np.flatnonzero(most == joint), np.flatnonzero(here)):
             if len(mine):
                 local = surface.points[mine] @ surface.bind[joint][:, :3].T
-                chosen.update(mine[(local @ ALL_WAYS.T).argmax(axis=0)].tolist())
+                chosen.update(mine[(local @ ALL_DIRECTIONS.T).argmax(axis=0)].tolist())
     return chosen
 
 

@@ -16,9 +16,9 @@ from anim.model import Clip, Pose, Skeleton
 from anim.sampling.times import frame_times
 
 FRAMES = 64  # times that mean and p99 are taken over
-MOST = 4_000_000  # vertices times frames that they are taken over
+MAX_SAMPLES = 4_000_000  # vertices times frames that they are taken over
 SLACK = 1.01  # the speed error is no more than this above the true one
-STILL = 1e-6  # diagonals per second; no speed error below this is searched for
+SPEED_TOLERANCE = 1e-6  # diagonals per second; no speed error below this is searched for
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def statistics(
     """
     times = dense_times(before, after, fps=fps) if times is None else times
     vertices = sum(len(group) for part in ruler.parts for group in part.groups)
-    count = int(np.clip(MOST // max(vertices, 1), 2, FRAMES))
+    count = int(np.clip(MAX_SAMPLES // max(vertices, 1), 2, FRAMES))
     chosen = np.unique(np.linspace(0, len(times) - 1, count).round().astype(np.int64))
     found: list[Floats] = []
     for block in ruler.blocks(before, after, times[chosen], player=player):
@@ -95,7 +95,7 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
             if field is None:
                 continue
             rate = field.rate(step)
-            floor = max(worst.size, STILL * ruler.diagonal)
+            floor = max(worst.size, SPEED_TOLERANCE * ruler.diagonal)
             top = max_displacement(rate, floor=floor, slack=SLACK, most=MAX_SEARCHED)
             if top.length > worst.size:
                 joint = ruler.called(part.node(rate.joint(top.group, top.frame, top.vertex)))

@@ -67,7 +67,7 @@ def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
         return frozenset(above)
     scenes = json.get("scenes", ())
     tops = scenes[json.get("scene", 0)].get("nodes", ()) if scenes else ()
-    found = {node for top in tops for node in np.flatnonzero(skeleton.below(top)).tolist()}
+    found = {node for top in tops for node in np.flatnonzero(skeleton.descendants(top)).tolist()}
     return frozenset(found or range(len(skeleton)))
 
 

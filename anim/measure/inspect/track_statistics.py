@@ -70,13 +70,13 @@ def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
     chosen = [tracks[i] for i in turning]
     counts = [len(track.times) for track in chosen]
     values = np.concatenate([track.values for track in chosen])
-    off = _off_unit(np.sqrt(quaternion.dot(values, values)), chosen, counts)
+    off = _unit_error(np.sqrt(quaternion.dot(values, values)), chosen, counts)
     for i, sum_of_track in zip(turning, np.add.reduceat(off, np.cumsum([0, *counts[:-1]]), dtype=int), strict=True):
         found[i] = int(sum_of_track)
     return found
 
 
-def _off_unit(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[int]) -> Bools:
+def _unit_error(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[int]) -> Bools:
     """Which of all keys' lengths (S,) are off 1 by more than is usual for how their tracks are stored."""
     bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in tracks])
     return np.asarray(np.abs(lengths - 1) > np.repeat(np.where(bytes_only, UNIT_BYTE, UNIT), counts))
@@ -98,7 +98,7 @@ def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, gi
     """Put the facts about a group into `result`, and which keys of tracks that move could go into `given`."""
     values = group.values
     if group.kind is ValueKind.ROTATION:
-        values = _turns(group, result)
+        values = _step_angles(group, result)
     constant = _same_values(group, values)
     result.constant[group.numbers] = constant
     result.no_effect[group.numbers] = _at_rest(group, constant, skeleton)
@@ -108,7 +108,7 @@ def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, gi
     given.update((number, masks[i]) for i, number in enumerate(group.numbers.tolist()) if not constant[i])
 
 
-def _turns(group: ConcatenatedTracks, result: TrackStats) -> Floats:
+def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:
     """The rotations (S, 4) at unit length, signs aligned within each track; what is counted goes into `result`."""
     lengths = np.sqrt(quaternion.dot(group.values, group.values))
     values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
@@ -116,7 +116,7 @@ def _turns(group: ConcatenatedTracks, result: TrackStats) -> Floats:
     dots[1:] = quaternion.dot(values[1:], values[:-1])
     dots[group.starts] = 1.0
     angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))
-    result.non_unit[group.numbers] = _sums(group, _off_unit(lengths, group.tracks, group.counts))
+    result.non_unit[group.numbers] = _sums(group, _unit_error(lengths, group.tracks, group.counts))
     if group.interpolation is not Interpolation.STEP:  # which never is on the way from one key to the next
         result.flips[group.numbers] = _sums(group, dots < 0)
     if group.interpolation is Interpolation.LINEAR:

@@ -119,7 +119,7 @@ def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:
     """Take the way of node `root` since the first frame off world matrices (N, F, 3, 4), in place; −1: of none."""
     if root >= 0:
         way = world[root, :, :, 3] - world[root, :1, :, 3]
-        world[..., 3] -= skeleton.below(root)[:, None, None] * way
+        world[..., 3] -= skeleton.descendants(root)[:, None, None] * way
 
 
 def differences(values: Floats, axis: int) -> Floats:

@@ -70,7 +70,7 @@ class SkinMotion:
         self._surfaces = surfaces(scene) if self.is_skin else []
         self._rest_world = world_by_node(scene.skeleton, rest_pose(scene.skeleton))
         self._lever = (
-            orientation_probes.LEVER * orientation_probes.probe_size(self._rest_world[..., 3])
+            orientation_probes.PROBE_DISTANCE * orientation_probes.probe_size(self._rest_world[..., 3])
             if len(scene.skeleton)
             else 0.0
         )
@@ -227,7 +227,7 @@ class SkinMotion:
         return self.skeleton.names[node] or f"node {node}"
 
     def _carries(self, node: int) -> bool:
-        below: Bools = self.skeleton.below(node)[self.points.nodes]
+        below: Bools = self.skeleton.descendants(node)[self.points.nodes]
         return bool((below[self.points.joints] & (self.points.factors[..., 3] > 0)).any())
 
     def _moved_between(self, both: Pose, root: int) -> Ints:

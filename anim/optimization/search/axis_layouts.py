@@ -14,7 +14,7 @@ from anim.optimization.search.time_axes import SharedAxis, merge_axes
 from anim.optimization.tracks.key_reduction import greedy_keys, joint_greedy_keys
 from anim.optimization.tracks.quantization import Encoding
 
-STILL = 0.1  # of the bound: a track that is less off its middle value gets no table
+CONSTANT_TOLERANCE = 0.1  # of the bound: a track that is less off its middle value gets no table
 ASKED = 4.0  # of the bound: larger budgets are hardly ever asked for
 
 
@@ -31,7 +31,7 @@ class TimeAxisSearch:
         self.key_bytes = np.array([coding.key_bytes(each.path) for each in truth.moving])
         self._scaled = _scaled(truth)
         moved = np.array([each.from_middle for each in truth.moving])
-        self._tabled = np.flatnonzero(moved > STILL * bound)
+        self._tabled = np.flatnonzero(moved > CONSTANT_TOLERANCE * bound)
         if not fits(len(self._tabled), truth.grid):
             self._tabled = np.empty(0, np.int64)
         self._segments = SegmentErrors(self._scaled[self._tabled], truth.grid, ASKED * bound)
@@ -45,7 +45,7 @@ class TimeAxisSearch:
         """Return the values of tracks on the grid (k, K, 4) in units of their budgets."""
         return np.asarray(self._scaled[keyed] / budgets[keyed][:, None, None])
 
-    def needed(self, keyed: Ints, budgets: Floats) -> Bools:
+    def greedy_keys(self, keyed: Ints, budgets: Floats) -> Bools:
         """Return which keys (k, K) each track must keep by itself."""
         names = [(i, float(budgets[i])) for i in keyed.tolist()]
         new = [k for k, name in enumerate(names) if name not in self._rows]
@@ -60,7 +60,7 @@ class TimeAxisSearch:
         there = np.isin(keyed, self._tabled)
         found = np.zeros((len(keyed), len(self.grid)), np.bool_)
         if there.any():
-            found[there] = self._segments.needed(rows[there], budgets[keyed[there]])
+            found[there] = self._segments.greedy_keys(rows[there], budgets[keyed[there]])
         if not there.all():
             found[~there] = greedy_keys(self.scaled(keyed[~there], budgets), self.grid)
         return found
@@ -73,7 +73,7 @@ class TimeAxisSearch:
 
 
 def _merge_by_bytes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-    return layouts.merged(keyed, layouts.needed(keyed, budgets))
+    return layouts.merged(keyed, layouts.greedy_keys(keyed, budgets))
 
 
 def _own(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:

@@ -14,7 +14,7 @@ from anim.optimization.options import Bounds
 from anim.optimization.search.source_motion import ROTATION, SourceMotion
 from anim.optimization.search.world_matrices import local_matrices
 
-LEAST_GAP = 1e-4  # s; speeds are not taken over less
+MIN_GAP_S = 1e-4  # s; speeds are not taken over less
 
 
 class BoundUsage:
@@ -37,13 +37,13 @@ class BoundUsage:
         self._nodes = np.array([each.node for each in truth.moving], np.int64)
         self._turning = np.array([each.path == "rotation" for each in truth.moving], np.bool_)
 
-    def along_arcs(self, shown: Sequence[Floats]) -> Floats:
+    def slerp_raw(self, shown: Sequence[Floats]) -> Floats:
         """Return the strain of each point (P,) where rotations run along arcs."""
-        return self._strain(shown, self._truth.columns)
+        return self._usage(shown, self._truth.columns)
 
-    def along_chords(self, shown: Sequence[Floats]) -> Floats:
+    def nlerp(self, shown: Sequence[Floats]) -> Floats:
         """Return the same against the truth as players show it that mix quaternions by components."""
-        return self._strain(shown, self._truth.by_chord)
+        return self._usage(shown, self._truth.by_chord)
 
     def own(self, shown: Sequence[Floats]) -> Floats:
         """Return what share of the bound on angles each track (G,) takes: turns of all nodes above add up."""
@@ -59,11 +59,11 @@ class BoundUsage:
         own[self._turning] = turned[self._nodes[self._turning]] / self.bounds.max_angle
         return own
 
-    def _strain(self, shown: Sequence[Floats], columns: Floats) -> Floats:
+    def _usage(self, shown: Sequence[Floats], columns: Floats) -> Floats:
         moved = self._rows.moves(stack_points(self._world(shown), self.points.nodes) - columns)
         strain = _longest(moved) / self._allowed
         if self.bounds.max_speed_error is not None and len(self._truth.at) > 1:
-            gaps = np.maximum(np.diff(self._truth.at), LEAST_GAP).astype(np.float32)
+            gaps = np.maximum(np.diff(self._truth.at), MIN_GAP_S).astype(np.float32)
             strain = np.maximum(strain, _longest(np.diff(moved, axis=2) / gaps) / self.bounds.max_speed_error)
         return np.asarray(strain, np.float64)
 

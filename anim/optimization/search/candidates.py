@@ -18,7 +18,7 @@ from anim.optimization.tracks.loop_closure import close_ends
 from anim.optimization.tracks.quantization import EncodedKeys, Form
 from anim.sampling.track import KeyInterval, find_interval
 
-MOST_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
+MAX_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,9 @@ class Candidates:
             self._make(axis, name, [i for i in new if self._paths[i] == path], forms, rotations=path == ROTATION)
         return [(i, self._made[name, i, forms[i]]) for i in axis.members]
 
-    def aimed(self, axis: SharedAxis, members: Sequence[int], aims: Floats, misses: Sequence[float]) -> list[Candidate]:
+    def compensated(
+        self, axis: SharedAxis, members: Sequence[int], aims: Floats, misses: Sequence[float]
+    ) -> list[Candidate]:
         """Return rotations for the `members` of an axis that aim at others (W, G, 4) than the tracks' own."""
         self._make_room()
         place = self._place(axis, axis.keys.tobytes())
@@ -102,7 +104,7 @@ class Candidates:
                 self._keys[name, i] = keys[:, k]
 
     def _make_room(self) -> None:
-        if self._kept <= MOST_KEPT:
+        if self._kept <= MAX_KEPT:
             return
         for kept in (self._places, self._fits, self._keys, self._made):
             kept.clear()

@@ -42,7 +42,7 @@ class Context:
 
     def morph_reach(self, node: int) -> Floats:
         """Return how far (M, V), in metres, each morph target of a node's mesh moves each vertex at weight 1."""
-        return morph_weights.reach(self.surfaces, node, self.widening(node))
+        return morph_weights.influence_radius(self.surfaces, node, self.widening(node))
 
     def weights_at_rest(self, node: int) -> Floats:
         """Return the morph weights (M,) of a node in the rest pose."""
@@ -86,7 +86,7 @@ def build_context(
         world,
         points,
         tuple(surface for surface in surfaces(scene) if len(surface.targets)),
-        {node: points.on(skeleton.below(node)) for node in driven},
+        {node: points.on(skeleton.descendants(node)) for node in driven},
         unseen,
         bounds,
         policy,

@@ -17,11 +17,11 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Skeleton
 from anim.optimization.search.candidates import Candidate, Candidates
-from anim.optimization.search.source_motion import LEVER_FRAMES, SourceMotion
+from anim.optimization.search.source_motion import PROBE_FRAMES, SourceMotion
 from anim.optimization.search.time_axes import SharedAxis
 from anim.optimization.search.world_matrices import level_world_matrices
 
-MOST = 20.0  # times that a lever may seem longer than what is left of it
+MAX_ANGLE_RAD = 20.0  # times that a lever may seem longer than what is left of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class ParentCompensation:
             for number in np.unique(axis_of[axis_of >= 0]).tolist():
                 here = np.flatnonzero(axis_of == number)
                 nodes, members = level.nodes[here], level.tracks[here].tolist()
-                found = self._candidates.aimed(axes[number], members, self._aims(nodes, above[here]), misses)
+                found = self._candidates.compensated(axes[number], members, self._targets(nodes, above[here]), misses)
                 for node, member, candidate in zip(nodes.tolist(), members, found, strict=True):
                     rotation[node] = candidate.shown
                     yield member, candidate
@@ -76,7 +76,7 @@ class ParentCompensation:
         for level in self._levels[1:]:
             yield level, world[level.parents]
 
-    def _aims(self, nodes: Ints, above: Floats) -> Floats:
+    def _targets(self, nodes: Ints, above: Floats) -> Floats:
         """What rotations (W, n, 4) under such parents (n, W, 4) leave the nodes as they truly lie."""
         aims = quaternion.multiply(quaternion.conjugate(above), self._true[nodes])
         own = self._truth.local[1][nodes]
@@ -89,7 +89,7 @@ def budget_gain(skeleton: Skeleton, truth: SourceMotion, points: PointMatrix) ->
     Others are the next nodes below that a track turns; nothing makes up for points that hang on none of these.
     """
     turning = {each.node: i for i, each in enumerate(truth.moving) if each.path == "rotation"}
-    nth = max(1, -(-len(truth.at) // LEVER_FRAMES))
+    nth = max(1, -(-len(truth.at) // PROBE_FRAMES))
     world = level_world_matrices(skeleton, [part[:, ::nth] for part in truth.local], truth.levels)
     turner = np.full(len(skeleton) + 1, -1)  # the nearest node that turns each; the last stands for "no parent"
     reach = np.zeros(len(skeleton))
@@ -106,5 +106,5 @@ def budget_gain(skeleton: Skeleton, truth: SourceMotion, points: PointMatrix) ->
     np.maximum.at(reach, carriers[mine], away)
     shorter = np.ones(len(truth.moving))
     for node, i in turning.items():
-        shorter[i] = np.clip(truth.moving[i].meters / max(2 * reach[node], 1e-30), 1, MOST)
+        shorter[i] = np.clip(truth.moving[i].meters / max(2 * reach[node], 1e-30), 1, MAX_ANGLE_RAD)
     return shorter

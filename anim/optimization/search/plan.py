@@ -37,7 +37,7 @@ class Plan:
     threshold: float
     axes: str
     coarser: Floats
-    aim: RotationTarget = RotationTarget.LOCAL
+    rotation_target: RotationTarget = RotationTarget.LOCAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,11 @@ class TrialResult:
     fates: Ints
     keys: Mapping[int, EncodedKeys]
     on: Mapping[int, Bools]
-    strain: Floats
+    usage: Floats
     own: Floats
     size: float
 
     @property
     def worst(self) -> float:
         """The largest share of any bound; up to 1 all hold."""
-        return max(float(self.strain.max(initial=0.0)), float(self.own.max(initial=0.0)))
+        return max(float(self.usage.max(initial=0.0)), float(self.own.max(initial=0.0)))

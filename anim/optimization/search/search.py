@@ -14,17 +14,17 @@ from anim.optimization.search.trial import TrialRunner
 from anim.optimization.tracks import quantization
 
 START = 1 / 3  # of the bound: the first budget of every track
-AIM = 0.97  # of the bound, that budgets are steered to
+TARGET_USAGE = 0.97  # of the bound, that budgets are steered to
 GAIN = 0.6  # how strongly a budget follows the error it led to
 STEPS = (0.5, 1.8)  # least and greatest change of a budget from round to round
 SHRINK = 0.6
 FORESEEN = 1.05  # strain up to which coarser storage is tried
-MOST = 4.0  # of the bound; larger budgets leave nothing more to gain
+MAX_SCALE = 4.0  # of the bound; larger budgets leave nothing more to gain
 ENOUGH = 1e3  # times what storing may miss, so that integers are taken
 SEED = 2026
 SPREAD = (0.25, 0.05)  # standard deviation of the logarithm of random changes: the first, and the least
 STRAYING = 0.3  # share of tracks changed at a time
-LEAST = 1e-6  # of the bound; smaller budgets mean that storage can't do better
+MIN_STEP = 1e-6  # of the bound; smaller budgets mean that storage can't do better
 
 
 def search(bench: TrialRunner, bound: float, effort: Effort) -> TrialResult | None:
@@ -73,7 +73,7 @@ class _Search:
         self._favor_long()
         for axes in self._effort.axes:
             self._adapt(replace(self._best.plan, axes=axes), max(self._effort.rounds // 2, 2))
-        self._aim_at_world()
+        self._compensate_parents()
         self._finish()
         self._descend()
 
@@ -87,15 +87,17 @@ class _Search:
             lengths[i] = self._best.keys[i].values.size
         mean = lengths[lengths > 0].mean() if lengths.any() else 1.0
         share = np.where(lengths > 0, lengths / mean, 1.0)
-        self._adapt(replace(plan, budgets=plan.budgets * share ** (2 / 3)), self._effort.favoring)
+        self._adapt(replace(plan, budgets=plan.budgets * share ** (2 / 3)), self._effort.long_track_rounds)
 
-    def _aim_at_world(self) -> None:
+    def _compensate_parents(self) -> None:
         """Rotations that make up for each other, and more and more room for those that reach far."""
         for share in self._effort.leeways:
             before = self._best
             assert before is not None
             plan = replace(
-                before.plan, aim=RotationTarget.WORLD, budgets=before.plan.budgets * self._bench.leeway**share
+                before.plan,
+                rotation_target=RotationTarget.WORLD,
+                budgets=before.plan.budgets * self._bench.leeway**share,
             )
             self._adapt(plan, self._effort.rounds)
             if self._best is before:
@@ -117,16 +119,16 @@ class _Search:
 
     def _followed(self, budgets: Floats, outcome: TrialResult) -> Floats:
         answering = self._bench.truth.answering
-        strain = np.where(answering, outcome.strain, 0.0).max(axis=1, initial=0.0)
+        strain = np.where(answering, outcome.usage, 0.0).max(axis=1, initial=0.0)
         strain = np.maximum(strain, outcome.own)
-        factor = np.clip((AIM / np.maximum(strain, 1e-9)) ** GAIN, *STEPS)
-        room = self._bench.leeway if outcome.plan.aim is RotationTarget.WORLD else 1.0
-        return np.asarray(np.minimum(budgets * factor, MOST * self._bound * room))
+        factor = np.clip((TARGET_USAGE / np.maximum(strain, 1e-9)) ** GAIN, *STEPS)
+        room = self._bench.leeway if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
+        return np.asarray(np.minimum(budgets * factor, MAX_SCALE * self._bound * room))
 
     def _shrink(self, plan: Plan) -> None:
         """Smaller and smaller budgets until something holds."""
         factor = SHRINK
-        while self._best is None and factor > LEAST:
+        while self._best is None and factor > MIN_STEP:
             self._attempt(replace(plan, budgets=plan.budgets * factor))
             factor *= SHRINK
 
@@ -137,11 +139,11 @@ class _Search:
         for factor in self._effort.finishing:
             self._attempt(replace(plan, budgets=plan.budgets * factor))
         self._store_coarser()
-        self._stray(self._effort.strays)
+        self._random_trials(self._effort.random_trials)
 
     def _descend(self) -> None:
         """Coarser storage for one track after the other."""
-        for _ in range(self._effort.descent):
+        for _ in range(self._effort.coarsen_passes):
             before = self._best
             assert before is not None
             for i in sorted(before.on, key=lambda i: -_length(self._best, i)):
@@ -154,9 +156,9 @@ class _Search:
         """Whether there seems to be room for missing the double: what is stored misses half of what it may."""
         assert self._best is not None
         truth = self._bench.truth
-        used = float(self._best.strain[truth.answering[track]].max(initial=0.0))
-        room = self._bench.leeway[track] if self._best.plan.aim is RotationTarget.WORLD else 1.0
-        miss = self._best.keys[track].miss
+        used = float(self._best.usage[truth.answering[track]].max(initial=0.0))
+        room = self._bench.leeway[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
+        miss = self._best.keys[track].error
         return miss > 0 and used + miss * truth.moving[track].meters / room / 2 / self._bound < FORESEEN
 
     def _store_coarser(self) -> None:
@@ -172,7 +174,7 @@ class _Search:
         coarser[track] *= factor
         return replace(self._best.plan, coarser=coarser)
 
-    def _stray(self, count: int) -> None:
+    def _random_trials(self, count: int) -> None:
         """Budgets of some tracks changed at random, by less where nothing is found; always the same random numbers."""
         chance = np.random.default_rng(SEED)
         spread = SPREAD[0]

@@ -7,13 +7,13 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 
 SPANS = (32, 64)  # keys that one segment covers at most: those of a second, but no fewer and no more than these
-MOST = 40_000_000  # numbers in a table; beyond, callers search anew for each budget (`keys.needed`)
+MAX_SPAN = 40_000_000  # numbers in a table; beyond, callers search anew for each budget (`keys.needed`)
 NEATNESS = 1e-3  # of a key: among the ways with fewest keys the one that misses least is taken
 
 
 def fits(tracks: int, times: Floats) -> bool:
     """Return whether a table for so many tracks with keys at `times` (K,), in seconds, is affordable."""
-    return tracks * len(times) * _span(times) <= MOST
+    return tracks * len(times) * _span(times) <= MAX_SPAN
 
 
 class SegmentErrors:
@@ -34,7 +34,7 @@ class SegmentErrors:
             self._missed[n + 1 :, bent, n] = missed.T
             bent = bent[(missed <= limit).any(axis=1)]  # if all segments miss by too much, so do nearly all longer ones
 
-    def needed(self, tracks: Ints, budgets: Floats) -> Bools:
+    def greedy_keys(self, tracks: Ints, budgets: Floats) -> Bools:
         """Return which keys (k, K) the `tracks` (k,) must keep so that lines miss none by over its budget (k,) in m."""
         shares = self._missed[:, tracks] * (1 / budgets).astype(np.float32)[:, None]
         span = shares.shape[2]

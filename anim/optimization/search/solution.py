@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from anim.model import Clip, Interpolation, Track
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
 
-NUMBERS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # for each value of a key
+COMPONENTS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # for each value of a key
 SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
 
@@ -34,4 +34,4 @@ class Solution:
 
 def value_bytes(track: Track) -> int:
     """Return the bytes of a track's values, tangents included, as its storage has them."""
-    return NUMBERS[track.interpolation] * SIZES[track.storage.component_type] * track.values.size
+    return COMPONENTS[track.interpolation] * SIZES[track.storage.component_type] * track.values.size

@@ -14,15 +14,15 @@ from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimization.options import Reference
 from anim.optimization.search import playback
-from anim.optimization.search.world_matrices import level_world_matrices, needed_levels
+from anim.optimization.search.world_matrices import level_world_matrices, required_levels
 from anim.optimization.tracks.loop_closure import closure_sign
 from anim.sampling import sample_pose, times
 from anim.sampling.track import find_interval
 
 CUBIC_STEP = 1 / 60  # s; a spline is looked at this often, and CUBIC_PIECES times a piece at least
-CUBIC_PIECES = 8
-MAX_CUBIC_PIECES = 256
-LEVER_FRAMES = 64  # at most so many moments at which levers are measured
+CUBIC_SEGMENTS = 8
+MAX_CUBIC_SEGMENTS = 256
+PROBE_FRAMES = 64  # at most so many moments at which levers are measured
 PATHS = ("translation", "rotation", "scale")
 ROTATION = PATHS.index("rotation")
 
@@ -37,7 +37,7 @@ class SourceTrack:
     closure: s where the last value is s times the first, 0 where it is another (see `closure`).
     """
 
-    number: int
+    index: int
     node: int
     path: str
     values: Floats
@@ -91,10 +91,10 @@ def analyze_source(
     grid = key_grid(tracks)
     at = grid if reference is Reference.KEYS else moments(grid, clip.tracks)
     local = _local(skeleton, clip, at)
-    levels = needed_levels(skeleton, points.nodes)
+    levels = required_levels(skeleton, points.nodes)
     world = level_world_matrices(skeleton, local, levels)
     nodes = {track.node for track in tracks if track.node is not None}
-    reach = _reach(world, points, {node: below[node] for node in nodes})
+    reach = _influence_radius(world, points, {node: below[node] for node in nodes})
     widening = _widening(skeleton, world, levels)
     moving = tuple(
         _moving(number, track, skeleton, local, reach, widening, noticed)
@@ -103,7 +103,9 @@ def analyze_source(
     answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
     columns = stack_points(world, points.nodes)
     by_chord = columns
-    if any(each.path == "rotation" and each.meters * _gap(clip.tracks[each.number]) > noticed for each in moving):
+    if any(
+        each.path == "rotation" and each.meters * _mean_interval(clip.tracks[each.index]) > noticed for each in moving
+    ):
         by_chord = stack_points(level_world_matrices(skeleton, _by_chords(clip, at, local), levels), points.nodes)
     return SourceMotion(
         grid,
@@ -135,7 +137,7 @@ def moments(grid: Floats, tracks: Sequence[Track]) -> Floats:
 
 
 def _on_splines(axis: Floats) -> Floats:
-    pieces = np.clip(np.ceil(np.diff(axis) / CUBIC_STEP), CUBIC_PIECES, MAX_CUBIC_PIECES).astype(np.int64)
+    pieces = np.clip(np.ceil(np.diff(axis) / CUBIC_STEP), CUBIC_SEGMENTS, MAX_CUBIC_SEGMENTS).astype(np.int64)
     inner = [np.linspace(a, b, n + 1) for a, b, n in zip(axis[:-1], axis[1:], pieces.tolist(), strict=True)]
     return np.concatenate(inner) if inner else axis
 
@@ -158,7 +160,7 @@ def _by_chords(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> 
     return local[0], rotation, local[2]
 
 
-def _gap(track: Track) -> float:
+def _mean_interval(track: Track) -> float:
     """How far chord and arc are apart, as quaternions."""
     if track.interpolation is not Interpolation.LINEAR or len(track.times) < 2:
         return 0.0
@@ -199,9 +201,9 @@ def _moving(
     return SourceTrack(number, node, track.path, values, rest, middle, float(meters), from_rest, from_middle, closure)
 
 
-def _reach(world: Floats, points: PointMatrix, answering: dict[int, Bools]) -> dict[int, float]:
+def _influence_radius(world: Floats, points: PointMatrix, answering: dict[int, Bools]) -> dict[int, float]:
     """For each node, how far the points that answer for it are from it at most, times what it carries of them."""
-    frames = world[:, :: max(1, -(-world.shape[1] // LEVER_FRAMES))]
+    frames = world[:, :: max(1, -(-world.shape[1] // PROBE_FRAMES))]
     places = points.places(frames)
     found = {}
     for node, mine in answering.items():

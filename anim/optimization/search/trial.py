@@ -67,19 +67,19 @@ class TrialRunner:
         """
         fates = self._fates(plan)
         shown = [part.copy() for part in self.truth.local]
-        keys = self._held(fates, plan, shown)
+        keys = self._single_key(fates, plan, shown)
         axes = self._layouts.axes(plan.axes, np.flatnonzero(fates == TrackAction.KEYED), plan.budgets)
         misses = (OF_STORING * plan.budgets * plan.coarser / np.maximum(self._meters, 1e-30)).tolist()
-        for i, candidate in self._keyed(plan.aim, axes, misses, shown[ROTATION]):
+        for i, candidate in self._keyed(plan.rotation_target, axes, misses, shown[ROTATION]):
             keys[i] = candidate.stored
             shown[self._paths[i]][self._nodes[i]] = candidate.shown
         on = {i: axis.keys for axis in axes for i in axis.members}
         size = self._size(fates, keys, axes)
         strains = self._strains
-        outcome = TrialResult(plan, fates, keys, on, strains.along_arcs(shown), strains.own(shown), size)
+        outcome = TrialResult(plan, fates, keys, on, strains.slerp_raw(shown), strains.own(shown), size)
         if outcome.worst > 1 or size >= smaller_than or not self._chords_matter(axes, keys):
             return outcome
-        return replace(outcome, strain=np.maximum(outcome.strain, self._chord_strain(axes, keys, shown)))
+        return replace(outcome, usage=np.maximum(outcome.usage, self._nlerp_usage(axes, keys, shown)))
 
     @cached_property
     def leeway(self) -> Floats:
@@ -105,7 +105,7 @@ class TrialRunner:
         fates[(self._from_rest <= allowance) & self._droppable] = TrackAction.DROPPED
         return fates
 
-    def _held(self, fates: Ints, plan: Plan, shown: list[Floats]) -> dict[int, EncodedKeys]:
+    def _single_key(self, fates: Ints, plan: Plan, shown: list[Floats]) -> dict[int, EncodedKeys]:
         """Single keys of held tracks; they, and the rest values of dropped ones, are put into `shown`."""
         for path, rest in enumerate(self._rest):
             gone = np.flatnonzero((fates == TrackAction.DROPPED) & (self._paths == path))
@@ -133,13 +133,13 @@ class TrialRunner:
                         return True
         return False
 
-    def _chord_strain(self, axes: list[SharedAxis], keys: dict[int, EncodedKeys], shown: list[Floats]) -> Floats:
+    def _nlerp_usage(self, axes: list[SharedAxis], keys: dict[int, EncodedKeys], shown: list[Floats]) -> Floats:
         for axis in axes:
             members = [i for i in axis.members if self._paths[i] == ROTATION]
             if members:
                 mixed = self._candidates.by_chords(axis, [keys[i] for i in members])
                 shown[ROTATION][self._nodes[members]] = np.swapaxes(mixed, 0, 1)
-        return self._strains.along_chords(shown)
+        return self._strains.nlerp(shown)
 
     def _size(self, fates: Ints, keys: dict[int, EncodedKeys], axes: list[SharedAxis]) -> float:
         prices = self._coding.prices

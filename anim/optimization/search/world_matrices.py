@@ -11,7 +11,7 @@ from anim.maths import matrix
 from anim.model import Skeleton
 
 
-def needed_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
+def required_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
     """Return the nodes of each depth, roots first, leaving out those that none of `nodes` hangs on."""
     needed = np.zeros(len(skeleton), np.bool_)
     for node in nodes.tolist():

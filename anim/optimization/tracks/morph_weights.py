@@ -22,7 +22,7 @@ FORMS = (AccessorFormat(5121, normalized=True), AccessorFormat(5123, normalized=
 LARGEST = {5121: 255.0, 5123: 65535.0}
 
 
-def reach(surfaces: Sequence[Surface], node: int, widening: float) -> Floats:
+def influence_radius(surfaces: Sequence[Surface], node: int, widening: float) -> Floats:
     """Return how far (M, V), in metres, each morph target of a node moves each vertex at weight 1; unmoved ones are
     left out. widening: how much larger the world is than the mesh's space, at most."""
     moved = [np.sqrt((part.targets**2).sum(axis=-1)) for part in surfaces if part.owner == node and len(part.targets)]

@@ -16,8 +16,8 @@ from anim.optimization.options import Objective, Packing
 
 INT16 = 32767.0
 FEW = 2  # keys up to which float32 takes no more bytes than int16 with its longer JSON
-INT16_MISS = 2.5e-5  # quaternion units that rounding to int16 may miss, and be worth it
-FILTER_MISS = 4e-5  # the same for meshopt's quaternion filter, whose output is int16 too
+INT16_ERROR = 2.5e-5  # quaternion units that rounding to int16 may miss, and be worth it
+FILTER_ERROR = 4e-5  # the same for meshopt's quaternion filter, whose output is int16 too
 FILTER_BITS = (5, 16)
 FILTER_STEP = 2.45 / 4  # what that filter may miss, times its largest integer: √3 components by half a step, and √2 / 2
 EXPONENT_STEP = 1.5 / 2  # what meshopt's exponential filter may miss, in its powers of two
@@ -86,7 +86,7 @@ class EncodedKeys:
     values: Floats
     form: str
     codes: bytes = b""
-    miss: float = 0.0
+    error: float = 0.0
 
     @property
     def name(self) -> bytes:
@@ -108,8 +108,8 @@ class EncodedKeys:
 def choose_format(values: Floats, path: str, miss: float, packing: Packing) -> Form:
     """Return the smallest form that misses keys (K, C) by about `miss` at most, in units of the values."""
     if packing is Packing.CORE:
-        return ("int16", 0) if path == "rotation" and miss >= INT16_MISS and len(values) > FEW else ("float32", 0)
-    if path == "rotation" and miss >= FILTER_MISS:
+        return ("int16", 0) if path == "rotation" and miss >= INT16_ERROR and len(values) > FEW else ("float32", 0)
+    if path == "rotation" and miss >= FILTER_ERROR:
         return "quaternion", filter_bits(miss)
     return "exponent", exponent(values, miss)
 

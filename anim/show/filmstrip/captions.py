@@ -44,7 +44,7 @@ def width(text: str) -> int:
     return math.ceil(length)
 
 
-def wrapped(text: str, pixels: int) -> list[str]:
+def wrap_text(text: str, pixels: int) -> list[str]:
     """Return a text in lines of at most `pixels` across, broken behind spaces and marks where there are any near.
 
     wrapped("Dualwield_Melee_Attack_Chop", 120) → ["Dualwield_Melee_", "Attack_Chop"]

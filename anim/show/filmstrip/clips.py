@@ -19,7 +19,7 @@ from anim.gltf.reading.materials import read_materials
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
 from anim.sampling import frame_times
 from anim.show.filmstrip import heat_map, palette, root_path
-from anim.show.filmstrip.filmstrip import MOST_POINTS, Extent, Strip
+from anim.show.filmstrip.filmstrip import MAX_POINTS, Extent, Strip
 from anim.show.filmstrip.ground import ground_height
 from anim.show.filmstrip.materials import MaterialReader
 from anim.show.filmstrip.surface import Surface
@@ -27,7 +27,7 @@ from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
 AROUND = 48  # frames of the whole motion that the camera is framed on
-MOST_FRAMES = 3000
+MAX_FRAMES = 3000
 THICKER = 1.9  # times as wide as the sticks that go into files
 WIDEST = 1.5  # times the middle one: links to helpers far away don't hide the others
 
@@ -72,8 +72,8 @@ class FrameSelection:
         first, last = self.span(start, end)
         if self.fps is not None and self.count is None:
             found = frame_times(first, last, fps=self.fps)
-            if len(found) > MOST_FRAMES:
-                raise RangeError(f"{len(found)} frames are too many for a picture (limit {MOST_FRAMES})")
+            if len(found) > MAX_FRAMES:
+                raise RangeError(f"{len(found)} frames are too many for a picture (limit {MAX_FRAMES})")
             return found
         return np.linspace(first, last, self.count or 1) if last > first else np.array([first])
 
@@ -174,7 +174,7 @@ def build_strips(
     first = shots[0]
     reference: AnyArray = np.empty(0)
     for i, shot in enumerate(shots):
-        positions = shot.cache.whole().positions
+        positions = shot.cache.load_all().positions
         if i == 0 or first.clip != shot.clip:
             first, reference = shot, positions
             goes = root_path.travels(shot.path) if followed is None else followed
@@ -268,7 +268,7 @@ def _spread(start: float, end: float) -> Floats:
 
 def _places(cache: VertexCache, way: root_path.RootPath | None) -> AnyArray:
     """Vertices of all frames as the camera sees them, of frames farther apart where they are too many."""
-    step = max(1, -(-cache.frame_count * cache.vertex_count // MOST_POINTS))
+    step = max(1, -(-cache.frame_count * cache.vertex_count // MAX_POINTS))
     found = []
     for chunk in cache.chunks():
         chosen = slice(-chunk.first % step, None, step)

@@ -27,9 +27,9 @@ MAX_WIDTH = 1600  # pixels, beyond which frames go into another line
 PAPER = (247, 247, 248)  # sRGB
 INSIDE = 8  # pixels from the left of a frame to words in it
 LOW = captions.LINE + 3  # pixels from the bottom of a frame to the top of words in it
-MOST_POINTS = 2_000_000  # that the camera is framed on
+MAX_POINTS = 2_000_000  # that the camera is framed on
 CLOSED = 1e-3  # share of the way that vertices move; a loop ends this near its start
-MOST_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
+MAX_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
 
 Image = NDArray[np.uint8]
 
@@ -51,7 +51,7 @@ class Strip:
     colors: Floats
     distances: AnyArray | None = None
     heading: str = ""
-    way: RootPath | None = None
+    root_path: RootPath | None = None
     rest: AnyArray | None = None
     surface: Surface | None = None
     clip: int = 0
@@ -96,7 +96,7 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
     top = header
     for clip in clips:
-        words = captions.wrapped(clip[0].heading, across) if clip[0].heading else []
+        words = captions.wrap_text(clip[0].heading, across) if clip[0].heading else []
         for i, line in enumerate(words):
             captions.write(sheet, line, EDGE, top + APART + i * LINE)
         begin = top + len(words) * LINE + (APART if words else 0)
@@ -125,7 +125,7 @@ def _columns(row: Strip, per_line: int) -> tuple[int, int]:
 
 
 def _footer(row: Strip) -> int:
-    return GAP + LINE * (1 if row.way is None else 2)
+    return GAP + LINE * (1 if row.root_path is None else 2)
 
 
 def _draw_row(
@@ -154,9 +154,9 @@ def _draw_row(
 def _render_moment(row: Strip, frame: int) -> list[str]:
     """When a frame is, and how far the figure has got where the camera goes with it: "0.50 s", "1.2 m"."""
     time = f"{row.times[frame]:.2f} s"
-    if row.way is None:
+    if row.root_path is None:
         return [time]
-    return [time, f"{row.way.distance(row.times[frame : frame + 1])[0]:.1f} m"]
+    return [time, f"{row.root_path.distance(row.times[frame : frame + 1])[0]:.1f} m"]
 
 
 def animate_frames(
@@ -169,7 +169,7 @@ def animate_frames(
     scenery = _scenery(extent, look)
     width, height = scenery.camera.width, scenery.camera.height
     per_line, pitch = _grid(width)
-    names = [captions.wrapped(" ".join(filter(None, (row.heading, row.label))), pitch - GAP) for row in rows]
+    names = [captions.wrap_text(" ".join(filter(None, (row.heading, row.label))), pitch - GAP) for row in rows]
     name_lines = max(len(lines) for lines in names) if any(lines != [""] for lines in names) else 0
     columns = min(len(rows), per_line)
     header, cell = _header_height(rows, title), name_lines * LINE + height + APART
@@ -227,10 +227,10 @@ def _paper(height: int, width: int) -> Image:
 
 
 def _check_size(height: int, width: int, frames: int) -> None:
-    if height * width * frames > MOST_PIXELS:
+    if height * width * frames > MAX_PIXELS:
         what = "the picture has" if frames == 1 else f"{frames} frames have"
         raise RangeError(
-            f"{what} {width} × {height} pixels, too many (limit {MOST_PIXELS // 10**6} million together)",
+            f"{what} {width} × {height} pixels, too many (limit {MAX_PIXELS // 10**6} million together)",
             help="ask for fewer or smaller frames",
         )
 
@@ -250,10 +250,10 @@ def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> I
         if row.distances is not None:
             colors = heat_map.heat_colors(row.distances[f], row.faces, most)
         seen, now = positions.astype(np.float64), scenery
-        if row.way is not None:
-            place = row.way.at(row.times[f])
+        if row.root_path is not None:
+            place = row.root_path.at(row.times[f])
             seen[:, [0, 2]] -= place
-            now = moved(scenery, place, row.way.milestones(row.times[f], mark_spacing(scenery)))
+            now = moved(scenery, place, row.root_path.milestones(row.times[f], mark_spacing(scenery)))
         picture = render_frame(now, seen, row.faces, colors, marks, row.surface, tinted=row.distances is None)
         yield to_srgb(picture)
 

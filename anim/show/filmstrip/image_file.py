@@ -15,7 +15,7 @@ COMPRESSION_LEVEL = 9
 WEBP_QUALITY = 88
 MOVING = {".webp": "WEBP", ".gif": "GIF", ".apng": "PNG"}
 TICK = {".gif": 10}  # ms in which times are kept, else 1
-MOST_FPS = {".gif": 50}  # quicker ones are shown at a tenth of the speed by most programs, else 1000
+MAX_FPS = {".gif": 50}  # quicker ones are shown at a tenth of the speed by most programs, else 1000
 
 
 def png(image: Image) -> bytes:
@@ -37,8 +37,8 @@ def moving(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
     """
     from PIL import Image as Pillow
 
-    if fps > MOST_FPS.get(ending, 1000):
-        raise RangeError(f"{fps:g} frames per second are too many for {ending} (limit {MOST_FPS.get(ending, 1000)})")
+    if fps > MAX_FPS.get(ending, 1000):
+        raise RangeError(f"{fps:g} frames per second are too many for {ending} (limit {MAX_FPS.get(ending, 1000)})")
     first, *others = [Pillow.fromarray(image) for image in images]
     out = io.BytesIO()
     about: dict[str, Any] = {

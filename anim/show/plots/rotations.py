@@ -16,7 +16,7 @@ from anim.show.plots.polylines import Polyline
 FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the twelve orders of Euler angles
 FLOAT32 = 1e-6  # rad from lock, below which rotations stored as float32 don't tell first and third angle apart
 NEAR_LOCK_DEG = 5.0  # rates of angles are 23 times amplified there
-TURN = 360.0
+FULL_TURN_DEG = 360.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +71,6 @@ def _continuous(q: Floats) -> Floats:
         length = float(np.linalg.norm(vectors[i]))
         if length > 0:
             axis = vectors[i] / length
-            turns = np.rint((vectors[i - 1] @ axis - length) / TURN)
-            vectors[i] += turns * TURN * axis
+            turns = np.rint((vectors[i - 1] @ axis - length) / FULL_TURN_DEG)
+            vectors[i] += turns * FULL_TURN_DEG * axis
     return np.asarray(vectors)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LIMIT = 6  # rules in one picture, as many as there are colors that are easily told apart
-PIECE = 129  # points of one piece
+SEGMENT_POINTS = 129  # points of one piece
 FINE = 2049  # points of one piece where its extremum is looked for
 LENS = 0.04  # of the range; overshoots below are shown magnified too
 VISIBLE = 1e-6  # of the range; overshoots below are rounding
@@ -94,8 +94,8 @@ class _Curve:
 
 def _curve(times: Floats, values: Floats, name: str) -> _Curve:
     track, departure = _track(times, values, name)
-    k = np.repeat(np.arange(len(times) - 1), PIECE)
-    u = np.tile(np.linspace(0, 1, PIECE), len(times) - 1)
+    k = np.repeat(np.arange(len(times) - 1), SEGMENT_POINTS)
+    u = np.tile(np.linspace(0, 1, SEGMENT_POINTS), len(times) - 1)
     points = _points(track, k, u)
     low, high = np.minimum(values[k], values[k + 1]), np.maximum(values[k], values[k + 1])
     bounds = np.clip(points[:, 0], low, high)
@@ -145,7 +145,7 @@ def _points(track: Track, k: arrays.Ints, u: Floats) -> Floats:
 
 def _broken(points: Floats) -> Floats:
     """Points (P, ...) with a NaN after every piece."""
-    pieces = points.reshape(-1, PIECE, *points.shape[1:])
+    pieces = points.reshape(-1, SEGMENT_POINTS, *points.shape[1:])
     gap = np.full((len(pieces), 1, *points.shape[1:]), np.nan)
     return np.concatenate((pieces, gap), axis=1).reshape(-1, *points.shape[1:])
 
@@ -214,7 +214,7 @@ def _lens(sheet: Figure, curves: Sequence[_Curve], widest: _Curve, x: float, y: 
     off = np.nan_to_num(widest.points[:, 0] - widest.bounds) * np.sign(widest.worst)
     at = int(off.argmax())
     inside = np.flatnonzero(off > 0)
-    near = inside[np.abs(inside - at) < PIECE]
+    near = inside[np.abs(inside - at) < SEGMENT_POINTS]
     start, end = float(widest.times[near].min()), float(widest.times[near].max())
     level, size = float(widest.bounds[at]), abs(widest.worst)
     height = min(1.3, sheet.height - y - FOOT)

@@ -19,8 +19,8 @@ from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
 from anim.operations.selection import Selection
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
 
-NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
-STILL = 2e-5  # of the largest value; what moves less than this is rounding of the exporter
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+CONSTANT_TOLERANCE = 2e-5  # of the largest value; what moves less than this is rounding of the exporter
 COLORS = ("color", "Color", "ColorFactor", "emissiveFactor", "attenuationColor")  # ends of pointers that name colors
 SLOWEST = 8.0  # fps; fewer are the distances of a few poses and no frames
 REGULAR = 0.98  # share of keys on a rate's grid from which on frames are worth showing
@@ -44,7 +44,7 @@ class PlotTrack:
     fps: float | None
     other: Track | None = None
     view: str = FROM_REST
-    rest: Floats = field(default_factory=lambda: NO_TURN)
+    rest: Floats = field(default_factory=lambda: IDENTITY)
 
     @property
     def is_in_degrees(self) -> bool:
@@ -121,7 +121,7 @@ def _select(document: Document, selection: Selection, view: str) -> list[PlotTra
             track = _align(clip.tracks[i])
             labels = _labels(track, targets, view)
             name, target = _plot_track(reader.clip_name(clip.name, number)), _plot_track(_target(track, skeleton))
-            rest = NO_TURN if track.node is None else skeleton.rotation[track.node]
+            rest = IDENTITY if track.node is None else skeleton.rotation[track.node]
             found.append(PlotTrack(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
     return found
 
@@ -228,7 +228,9 @@ def _shorten(names: Sequence[str]) -> tuple[str, ...]:
 def _is_moving(track: Track) -> bool:
     values = track.values
     tangents = (track.in_tangents, track.out_tangents)
-    tolerance = STILL * (1 if track.kind is ValueKind.ROTATION else max(float(np.abs(values).max()), 1e-30))
+    tolerance = CONSTANT_TOLERANCE * (
+        1 if track.kind is ValueKind.ROTATION else max(float(np.abs(values).max()), 1e-30)
+    )
     return bool((np.abs(values - values[0]) > tolerance).any()) or any(
         each is not None and len(values) > 1 and bool(np.abs(each).max() > tolerance) for each in tangents
     )

@@ -62,7 +62,10 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
 
     rig = layer.rig
     playback = PosePlayback(scene.skeleton, clip)
-    held, sides = group_influences(rig.held), _sides(rig, layer.matrices(rest_block(scene.skeleton), slice(None))[0])
+    held, sides = (
+        group_influences(rig.influences),
+        _sides(rig, layer.matrices(rest_block(scene.skeleton), slice(None))[0]),
+    )
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
     by_frame = np.zeros(len(times))
@@ -80,7 +83,7 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
     root = np.sqrt(np.clip(least.astype(np.float64), 0, None))
     worst = int(least.argmin())
     time = float(times[when[worst]])
-    narrow = _narrow(scene.skeleton, layer, playback, worst, time, float(root[worst]))
+    narrow = _collapse_point(scene.skeleton, layer, playback, worst, time, float(root[worst]))
     return CollapseIndices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
 
 
@@ -98,7 +101,7 @@ def _logs(matrices: Floats) -> FloatArray:
     return fill_lanes(np.log(np.where(sizes > 0, sizes, np.nan)).T)
 
 
-def _narrow(
+def _collapse_point(
     names: Skeleton, layer: BoundMesh, playback: PosePlayback, vertex: int, time: float, index: float
 ) -> CollapsePoint:
     rig = layer.rig

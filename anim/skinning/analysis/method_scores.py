@@ -14,9 +14,9 @@ from anim.skinning.analysis.method_deviation import max_distance, model_size
 from anim.skinning.bake import Baker
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh
-from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, place_clamped
+from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, clamp_positions
 from anim.skinning.pose_blocks import PoseBlock, PosePlayback, rest_block
-from anim.skinning.weighted_joints import is_above
+from anim.skinning.weighted_joints import is_ancestor
 
 BULGE = 1.05  # distance from the links, against that in bind pose, above which a vertex bulges
 NEAR = 0.25  # of the middle distance: what lies nearer to a link has no ratio worth a word
@@ -40,8 +40,8 @@ class MethodScore:
     vertex: int
     joint: str
     time: float
-    off: float = 0.0
-    off_time: float = 0.0
+    max_distance: float = 0.0
+    max_distance_time: float = 0.0
     unusable: bool = False
 
 
@@ -67,7 +67,7 @@ def bind_measures(layer: BoundMesh, skeleton: Skeleton) -> BindMeasures:
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
     volume *= np.sign(_common_volume(rig, layer.matrices(rest_block(skeleton), slice(None)))[0])
     of = bone_segments(rig)
-    shared = of.share > 0
+    shared = of.fraction > 0
     middle = float(np.median(of.distance[shared])) if shared.any() else 0.0
     watched = np.flatnonzero(shared & (of.distance > NEAR * middle))
     return BindMeasures(layer, faces if volume else faces[:0], volume, of, watched)
@@ -118,7 +118,7 @@ class _Extremes:
         from anim.skinning.kernels.bone_distance import squared_bone_distance
 
         of, rig, links = self._of, self._of.layer.rig, self._of.links
-        joints, scales = place_clamped(of.links, matrices)
+        joints, scales = clamp_positions(of.links, matrices)
         squared = np.empty((len(positions), len(rig.points)), np.float32)
         at = of.layer.at
         squared_bone_distance(positions, at, rig.start, rig.joint, links.start, links.tips, joints, squared)
@@ -153,7 +153,7 @@ def _common_volume(rig: SkinBinding, matrices: Floats) -> Floats:
     that is what its scale acts on. A few joints that grow or shrink don't count.
     """
     own = np.bincount(rig.joint, rig.weight, minlength=len(rig.nodes))
-    weight = np.where(own > 0, own + is_above(rig.above) @ own, 0)
+    weight = np.where(own > 0, own + is_ancestor(rig.ancestors) @ own, 0)
     sizes = np.linalg.det(matrices[..., :3])
     order = np.argsort(sizes, axis=1)
     middle = (np.cumsum(weight[order], axis=1) >= weight.sum() / 2).argmax(axis=1)

@@ -44,10 +44,10 @@ def best_method(found: Sequence[RankedMethod]) -> RankedMethod | None:
     bulges least; of equal ones the first. Where nothing is closed, bulge alone decides.
     """
     others = [each for each in found if each.method != "lbs" and not each.unusable]
-    most = max((_held(each) for each in others), default=0.0)
-    near = [each for each in others if _held(each) >= most - SAME_VOLUME_FRACTION]
+    most = max((_is_kept(each) for each in others), default=0.0)
+    near = [each for each in others if _is_kept(each) >= most - SAME_VOLUME_FRACTION]
     return min(near, key=lambda each: round(each.bulge, FINE), default=None)
 
 
-def _held(standing: RankedMethod) -> float:
+def _is_kept(standing: RankedMethod) -> float:
     return 1.0 if standing.volume is None else min(standing.volume, 1.0)

@@ -50,12 +50,12 @@ def recommend(found: Sequence[Found], *, clamped: bool = False) -> Iterator[str]
 
 def _unusable(found: Sequence[Found]) -> Iterator[str]:
     """Of each method that loses the model, where it does most."""
-    lost = [(fared.off, fared, each) for each in found for fared in each.mesh.methods if fared.unusable]
+    lost = [(fared.max_distance, fared, each) for each in found for fared in each.mesh.methods if fared.unusable]
     for method in dict.fromkeys(fared.method for _, fared, _ in lost):
         off, fared, each = max((one for one in lost if one[1].method == method), key=lambda one: one[0])
         yield (
             f"{method} can't be used: a vertex is {off:.3g} m from where linear blending has it, more than the model's "
-            f"size ('{each.clip}', {fared.off_time:.2f} s)"
+            f"size ('{each.clip}', {fared.max_distance_time:.2f} s)"
         )
 
 
@@ -71,7 +71,7 @@ def _all_is_well(found: Sequence[Found], *, clamped: bool) -> str:
     meshes = [each.mesh for each in found]
     index = min(each.worst.index for each in meshes)
     told = f"no vertex falls below {LOW_INDEX} (least {index:.3f})"
-    left = _left(meshes)
+    left = _remaining_collapse(meshes)
     if left is not None and left < MIN_VOLUME_FRACTION:
         return f"{told}; {_percent(left)} of the volume is left at worst, and no method that was measured keeps more"
     if left is not None:
@@ -82,7 +82,7 @@ def _all_is_well(found: Sequence[Found], *, clamped: bool) -> str:
     return f"linear blending is good enough: {told}"
 
 
-def _left(meshes: list[MeshCollapse]) -> float | None:
+def _remaining_collapse(meshes: list[MeshCollapse]) -> float | None:
     """The least volume of all by linear blending, against bind pose."""
     volumes = [volume for each in meshes if (volume := linear_volume(each)) is not None]
     return min((float(each.min()) for each in volumes), default=None)
@@ -101,7 +101,7 @@ def _against_pinching(pinched: list[Found], *, clamped: bool) -> Iterator[str]:
 
 def _worst(pinched: list[Found]) -> str:
     first, clips = pinched[0], len({each.number for each in pinched})
-    worst, left = first.mesh.worst, _left([first.mesh])
+    worst, left = first.mesh.worst, _remaining_collapse([first.mesh])
     told = "1 clip pinches" if clips == 1 else f"{clips} clips pinch"
     places = f"'{worst.joint}' against '{worst.other}', {math.degrees(worst.angle):.0f}° at {worst.time:.2f} s"
     loss = f"; {_percent(left)} of the volume is left" if left is not None and left < MIN_VOLUME_FRACTION else ""

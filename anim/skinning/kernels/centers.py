@@ -17,7 +17,7 @@ def skin_centers(
     normals: OptionalArray,
     tangents: OptionalArray,
     centers: FloatArray,
-    held: Influences,
+    influences: Influences,
     rotations: FloatArray,
     rigids: FloatArray,
     stretches: ScaleShear | None,
@@ -31,23 +31,23 @@ def skin_centers(
     rotations: (J, 4, L) quaternions. rigids: (J, 12, L), the same motions as matrices; with stretches (J, 15, L), where
     the vertex's scale times the last three is added to the translations. The rest as in skin_dual_quaternion.
     """
-    tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((held.most, LANES), np.float32)
+    tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((influences.max_count, LANES), np.float32)
     rotation, matrix = np.empty((4, LANES), np.float32), np.empty((15, LANES), np.float32)
     stretch: OptionalArray = None if stretches is None else np.empty((15, LANES), np.float32)
     center, scale = np.empty((3, LANES), np.float32), np.empty((1, LANES), np.float32)
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
         for v in range(count):
-            if held.start[low + v] == held.start[low + v + 1]:
+            if influences.start[low + v] == influences.start[low + v + 1]:
                 tiles[:, v] = 0
                 continue
-            blend_quaternions(rotation, rotations, held, low + v, 4, signed)
-            blend(matrix, rigids, held, low + v, 12 if stretches is None else 15)
+            blend_quaternions(rotation, rotations, influences, low + v, 4, signed)
+            blend(matrix, rigids, influences, low + v, 12 if stretches is None else 15)
             point = tiles[0, v]
             load(point, points[low + v])
             load(center, points[low + v] if np.isnan(centers[low + v, 0, 0]) else centers[low + v])
             if stretches is not None:
-                blend(stretch, stretches.matrices, held, low + v, 15)
+                blend(stretch, stretches.matrices, influences, low + v, 15)
                 blend(scale, stretches.scales, stretches.ruling, low + v, 1)
                 transform(point, stretch)
                 transform(center, stretch)
@@ -55,7 +55,7 @@ def skin_centers(
                 add_scaled(center, stretch[12:], scale)
                 for i in range(3):
                     add_scaled(matrix[4 * i + 3 : 4 * i + 4], matrix[12 + i : 13 + i], scale)
-            _move_about(point, center, rotation, matrix)
+            _rotate_about(point, center, rotation, matrix)
             if normals is not None:
                 rotate_normal(tiles[1, v], normals[low + v], stretch, rotation)
             if tangents is not None:
@@ -68,7 +68,7 @@ def skin_centers(
 
 
 @inline
-def _move_about(p: FloatArray, center: FloatArray, rotation: FloatArray, matrix: FloatArray) -> None:
+def _rotate_about(p: FloatArray, center: FloatArray, rotation: FloatArray, matrix: FloatArray) -> None:
     """Rotate points about a center that moves by matrices."""
     for i in range(3):
         for f in range(LANES):

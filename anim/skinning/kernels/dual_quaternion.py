@@ -16,7 +16,7 @@ def skin_dual_quaternion(
     points: FloatArray,
     normals: OptionalArray,
     tangents: OptionalArray,
-    held: Influences,
+    influences: Influences,
     duals: FloatArray,
     stretches: ScaleShear | None,
     first: int,
@@ -29,21 +29,21 @@ def skin_dual_quaternion(
     After stretches the points get the vertex's scale times its pivot, and the dual quaternions that scale times their
     last four. points (V, 3, m), normals and tangents the same or None; out: (n, all, 3) of each, columns at + v.
     """
-    tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((held.most, LANES), np.float32)
+    tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((influences.max_count, LANES), np.float32)
     dual = np.empty((12, LANES), np.float32)
     stretch: OptionalArray = None if stretches is None else np.empty((15, LANES), np.float32)
     scale = np.empty((1, LANES), np.float32)
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
         for v in range(count):
-            if held.start[low + v] == held.start[low + v + 1]:
+            if influences.start[low + v] == influences.start[low + v + 1]:
                 tiles[:, v] = 0
                 continue
-            blend_quaternions(dual, duals, held, low + v, 8 if stretches is None else 12, signed)
+            blend_quaternions(dual, duals, influences, low + v, 8 if stretches is None else 12, signed)
             point = tiles[0, v]
             load(point, points[low + v])
             if stretches is not None:
-                blend(stretch, stretches.matrices, held, low + v, 15)
+                blend(stretch, stretches.matrices, influences, low + v, 15)
                 blend(scale, stretches.scales, stretches.ruling, low + v, 1)
                 transform(point, stretch)
                 add_scaled(point, stretch[12:], scale)

@@ -40,7 +40,7 @@ class Influences(NamedTuple):
     weight: FloatArray
     joint: NDArray[np.int32]
     start: Ints
-    most: int
+    max_count: int
 
 
 class OutputSlice(NamedTuple):
@@ -84,19 +84,19 @@ def aligned(*shape: int) -> FloatArray:
     return memory[first : first + size].reshape(shape)
 
 
-def group_influences(held: Influences) -> Influences:
+def group_influences(influences: Influences) -> Influences:
     """Return the same influences, the last GROUP of each vertex filled up by its first joint with weight 0.
 
     group_influences([0.7, 0.3], [4, 7], start [0, 2]) → [0.7, 0.3, 0, 0], [4, 7, 4, 4], start [0, 4]
     """
-    counts = np.diff(held.start)
+    counts = np.diff(influences.start)
     start = np.concatenate(([0], np.cumsum(-(-counts // GROUP) * GROUP)))
     owner = np.repeat(np.arange(len(counts)), np.diff(start))
     k = np.arange(start[-1]) - start[owner]
     is_own = k < counts[owner]
-    source = held.start[owner] + np.where(is_own, k, 0)
-    weight = np.where(is_own, held.weight[source], np.float32(0))
-    return Influences(weight, held.joint[source], start, -(-held.most // GROUP) * GROUP)
+    source = influences.start[owner] + np.where(is_own, k, 0)
+    weight = np.where(is_own, influences.weight[source], np.float32(0))
+    return Influences(weight, influences.joint[source], start, -(-influences.max_count // GROUP) * GROUP)
 
 
 def _or_none(values: FloatArray) -> FloatArray | None:

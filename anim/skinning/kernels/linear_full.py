@@ -16,7 +16,7 @@ def skin_linear(
     points: FloatArray,
     normals: OptionalArray,
     tangents: OptionalArray,
-    held: Influences,
+    influences: Influences,
     matrices: FloatArray,
     first: int,
     last: int,
@@ -31,7 +31,7 @@ def skin_linear(
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
         for v in range(count):
-            blend(matrix, matrices, held, low + v, 12)
+            blend(matrix, matrices, influences, low + v, 12)
             point = tiles[0, v]
             load(point, points[low + v])
             transform(point, matrix)

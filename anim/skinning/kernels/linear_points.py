@@ -11,7 +11,7 @@ from anim.skinning.kernels.layout import LANES, TILE, FloatArray, Influences
 @jit
 def skin_linear_points(
     coefficients: FloatArray,
-    held: Influences,
+    influences: Influences,
     matrices: FloatArray,
     first: int,
     last: int,
@@ -27,16 +27,16 @@ def skin_linear_points(
         count = min(TILE, last - low)
         for v in range(count):
             moved = tile[v]
-            begin, end = held.start[low + v], held.start[low + v + 1]
+            begin, end = influences.start[low + v], influences.start[low + v + 1]
             if begin == end:
                 moved[:] = 0
                 continue
-            a, c = matrices[held.joint[begin]], coefficients[begin]
+            a, c = matrices[influences.joint[begin]], coefficients[begin]
             x, y, z, w = c[0], c[1], c[2], c[3]
             for i in range(3 * LANES):
                 moved[i] = x * a[0, i] + y * a[1, i] + z * a[2, i] + w * a[3, i]
             for e in range(begin + 1, end):
-                a, c = matrices[held.joint[e]], coefficients[e]
+                a, c = matrices[influences.joint[e]], coefficients[e]
                 x, y, z, w = c[0], c[1], c[2], c[3]
                 for i in range(3 * LANES):
                     moved[i] += x * a[0, i] + y * a[1, i] + z * a[2, i] + w * a[3, i]

@@ -11,14 +11,19 @@ from anim.skinning.kernels.layout import GROUP, LANES, FloatArray, Influences
 
 
 @inline
-def blend(total: FloatArray, terms: FloatArray, held: Influences, v: int, rows: int) -> None:
+def blend(total: FloatArray, terms: FloatArray, influences: Influences, v: int, rows: int) -> None:
     """Set the first C rows of `total` to the sum of a vertex's matrices (J, C, L), by weight; 0 without influences."""
-    begin, end = held.start[v], held.start[v + 1]
+    begin, end = influences.start[v], influences.start[v + 1]
     if begin == end:
         total[:] = 0
     for e in range(begin, end, GROUP):
-        a, b, c, d = terms[held.joint[e]], terms[held.joint[e + 1]], terms[held.joint[e + 2]], terms[held.joint[e + 3]]
-        s, t, u, w = held.weight[e], held.weight[e + 1], held.weight[e + 2], held.weight[e + 3]
+        a, b, c, d = (
+            terms[influences.joint[e]],
+            terms[influences.joint[e + 1]],
+            terms[influences.joint[e + 2]],
+            terms[influences.joint[e + 3]],
+        )
+        s, t, u, w = influences.weight[e], influences.weight[e + 1], influences.weight[e + 2], influences.weight[e + 3]
         for i in range(rows):
             if e == begin:
                 for f in range(LANES):
@@ -30,7 +35,7 @@ def blend(total: FloatArray, terms: FloatArray, held: Influences, v: int, rows: 
 
 @inline
 def blend_quaternions(
-    total: FloatArray, terms: FloatArray, held: Influences, v: int, rows: int, signed: FloatArray
+    total: FloatArray, terms: FloatArray, influences: Influences, v: int, rows: int, signed: FloatArray
 ) -> None:
     """Set the first C rows of `total` to the sum of a vertex's quaternions, or dual ones, in the first's hemisphere.
 
@@ -38,15 +43,20 @@ def blend_quaternions(
     other hemisphere. So the sum is never shorter than the first one's weight, and can always be normalized, opposite
     rotations included. signed: (I, L), room for the weights with their signs.
     """
-    begin, end = held.start[v], held.start[v + 1]
-    pivot = terms[held.joint[begin]]
+    begin, end = influences.start[v], influences.start[v + 1]
+    pivot = terms[influences.joint[begin]]
     for e in range(begin, end):
-        weight, q, row = held.weight[e], terms[held.joint[e]], signed[e - begin]
+        weight, q, row = influences.weight[e], terms[influences.joint[e]], signed[e - begin]
         for f in range(LANES):
             side = pivot[0, f] * q[0, f] + pivot[1, f] * q[1, f] + pivot[2, f] * q[2, f] + pivot[3, f] * q[3, f]
             row[f] = -weight if side < 0 else weight
     for e in range(begin, end, GROUP):
-        a, b, c, d = terms[held.joint[e]], terms[held.joint[e + 1]], terms[held.joint[e + 2]], terms[held.joint[e + 3]]
+        a, b, c, d = (
+            terms[influences.joint[e]],
+            terms[influences.joint[e + 1]],
+            terms[influences.joint[e + 2]],
+            terms[influences.joint[e + 3]],
+        )
         s, t, u, w = signed[e - begin], signed[e - begin + 1], signed[e - begin + 2], signed[e - begin + 3]
         for i in range(rows):
             if e == begin:

@@ -18,22 +18,22 @@ class BlendedMethod:
 
     first: Skinner
     second: Skinner
-    share: float
+    fraction: float
 
     def pack(self, matrices: Floats) -> tuple[Any, Any]:
         """Return what both kernels read."""
         return self.first.pack(matrices), self.second.pack(matrices)
 
-    def place(self, packed: tuple[Any, Any], shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
+    def skin(self, packed: tuple[Any, Any], shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
-        self.first.place(packed[0], shape, target, first, last)
+        self.first.skin(packed[0], shape, target, first, last)
         aside = OutputSlice(target.at, *(np.empty_like(each) for each in target[1:]))
-        self.second.place(packed[1], shape, aside, first, last)
+        self.second.skin(packed[1], shape, aside, first, last)
         span = slice(target.at + first, target.at + last)
-        _mix(target.positions[:, span], aside.positions[:, span], self.share)
+        _mix(target.positions[:, span], aside.positions[:, span], self.fraction)
         for ours, other in ((target.normals, aside.normals), (target.tangents, aside.tangents)):
             if len(ours):
-                _mix(ours[:, span], other[:, span], self.share)
+                _mix(ours[:, span], other[:, span], self.fraction)
                 length = np.sqrt((ours[:, span] ** 2).sum(axis=-1, keepdims=True))
                 ours[:, span] /= np.where(length > 0, length, 1)
 

@@ -27,25 +27,25 @@ class BoneSegments:
     start: Ints
     tips: Ints
     distance: FloatArray
-    share: FloatArray
+    fraction: FloatArray
     joints: Floats
 
 
 def bone_segments(rig: SkinBinding) -> BoneSegments:
     """Return the links of a rig and how far its vertices are from them."""
     count = len(rig.nodes)
-    below = [np.flatnonzero(rig.above == j) for j in range(count)]
+    below = [np.flatnonzero(rig.ancestors == j) for j in range(count)]
     tips = [each if len(each) else np.array([j]) for j, each in enumerate(below)]
     start = np.cumsum([0, *map(len, tips)])
     found = BoneSegments(
-        start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _share(rig), joint_origins(rig)
+        start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _blend_weight(rig), joint_origins(rig)
     )
     points, at = rig.points[None].astype(np.float32), found.joints[None].astype(np.float32)
     squared = np.zeros((1, len(rig.points)), np.float32)
     from anim.skinning.kernels.bone_distance import squared_bone_distance
 
     squared_bone_distance(points, 0, rig.start, rig.joint, start, found.tips, at, squared)
-    return BoneSegments(start, found.tips, np.sqrt(squared[0]), found.share, found.joints)
+    return BoneSegments(start, found.tips, np.sqrt(squared[0]), found.fraction, found.joints)
 
 
 @dataclass(frozen=True)
@@ -65,29 +65,29 @@ class BulgeClamp:
 
     def pack(self, matrices: Floats) -> tuple[Any, FloatArray, FloatArray]:
         """Return what the inner method needs, where joints are (n, J, 3), and their scales (n, J)."""
-        return self.inner.pack(matrices), *place_clamped(self.links, matrices)
+        return self.inner.pack(matrices), *clamp_positions(self.links, matrices)
 
-    def place(
+    def skin(
         self, packed: tuple[Any, FloatArray, FloatArray], shape: VertexBlock, target: OutputSlice, first: int, last: int
     ) -> None:
         """Write vertices first … last of all frames."""
         from anim.skinning.kernels.bone_distance import clamp_to_bones
 
         inner, joints, scales = packed
-        self.inner.place(inner, shape, target, first, last)
+        self.inner.skin(inner, shape, target, first, last)
         start, joint, links = self.rig.start, self.rig.joint, self.links
-        moved = (joints, scales, links.distance, links.share, first, last)
+        moved = (joints, scales, links.distance, links.fraction, first, last)
         clamp_to_bones(target.positions, target.at, start, joint, links.start, links.tips, *moved)
 
 
-def place_clamped(of: BoneSegments, matrices: Floats) -> tuple[FloatArray, FloatArray]:
+def clamp_positions(of: BoneSegments, matrices: Floats) -> tuple[FloatArray, FloatArray]:
     """Return where joints stand (n, J, 3) under matrices (n, J, 3, 4), and how much they scale (n, J)."""
     at = matrix.apply(matrices, of.joints[:, None])[..., 0, :]
     scales = np.cbrt(np.abs(np.linalg.det(matrices[..., :3])))
     return at.astype(np.float32), scales.astype(np.float32)
 
 
-def _share(rig: SkinBinding) -> FloatArray:
+def _blend_weight(rig: SkinBinding) -> FloatArray:
     """1 − (w₁ − w₂)² of the two strongest weights, as shares of the two; 0 where there is one."""
     counts = np.diff(rig.start)
     two = counts > 1

@@ -22,9 +22,9 @@ class Packed:
     The last three are what is added to the translation for each unit of scale.
     """
 
-    turns: FloatArray
+    rotations: FloatArray
     rigids: FloatArray
-    stretches: ScaleShear | None
+    scale_shear: ScaleShear | None
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class CentersOfRotation:
         parts = self.carriers.split(matrices)
         turn = quaternion.to_matrix(parts.rotation)
         rigid = np.concatenate((turn, parts.translation[..., None]), axis=-1).reshape(*turn.shape[:2], 12)
-        if parts.stretch is not None:
+        if parts.scale_shear is not None:
             rigid = np.concatenate((rigid, -quaternion.rotate(parts.rotation, self.carriers.pivots)), axis=-1)
-        return Packed(lanes(parts.rotation), lanes(rigid), self.carriers.stretches(parts))
+        return Packed(lanes(parts.rotation), lanes(rigid), self.carriers.scale_shear(parts))
 
-    def place(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
+    def skin(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         from anim.skinning.kernels.centers import skin_centers
 
-        moves = (packed.turns, packed.rigids, packed.stretches)
-        skin_centers(*vertices(shape), self.centers, self.carriers.held, *moves, first, last, *output(target))
+        moves = (packed.rotations, packed.rigids, packed.scale_shear)
+        skin_centers(*vertices(shape), self.centers, self.carriers.influences, *moves, first, last, *output(target))

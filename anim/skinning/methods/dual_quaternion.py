@@ -23,7 +23,7 @@ class Packed:
     """
 
     duals: FloatArray
-    stretches: ScaleShear | None
+    scale_shear: ScaleShear | None
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ class DualQuaternion:
         """Return the matrices (n, J, 3, 4) as the kernel reads them."""
         parts = self.carriers.split(matrices)
         rigid = duals.from_rigid(parts.rotation, parts.translation)
-        if parts.stretch is not None:
+        if parts.scale_shear is not None:
             turned = quaternion.rotate(parts.rotation, self.carriers.pivots)
             rigid = np.concatenate((rigid, duals.from_rigid(parts.rotation, -turned)[..., 4:]), axis=-1)
-        return Packed(lanes(rigid), self.carriers.stretches(parts))
+        return Packed(lanes(rigid), self.carriers.scale_shear(parts))
 
-    def place(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
+    def skin(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         from anim.skinning.kernels.dual_quaternion import skin_dual_quaternion
 
-        moves = (self.carriers.held, packed.duals, packed.stretches)
+        moves = (self.carriers.influences, packed.duals, packed.scale_shear)
         skin_dual_quaternion(*vertices(shape), *moves, first, last, *output(target))

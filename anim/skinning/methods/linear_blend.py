@@ -40,14 +40,16 @@ class LinearBlend:
 
     rig: SkinBinding
     plain: bool
-    held: Influences = field(init=False, repr=False)
+    influences: Influences = field(init=False, repr=False)
     coefficients: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         owner = np.repeat(np.arange(len(self.rig.points)), np.diff(self.rig.start))
         whole = np.concatenate((self.rig.points, np.ones((len(self.rig.points), 1))), axis=1)
         weighted = self.rig.weight[:, None] * whole[owner] if self.plain else np.empty((0, 4))
-        object.__setattr__(self, "held", self.rig.held if self.plain else group_influences(self.rig.held))
+        object.__setattr__(
+            self, "influences", self.rig.influences if self.plain else group_influences(self.rig.influences)
+        )
         object.__setattr__(self, "coefficients", weighted.astype(np.float32))
 
     def pack(self, matrices: Floats) -> Packed:
@@ -60,14 +62,14 @@ class LinearBlend:
         columns[:, :, frames:] = 0
         return Packed(columns.reshape(joints, 4, 3 * LANES), None)
 
-    def place(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
+    def skin(self, packed: Packed, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all frames."""
         if packed.columns is not None:
             from anim.skinning.kernels.linear_points import skin_linear_points
 
             coefficients, columns = self.coefficients, packed.columns
-            skin_linear_points(coefficients, self.held, columns, first, last, target.at, target.positions)
+            skin_linear_points(coefficients, self.influences, columns, first, last, target.at, target.positions)
         elif packed.rows is not None:
             from anim.skinning.kernels.linear_full import skin_linear
 
-            skin_linear(*vertices(shape), self.held, packed.rows, first, last, *output(target))
+            skin_linear(*vertices(shape), self.influences, packed.rows, first, last, *output(target))

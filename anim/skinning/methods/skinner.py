@@ -14,7 +14,7 @@ class Skinner(Protocol):
     def pack(self, matrices: Floats) -> Any:
         """Return what the kernel reads of the joints' matrices (n, J, 3, 4), world_from_mesh."""
 
-    def place(self, packed: Any, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
+    def skin(self, packed: Any, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all n frames into the target."""
 
 

@@ -76,17 +76,19 @@ def opened(files: Memory, reading: ReadOptions | None = None) -> VertexCache:
 
 def off(one: VertexCache, other: VertexCache) -> float:
     """Return how far the farthest vertex of one is from the other's, in m."""
-    return float(np.linalg.norm(one.whole().positions.astype(np.float64) - other.whole().positions, axis=-1).max())
+    return float(
+        np.linalg.norm(one.load_all().positions.astype(np.float64) - other.load_all().positions, axis=-1).max()
+    )
 
 
 def positions_of(cache: VertexCache) -> AnyArray:
     """Return all positions (F, V, 3)."""
-    return cache.whole().positions
+    return cache.load_all().positions
 
 
 def normals_of(cache: VertexCache) -> AnyArray:
     """Return all normals (F, V, 3), which have to be there."""
-    normals = cache.whole().normals
+    normals = cache.load_all().normals
     assert normals is not None
     return normals
 

@@ -25,7 +25,7 @@ SOURCE = cache(tangents=True)
 
 
 def tangents_of(of: VertexCache) -> AnyArray:
-    found = of.whole().tangents
+    found = of.load_all().tangents
     assert found is not None
     return found
 

@@ -15,7 +15,7 @@ FACES = np.array([[0, 1, 2]])
 
 def test_frames_come_back() -> None:
     positions = np.arange(24.0).reshape(2, 4, 3)
-    assert from_arrays(np.arange(2.0), positions, FACES).whole().positions.tolist() == positions.tolist()
+    assert from_arrays(np.arange(2.0), positions, FACES).load_all().positions.tolist() == positions.tolist()
 
 
 @pytest.mark.parametrize("shape", [(3, 4, 3), (2, 4, 2), (4, 3)])

@@ -55,7 +55,9 @@ def every_point(of: Scene) -> PointMatrix:
 
 def truth_of(of: Scene, what: Clip, points: PointMatrix, reference: Reference = Reference.CURVE) -> SourceMotion:
     """What a clip does to points, all of its tracks free."""
-    below = {track.node: points.on(of.skeleton.below(track.node)) for track in what.tracks if track.node is not None}
+    below = {
+        track.node: points.on(of.skeleton.descendants(track.node)) for track in what.tracks if track.node is not None
+    }
     return analyze_source(of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, noticed=1e-6)
 
 

@@ -71,7 +71,7 @@ def test_what_never_holds_is_kept_without_loss(monkeypatch: pytest.MonkeyPatch) 
 
 def test_below_float32_nothing_is_lost() -> None:
     found = optimize_clip(_site(1e-13), (0, _task(1e-13)))
-    assert found.verdict.strain <= 1
+    assert found.verdict.usage <= 1
     by_target = {track.target: track for track in found.solution.clip.tracks}
     for each in waving().tracks:
         if len(by_target[each.target].times) > 1:

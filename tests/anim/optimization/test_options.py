@@ -30,7 +30,7 @@ def test_each_effort_tries_what_a_smaller_one_does_and_more() -> None:
         assert less.rounds <= more.rounds
         assert set(less.axes) <= set(more.axes)
         assert set(less.leeways) <= set(more.leeways)
-        assert less.favoring <= more.favoring
-        assert less.strays <= more.strays
-        assert less.descent <= more.descent
+        assert less.long_track_rounds <= more.long_track_rounds
+        assert less.random_trials <= more.random_trials
+        assert less.coarsen_passes <= more.coarsen_passes
     assert all(0 < share < 1 for effort in EFFORTS.values() for share in effort.thresholds)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from anim.optimization.rate_distortion import LEAST, MOST, SHARES, RatePoint, curve, smallest_error
+from anim.optimization.rate_distortion import ERROR_FRACTIONS, LEAST, MOST, RatePoint, curve, smallest_error
 
 DIAGONAL = 3.0
 
@@ -18,9 +18,9 @@ def _sized(max_error: float) -> RatePoint:
 
 def test_a_curve_goes_from_small_bounds_to_large() -> None:
     found = list(curve(DIAGONAL, _sized))
-    assert [each.max_error for each in found] == pytest.approx([share * DIAGONAL for share in SHARES])
-    assert SHARES[0] == pytest.approx(1e-5)
-    assert SHARES[-1] == pytest.approx(1e-2)
+    assert [each.max_error for each in found] == pytest.approx([share * DIAGONAL for share in ERROR_FRACTIONS])
+    assert ERROR_FRACTIONS[0] == pytest.approx(1e-5)
+    assert ERROR_FRACTIONS[-1] == pytest.approx(1e-2)
     assert [each.size for each in found] == sorted((each.size for each in found), reverse=True)
     assert [each.max_error for each in curve(1.0, _sized, (0.3, 0.1))] == [0.1, 0.3]
 
@@ -48,7 +48,7 @@ def test_without_error_where_that_fits() -> None:
 def test_nothing_fits_too_few_bytes() -> None:
     assert smallest_error(_sized(MOST * DIAGONAL).size - 1, DIAGONAL, _sized) is None
     assert smallest_error(_sized(MOST * DIAGONAL).size, DIAGONAL, _sized) is not None
-    assert SHARES[0] > LEAST
+    assert ERROR_FRACTIONS[0] > LEAST
 
 
 def test_what_is_given_back_was_tried_and_fits_though_sizes_are_noisy() -> None:

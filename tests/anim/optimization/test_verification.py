@@ -40,7 +40,7 @@ def _lifted(height: float) -> Clip:
 def test_the_largest_distance_against_its_bound(bound: float, holds: bool) -> None:
     found = _verdict(SLIDE, _lifted(0.01), Bounds(bound, 0.0))
     assert found.error.max_error == pytest.approx(0.01, rel=2e-3)
-    assert found.strain == pytest.approx(0.01 / bound, rel=2e-3)
+    assert found.usage == pytest.approx(0.01 / bound, rel=2e-3)
     assert found.holds is holds
 
 
@@ -67,12 +67,12 @@ def test_other_ends_never_hold() -> None:
     (only,) = SLIDE.tracks
     later = clip(replace(only, times=np.array([0, 0.5, 1.0000001])))
     found = _verdict(SLIDE, later, Bounds(10.0, 0.0))
-    assert (found.strain, found.holds) == (math.inf, False)
+    assert (found.usage, found.holds) == (math.inf, False)
 
 
 def test_a_bound_of_0_lets_rounding_pass_and_nothing_else() -> None:
     bounds = Bounds(0.0, 0.0)
-    assert _verdict(SLIDE, SLIDE, bounds).strain == 0
+    assert _verdict(SLIDE, SLIDE, bounds).usage == 0
     assert _verdict(SLIDE, _lifted(1e-12), bounds).holds
     assert not _verdict(SLIDE, _lifted(1e-7), bounds).holds
 

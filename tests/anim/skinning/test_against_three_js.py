@@ -34,6 +34,6 @@ def test_vertices_come_as_three_meets_them(name: str, asset: Callable[[str], Pat
     clip = len(clips) - 1
     time = 0.37 * clips[clip].end
     theirs = vertices(asset(name), clip=clip, time=time)
-    ours = bake(reader.scene(document), clips[clip], times=np.array([time]), rigid=True).whole().positions[0]
+    ours = bake(reader.scene(document), clips[clip], times=np.array([time]), rigid=True).load_all().positions[0]
     assert ours.shape == theirs.shape
     assert np.abs(ours - theirs).max() < FILES[name] * np.linalg.norm(np.ptp(theirs, axis=0))

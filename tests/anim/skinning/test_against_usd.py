@@ -45,7 +45,7 @@ def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
     compared = 0
     for played in clips:
         times = frame_times(played.start, played.end, fps=6)
-        whole = made.bake(played, times=times).whole().positions
+        whole = made.bake(played, times=times).load_all().positions
         local = sample_pose(of.skeleton, played, times)
         frames = PoseBlock(times, world_by_node(of.skeleton, local), local.weights)
         for layer in made.layers:

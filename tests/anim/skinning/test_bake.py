@@ -34,7 +34,7 @@ def test_every_mesh_in_order_as_the_ruler_places_it(name: str) -> None:
         cache = bake(of, played, times=times, rigid=True)
         local = sample_pose(of.skeleton, played, times)
         world, at = world_matrices(of.skeleton, local), 0
-        whole = cache.whole().positions
+        whole = cache.load_all().positions
         for surface in surfaces(of):
             weights = local.weights.get(surface.owner, np.tile(surface.rest_weights, (len(times), 1)))
             frames = [place_points(surface, world[f][surface.nodes], weights[f]) for f in range(len(times))]
@@ -76,15 +76,15 @@ def test_nodes_depth_first() -> None:
 
 @pytest.mark.parametrize("method", SKINNING_METHODS)
 def test_mesh_space_is_the_node_away_from_world_space(method: str) -> None:
-    of = random_scene(3, stretch=0.2)
+    of = random_scene(3, scale_shear=0.2)
     played = moving(of, 4)
     node = of.instances[0].node
     turning = track("rotation", [0, 2], about("z", [10, 100]), node=node)
     growing = track("scale", [0, 2], np.array([[1, 1, 1], [2, 3, 0.5]]), node=node)
     played = replace(played, tracks=(*played.tracks, turning, growing))
     of = Scene(of.skeleton, (replace(of.instances[0], mesh=replace(of.instances[0].mesh, normals=_normals(of))),))
-    worldly = bake(of, played, times=TIMES, method=method, normals=True).whole()
-    own = bake(of, played, times=TIMES, method=method, normals=True, space="mesh").whole()
+    worldly = bake(of, played, times=TIMES, method=method, normals=True).load_all()
+    own = bake(of, played, times=TIMES, method=method, normals=True, space="mesh").load_all()
     at = world_matrices(of.skeleton, sample_pose(of.skeleton, played, TIMES))[:, node]
     back = matrix.apply(at, own.positions.astype(float))
     assert np.abs(back - worldly.positions).max() < 1e-5 * np.abs(back).max()
@@ -104,7 +104,7 @@ def test_normals_of_one_joint_stand_on_the_moved_surface(method: str) -> None:
     for scale in ([1, 1, 1], [2, 0.5, 3], [-1, 1, 1], [-2, 0.5, 1]):
         body = mesh(points, [[0, 1]] * 3, [[1, 0]] * 3, faces=TRIANGLE, normals=np.tile(normal, (3, 1)))
         of = scene(body, [-1, 0], scale=[scale, [1, 1, 1]], rotation=about("x", [35, 0]).tolist())
-        chunk = bake(of, clip(), times=np.zeros(1), method=method, normals=True).whole()
+        chunk = bake(of, clip(), times=np.zeros(1), method=method, normals=True).load_all()
         a, b, c = chunk.positions[0].astype(float)
         wanted = np.cross(b - a, c - a) * np.sign(np.prod(scale))
         assert chunk.normals is not None
@@ -119,7 +119,7 @@ def test_normals_morph_and_come_from_faces_where_there_are_none() -> None:
     morphing = clip(track("weights", [0, 1], [[0], [1]], node=1))
     for normals, targets in ((up, lean), (None, None)):
         body = mesh(flat, [[0]] * 3, [[1]] * 3, faces=TRIANGLE, targets=lift, normals=normals, normal_targets=targets)
-        chunk = bake(scene(body, [-1]), morphing, times=np.array([0.0, 1.0]), normals=True).whole()
+        chunk = bake(scene(body, [-1]), morphing, times=np.array([0.0, 1.0]), normals=True).load_all()
         assert chunk.normals is not None
         assert chunk.positions[1, 2].tolist() == [0, 1, 1]
         half = np.sqrt(0.5)
@@ -133,7 +133,7 @@ def test_blend_goes_from_lbs_to_the_method() -> None:
     played = moving(of, 3)
 
     def baked(**how: object) -> tuple[np.ndarray, np.ndarray]:
-        chunk = bake(of, played, times=TIMES, normals=True, **how).whole()  # type: ignore[arg-type]
+        chunk = bake(of, played, times=TIMES, normals=True, **how).load_all()  # type: ignore[arg-type]
         assert chunk.normals is not None
         return chunk.positions, chunk.normals
 
@@ -147,17 +147,17 @@ def test_blend_goes_from_lbs_to_the_method() -> None:
 
 @pytest.mark.parametrize("method", SKINNING_METHODS)
 def test_same_bytes_for_any_chunk_and_number_of_threads(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    of = random_scene(7, stretch=0.3)
+    of = random_scene(7, scale_shear=0.3)
     played = moving(of, 3)
-    once = bake(of, played, times=TIMES, method=method, threads=1).whole().positions
+    once = bake(of, played, times=TIMES, method=method, threads=1).load_all().positions
     monkeypatch.setattr(chunk_pipeline, "MIN_VERTICES", 7)
-    assert np.array_equal(once, bake(of, played, times=TIMES, method=method, threads=5).whole().positions)
+    assert np.array_equal(once, bake(of, played, times=TIMES, method=method, threads=5).load_all().positions)
     monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
     cache = bake(of, played, times=TIMES, method=method)
     assert [(chunk.first, len(chunk.positions)) for chunk in cache.chunks()] == [(0, 32), (32, 13)]
-    assert np.array_equal(cache.whole().positions, once)
-    assert np.array_equal(cache.whole().positions, once), "a second pass is the first"
-    alone = bake(of, played, times=TIMES[17:18], method=method).whole().positions
+    assert np.array_equal(cache.load_all().positions, once)
+    assert np.array_equal(cache.load_all().positions, once), "a second pass is the first"
+    alone = bake(of, played, times=TIMES[17:18], method=method).load_all().positions
     assert np.array_equal(alone[0], once[17]), "a frame does not depend on the others"
 
 
@@ -185,9 +185,9 @@ def test_only_what_skins_or_morphs_is_baked_unless_rigid_is_wanted() -> None:
 
 
 def test_rest_is_the_scene_without_a_clip() -> None:
-    of = random_scene(3, stretch=0.4)
+    of = random_scene(3, scale_shear=0.4)
     cache = bake(of, moving(of, 1), times=np.zeros(1))
-    still = bake(of, clip(), times=np.zeros(1)).whole().positions[0]
+    still = bake(of, clip(), times=np.zeros(1)).load_all().positions[0]
     assert cache.rest is not None
     assert np.abs(cache.rest - still).max() < 1e-5
 
@@ -220,7 +220,7 @@ def test_a_flat_node_has_no_mesh_space() -> None:
     of = random_scene(1)
     flat = clip(track("scale", [0], [[1, 0, 1]], node=of.instances[0].node))
     with pytest.raises(RangeError, match="mesh space is flat"):
-        bake(of, flat, times=np.zeros(1), space="mesh").whole()
+        bake(of, flat, times=np.zeros(1), space="mesh").load_all()
 
 
 def test_files_that_cant_be_skinned() -> None:
@@ -264,7 +264,7 @@ def test_a_mesh_on_two_nodes_is_baked_twice() -> None:
     plain = replace(body, joints=np.empty((1, 0), np.int64), weights=np.empty((1, 0)))
     nodes = skeleton([-1, -1], translation=[[0, 0, 0], [5, 0, 0]])
     of = Scene(nodes, (MeshInstance(0, plain, None, np.array([0.0])), MeshInstance(1, plain, None, np.array([0.5]))))
-    found = bake(of, clip(), times=np.zeros(1)).whole().positions[0]
+    found = bake(of, clip(), times=np.zeros(1)).load_all().positions[0]
     assert found.tolist() == [[1, 0, 0], [6, 0.5, 0]]
 
 
@@ -274,7 +274,7 @@ def test_real_files_stay_whole(method: str) -> None:
     """No vertex of the walking man leaves the box of his bind pose by more than a stride."""
     document = opened_path(ASSETS / "CesiumMan.glb")
     of, (walk,) = reader.scene(document), reader.clips(document)
-    found = bake(of, walk, times=np.linspace(walk.start, walk.end, 20), method=method).whole().positions
+    found = bake(of, walk, times=np.linspace(walk.start, walk.end, 20), method=method).load_all().positions
     rest = of.instances[0].mesh.positions
     assert np.isfinite(found).all()
     assert np.ptp(found.reshape(-1, 3), axis=0).max() < 1.3 * np.ptp(rest, axis=0).max()

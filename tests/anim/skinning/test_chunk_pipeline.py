@@ -25,7 +25,7 @@ FRAMES = 231  # eight chunks of 32, the last one shorter
 def _scene(method: str) -> tuple[Scene, Clip]:
     """A skinned mesh whose shape is animated, and a rigid one on a joint."""
     random = np.random.default_rng(5)
-    of = random_scene(7, stretch=0.3 if method != "lbs" else 0.0, targets=random.normal(size=(2, 150, 3)) / 4)
+    of = random_scene(7, scale_shear=0.3 if method != "lbs" else 0.0, targets=random.normal(size=(2, 150, 3)) / 4)
     rigid = MeshInstance(3, mesh(np.eye(3), np.empty((3, 0)), np.empty((3, 0)), faces=TRIANGLE), None, np.zeros(0))
     of = replace(of, instances=(*of.instances, rigid))
     shapes = track("weights", np.linspace(0, 2, 5), random.random((5, 2)), node=of.instances[0].node)
@@ -33,7 +33,7 @@ def _scene(method: str) -> tuple[Scene, Clip]:
 
 
 def _baked(of: Scene, played: Clip, **how: Any) -> AnyArray:
-    return bake(of, played, times=np.linspace(0, 2, FRAMES), rigid=True, **how).whole().positions
+    return bake(of, played, times=np.linspace(0, 2, FRAMES), rigid=True, **how).load_all().positions
 
 
 @pytest.mark.parametrize("packed", [1, 700_000, 1 << 40], ids=["one block", "few blocks", "any number"])
@@ -47,7 +47,7 @@ def test_same_bytes_for_any_chunk_and_number_of_threads(
         bake(of, played, times=np.array([2 * f / (FRAMES - 1)]), rigid=True, method=method) for f in (40, 130, 230)
     ]
     for frame, one in zip((40, 130, 230), alone, strict=True):
-        assert np.array_equal(once[frame], one.whole().positions[0]), "a frame doesn't depend on the others"
+        assert np.array_equal(once[frame], one.load_all().positions[0]), "a frame doesn't depend on the others"
     monkeypatch.setattr(chunk_pipeline, "MIN_VERTICES", 7)
     monkeypatch.setattr(chunk_pipeline, "PACKED_BYTES", packed)
     for threads in (1, 2, 5):

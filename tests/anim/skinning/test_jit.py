@@ -73,7 +73,7 @@ def test_influences_come_in_groups_of_four() -> None:
     assert found.start.tolist() == [0, 4, 4, 8, 16]
     assert found.weight.round(6).tolist() == pytest.approx([0.7, 0.3, 0, 0, 1, 0, 0, 0, *[0.2] * 5, 0, 0, 0])
     assert found.joint.tolist() == [0, 1, 0, 0, 2, 2, 2, 2, 3, 4, 5, 6, 7, 3, 3, 3]
-    assert found.most == 8
+    assert found.max_count == 8
 
 
 def test_code_is_cached_for_one_version_and_set_of_sources(tmp_path: Path) -> None:

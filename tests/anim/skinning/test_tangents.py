@@ -42,9 +42,9 @@ def with_neighbors(of: Scene) -> tuple[Scene, Floats]:
 @pytest.mark.parametrize("stretch", [0.0, 0.4])
 @pytest.mark.parametrize("space", ["world", "mesh"])
 def test_tangents_and_normals_follow_the_surface(method: str, stretch: float, space: str) -> None:
-    of, handed = with_neighbors(random_scene(3, vertices=60, stretch=stretch))
+    of, handed = with_neighbors(random_scene(3, vertices=60, scale_shear=stretch))
     cache = bake(of, moving(of, 4), times=TIMES, method=method, normals=True, tangents=True, space=space)
-    found = cache.whole()
+    found = cache.load_all()
     assert found.normals is not None
     assert found.tangents is not None
     own, along, across = np.split(found.positions.astype(float), 3, axis=1)
@@ -75,7 +75,7 @@ def test_a_turn_by_hand() -> None:
         normals=True,
         tangents=True,
     )
-    whole = cache.whole()
+    whole = cache.load_all()
     assert whole.tangents == pytest.approx(np.array([[[0, 1, 0]] * 3]), abs=1e-7)
     assert whole.normals == pytest.approx(np.array([[[-1, 0, 0]] * 3]), abs=1e-7)
     assert cache.handedness == pytest.approx(-np.ones(3))
@@ -86,7 +86,7 @@ def test_morph_targets_add_to_tangents() -> None:
     moved = np.zeros((1, 3, 3))
     moved[:, :, 2] = 2
     of = scene(quad(targets=np.zeros((1, 3, 3)), tangent_targets=moved, rest_weights=[0.5]), [-1])
-    whole = bake(of, Clip("", ()), times=np.zeros(1), tangents=True).whole()
+    whole = bake(of, Clip("", ()), times=np.zeros(1), tangents=True).load_all()
     assert whole.tangents == pytest.approx(np.array([[[0.5**0.5, 0, 0.5**0.5]] * 3]), abs=1e-6)
 
 

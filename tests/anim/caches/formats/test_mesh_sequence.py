@@ -21,7 +21,7 @@ def test_trimesh_reads_every_frame(ending: str, normals: bool) -> None:
     source = cache(normals=normals)
     files, _ = written(source, f"walk{ending}")
     assert sorted(files.files) == [f"walk_{i:05d}{ending}" for i in range(1, 8)]
-    whole = source.whole()
+    whole = source.load_all()
     for f, name in enumerate(sorted(files.files)):
         if ending == ".obj":  # trimesh gives the order of an OBJ up where it has normals
             lines = [line.split()[1:] for line in files.files[name].decode().splitlines() if line.startswith("v ")]
@@ -109,11 +109,11 @@ def test_quads_of_others_are_cut() -> None:
 )
 def test_what_is_wrong_is_said(files: dict[str, bytes], words: str) -> None:
     with pytest.raises(FormatError, match=words):
-        opened(Memory("a.obj", files)).whole()
+        opened(Memory("a.obj", files)).load_all()
 
 
 @pytest.mark.parametrize("cut", [0, 20, 200, -3])
 def test_a_cut_off_ply_is_refused(cut: int) -> None:
     files, _ = written(at_time(cache(), 0), "a.ply")
     with pytest.raises(FormatError):
-        opened(Memory("a.ply", {"a.ply": files.files["a.ply"][:cut]})).whole()
+        opened(Memory("a.ply", {"a.ply": files.files["a.ply"][:cut]})).load_all()

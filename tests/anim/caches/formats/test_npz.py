@@ -19,7 +19,7 @@ REST = (positions_of(cache())[0].astype(np.float64) + 0.5).tolist()
 def test_numpy_reads_it() -> None:
     source = cache()
     files, _ = written(source, "a.npz")
-    whole = source.whole()
+    whole = source.load_all()
     with np.load(io.BytesIO(files.files["a.npz"]), allow_pickle=False) as arrays:
         assert arrays["positions"].dtype == np.float32
         assert (arrays["positions"] == whole.positions).all()
@@ -81,4 +81,4 @@ def test_what_is_wrong_is_said(change: dict[str, np.ndarray | None], words: str)
     out = io.BytesIO()
     np.savez(out, **{name: array for name, array in arrays.items() if array is not None})  # type: ignore[arg-type]
     with pytest.raises(FormatError, match=words):
-        opened(Memory("b.npz", {"b.npz": out.getvalue()})).whole()
+        opened(Memory("b.npz", {"b.npz": out.getvalue()})).load_all()

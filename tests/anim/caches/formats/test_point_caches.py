@@ -131,4 +131,4 @@ def test_cut_off_files_are_refused(name: str, cut: int) -> None:
 )
 def test_wrong_headers_are_refused(name: str, data: bytes) -> None:
     with pytest.raises(FormatError):
-        opened(Memory(name, {name: data})).whole()
+        opened(Memory(name, {name: data})).load_all()

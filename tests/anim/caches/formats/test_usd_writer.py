@@ -30,7 +30,7 @@ def test_usd_core_reads_every_frame(stage: Any) -> None:
     from pxr import UsdGeom
 
     source = cache()
-    whole = source.whole()
+    whole = source.load_all()
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1
     assert stage.GetTimeCodesPerSecond() == 30
@@ -105,7 +105,7 @@ def test_a_stage_of_others() -> None:
 def test_cut_off_files_are_refused_in_silence(ending: str, cut: float, capfd: pytest.CaptureFixture[str]) -> None:
     data = written(cache(), f"a{ending}")[0].files[f"a{ending}"]
     with pytest.raises(FormatError):
-        opened(Memory(f"a{ending}", {f"a{ending}": data[: int(cut * len(data)) if cut < 1 else int(cut)]})).whole()
+        opened(Memory(f"a{ending}", {f"a{ending}": data[: int(cut * len(data)) if cut < 1 else int(cut)]})).load_all()
     assert capfd.readouterr() == ("", "")
 
 
@@ -114,4 +114,4 @@ def test_cut_off_files_are_refused_in_silence(ending: str, cut: float, capfd: py
 )
 def test_wrong_stages_are_refused(change: tuple[str, str]) -> None:
     with pytest.raises(FormatError):
-        opened(Memory("a.usda", {"a.usda": SCENE.replace(*change).encode()})).whole()
+        opened(Memory("a.usda", {"a.usda": SCENE.replace(*change).encode()})).load_all()

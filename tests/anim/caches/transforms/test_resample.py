@@ -26,7 +26,7 @@ def test_between_frames_lie_straight_lines() -> None:
 def test_many_new_frames_from_a_stream() -> None:
     source = cache(50, step=1)
     found = at_rate(source, 200)
-    whole = found.whole()
+    whole = found.load_all()
     p = positions_of(source)
     for axis in range(3):
         expected = np.interp(found.times, source.times, p[:, 4, axis])

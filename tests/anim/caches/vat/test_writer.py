@@ -175,7 +175,7 @@ def test_damaged_or_missing_files_are_refused(name: str, cut: int | None) -> Non
     else:
         files.files[name] = files.files[name][: cut if name != "a.png.json" or cut != -2 else -4]
     with pytest.raises(FormatError):
-        opened(files).whole()
+        opened(files).load_all()
 
 
 def test_companions_are_those_that_the_json_names() -> None:

@@ -57,7 +57,7 @@ def test_vertices_are_where_three_has_them(asset: Callable[[str], Path], tmp_pat
     document = opened(bad.read_bytes())
     of, (walk,) = reader.scene(document), reader.clips(document)
     assert unnormalized_weights(of.instances)[0].count > 1000
-    ours = bake(of, walk, times=np.array([0.7])).whole().positions[0]
+    ours = bake(of, walk, times=np.array([0.7])).load_all().positions[0]
     theirs = vertices(bad, clip=0, time=0.7)
     assert np.abs(ours - theirs).max() < 1e-6 * np.linalg.norm(np.ptp(theirs, axis=0))
 

@@ -52,7 +52,7 @@ def proven(scene: Scene, before: Clip, after: Clip, *, players: Sequence[str] = 
     """What is certified of a pair of clips, looked at where `optimize` looks."""
     ruler = ErrorMetric(scene)
     times = dense_times(before, after)
-    looks = {player: ruler.look(before, after, times, player=player) for player in players}
+    looks = {player: ruler.sample_errors(before, after, times, player=player) for player in players}
     return Prover(ruler).certified(before, after, times, looks, **more)
 
 

@@ -138,7 +138,7 @@ def test_what_of_a_bend_is_sideways_is_bounded_between_ends_that_have_none_of_it
     across = (bends - curve * (curve * bends).sum(axis=1, keepdims=True) / length**2) / length / H**2
     assert found.own is not None
     assert np.abs(found.own).max() < 1e-12
-    assert 1 < _size(across) <= float(np.asarray(found.most_own)[0, 0, 0])
+    assert 1 < _size(across) <= float(np.asarray(found.max_residual)[0, 0, 0])
 
 
 def test_drift_of_lines_that_change_in_length_more_than_they_turn() -> None:

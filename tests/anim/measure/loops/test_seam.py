@@ -163,7 +163,7 @@ def test_the_seam_is_how_far_a_bake_ends_from_its_start(name: str) -> None:
     document = opened(fixtures.build(name))
     scene = reader.scene(document)
     for each in reader.clips(document):
-        first, last = bake(scene, each, times=np.array([each.start, each.end]), rigid=True).whole().positions
+        first, last = bake(scene, each, times=np.array([each.start, each.end]), rigid=True).load_all().positions
         assert analyze_loop(scene, each).seam == pytest.approx(
             np.linalg.norm(last - first, axis=1).max(), rel=1e-5, abs=1e-6
         )
@@ -180,7 +180,7 @@ def test_steps_inside_are_those_of_a_bake(name: str, monkeypatch: pytest.MonkeyP
         step = min(1 / found.fps, (each.end - each.start) / 2)
         count = max(round((each.end - each.start) / step), 2)
         times = np.minimum(each.start + step * np.arange(count + 1), each.end)
-        places = bake(scene, each, times=times, rigid=True).whole().positions.astype(float)
+        places = bake(scene, each, times=times, rigid=True).load_all().positions.astype(float)
         moves = np.linalg.norm(np.diff(places, axis=0), axis=2).max(axis=1)
         assert found.inside.largest == pytest.approx(moves.max(), rel=1e-5, abs=1e-6)
 

@@ -50,9 +50,9 @@ def test_regular_axes() -> None:
 
 def test_larger_budgets_need_fewer_keys_and_what_was_found_is_kept() -> None:
     layouts = _layouts()
-    counts = [int(layouts.needed(KEYED, factor * BUDGETS).sum()) for factor in (0.1, 1, 10)]
+    counts = [int(layouts.greedy_keys(KEYED, factor * BUDGETS).sum()) for factor in (0.1, 1, 10)]
     assert counts[0] > counts[1] > counts[2] >= 6
-    assert [int(layouts.needed(KEYED, factor * BUDGETS).sum()) for factor in (0.1, 1, 10)] == counts
+    assert [int(layouts.greedy_keys(KEYED, factor * BUDGETS).sum()) for factor in (0.1, 1, 10)] == counts
 
 
 def test_efforts_name_layouts() -> None:

@@ -36,7 +36,7 @@ def _chosen(count: int, inner: tuple[int, ...]) -> Bools:
 def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, budget: float) -> None:
     values, times = _random(seed, count)
     budgets = budget * np.array([1.0, 0.5, 2, 0.01])
-    keep = SegmentErrors(values, times, np.inf).needed(np.arange(4), budgets)
+    keep = SegmentErrors(values, times, np.inf).greedy_keys(np.arange(4), budgets)
     assert keep[:, [0, -1]].all()
     for track in range(4):
         assert _missed(values[track], times, keep[track]) <= budgets[track] * (1 + 1e-5)
@@ -47,7 +47,7 @@ def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, 
 def test_no_choice_of_fewer_keys_does(seed: int) -> None:
     """Tried are all of them."""
     values, times = _random(seed, 9)
-    keep = SegmentErrors(values, times, np.inf).needed(np.arange(4), np.full(4, 1.5))
+    keep = SegmentErrors(values, times, np.inf).greedy_keys(np.arange(4), np.full(4, 1.5))
     for track in range(4):
         count = int(keep[track].sum())
         fewer = (_chosen(9, inner) for inner in combinations(range(1, 8), max(count - 3, 0)))
@@ -58,21 +58,21 @@ def test_among_the_fewest_the_one_that_misses_least() -> None:
     """A bow in two lines: the middle key misses least."""
     times = np.linspace(0, 1, 11)
     bow = (times**2)[None, :, None]
-    keep = SegmentErrors(bow, times, np.inf).needed(np.array([0]), np.array([0.08]))
+    keep = SegmentErrors(bow, times, np.inf).greedy_keys(np.array([0]), np.array([0.08]))
     assert np.flatnonzero(keep[0]).tolist() == [0, 5, 10]
 
 
 def test_some_tracks_of_many() -> None:
     values, times = _random(3, 40)
     table = SegmentErrors(values, times, np.inf)
-    every = table.needed(np.arange(4), np.array([1.0, 2, 3, 4]))
-    some = table.needed(np.array([3, 1]), np.array([4.0, 2]))
+    every = table.greedy_keys(np.arange(4), np.array([1.0, 2, 3, 4]))
+    some = table.greedy_keys(np.array([3, 1]), np.array([4.0, 2]))
     assert (some == every[[3, 1]]).all()
 
 
 def test_never_more_keys_than_greedy_ones() -> None:
     values, times = _random(5, 60, tracks=30)
-    fewest = SegmentErrors(values, times, np.inf).needed(np.arange(30), np.full(30, 2.0)).sum(axis=1)
+    fewest = SegmentErrors(values, times, np.inf).greedy_keys(np.arange(30), np.full(30, 2.0)).sum(axis=1)
     greedy = greedy_keys(values / 2.0, times).sum(axis=1)
     assert (fewest <= greedy).all()
     assert fewest.sum() < greedy.sum()
@@ -80,7 +80,7 @@ def test_never_more_keys_than_greedy_ones() -> None:
 
 def test_long_lines_have_a_key_now_and_then() -> None:
     times = np.arange(300.0)
-    keep = SegmentErrors(times[None, :, None] * np.ones(3), times, np.inf).needed(np.array([0]), np.array([1e-3]))
+    keep = SegmentErrors(times[None, :, None] * np.ones(3), times, np.inf).greedy_keys(np.array([0]), np.array([1e-3]))
     at = np.flatnonzero(keep[0])
     assert np.diff(at).max() <= SPANS[0]
     assert len(at) == 2 + (299 - 1) // SPANS[0]
@@ -89,7 +89,7 @@ def test_long_lines_have_a_key_now_and_then() -> None:
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_and_two_keys_stay(count: int) -> None:
     values, times = _random(1, count)
-    assert SegmentErrors(values, times, np.inf).needed(np.arange(4), np.full(4, 1e9)).all()
+    assert SegmentErrors(values, times, np.inf).greedy_keys(np.arange(4), np.full(4, 1e9)).all()
 
 
 def test_tables_are_kept_within_memory(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,9 +106,9 @@ def test_segments_beyond_the_limit_are_not_looked_at() -> None:
     values[3] = times[:, None] * np.ones(3)
     whole, limited = SegmentErrors(values, times, np.inf), SegmentErrors(values, times, 2.0)
     budgets = np.full(4, 1.9)
-    expected = whole.needed(np.arange(4), budgets)
-    assert (limited.needed(np.arange(4), budgets) == expected).mean() > 0.98
-    assert limited.needed(np.arange(4), budgets)[3].sum() == 3  # 40 keys are more than one segment spans
+    expected = whole.greedy_keys(np.arange(4), budgets)
+    assert (limited.greedy_keys(np.arange(4), budgets) == expected).mean() > 0.98
+    assert limited.greedy_keys(np.arange(4), budgets)[3].sum() == 3  # 40 keys are more than one segment spans
     for track in range(4):
-        keep = limited.needed(np.array([track]), np.array([10.0]))[0]
+        keep = limited.greedy_keys(np.array([track]), np.array([10.0]))[0]
         assert _missed(values[track], times, keep) <= 10

@@ -12,7 +12,7 @@ from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Scene
 from anim.optimization.options import Reference
 from anim.optimization.search.source_motion import PATHS, key_grid, moments
-from anim.optimization.search.world_matrices import level_world_matrices, needed_levels
+from anim.optimization.search.world_matrices import level_world_matrices, required_levels
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.optimization.making import every_point, scene, truth_of, turning, waving
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
@@ -40,8 +40,8 @@ def test_moments_lie_on_keys_between_them_and_before_jumps() -> None:
 
 def test_levels_hold_what_points_hang_on_and_no_more() -> None:
     nodes = skeleton([-1, 0, 1, 1, -1, 4])
-    assert [level.tolist() for level in needed_levels(nodes, np.array([3]))] == [[0], [1], [3]]
-    assert [level.tolist() for level in needed_levels(nodes, np.array([5, 0]))] == [[0, 4], [5], []]
+    assert [level.tolist() for level in required_levels(nodes, np.array([3]))] == [[0], [1], [3]]
+    assert [level.tolist() for level in required_levels(nodes, np.array([5, 0]))] == [[0, 4], [5], []]
 
 
 def _chained(of: Scene, node: int, local: tuple[Floats, Floats, Floats], frame: int) -> Floats:
@@ -84,7 +84,7 @@ def test_keys_only() -> None:
 def test_rest_and_middle_are_off_by_what_they_say() -> None:
     of, what = scene(), waving()
     for each in truth_of(of, what, every_point(of)).moving:
-        own = what.tracks[each.number]
+        own = what.tracks[each.index]
         assert (each.node, each.path) == own.target
         rest = getattr(of.skeleton, each.path)[each.node]
         off = np.linalg.norm(each.values - rest, axis=1)

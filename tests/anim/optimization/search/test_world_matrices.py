@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.optimization.search.world_matrices import level_world_matrices, needed_levels
+from anim.optimization.search.world_matrices import level_world_matrices, required_levels
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.optimization.making import scene, waving
 from tests.clips import skeleton
@@ -22,5 +22,5 @@ def test_worlds_are_those_of_poses() -> None:
 def test_only_ancestors_are_needed() -> None:
     # 0 ─ 1 ─ 2,  1 ─ 3,  4
     tree = skeleton([-1, 0, 1, 1, -1])
-    assert [level.tolist() for level in needed_levels(tree, np.array([3]))] == [[0], [1], [3]]
-    assert needed_levels(tree, np.array([4]))[0].tolist() == [4]
+    assert [level.tolist() for level in required_levels(tree, np.array([3]))] == [[0], [1], [3]]
+    assert required_levels(tree, np.array([4]))[0].tolist() == [4]

@@ -10,7 +10,7 @@ from anim.measure.error.surface import surfaces
 from anim.model import Scene, Track
 from anim.optimization.options import Packing
 from anim.optimization.search.source_motion import key_grid
-from anim.optimization.tracks.morph_weights import reach, reduce_weights
+from anim.optimization.tracks.morph_weights import influence_radius, reduce_weights
 from anim.sampling.track import sample
 from tests.anim.skinning.scenes import mesh
 from tests.anim.skinning.scenes import scene as made
@@ -28,7 +28,7 @@ def _scene() -> Scene:
 
 
 def _reach(widening: float = 1.0) -> Floats:
-    return reach(surfaces(_scene()), 1, widening)
+    return influence_radius(surfaces(_scene()), 1, widening)
 
 
 def _weights(low: float = 0.0, high: float = 1.0) -> Track:
@@ -50,7 +50,7 @@ def test_reach_is_the_length_of_each_displacement() -> None:
         for m in range(3):
             assert found[m, column] == pytest.approx(2.5 * np.sqrt((TARGETS[m, v] ** 2).sum()))
     assert found.shape == (3, 11)
-    assert reach(surfaces(_scene()), 0, 1.0).shape == (0, 0)
+    assert influence_radius(surfaces(_scene()), 0, 1.0).shape == (0, 0)
 
 
 @pytest.mark.parametrize("packing", list(Packing))

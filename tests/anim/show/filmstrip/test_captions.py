@@ -50,16 +50,16 @@ def row(heading: str, count: int, label: str = "", clip: int = 0) -> Strip:
     ],
 )
 def test_long_names_are_broken_behind_their_marks(text: str, pixels: int, lines: list[str]) -> None:
-    assert captions.wrapped(text, pixels) == lines
+    assert captions.wrap_text(text, pixels) == lines
     assert all(captions.width(line) <= pixels for line in lines)
 
 
 def test_a_name_without_marks_is_broken_anywhere() -> None:
-    lines = captions.wrapped("x" * 50, 118)
+    lines = captions.wrap_text("x" * 50, 118)
     assert "".join(lines) == "x" * 50
     assert len(lines) > 2
     assert all(captions.width(line) <= 118 for line in lines)
-    assert captions.wrapped("xxx", 1) == ["x", "x", "x"], "a letter that is too wide stands alone"
+    assert captions.wrap_text("xxx", 1) == ["x", "x", "x"], "a letter that is too wide stands alone"
 
 
 def test_clips_of_one_name_come_one_after_the_other_too(written: list[tuple[str, int, int]]) -> None:

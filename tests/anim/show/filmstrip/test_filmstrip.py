@@ -100,7 +100,7 @@ def test_a_cache_with_z_up_stands() -> None:
     cache = from_arrays(np.zeros(1), points, FACE)
     for each in (cache, to_up_axis(cache, "z")):
         (shot,) = clips.of_cache(each, FrameSelection(count=3))
-        assert shot.cache.whole().positions == pytest.approx(points)
+        assert shot.cache.load_all().positions == pytest.approx(points)
 
 
 def test_nearer_faces_hide_others() -> None:

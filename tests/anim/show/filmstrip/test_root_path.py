@@ -40,8 +40,8 @@ def _seen_sizes(document: Document, followed: bool | None) -> tuple[np.ndarray, 
     (row,) = rows
     sizes, off = [], []
     for time, positions in zip(row.times, row.positions.astype(float), strict=True):
-        if row.way is not None:
-            positions[:, [0, 2]] -= row.way.at(time)
+        if row.root_path is not None:
+            positions[:, [0, 2]] -= row.root_path.at(time)
         seen = camera.project(positions)
         sizes.append(np.ptp(seen[:, 1]) / camera.height)
         off.append(abs((seen[:, 0].max() + seen[:, 0].min()) / 2 - camera.width / 2) / camera.width)
@@ -60,7 +60,7 @@ def test_a_figure_that_stays_is_not_followed() -> None:
         rows, _ = clips.build_strips(
             clips.of_document(walking(speed), [0], (), FrameSelection(count=2)), followed=followed
         )
-        assert (rows[0].way is not None) == moves
+        assert (rows[0].root_path is not None) == moves
 
 
 def test_the_way_is_that_of_the_figure() -> None:
@@ -86,7 +86,7 @@ def test_a_single_step_does_not_sway_the_camera() -> None:
 
 def test_methods_of_one_clip_are_followed_alike() -> None:
     rows, _ = clips.build_strips(clips.of_document(walking(20.0), [0], ("lbs", "dqs"), FrameSelection(count=2)))
-    assert rows[0].way is rows[1].way is not None
+    assert rows[0].root_path is rows[1].root_path is not None
 
 
 def test_the_ground_goes_by() -> None:

@@ -61,7 +61,7 @@ def test_a_candy_wrapper_and_its_share() -> None:
 
 def test_indices_are_the_determinants_of_the_blend() -> None:
     """Scales and shears divided out, for random joints; scales alone are no collapse."""
-    of = random_scene(4, stretch=0.5)
+    of = random_scene(4, scale_shear=0.5)
     played = moving(of, 1)
     matrices, body = skinning_matrices(of, played, TIMES)[..., :3], of.instances[0].mesh
     blended = np.einsum("vi,fviab->fvab", body.weights, matrices[:, body.joints])
@@ -89,7 +89,7 @@ def test_volumes_are_trimeshs() -> None:
     for name in ("tube", "arm"):
         of = reader.scene(opened_fixture(name))
         cache = bake(of, reader.clips(opened_fixture(name))[-1], times=np.array([0.3, 1.0]), method="dqs")
-        whole = cache.whole().positions
+        whole = cache.load_all().positions
         for points, volume in zip(whole, volumes(whole, cache.faces), strict=True):
             assert volume == pytest.approx(trimesh.Trimesh(points, cache.faces, process=False).volume, rel=1e-5)
 
@@ -296,7 +296,7 @@ def test_the_clamp_is_that_of_bake() -> None:
     of, bend, time = tube(), turned("x", 0, 90), np.array([1.0])
     (free,) = collapse(of, bend, times=time)
     (held,) = collapse(of, bend, times=time, bulge_clamp=True)
-    whole = bake(of, bend, times=time, method="dqs", bulge_clamp=True).whole()
+    whole = bake(of, bend, times=time, method="dqs", bulge_clamp=True).load_all()
     faces = of.instances[0].mesh.faces
     wanted = [
         trimesh.Trimesh(each, faces, process=False).volume

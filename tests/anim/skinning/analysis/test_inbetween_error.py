@@ -68,8 +68,8 @@ def test_the_widest_gaps_are_looked_into() -> None:
     times = np.delete(np.linspace(0, 8, 4 * MAX_SAMPLES), 30)
     found = inbetween_error(made, played, times)
     middles = (times[1:] + times[:-1]) / 2
-    frames = made.bake(played, times=times).whole().positions
-    half = made.bake(played, times=middles[29:30]).whole().positions
+    frames = made.bake(played, times=times).load_all().positions
+    half = made.bake(played, times=middles[29:30]).load_all().positions
     wanted = np.linalg.norm(half[0] - (frames[29] + frames[30]) / 2, axis=1).max()
     assert found.distance >= wanted - 1e-6
     assert any(low <= found.time <= high for low, high in itertools.pairwise(times))

@@ -25,7 +25,7 @@ def test_links_go_from_joint_to_joint() -> None:
     found = bone_segments(bind_skin(of.instances[0], of.skeleton.parents))
     assert found.tips.tolist() == [1, 2, 2]
     assert found.distance == pytest.approx([2, np.hypot(0.5, 2), np.hypot(0.5, 2), 1])
-    assert found.share == pytest.approx([0, 0, 0, 0.75])
+    assert found.fraction == pytest.approx([0, 0, 0, 0.75])
 
 
 def test_the_clamp_takes_the_bulge_of_a_bent_arm_and_nothing_else() -> None:
@@ -33,9 +33,9 @@ def test_the_clamp_takes_the_bulge_of_a_bent_arm_and_nothing_else() -> None:
     made = bind_skin(of.instances[0], of.skeleton.parents)
     rest = bone_segments(made).distance
     bend = clip(track("rotation", [0], about("x", [90]), node=1))
-    free = bake(of, bend, times=np.zeros(1), method="dqs").whole().positions[0].astype(float)
-    held = bake(of, bend, times=np.zeros(1), method="dqs", bulge_clamp=True).whole().positions[0].astype(float)
-    shared = bone_segments(made).share
+    free = bake(of, bend, times=np.zeros(1), method="dqs").load_all().positions[0].astype(float)
+    held = bake(of, bend, times=np.zeros(1), method="dqs", bulge_clamp=True).load_all().positions[0].astype(float)
+    shared = bone_segments(made).fraction
     assert np.array_equal(free[shared == 0], held[shared == 0])
 
     before, after = (np.linalg.norm(points - _nearest(points), axis=1) for points in (free, held))
@@ -46,16 +46,16 @@ def test_the_clamp_takes_the_bulge_of_a_bent_arm_and_nothing_else() -> None:
 def test_a_twist_is_not_touched() -> None:
     of = reader.scene(opened_fixture("tube"))
     twist = clip(track("rotation", [0], about("y", [120]), node=1))
-    free = bake(of, twist, times=np.zeros(1), method="dqs").whole().positions
-    held = bake(of, twist, times=np.zeros(1), method="dqs", bulge_clamp=True).whole().positions
+    free = bake(of, twist, times=np.zeros(1), method="dqs").load_all().positions
+    held = bake(of, twist, times=np.zeros(1), method="dqs", bulge_clamp=True).load_all().positions
     assert np.abs(free - held).max() < 1e-6
 
 
 def test_scaled_joints_allow_more() -> None:
     of = reader.scene(opened_fixture("tube"))
     grown = clip(track("scale", [0], [[3, 3, 3]], node=0))
-    free = bake(of, grown, times=np.zeros(1), method="dqs").whole().positions
-    held = bake(of, grown, times=np.zeros(1), method="dqs", bulge_clamp=True).whole().positions
+    free = bake(of, grown, times=np.zeros(1), method="dqs").load_all().positions
+    held = bake(of, grown, times=np.zeros(1), method="dqs", bulge_clamp=True).load_all().positions
     assert np.abs(free - held).max() < 1e-5
 
 

@@ -48,7 +48,7 @@ def test_the_kernel_is_the_plain_loop() -> None:
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 def test_one_influence_is_exactly_its_matrix(method: str, mirror: float) -> None:
     """Scale, shear and mirror included: the shear comes from uneven scales above turned joints."""
-    of = random_scene(8, stretch=0.4)
+    of = random_scene(8, scale_shear=0.4)
     of = Scene(of.skeleton, of.instances)
     scales = of.skeleton.scale.copy()
     scales[0, 0] *= mirror
@@ -72,19 +72,19 @@ def test_one_influence_is_exactly_its_matrix(method: str, mirror: float) -> None
 
 
 def test_a_split_gives_the_matrix_back() -> None:
-    of = random_scene(1, stretch=0.7)
+    of = random_scene(1, scale_shear=0.7)
     matrices = skinning_matrices(of, moving(of, 2), TIMES)
     matrices[:, 3, :, :3] *= -1
     centers = np.random.default_rng(0).normal(size=(matrices.shape[1], 3))
     parts = decompose(matrices, centers)
-    assert parts.stretch is not None
+    assert parts.scale_shear is not None
     assert parts.scale is not None
     assert quaternion.dot(parts.rotation, parts.rotation) == pytest.approx(1)
-    linear = quaternion.to_matrix(parts.rotation) @ parts.stretch
+    linear = quaternion.to_matrix(parts.rotation) @ parts.scale_shear
     linear[..., 3] += parts.translation
     assert np.abs(linear - matrices).max() < 1e-12 * np.abs(matrices).max()
     assert parts.scale**3 == pytest.approx(np.linalg.det(matrices[..., :3]))
-    square = parts.stretch[..., :3]
+    square = parts.scale_shear[..., :3]
     assert np.abs(square - np.swapaxes(square, -1, -2)).max() < 1e-12 * np.abs(square).max()
 
 
@@ -155,7 +155,7 @@ def test_the_volume_of_the_tube(name: str, fraction: float, axis: str, loss: flo
     left = {}
     for method in SKINNING_METHODS:
         cache = bake(of, played, times=np.array([0.0, 1.0]), method=method)
-        rest, posed = volumes(cache.whole().positions, cache.faces)
+        rest, posed = volumes(cache.load_all().positions, cache.faces)
         left[method] = posed / rest
     assert left["lbs"] == pytest.approx(1 - loss * fraction * np.sin(np.radians(angle) / 2) ** 2, abs=1e-3)
     assert left["dqs"] == pytest.approx(1, abs=1e-3)
@@ -179,7 +179,7 @@ def test_a_twist_turns_every_vertex_as_its_blended_quaternion(name: str, fractio
     wanted = np.stack((x * np.cos(turn) + z * np.sin(turn), y, z * np.cos(turn) - x * np.sin(turn)), axis=1)
     played = clip(track("rotation", [0], about("y", [angle]), node=1))
     assert np.abs(baked(of, played, np.zeros(1), method="dqs")[0] - wanted).max() < 1e-7
-    linear = bake(of, played, times=np.zeros(1)).whole().positions[0]
+    linear = bake(of, played, times=np.zeros(1)).load_all().positions[0]
     rest, posed = volumes(np.stack((body.positions.astype(np.float32), linear)), body.faces)
     assert posed / rest == pytest.approx(1 - 2 / 3 * fraction * np.sin(half) ** 2, abs=1e-3)
 
@@ -210,4 +210,4 @@ def test_a_pivot_is_where_the_joint_was_bound() -> None:
 
     made = bind_skin(of.instances[0], of.skeleton.parents)
     assert joint_origins(made).tolist() == [[0, 0, 0], [0, 0.5, 0]]
-    assert made.above.tolist() == [-1, 0]
+    assert made.ancestors.tolist() == [-1, 0]
