@@ -71,13 +71,13 @@ def test_bytes_and_error_both_count(fixture: Fixture, tmp_path: Path, call: Call
     assert not (tmp_path / "no.glb").exists()
 
 
-@pytest.mark.parametrize("place", ["in.data", "out.data"])
+@pytest.mark.parametrize("place", ["in", "out"])
 def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
-    """Whatever the models are called; a dry run counts too."""
-    source = tmp_path / "in.data"
+    """Also where the models' names have no ending; a dry run counts too."""
+    source = tmp_path / "in"
     source.write_bytes(fixture("arm").read_bytes())
     for dry in ((), ("-n",)):
-        run = call("optimize", source, tmp_path / "out.data", "--report", tmp_path / "." / place, *dry, *FAST)
+        run = call("optimize", source, tmp_path / "out", "--report", tmp_path / "." / place, *dry, *FAST)
         assert "--report would take the place of a model" in refusal(run, 2)
     assert source.read_bytes() == fixture("arm").read_bytes()
-    assert not (tmp_path / "out.data").exists()
+    assert not (tmp_path / "out").exists()
