@@ -1,4 +1,4 @@
-"""Exit codes, and the one line that says what went wrong."""
+"""Exit codes, and error messages of one line."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ CODES: dict[type[AnimError], int] = {
 
 
 class UsageError(AnimError):
-    """The command line asks for something that can't be done: exit 2."""
+    """The command line is invalid: exit 2."""
 
 
 class CheckError(AnimError):
-    """A check that the user asked for said no: exit 6."""
+    """A requested check failed: exit 6."""
 
 
 CODES[UsageError] = USAGE
@@ -46,9 +46,9 @@ CODES[CheckError] = CHECK
 
 
 def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
-    """Run a job and return the exit code; one line on stderr for what went wrong, a traceback only for our own bugs.
+    """Run a job and return the exit code; errors are one line on stderr, tracebacks are for internal errors only.
 
-    args: of the command line, for the hint where one of them is a file that looks like an option.
+    args: of the command line, for the hint on a file name that looks like an option.
     """
     try:
         code = job()
@@ -74,24 +74,24 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
 
 
 def report_error(error: AnimError) -> int:
-    """Say what was refused, in one line and maybe a hint, and return its exit code."""
+    """Report an error as one line, with its help if any, and return the exit code."""
     code = CODES.get(type(error), BUG)
     if code == BUG:
-        vars(error).pop("__notes__", None)  # the help, which stands below
+        vars(error).pop("__notes__", None)  # the help, which is written separately
         _print_trace()
     _print_error(str(error), error.help)
     return code
 
 
 def _file_hint(error: TyperException, args: Sequence[str]) -> str:
-    """What to do where an unknown option is the name of a file: -x.glb."""
+    """Hint for an unknown option that is the name of a file: -x.glb."""
     unknown = "no such option" in str(error.format_message()).lower()
     files = [each for each in args if re.fullmatch(r"-[^-].*\.[A-Za-z]\w{1,4}", each)]
     return f"if it is a file, write ./{files[0]}" if unknown and files else ""
 
 
 def _usage(error: TyperException) -> tuple[str, str]:
-    """What is wrong with the command line, in our words, and what to do about it."""
+    """Problem of the command line and the hint for it."""
     context = getattr(error, "ctx", None)
     command = getattr(context, "info_name", None)
     near = getattr(error, "possibilities", None) or ()
@@ -113,7 +113,7 @@ def _has_output(context: Any) -> bool:
 
 
 def _print_error(problem: str, hint: str) -> None:
-    voice = Reporter()  # the exit code is the same where nobody listens
+    voice = Reporter()  # the exit code stays the same if stderr is closed
     voice.info(f"{PROGRAM}: {escape_control(problem)}")
     if hint:
         voice.info(f"help: {escape_control(hint)}")

@@ -1,4 +1,4 @@
-"""The line that explains why a first run takes seconds longer."""
+"""Note on the compilation of kernels at the first run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cli.text import Reporter
 
 
 def announce_compiling(voice: Reporter) -> None:
-    """Write to a terminal that kernels are compiled, where none is in the user's cache folder yet."""
+    """Report the compilation of kernels to a terminal if the user's cache folder has none yet."""
     if voice.quiet or sys.stderr is None or not sys.stderr.isatty():
         return
     from anim.skinning.kernels.jit import is_compiled

@@ -1,4 +1,4 @@
-"""The command table, and a group that imports a command only when it runs."""
+"""Table of commands, and a command group with lazy imports."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PROGRAM = "gltf-anim"
 
 
 class CommandInfo(NamedTuple):
-    """One command: what `--help` says of it, and examples that its own help ends with."""
+    """One command: its line in `--help`, and the examples at the end of its own help."""
 
     about: str
     examples: tuple[str, ...]
@@ -171,14 +171,14 @@ COMMANDS = {
 
 
 class LazyGroup(Parsing, TyperGroup):
-    """A group whose commands live in `cli.commands`, one module each, imported on use only."""
+    """Group of the commands in `cli.commands`, one module each, imported on use."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, in the table's order."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command, imported now, None where there is none of this name; a stand-in where there is one."""
+        """Return the command, imported on demand, or its placeholder; None for an unknown name."""
         row = COMMANDS.get(cmd_name)
         if row is None or cmd_name in self.commands:
             return self.commands.get(cmd_name)
@@ -190,12 +190,12 @@ class LazyGroup(Parsing, TyperGroup):
         return typer.main.get_command(single)
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
-        """Return the commands and options that begin so; the words beside a command are the table's, none imported."""
+        """Return the commands and options with this prefix; descriptions come from the table, without imports."""
         self.commands = {name: TyperCommand(name, short_help=row.about) for name, row in COMMANDS.items()}
         return super().shell_complete(ctx, incomplete)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that `args` name; a misspelled one is answered with the nearest, but not to a shell."""
+        """Return the command named in `args`; a misspelled one raises an error, except in completion."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
             near = difflib.get_close_matches(args[0], COMMANDS, n=1)
             hint = f" Did you mean '{near[0]}'?" if near else f" The commands are {', '.join(COMMANDS)}."
@@ -236,23 +236,25 @@ def gltf_anim(
 
 
 def main() -> None:
-    """Run the command line of this process and exit with the code that says how it went."""
+    """Run the command line of this process and exit with its exit code."""
     if hasattr(signal, "SIGPIPE"):
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends us quietly, as it ends any other tool
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends the process silently, as for other tools
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
-            signal.signal(number, lambda number, _: sys.exit(128 + number))  # so that temporary files are cleared away
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # our products are small: a second thread would only spin
-    gc.disable()  # one short job over many long-lived objects: collecting only costs time
+            signal.signal(
+                number, lambda number, _: sys.exit(128 + number)
+            )  # exits normally, so that temporary files are removed
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrix products are small: more threads only cost time
+    gc.disable()  # one short job over many long-lived objects: collection only costs time
     code = run(sys.argv[1:])
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, AttributeError):  # closed by whoever started us
+        with suppress(OSError, AttributeError):  # closed by the parent process
             stream.flush()
-    os._exit(code)  # without taking all those objects apart first
+    os._exit(code)  # without deallocating all objects first
 
 
 def run(args: list[str]) -> int:
-    """Run one command line and return its exit code; whatever goes wrong is said on stderr."""
+    """Run one command line and return its exit code; errors are written to stderr."""
     from cli import errors
 
     command = typer.main.get_command(app)

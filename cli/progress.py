@@ -1,19 +1,19 @@
-"""A bar on stderr for work that takes longer than a second; nothing where no person looks."""
+"""Progress bar on stderr for work that takes longer than a second; none if stderr is no terminal."""
 
 from __future__ import annotations
 
 import sys
 import time
 
-PATIENCE = 1.0  # s, before there is a bar
-PAUSE = 0.1  # s, between two pictures of it
+PATIENCE = 1.0  # s, before the bar is shown
+PAUSE = 0.1  # s, between two updates
 WIDTH = 30  # characters
 
 
 class Progress:
-    """Shows how far a job is: progress(done) is called now and then, `close` at the end.
+    """Progress bar of a job: progress(done) is called repeatedly, `close` at the end.
 
-    words: what is being done. total: what `done` is at the end. shown: False for no bar at all.
+    words: name of the work. total: value of `done` at the end. shown: False for no bar.
     """
 
     def __init__(self, words: str, total: int, *, shown: bool = True) -> None:
@@ -23,7 +23,7 @@ class Progress:
         self._length = 0
 
     def __call__(self, done: int) -> None:
-        """Draw the bar, if it is time to."""
+        """Draw the bar if an update is due."""
         now = time.monotonic()
         if not self._shown or now - self._began < PATIENCE or now - self._drawn < PAUSE:
             return
@@ -38,7 +38,7 @@ class Progress:
         self._length = len(line)
 
     def close(self) -> None:
-        """Wipe the bar away."""
+        """Erase the bar."""
         if self._length:
             sys.stderr.write("\r" + " " * self._length + "\r")
             sys.stderr.flush()

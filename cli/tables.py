@@ -1,4 +1,4 @@
-"""Tables that a person likes to read, and the same rows as CSV."""
+"""Text tables, and the same rows as CSV."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> st
 
 
 def escape_control(words: str) -> str:
-    """Return words as they can be shown to a person: line breaks and terminal codes of a name become \\n, \\x1b."""
+    """Return text with control characters escaped: line breaks and terminal codes of a name become \\n, \\x1b."""
     if words.isprintable():
         return words
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)

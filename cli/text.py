@@ -1,4 +1,4 @@
-"""Words for a person, on stderr: numbers with units that are read at a glance."""
+"""Messages on stderr, and formatting of numbers with units."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 MIN_PERCENT = 1e-4
-NEARLY_NOTHING = 1e-11  # m; what rounding leaves of nothing
+NEARLY_NOTHING = 1e-11  # m; smaller lengths come from rounding
 
 
 @dataclass(frozen=True, slots=True)
 class Reporter:
-    """How much is said: nothing but errors and warnings, one line, or every detail.
+    """Writer of messages by verbosity: errors and warnings only, one line, or all details.
 
-    warnings: what was warned of so far, for the list of this name in a JSON report.
+    warnings: issued so far, for the list of this name in a JSON report.
     """
 
     quiet: bool = False
@@ -24,23 +24,23 @@ class Reporter:
     def info(self, line: str) -> None:
         """Write a line to stderr, unless quiet."""
         if not self.quiet:
-            with suppress(OSError, AttributeError):  # nobody listens
+            with suppress(OSError, AttributeError):  # stderr is closed
                 sys.stderr.write(line + "\n")
 
     def warn(self, words: str) -> None:
-        """Write "warning: words" to stderr, even when quiet, and once: for what changes the meaning of a number."""
+        """Write "warning: words" to stderr, even when quiet, once: for facts that change the meaning of a figure."""
         if words not in self.warnings:
             self.warnings.append(words)
             Reporter().info(f"warning: {words}")
 
     def verbose_info(self, line: str) -> None:
-        """Write a line to stderr only where details are wanted."""
+        """Write a line to stderr if details are requested."""
         if self.verbose:
             self.info(line)
 
 
 def format_bytes(count: int) -> str:
-    """Return bytes as people say them: "812 B", "42.3 kB", "3.66 MB"."""
+    """Return a size with its unit: "812 B", "42.3 kB", "3.66 MB"."""
     if count < 1000:
         return f"{count} B"
     for unit in ("kB", "MB", "GB"):
@@ -51,13 +51,13 @@ def format_bytes(count: int) -> str:
 
 
 def format_change(before: int, after: int) -> str:
-    """Return "42.3 kB → 9.1 kB (-78 %)", without the percentage where it rounds to 0."""
+    """Return "42.3 kB → 9.1 kB (-78 %)", without a percentage that rounds to 0."""
     percent = round(100 * (after - before) / before) if before else 0
     return f"{format_bytes(before)} → {format_bytes(after)}" + (f" ({percent:+d} %)" if percent else "")
 
 
 def format_length(meters: float) -> str:
-    """Return a length in the unit in which it is easy to read: "0.41 mm", "12 µm", "1.5 cm", "2.9 m"."""
+    """Return a length in a suitable unit: "0.41 mm", "12 µm", "1.5 cm", "2.9 m"."""
     if meters == 0:
         return "0 mm"
     if meters < NEARLY_NOTHING:
@@ -69,7 +69,7 @@ def format_length(meters: float) -> str:
 
 
 def format_fraction(part: float, whole: float) -> str:
-    """Return " (0.41 %)", or nothing where there is no whole or what is left is far below what anybody sees."""
+    """Return " (0.41 %)", or "" if the whole is 0 or the fraction is negligible."""
     percent = 100 * part / whole if whole else 0.0
     return f" ({format_number(percent, 2)} %)" if percent >= MIN_PERCENT else ""
 
@@ -80,12 +80,12 @@ def format_speed(meters_per_second: float) -> str:
 
 
 def format_time(seconds: float) -> str:
-    """Return a time or a length of time to a tenth of a millisecond: "0.0417 s", "12 s"."""
+    """Return a time or duration rounded to 0.1 ms: "0.0417 s", "12 s"."""
     return f"{_round_significant(seconds)} s"
 
 
 def format_span(start: float, end: float) -> str:
-    """Return the seconds of a clip: "1.5 s", or "0.0417–2 s" where it starts late."""
+    """Return the time span of a clip: "1.5 s", or "0.0417–2 s" if it starts after 0."""
     begins = _round_significant(start)
     return format_time(end) if begins == "0" else f"{begins}–{format_time(end)}"
 
@@ -95,12 +95,12 @@ def _round_significant(seconds: float) -> str:
 
 
 def format_duration(seconds: float) -> str:
-    """Return how long the command worked, so that nobody takes it for the length of a clip: "took 0.8 s"."""
+    """Return the run time of the command, marked to differ from a clip's duration: "took 0.8 s"."""
     return f"took {format_number(seconds, 2 if seconds < 10 else 3)} s"
 
 
 def format_number(value: float, count: int) -> str:
-    """Return the value rounded to so many digits, never in the form 2.8e+02."""
+    """Return the value rounded to `count` significant digits, without exponent."""
     return f"{float(f'{value:.{count}g}'):.10f}".rstrip("0").rstrip(".")
 
 

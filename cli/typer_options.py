@@ -1,4 +1,4 @@
-"""Values of options and arguments, refused in our words: parsers and metavars for typer, set by an option's type."""
+"""Parsers and metavars of options by type, with the project's error messages, for typer."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ METAVARS = {str: "TEXT", int: "N", float: "N"}
 
 
 class Parsing:
-    """What our group and our commands have in common: whole help pages, and errors that know their command."""
+    """Base of the group and the commands: complete help pages, and errors with their command."""
 
     def get_help_option(self, ctx: Any) -> Any:
-        """Return the option --help, its page written whole, or with one line that says why not."""
+        """Return the option --help, with its page written completely or an error raised."""
         option = super().get_help_option(ctx)  # type: ignore[misc]
         if option is not None:
             option.callback = _show_help
         return option
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the words behind the command's name."""
+        """Parse the arguments after the command's name."""
         try:
             parsed: list[str] = super().parse_args(ctx, args)  # type: ignore[misc]
         except TyperException as error:
@@ -43,7 +43,7 @@ class Parsing:
 
 
 class Command(Parsing, TyperCommand):
-    """A command whose help shows arguments without a type."""
+    """Command with a help page that shows arguments without a type."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the tables of arguments and options."""
@@ -64,7 +64,7 @@ def _show_help(ctx: Any, param: Any, wanted: bool) -> None:
 
 
 def set_parsers(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Give every option of a command that is text, a number or a choice its parser, and a metavar if it has none."""
+    """Set the parser, and a missing metavar, of every text, number and choice option of a command."""
     function.__annotations__ = typing.get_type_hints(function, include_extras=True)
     for hint in function.__annotations__.values():
         kind, *extras = typing.get_args(hint) or (hint,)
@@ -86,7 +86,7 @@ def _set_parser(info: OptionInfo | ArgumentInfo, kind: Any) -> None:
 
 
 def _value_type(hint: Any) -> Any:
-    """The type of one value: `float` of `float | None`, `str` of `list[str] | None`."""
+    """Type of one value: `float` of `float | None`, `str` of `list[str] | None`."""
     kinds = [each for each in typing.get_args(hint) if each is not type(None)]
     return _value_type(kinds[0]) if kinds else hint
 

@@ -1,4 +1,4 @@
-"""Numbers with units, as options take them; what can't be read is the command line's fault, not the input's."""
+"""Option values with units; invalid ones raise UsageError."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from cli.errors import UsageError
 
 
 def parse_share(text: str, option: str) -> float:
-    """Return a share above 0: "0.1%" or a bare number. Raises UsageError otherwise."""
+    """Return a fraction above 0: "0.1%" or a number without unit. Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_fraction(text, option)
 
 
 def parse_length(text: str, option: str, diagonal: Callable[[], float]) -> float:
-    """Return a length above 0 in metres, also from "0.1%" of what `diagonal` gives. Raises UsageError otherwise."""
+    """Return a length above 0 in metres, also from "0.1%" of `diagonal()`. Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_length(text, option, diagonal)
 

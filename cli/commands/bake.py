@@ -97,7 +97,9 @@ def command(
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     ending = cache_files.check(output, None if format is None else f".{format}", PLACEHOLDERS)
     given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    caches.write_options(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    caches.write_options(
+        ending, given | {"max_error": max_error}
+    )  # raises before any work for options that the format doesn't support
     caches.check_supported(ending, normals=normals, tangents=tangents)
     done: list[_Done] = []
     with documents.source(input, voice) as source:
@@ -170,7 +172,7 @@ def command(
 
 @dataclass(frozen=True, slots=True)
 class _Job:
-    """A file that is to be: which meshes and which clip go into it, by index; None where the file has no clip."""
+    """An output file to write: indices of its meshes and of its clip; None for a file without clips."""
 
     file: str
     group: int
@@ -179,7 +181,7 @@ class _Job:
 
 @dataclass(frozen=True, slots=True)
 class _Done:
-    """One clip that was baked into a file. number: of the clip. group: which of the meshes that share files."""
+    """One clip baked into a file. number: index of the clip. group: index of the mesh group."""
 
     file: str
     clip: str
@@ -190,11 +192,11 @@ class _Done:
     saved: SavedCache
 
 
-Group = tuple[str, Sequence[int] | None]  # what {mesh} becomes, and the nodes of the meshes; None for all
+Group = tuple[str, Sequence[int] | None]  # value of {mesh}, and the nodes of the meshes; None for all
 
 
 def _groups(scene: Scene, nodes: Sequence[int] | None, output: str, *, rigid: bool) -> list[Group]:
-    """Meshes that go into a file together: each by itself where OUT says {mesh}."""
+    """Meshes grouped by output file: one group per mesh if OUT contains {mesh}."""
     if "{mesh}" not in output:
         return [("", nodes)]
     chosen = {each.node: each.mesh.name for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)}
@@ -202,7 +204,7 @@ def _groups(scene: Scene, nodes: Sequence[int] | None, output: str, *, rigid: bo
 
 
 def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tuple[str, int]]) -> list[_Job]:
-    """All files that will be written, their names settled and checked. clips: name and index of each."""
+    """All output files, with their names expanded and checked. clips: name and index of each."""
     if "{clip}" not in output and len(clips) > 1:
         raise UsageError(
             f"{len(clips)} clips are chosen, but '{output}' holds one",
@@ -219,7 +221,7 @@ def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tup
 
 
 def _report_written(done: Sequence[_Done], voice: Reporter, *, dry_run: bool) -> None:
-    """Say which files are there already where a later one fails."""
+    """Report the files already written when a later one fails."""
     if done and not dry_run:
         names = ", ".join(each.file for each in done[:LISTED])
         more = f" and {len(done) - LISTED} more" if len(done) > LISTED else ""
@@ -237,7 +239,7 @@ def _meters(max_error: str | None, cache: VertexCache) -> float | None:
 
 
 def _report_notes(done: list[_Done], voice: Reporter) -> None:
-    """Every note once, with the files that it is about where it is not about all."""
+    """Report every note once, with its files unless it applies to all."""
     files: dict[str, list[str]] = {}
     for each in done:
         for note in each.saved.written.notes:

@@ -1,4 +1,4 @@
-"""`gltf-anim collapse`: where linear skinning pinches, and what other methods make of it."""
+"""`gltf-anim collapse`: collapse and volume loss of linear skinning, compared with other methods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`gltf-anim convert`: the other container, and nothing else."""
+"""`gltf-anim convert`: .glb ↔ .gltf."""
 
 from __future__ import annotations
 

@@ -69,7 +69,9 @@ def command(
         raise UsageError("--at and --fps exclude each other")
     ending = cache_files.check(output, None if format is None else f".{format}")
     given: dict[str, Any] = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    caches.write_options(ending, given | {"max_error": max_error})  # refuses at once what the format doesn't take
+    caches.write_options(
+        ending, given | {"max_error": max_error}
+    )  # raises before any work for options that the format doesn't support
     with cache_files.load(input, ReadOptions(read_fps)) as loaded:
         if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
@@ -117,7 +119,7 @@ def _changed(
 
 
 def _counted(cache: VertexCache, progress: Progress) -> VertexCache:
-    """The cache, which says how far it was read."""
+    """The cache with its reading reported to `progress`."""
 
     def chunks() -> Iterator[FrameChunk]:
         for chunk in cache.chunks():

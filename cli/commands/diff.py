@@ -1,4 +1,4 @@
-"""`gltf-anim diff`: how far apart is the motion of two files?"""
+"""`gltf-anim diff`: distances between the motion of two files."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def command(
 
 
 def _players(new: str | None, player: str, players: str | None) -> str:
-    """Who plays: one for both files, or two for one file."""
+    """Player name: one for both files, or two for one file."""
     if players is None:
         if new is None:
             raise UsageError("B is missing (expected two files, or one and --players spec,nlerp)")
@@ -150,14 +150,14 @@ def _opened(path: str, voice: Reporter) -> _Side:
 
 
 def _names(one: _Side, other: _Side) -> tuple[int, bool]:
-    """How many nodes of one have a namesake in the other, and whether both have any names at all."""
+    """Number of nodes of one whose name exists in the other, and whether both files have node names."""
     nodes = one.scene.skeleton.names, other.scene.skeleton.names
     are_named = all(any((*side.file.clips, *names)) for side, names in zip((one, other), nodes, strict=True))
     return int((match_by_name(*nodes) >= 0).sum()), are_named
 
 
 def _ambiguous(one: File, other: File, chosen: Sequence[int] | None) -> Iterator[str]:
-    """Yield what to know of clips whose name is not equally often in both files. chosen: numbers of those of A."""
+    """Yield notes on clip names that occur more often in one file than in the other. chosen: clip indices of A."""
     looked_at = set(one.clips if chosen is None else (one.clips[i] for i in chosen))
     for name in ambiguous_names(one.clips, other.clips):
         if name in looked_at:
@@ -193,7 +193,7 @@ def _drawn(found: DiffReport, ruler: ErrorMetric, one: _Side, other: _Side, kind
 
 
 def _left_out(drawn: int, apart: int, count: int) -> str:
-    """How many clips a picture shows of those that are apart, and how many are not."""
+    """Number of clips drawn of those that differ, and number of clips that don't."""
     shown = (
         f"the worst {drawn} of {apart} clips that differ" if drawn < apart else f"{plural(apart, 'clip')} that differ"
     )
@@ -202,7 +202,7 @@ def _left_out(drawn: int, apart: int, count: int) -> str:
 
 
 def _check(found: DiffReport, limit: float) -> None:
-    """Raise CheckError where a clip is farther away than `limit`, in m, or missing, or nothing was compared."""
+    """Raise CheckError if a clip's error exceeds `limit`, in m, if a clip is missing, or if nothing was compared."""
     if found.diff.missing_clips:
         number = found.diff.missing_clips[0]
         raise CheckError(f"{found.new.name}: {reader.clip_label(found.old.clips[number], number)} is missing")

@@ -1,4 +1,4 @@
-"""`gltf-anim ease`: another tempo between the same keys."""
+"""`gltf-anim ease`: easing between the same keys, or over a time range."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cli.workflows.edit_clips import Clips, edit_clips
 
 
 class Per(StrEnum):
-    """What one ease covers."""
+    """Time range of one easing."""
 
     SEGMENT = "segment"
     RANGE = "range"
@@ -122,7 +122,7 @@ DENSE = 0.1  # s; keys nearer than this are samples of a motion rather than pose
 
 
 def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[str]:
-    """What a user would want to know before playing it, once for all clips that it is true of."""
+    """Yield notes on the eased clips, each once for all clips that it applies to."""
     changed = {
         i: [old for old, new in zip(clip.tracks, after[i].tracks, strict=True) if old is not new]
         for i, clip in before.items()
@@ -146,7 +146,7 @@ def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[st
 
 
 def _usual_step(tracks: Iterable[Track]) -> float | None:
-    """The median time (s) from a key to the next, where the value changes between them; None without any."""
+    """Median interval (s) between keys of different value; None without any."""
     steps = [np.diff(t.times)[(np.diff(t.values, axis=0) != 0).any(axis=1)] for t in tracks]
     every = np.concatenate([np.zeros(0), *steps])
     return float(np.median(every)) if len(every) else None
@@ -157,7 +157,7 @@ def _labels(clips: Clips, numbers: Iterable[int]) -> str:
 
 
 def _table() -> str:
-    """All eases with a sparkline; then those that take arguments."""
+    """Table of all easings with a sparkline; then the easing functions with arguments."""
     width = max(len(name) for name in EASINGS)
     lines = [f"{name:{width}}  {sparkline(each)}{_mark(each)}" for name, each in EASINGS.items()]
     makers = [f"{maker.usage}" for maker in EASING_FACTORIES.values()]

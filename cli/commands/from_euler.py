@@ -35,18 +35,18 @@ from cli.reports import from_euler_report
 from cli.reports.from_euler_report import ConversionReport
 from cli.workflows.character import CharacterOptions, check_name, index_of, named, pairs, put_on_character
 
-TALL = 10.0  # m; a skeleton that is taller is hardly in meters
+TALL = 10.0  # m; a taller skeleton is unlikely to be in meters
 
 
 class Up(StrEnum):
-    """Which axis of the source points up."""
+    """Up axis of the source."""
 
     Y = "y"
     Z = "z"
 
 
 class Mesh(StrEnum):
-    """What body a new skeleton gets."""
+    """Mesh of a new skeleton."""
 
     NONE = "none"
     STICKS = "sticks"
@@ -171,7 +171,7 @@ def _order(order: str | None) -> str | None:
 def _check(
     source: str, output: str, format: Format, scale: float | None, onto: str | None, mesh: Mesh, *, dry_run: bool
 ) -> None:
-    """Refuse at once what can't be done."""
+    """Raise UsageError for contradicting options, before any work."""
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
     if onto is not None and mesh is not Mesh.NONE:
@@ -185,7 +185,7 @@ def _check(
 
 
 def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str, bool]:
-    """Meters per unit of the motion, the words that say where that comes from, and whether it is uncertain."""
+    """Meters per unit of the motion, the description of its origin, and whether it is a guess."""
     height = bounding_size(skeleton(motion))
     if scale is not None:
         return (

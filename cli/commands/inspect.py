@@ -1,4 +1,4 @@
-"""`gltf-anim inspect`: what is in these files, and are they healthy?"""
+"""`gltf-anim inspect`: contents and findings of glTF files."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LOST_NOTE = "put it there, or mend the URI"
 
 
 class Format(StrEnum):
-    """What the product looks like."""
+    """Output format."""
 
     TEXT = "text"
     JSON = "json"
@@ -100,7 +100,7 @@ def command(
 
 
 def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, continuity: bool) -> str:
-    """One table: rows of clips or tracks, and a row for the first fault of each file that has one."""
+    """CSV of clips or tracks, with a row for the first error of each invalid file."""
     if continuity:
         from cli.reports import continuity_report
 
@@ -114,7 +114,7 @@ def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, conti
 
 
 def _unreadable(path: str, error: AnimError) -> Inspected:
-    """What is known of a file of which nothing can be read."""
+    """Report of a file that can't be read at all."""
     name = documents.called(path)
     fault = copy(error)
     fault.where = fault.where.removeprefix(name).removeprefix(": ")
@@ -140,8 +140,8 @@ def _named(fault: AnimError, name: str) -> AnimError:
 
 
 def _check(done: list[Inspected], limit: Severity) -> None:
-    """Raise CheckError where a finding is as bad as `limit`, or worse."""
-    order = list(Severity)  # the worst first
+    """Raise CheckError if a finding has severity `limit` or higher."""
+    order = list(Severity)  # most severe first
     bad = [
         (name, each)
         for name, _, facts in done
@@ -170,13 +170,13 @@ def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: boo
 
 
 class _Opener:
-    """Opens a document, or what is left of one. broken: what is wrong with it."""
+    """Opens a document, or the readable parts of an invalid one. broken: its errors."""
 
     def __init__(self) -> None:
         self.broken: BrokenFile | None = None
 
     def open(self, data: Bytes, resolve: container.Resolve | None) -> Document:
-        """Return the document in `data`, as far as it can be read."""
+        """Return the document in `data`; of an invalid one the readable parts."""
         self.broken = None
         try:
             document = container.read(data, resolve)
@@ -213,7 +213,7 @@ def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> No
 
 
 def _plain(facts: dict[str, Any]) -> dict[str, Any]:
-    """Facts as JSON holds them: a list of tracks only where one was asked for, and the first fault in words."""
+    """Report as JSON values: tracks only if requested, and the first error as text."""
     faults = facts.pop("faults")
     facts["error"] = str(faults[0]) if faults else None
     for clip in facts["clips"]:

@@ -1,4 +1,4 @@
-"""`gltf-anim loop`: does a clip loop, and how to make it."""
+"""`gltf-anim loop`: loop report of clips, and closing of loops."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def command(
 
 
 class _Closing:
-    """Closes one clip after the other; blend: s, None to add a missing frame only. path: of the input, for messages.
+    """Closes clips one by one. blend: s, None to add a missing frame only. path: of the input, for messages.
 
-    Clips that can't be closed are collected, so that all of them are named before anything is written.
+    Clips that can't be closed are collected, so that one error names all of them before anything is written.
     """
 
     def __init__(self, blend: float | None, path: str) -> None:
@@ -101,7 +101,7 @@ class _Closing:
             return clip
 
     def notes(self, before: Mapping[int, Clip], after: Mapping[int, Clip]) -> Iterator[str]:
-        """Yield what was left alone. Raises UsageError that names every clip that can't be closed."""
+        """Yield notes on unchanged clips. Raises UsageError that names every clip that can't be closed."""
         if self._problems:
             raise UsageError(f"{self._path}: {'; '.join(self._problems)}", help=HELP)
         if self._poses:
@@ -159,7 +159,7 @@ def _report(
 
 
 def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> Iterator[str]:
-    """Yield a line for the clips of which --find has no part to offer, by the reason. found: by the clips' numbers."""
+    """Yield a line per reason for the clips without a better part for --find. found: with clip indices."""
     reasons: dict[str, list[tuple[str, int]]] = {}
     for number, parts in found:
         if reason := _why_none(clips[number], parts):
@@ -168,7 +168,7 @@ def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> It
 
 
 def _why_none(clip: Clip, parts: list[Loop]) -> str:
-    """Why no part of a clip is worth trimming, "" where one is. parts: the best first."""
+    """Reason for which no part of a clip is worth trimming, "" if one is. parts: the best first."""
     if clip.end <= clip.start:
         return "a single pose, with no part to find"
     if not parts:
@@ -181,7 +181,7 @@ def _why_none(clip: Clip, parts: list[Loop]) -> str:
 
 
 def _skin(source: Source, voice: Reporter) -> SkinMotion:
-    """Where seams are measured: at nodes where vertices can't be read."""
+    """Motion on which seams are measured: nodes if vertices can't be read."""
     try:
         return SkinMotion(scenes.read_scene(source.document, source.name, voice))
     except AnimError as error:
@@ -220,7 +220,7 @@ def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
 
 
 def _names(found: Loop, *, quote: bool = False) -> str:
-    """The joints that stay open, the largest gap first."""
+    """Names of the joints that stay open, the largest loop gap first."""
     names = [f"'{each.joint}'" if quote else each.joint for each in found.joints]
     more = len(names) - MAX_NAMES
     return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")

@@ -1,4 +1,4 @@
-"""`gltf-anim optimize`: fewer bytes, within an error that is measured on the written file."""
+"""`gltf-anim optimize`: smaller animations within an error bound, verified on the written file."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ PICTURES = (".png", ".svg")
 
 
 class Meshopt(StrEnum):
-    """Which extension compresses the numbers."""
+    """Compression extension."""
 
     EXT = "ext"
     KHR = "khr"
 
 
 class Player(StrEnum):
-    """Who must show the motion within the bound."""
+    """Players for which the error bound holds."""
 
     ANY = "any"
     SPEC = "spec"
@@ -186,7 +186,7 @@ def command(
 
 
 def _about(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:
-    """Return all there is to say of what was found."""
+    """Return the report on an optimization."""
     source, result = work.source, work.smaller(found)
     name = source.name if work.output == documents.PIPE else work.output
     size, place = work.size(result), is_measured_at(work.scene)
@@ -200,9 +200,9 @@ def _about(work: OptimizeJob, request: Request, found: Optimized, began: float) 
 def _report(
     about: optimize_report.OptimizeReport, voice: Reporter, path: str | None, *, dry_run: bool
 ) -> Iterator[None]:
-    """Write the report around the block that writes the model: where one of them fails, neither file changes.
+    """Write the report around the block that writes the model: if one of them fails, neither file changes.
 
-    On stdout it comes first, so that the model stays as it was where nobody can read the report.
+    On stdout the report is written first, so that the model stays unchanged if the report can't be written.
     """
     if path is None or (dry_run and path != documents.PIPE):
         yield
@@ -222,7 +222,7 @@ def _report_result(about: optimize_report.OptimizeReport, voice: Reporter, *, dr
 
 
 def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
-    """Refuse at once what can't be written, or would be written over something else."""
+    """Raise before any work for outputs that can't be written or would replace another file of the command."""
     if curve_file is not None:
         documents.check_file(curve_file)
         if PurePath(curve_file).suffix.lower() not in (".csv", *PICTURES):
@@ -236,7 +236,7 @@ def _check_outputs(input: str, output: str, report: str | None, curve_file: str 
 
 
 def _check_report(report: str, input: str, output: str) -> None:
-    """Refuse a report in the place of a model."""
+    """Raise UsageError for a report path that is a model's."""
     documents.check_file(report)
     if PurePath(report).suffix.lower() in (*GLTF_SUFFIXES, ".bin") or Path(report).resolve() in {
         Path(other).resolve() for other in (input, output) if other != documents.PIPE
@@ -246,7 +246,7 @@ def _check_report(report: str, input: str, output: str) -> None:
 
 def _draw_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
     sizes = []
-    bounds = (0.0, *ERROR_FRACTIONS, MOST)  # also what is kept without loss, and the least that any bound leaves
+    bounds = (0.0, *ERROR_FRACTIONS, MOST)  # also the lossless size, and the smallest size of any bound
     for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
         voice.info(optimize_report.curve_line(sized, work.scale))
         sizes.append(sized)

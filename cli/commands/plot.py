@@ -1,4 +1,4 @@
-"""`gltf-anim plot`: see the curves of tracks, of eases, and of tangent rules."""
+"""`gltf-anim plot`: curves of tracks, easings and tangent rules."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cli.text import Reporter, format_bytes, plural
 
 
 class Format(StrEnum):
-    """What the picture is written as."""
+    """Image format."""
 
     PNG = "png"
     SVG = "svg"
@@ -117,7 +117,7 @@ def command(
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
-    """Input and output; one file alone is the input, or the output where there is no input."""
+    """Input and output paths; a single file is the input, or the output of a plot without input."""
     most = 1 if alone else 2
     if len(files) > most:
         raise UsageError(f"{len(files)} files are named (expected {'OUT' if alone else 'IN and OUT'})")
@@ -138,7 +138,7 @@ def _format(chosen: Format | None, output: str) -> str:
 
 
 def _keys(text: str) -> tuple[Floats, Floats]:
-    """Times and values of "0,0.9,0.2,1" or "0:0,0.5:0.9,2:1"."""
+    """Times and values parsed from "0,0.9,0.2,1" or "0:0,0.5:0.9,2:1"."""
     pairs = [part.rpartition(":") for part in text.split(",")]
     timed = {bool(colon) for _, colon, _ in pairs}
     try:

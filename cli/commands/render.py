@@ -177,11 +177,11 @@ def _ending(output: str) -> str:
 
 @contextmanager
 def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, container.Resolve | None]]:
-    """Give a glTF document or a vertex cache, what messages call it, and what opens files beside it.
+    """Give a glTF document or a vertex cache, its name for messages, and the resolver of its companion files.
 
-    Which it is says its ending, of a pipe its bytes.
+    The type follows from the file extension, for a pipe from the first bytes.
 
-    voice: says what readers found.
+    voice: reports the notes of readers.
     """
     if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
         with cache_files.load(path, ReadOptions()) as loaded:
@@ -207,7 +207,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) -> FrameSelection:
-    """As many frames of the longest clip, and the others at its rate: in a film all play at once."""
+    """The frame rate at which the longest clip has the chosen frame count: in a film all clips share one rate."""
     clips = reader.clips(document)
     spans = [when.span(clips[i].start, clips[i].end) for i in numbers]
     longest = max(last - first for first, last in spans)
@@ -219,5 +219,5 @@ def _one_clip(found: Sequence[FilmstripClip]) -> str:
 
 
 def _rate(times: Floats) -> float:
-    """Frames per second that play the times as fast as they are; one where there is a single one."""
+    """Mean frame rate of the times, in frames per second; 1 for a single time."""
     return (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 1 else 1.0

@@ -1,4 +1,4 @@
-"""`gltf-anim resample`: the keys of clips on a regular grid of frames."""
+"""`gltf-anim resample`: keys of clips on a uniform frame grid."""
 
 from __future__ import annotations
 

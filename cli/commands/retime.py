@@ -1,4 +1,4 @@
-"""`gltf-anim retime`: seconds of a clip stretched, turned round, warped."""
+"""`gltf-anim retime`: time of clips scaled, reversed, shifted, warped."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ SCHEMA = 1
 
 
 class Format(StrEnum):
-    """What the product looks like."""
+    """Output format."""
 
     JSON = "json"
     CSV = "csv"
@@ -150,7 +150,7 @@ def _csv(taken: Taken, skeleton: Skeleton, nodes: list[int], _: Space) -> str:
 
 
 def _short(values: Floats) -> list[float]:
-    """Nine digits: all that a float32 file can mean."""
+    """Values rounded to nine significant digits, the precision of float32."""
     return [float(f"{value:.9g}") + 0.0 for value in values.tolist()]
 
 

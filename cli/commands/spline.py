@@ -1,4 +1,4 @@
-"""`gltf-anim spline`: raw keys as a smooth curve."""
+"""`gltf-anim spline`: smooth curves through keys by a tangent rule."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def command(
 
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:
-    """How far the curve passes keys by."""
+    """Yield notes on the largest distance of the curve from its keys."""
     found = {i: max_key_change(old, after[i]) for i, old in before.items()}
     found = {i: each for i, each in found.items() if each[0] or each[1] > SHOWN_TRACKS}
     if found:
@@ -80,7 +80,7 @@ def _notes(before: Clips, after: Clips) -> Iterator[str]:
         yield f"{where}: the curve passes keys by, {', '.join(far)}; --tangents natural goes through them"
 
 
-SHOWN_TRACKS = 1e-6  # rad; turns below come from rounding
+SHOWN_TRACKS = 1e-6  # rad; smaller angles come from rounding
 
 
 _ABOUT = {

@@ -1,4 +1,4 @@
-"""`gltf-anim to-euler`: a clip as Euler curves: BVH, CSV or JSON."""
+"""`gltf-anim to-euler`: Euler curves of a clip as BVH, CSV or JSON."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from cli.io import documents
 from cli.options import common
 
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
-MIN_DEVIATION_DEG = 1e-6  # degrees; below is what rounding leaves
-NOTABLE = math.radians(0.5)  # that straight curves may leave the motion by before a way out is named
-CENTIMETERS = 0.01  # m per unit of a BVH, unless told
+MIN_DEVIATION_DEG = 1e-6  # degrees; smaller ones come from rounding
+NOTABLE = math.radians(0.5)  # rad; above, a note names an alternative to linear curves
+CENTIMETERS = 0.01  # default m per unit of a BVH
 
 
 def command(
@@ -89,7 +89,7 @@ def command(
             source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS
         )
         data = kind.write(motion, convention)
-        if kind is TRACK_FORMATS["bvh"]:  # which has no place for its unit
+        if kind is TRACK_FORMATS["bvh"]:  # which can't store its unit
             words = f"1 unit = {scale or CENTIMETERS:g} m (from-euler --scale {scale or CENTIMETERS:g}), "
     if not dry_run:
         documents.write_text(data.decode(), output)
@@ -162,7 +162,7 @@ def _motion(
     limit: float | None,
     scale: float,
 ) -> tuple[EulerMotion, str, int]:
-    """The motion to write, words on what it lost, and how many joints rest elsewhere in the file."""
+    """The motion to write, notes on lost data, and the number of joints with another rest pose in the file."""
     nodes = reader.skeleton(document)
     bound = bind_pose(nodes, reader.skins(document))
     skeleton = bound.skeleton

@@ -52,7 +52,7 @@ def command(
 
 
 def _moved_apart(before: Clips, start: float) -> Iterator[str]:
-    """Say which clips --rebase moves by different times, where it does. start: s, of what is kept."""
+    """Yield a note on the clips that --rebase moves by different times. start: s, of the kept part."""
     by_time: dict[float, list[tuple[str, int]]] = {}
     for number, clip in before.items():
         by_time.setdefault(round(max(clip.start, start), 6), []).append((clip.name, number))

@@ -1,4 +1,4 @@
-"""Vertex caches on disk and in pipes: which format a path has, and its reader or writer set to work, frame by frame."""
+"""Vertex caches in files and pipes: formats of paths, and reading and writing frame by frame."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from cli.reports import cache_notes
 
 @dataclass(frozen=True, slots=True)
 class LoadedCache:
-    """A cache that was opened: what messages call it, its format's ending, and what its reader said."""
+    """An open cache, its name for messages, its format's file extension, and the notes of its reader."""
 
     cache: VertexCache
     name: str
@@ -32,13 +32,13 @@ class LoadedCache:
 
     @property
     def size(self) -> int:
-        """Bytes of all files that were opened up to now."""
+        """Bytes of all files opened so far."""
         return sum(self._folder.sizes.values())
 
 
 @dataclass(frozen=True, slots=True)
 class SavedCache:
-    """Files that were written, the main one last, their size in bytes together, and what there is to say."""
+    """Written files, the main one last, their total size in bytes, and notes."""
 
     files: tuple[str, ...]
     size: int
@@ -47,9 +47,9 @@ class SavedCache:
 
 @contextmanager
 def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
-    """Give the cache at `path`, "-" for stdin, its format by the name's ending or by its first bytes.
+    """Give the cache at `path`, "-" for stdin, its format by file extension or by its first bytes.
 
-    Its frames are read while it is used, so use it inside; errors raised there name the input.
+    Its frames are read on demand, so use it inside the block; errors raised there name the input.
     """
     name = "stdin" if path == documents.PIPE else path or "''"
     notes: list[str] = []
@@ -69,10 +69,10 @@ def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
 
 
 def check(path: str, ending: str | None = None, placeholders: Sequence[str] = ()) -> str:
-    """Return the ending of the format that is written to `path`: its own, or `ending`; ".npz" for "-" without one.
+    """Return the file extension of the format of `path`: its own, or `ending`; ".npz" for "-" without one.
 
-    Raises UsageError at once, before any work, where nothing can be written, no format is called so, `ending` and
-    the name's own are two formats, or a pipe is no place for it. placeholders: what may stand in the name as {this}.
+    Raises UsageError, before any work, if nothing can be written, the format is unknown, `ending` contradicts the
+    extension of the name, or a pipe can't take the format. placeholders: allowed in the name as {this}.
     """
     own = "" if path == documents.PIPE else suffix(path)
     if path == documents.PIPE:
@@ -91,7 +91,7 @@ def check(path: str, ending: str | None = None, placeholders: Sequence[str] = ()
 
 
 def check_pipe(name: str, ending: str) -> None:
-    """Raise UsageError for a format that one file is not enough for."""
+    """Raise UsageError for a format of several files, which a pipe can't take."""
     if ending in CACHE_FORMATS and CACHE_FORMATS[ending].files is Files.SEVERAL:
         raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")
 
@@ -99,7 +99,7 @@ def check_pipe(name: str, ending: str) -> None:
 def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, dry_run: bool = False) -> SavedCache:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
-    What lies beside the main file (a rest mesh) is left out on stdout, and a note says so.
+    Companion files (a rest mesh) are left out on stdout, with a note.
     """
     is_pipe = path == documents.PIPE
     if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
@@ -127,7 +127,7 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
 
 
 def _ending(inputs: cache_folders.CacheFolder) -> str:
-    """The format of what is read: by the name, else by the first bytes of it or of its first frame."""
+    """File extension of the input's format: by name, else by the first bytes of the file or of its first frame."""
     own = suffix(inputs.main)
     if own in CACHE_FORMATS:
         return own
@@ -137,5 +137,5 @@ def _ending(inputs: cache_folders.CacheFolder) -> str:
         return sniff_format(head, size)
     except FormatError:
         if own:
-            return own  # which is then said to be none
+            return own  # which is then reported as unknown
         raise

@@ -1,4 +1,4 @@
-"""Files that are read and written a piece at a time, several side by side: what is too long for `cli.io.documents`."""
+"""Streamed files, several in one folder: inputs and outputs too large for `cli.io.documents`."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from cli.io import documents
 
 
 def inputs(path: str, stack: ExitStack) -> CacheFolder:
-    """Return the file at `path` and what is beside it; "-" for stdin, which is kept in a file for as long as `stack`.
+    """Return the folder of the file at `path`; "-" for stdin, stored in a temporary file until `stack` closes.
 
-    Raises UsageError where stdin is a terminal; FormatError when what is asked for can't be opened.
+    Raises UsageError if stdin is a terminal; FormatError if a requested file can't be opened.
     """
     return CacheFolder(Path(path)) if path != documents.PIPE else _received(stack)
 
 
 def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
-    """Return a place for the file at `path` and what goes beside it; `away`: a folder for what is not to stay."""
+    """Return the outputs for `path` and its companion files; `away`: a folder for temporary files."""
     is_pipe = path == documents.PIPE
     place = links.resolve_links(Path(path))
     folder = Path(away) if dry_run or is_pipe else place.parent
@@ -46,7 +46,7 @@ def to_stdout(staged: AtomicOutputs) -> None:
 
 
 class CacheFolder:
-    """Inputs in a folder."""
+    """Input files of one folder."""
 
     def __init__(self, path: Path) -> None:
         path = links.resolve_links(path)
@@ -55,7 +55,7 @@ class CacheFolder:
         self._folder = path.parent
 
     def open(self, name: str) -> BinaryIO:
-        """The file of this name, from its beginning."""
+        """Open the file of this name."""
         path = self._folder / name
         try:
             if path.is_dir():
@@ -68,7 +68,7 @@ class CacheFolder:
             raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})", where=where) from None
 
     def beginning(self, name: str) -> tuple[bytes, int]:
-        """The first bytes of a file, and its size."""
+        """First bytes of a file, and its size."""
         with self.open(name) as file:
             return file.read(HEAD), self.sizes[name]
 
@@ -81,7 +81,7 @@ class CacheFolder:
 
 
 def _received(stack: ExitStack) -> CacheFolder:
-    """Stdin as a file in a folder of its own, so that it can be read more than once."""
+    """Stdin as a file in a temporary folder, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
     folder = stack.enter_context(tempfile.TemporaryDirectory())

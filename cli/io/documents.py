@@ -1,5 +1,8 @@
-"""Where bytes come from and go to: files, pipes, and the folder beside a .gltf. No other module opens a path, but
-`cli.io.cache_folders` for what is streamed, and of the library `anim.files` and `anim.gltf.io`."""
+"""Input and output of documents and text: files, pipes, and the folder of a .gltf.
+
+No other module opens a path, except `cli.io.cache_folders` for streams, and in the library `anim.files` and
+`anim.gltf.io`.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ AUDIBLE = Reporter()
 def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
     """Give the document at `path`, "-" for stdin; errors raised inside name the input.
 
-    voice: says what had to be mended to read it. opener: makes a document of bytes.
+    voice: reports the fixes made on reading. opener: makes a document of bytes.
     """
     name = called(path)
     try:
@@ -46,9 +49,9 @@ def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read
 
 @contextmanager
 def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
-    """Give the bytes at `path`, "-" for stdin, and what messages call them; errors raised inside name the input.
+    """Give the bytes at `path`, "-" for stdin, and their name for messages; errors raised inside name the input.
 
-    ending: of the files that are meant, for the hint where `path` is a folder.
+    ending: expected file extension, for the hint if `path` is a folder.
     """
     name = called(path)
     try:
@@ -60,7 +63,7 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
 
 
 def repaired_note(document: Document, name: str, voice: Reporter) -> None:
-    """Say what had to be mended to read a document, nothing of most. name: of the input."""
+    """Report the fixes made on reading a document, if any. name: of the input."""
     if not document.expanded:
         return
     first, more = document.expanded[0], len(document.expanded) - 1
@@ -80,9 +83,9 @@ def write(
 ) -> int:
     """Write a document to a file or, for "-", as a GLB to stdout; return its size in bytes.
 
-    Files as `anim.gltf.io.source.write_file` does. source: the input that the document comes from. unchanged: bytes
-    that say the same already (`Source.bytes_of`), written where they do as they are. voice: says which buffers of a
-    replaced .gltf stay.
+    Files are written as by `anim.gltf.io.source.write_file`. source: the document's input. unchanged: bytes of the
+    same document (`Source.bytes_of`), written unchanged if they fit the output. voice: reports buffer files of a
+    replaced .gltf that stay.
     """
     if path != PIPE:
         return write_file(
@@ -100,7 +103,7 @@ def write(
 
 
 def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
-    """Write pieces to a file, whole or not at all, or to stdout for "-"; never binary to a terminal."""
+    """Write bytes to a file atomically, or to stdout for "-"; never binary to a terminal."""
     if path == PIPE:
         stdout.check_no_terminal()
         stdout.write(piece.data for piece in pieces)
@@ -109,9 +112,9 @@ def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
 
 
 def write_text(text: str, path: str = PIPE) -> None:
-    """Write a text product to a file, whole or not at all, or to stdout: UTF-8 whatever the locale.
+    """Write text to a file atomically, or to stdout: UTF-8 in any locale.
 
-    Half a surrogate pair, which JSON names can hold and UTF-8 can't, becomes \\ud83d: what JSON itself calls it.
+    A lone surrogate, which JSON strings can contain and UTF-8 can't, is written as its JSON escape: \\ud83d.
     """
     with commit_text_after(text, path):
         pass
@@ -119,7 +122,7 @@ def write_text(text: str, path: str = PIPE) -> None:
 
 @contextmanager
 def commit_text_after(text: str, path: str) -> Iterator[None]:
-    """Write a text product like `write_text`, a file so that it takes its place after the block, or not at all."""
+    """Write text like `write_text`; a file is replaced after the block, or not at all if the block fails."""
     if path == PIPE:
         stdout.write_text(text)
         yield
@@ -130,9 +133,9 @@ def commit_text_after(text: str, path: str) -> Iterator[None]:
 
 
 def check_output(path: str) -> None:
-    """Raise UsageError at once, before any work, where a glTF can't be written to `path`, or its ending says another.
+    """Raise UsageError, before any work, if glTF can't be written to `path` or its extension is another format's.
 
-    A name without ending is a GLB; what is no plain file (/dev/null, a named pipe) may be called anything.
+    A name without extension is a GLB; devices and named pipes (/dev/null) can have any name.
     """
     check_binary(path)
     if path == PIPE or (ending := Path(path).suffix).lower() in ("", *GLTF_SUFFIXES):
@@ -149,7 +152,7 @@ def check_output(path: str) -> None:
 
 
 def check_binary(path: str) -> None:
-    """Raise UsageError or OutputError at once, before any work, where no binary can be written to `path`."""
+    """Raise UsageError or OutputError, before any work, if no binary data can be written to `path`."""
     if path == PIPE:
         stdout.check_no_terminal()
     else:
@@ -157,9 +160,9 @@ def check_binary(path: str) -> None:
 
 
 def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
-    """Raise UsageError or OutputError at once, before any work, where no file can be written at `path`.
+    """Raise UsageError or OutputError, before any work, if no file can be written at `path`.
 
-    placeholders: what may stand in its name as {this}.
+    placeholders: allowed in its name as {this}.
     """
     if not path:
         raise UsageError("the output has an empty name")
@@ -176,12 +179,12 @@ def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
                 raise OutputError(f"{path}: can't be written (no permission to write in its folder)")
     except PermissionError:
         raise OutputError(f"{path}: can't be written (permission denied)") from None
-    except OSError as error:  # a name that no file can have
+    except OSError as error:  # an invalid file name
         raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
 
 
 def called(path: str) -> str:
-    """Return what messages call an input."""
+    """Return the name of an input for messages."""
     return "stdin" if path == PIPE else path or "''"
 
 
@@ -194,7 +197,7 @@ def _stdin() -> Bytes:
 
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:
-    """Yield place and problem of every image that can't be found from the input's folder."""
+    """Yield position and problem of every image that is not found from the input's folder."""
     for i, about in enumerate(json_array(document.json, "images")):
         address = about.get("uri")
         if folder is None or address is None or uri.is_data(address):

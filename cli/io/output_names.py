@@ -1,4 +1,4 @@
-"""Names of outputs with places for other names: one file per clip from '{clip}.npz', per mesh from '{mesh}.npz'."""
+"""Placeholders in output names: one file per clip from '{clip}.npz', per mesh from '{mesh}.npz'."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 
 from cli.errors import UsageError
 
-FORBIDDEN = frozenset('/\\:*?"<>|')  # what some file system doesn't take in a name
+FORBIDDEN = frozenset('/\\:*?"<>|')  # invalid in names on some file systems
 _PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
 
 
 def check_placeholders(output: str, known: Sequence[str] = ()) -> None:
-    """Raise UsageError where a name of an output has a place, like {foo}, that nothing would be put into."""
+    """Raise UsageError for an unknown placeholder, such as {foo}, in an output name."""
     for name in _PLACEHOLDER.findall(output):
         if name not in known:
             expected = " or ".join(f"{{{each}}}" for each in known)
@@ -23,13 +23,13 @@ def check_placeholders(output: str, known: Sequence[str] = ()) -> None:
 
 
 def expand(output: str, rows: Sequence[Mapping[str, str]], numbers: Sequence[int]) -> list[str]:
-    """Return a file name for each row, its values in the places that are called as their keys.
+    """Return a file name for each row, with placeholders replaced by the values of their keys.
 
-    A value without a usable letter becomes the number of its row, and a name that is taken gets that number.
+    A value without a valid letter is replaced by the row's number; a duplicate name gets that number as a suffix.
     expand("{clip}.npz", [{"clip": "walk"}, {"clip": "Walk"}], [0, 3]) → ["walk.npz", "Walk-3.npz"]
     """
     names: list[str] = []
-    taken: set[str] = set()  # to some file systems "Walk" and "walk" are one name
+    taken: set[str] = set()  # some file systems ignore case: "Walk" and "walk" collide
     for row, number in zip(rows, numbers, strict=True):
         values = {key: _plain(value) or str(number) for key, value in row.items()}
         last = next((key for key in reversed(values) if f"{{{key}}}" in output), "")

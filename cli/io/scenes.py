@@ -1,4 +1,4 @@
-"""Where commands read the scene of a file, and say what changes the meaning of whatever is measured on it."""
+"""Scenes of files, with warnings on everything that changes the meaning of measurements."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def read_scene(
     tangents: bool = False,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
-    """Return the scene of a document, and warn of skin weights and copies of meshes that don't count as in the file.
+    """Return the scene of a document; warn of normalized skin weights and ignored mesh copies.
 
-    name: of the file, as messages call it. normals, tangents: whether to read those too.
-    nodes: gives the nodes whose meshes the command is about; None for all.
+    name: of the file, for messages. normals, tangents: whether to read those too.
+    nodes: gives the nodes of the command's meshes; None for all.
     """
     found = reader.scene(document, accessors, normals=normals, tangents=tangents)
     chosen = nodes(found)

@@ -1,4 +1,4 @@
-"""Stdout: every byte of a product, or one line that says why not."""
+"""Stdout: complete output, or an error."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from cli.errors import UsageError
 
 
 def write(pieces: Iterable[bytes | memoryview]) -> None:
-    """Write all bytes of all pieces. Raises UsageError where stdout is closed, OutputError where it takes no more.
+    """Write all bytes. Raises UsageError if stdout is closed, OutputError if a write fails.
 
-    The system may take a part only of what one write gives it: on a disk that is nearly full, or more than 2 GiB into
-    a pipe. And a pipe that is not to block, as some programs hand down, may take nothing until its reader has read.
+    The system may write only a part of the bytes per call: on a disk that is nearly full, or above 2 GiB into a pipe.
+    A non-blocking pipe, as some parent processes pass on, may accept nothing until its reader has read.
     """
     if sys.stdout is None:
         raise UsageError("stdout is closed", help="name an output file")
     try:
         sys.stdout.flush()
-        file = getattr(sys.stdout.buffer, "raw", sys.stdout.buffer)  # no buffer where PYTHONUNBUFFERED says so
+        file = getattr(sys.stdout.buffer, "raw", sys.stdout.buffer)  # no buffer if PYTHONUNBUFFERED is set
         for piece in pieces:
             _write_whole(file, memoryview(piece).cast("B"))
     except OSError as error:
@@ -29,12 +29,12 @@ def write(pieces: Iterable[bytes | memoryview]) -> None:
 
 
 def write_text(text: str) -> None:
-    """Write text as UTF-8, whatever the locale: half a surrogate pair becomes \\ud83d."""
+    """Write text as UTF-8 in any locale; a lone surrogate is escaped as \\ud83d."""
     write([text.encode(errors="backslashreplace")])
 
 
 def check_no_terminal() -> None:
-    """Raise UsageError where binary would go to a terminal."""
+    """Raise UsageError if stdout, for binary data, is a terminal."""
     if sys.stdout is not None and sys.stdout.isatty():
         raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")
 

@@ -1,4 +1,4 @@
-"""Options of all commands that read or write vertex caches, and what they come to."""
+"""Options of the commands that read or write vertex caches, and their settings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Format = StrEnum("Format", [(ending[1:], ending[1:]) for ending in CACHE_FORMATS
 
 
 class Depth(StrEnum):
-    """Numbers of an EXR."""
+    """Channel type of an EXR."""
 
     FLOAT = "float"
     HALF = "half"
@@ -84,9 +84,9 @@ RestOption = Annotated[
 
 
 def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
-    """Return the settings for a format from the options that were given (None, False: not given).
+    """Return the write options of a format from command line options (None, False: not given).
 
-    Raises UsageError for an option that means nothing to the format.
+    Raises UsageError for an option that the format doesn't support.
     """
     takes = CACHE_FORMATS[ending].takes
     said: dict[str, Any] = {name: value for name, value in given.items() if value not in (None, False)}
@@ -102,12 +102,12 @@ def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
 
 
 def formats_with(what: str) -> tuple[str, ...]:
-    """Return the endings of formats with a place for "normals" or "tangents"."""
+    """Return the file extensions of the formats that store "normals" or "tangents"."""
     return tuple(ending for ending, format in CACHE_FORMATS.items() if what in format.holds)
 
 
 def check_supported(ending: str, **wanted: bool) -> None:
-    """Raise UsageError for what is wanted beside positions and has no place in the format."""
+    """Raise UsageError for requested normals or tangents that the format can't store."""
     for what, is_wanted in wanted.items():
         if is_wanted and what not in CACHE_FORMATS[ending].holds:
             raise UsageError(f"--{what} means nothing to {ending}", help=f"{', '.join(formats_with(what))} keep {what}")

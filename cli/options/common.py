@@ -1,4 +1,4 @@
-"""Options that several commands share: one meaning everywhere."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Nodes = Annotated[
 
 
 class Path(StrEnum):
-    """A property of a node that clips animate."""
+    """Animated node property."""
 
     TRANSLATION = "translation"
     ROTATION = "rotation"
@@ -33,7 +33,7 @@ Paths = Annotated[list[Path] | None, typer.Option("--path", help="Only tracks of
 
 
 class Format(StrEnum):
-    """What a report looks like."""
+    """Report format."""
 
     TEXT = "text"
     JSON = "json"

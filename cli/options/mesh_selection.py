@@ -1,4 +1,4 @@
-"""Which meshes of a scene a command is about: `--mesh GLOB`, `--hide GLOB`."""
+"""Selection of meshes: `--mesh GLOB`, `--hide GLOB`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Hidden = Annotated[
 
 
 def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:
-    """Return the nodes of the meshes that are meant, by the mesh's name or the node's; None for all.
+    """Return the nodes of the selected meshes, by the name of mesh or node; None for all.
 
     Raises NotFoundError for a glob that matches none.
     """
@@ -36,9 +36,9 @@ def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:
 
 
 def visible_meshes(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> list[int] | None:
-    """Return the nodes of the meshes that are meant and not hidden; None for all.
+    """Return the nodes of the selected meshes without the hidden ones; None for all.
 
-    hidden: globs for names of meshes and of nodes, which hide what descends from them too.
+    hidden: globs for names of meshes and of nodes; a node hides its descendants too.
     Raises NotFoundError for a glob that matches none.
     """
     chosen = nodes(scene, globs)

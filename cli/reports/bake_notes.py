@@ -1,4 +1,4 @@
-"""What `bake` says about a scene besides its result: what it leaves out or loses, so that it is never silent."""
+"""Notes and warnings of `bake` on data that is left out or lost."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from anim.skinning.bake import bakeable_instances
 from cli import text
 from cli.text import Reporter
 
-SHOWN_JOINTS = 3  # that a note lists
-SHOWN = 1e-3  # of the diagonal; less is not seen
+SHOWN_JOINTS = 3  # joints that a note lists
+SHOWN = 1e-3  # of the diagonal; smaller errors are invisible
 
 
 def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: Reporter) -> None:
-    """Warn where a method places vertices farther from linear blending than the model is large.
+    """Warn of vertices farther from linear blending than the size of the model.
 
-    found: of clips of these names.
+    found: name and deviation of each clip.
     """
     if far := [(each, name) for name, each in found if each.distance > each.size]:
         worst, name = max(far)
@@ -33,7 +33,7 @@ def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: 
 
 
 def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: Reporter) -> None:
-    """Note which joints scale unevenly while a method plays that other tools define differently there."""
+    """Note the joints with non-uniform scale if other tools define the method differently there."""
     if joints:
         names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
         more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
@@ -44,7 +44,7 @@ def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: R
 
 
 def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) -> None:
-    """Warn of how many vertices are not baked as only nodes move them."""
+    """Warn of the vertices left out because only nodes move them."""
     kept = {id(each) for each in bakeable_instances(scene, nodes=nodes)}
     lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if id(each) not in kept]
     if lost:
@@ -53,9 +53,9 @@ def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) ->
 
 
 def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, voice: Reporter) -> None:
-    """Warn of how far vertices are off the straight way between frames, of the clip where that can be seen best.
+    """Warn of the error of linear interpolation between frames, for the clip with the most visible one.
 
-    found: what clips of these names miss. rest: (V, 3) m, for their size.
+    found: name and inter-frame error of each clip. rest: (V, 3) m, for the diagonal.
     """
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) if len(rest) else 0.0
     seen = [(missed, name) for name, missed in found if missed.distance > SHOWN * diagonal]

@@ -1,4 +1,4 @@
-"""What there is to say about the files of a vertex cache that was written: a line each."""
+"""Notes on the written files of a vertex cache, a line each."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from cli import text
 
 
 def unsupported_notes(cache: VertexCache, ending: str) -> tuple[str, ...]:
-    """Return what of the cache has no place in the format."""
+    """Return notes on data of the cache that the format can't store."""
     carried = [name for name, has in (("normals", cache.has_normals), ("tangents", cache.has_tangents)) if has]
     lost = [name for name in carried if name not in CACHE_FORMATS[ending].holds]
     return (f"{' and '.join(lost)} are left out: {ending[1:]} has no place for them",) if lost else ()
 
 
 def unwritable_note(names: Sequence[str]) -> tuple[str, ...]:
-    """Return which files a pipe has no place for."""
+    """Return the note on the files that a pipe can't take."""
     return (f"not written, since the output is a pipe: {', '.join(names)}",) if names else ()
 
 
 def orphans_note(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
-    """Return which frames of an earlier sequence are still beside those that were written to `path`."""
+    """Return the note on frames of an earlier sequence beside those written to `path`."""
     if CACHE_FORMATS[ending].files is not Files.FRAMES:
         return ()
     target, there = links.resolve_links(Path(path)), []

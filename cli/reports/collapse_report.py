@@ -1,4 +1,4 @@
-"""The report of `collapse`: a table and advice for people, one JSON document for scripts."""
+"""Report of `collapse`: a table with recommendations, or a JSON document."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class CollapseReport:
-    """What was looked at, and what was found.
+    """The analyzed file, the options, and the findings.
 
-    name: of the file. meshes: how many skinned ones. clamped: whether methods other than lbs had the bulge clamp.
-    warnings: said of the file, for the report.
+    name: of the file. meshes: number of skinned ones. clamped: whether methods other than lbs had the bulge clamp.
+    warnings: on the file, for the report.
     """
 
     name: str
@@ -36,7 +36,7 @@ class CollapseReport:
 
     @property
     def clips(self) -> int:
-        """How many clips were looked at."""
+        """Number of analyzed clips."""
         return len({each.number for each in self.found})
 
 
@@ -50,7 +50,7 @@ def worst_of_clips(found: Sequence[Found]) -> list[Found]:
 
 
 def text(seen: CollapseReport, *, every: bool) -> str:
-    """Return a row for the worst mesh of each clip, or for every mesh, and what to do. Without a clip only words."""
+    """Return a row for the worst mesh of each clip, or for every mesh, and recommendations."""
     shown = seen.found if every else worst_of_clips(seen.found)
     header = ["clip", "mesh", "index", f"< {LOW_INDEX}", "inverted", "at", "joints", "turn"]
     header += [f"volume {each}" for each in seen.methods] + [f"bulge {each}" for each in seen.methods]
@@ -60,7 +60,7 @@ def text(seen: CollapseReport, *, every: bool) -> str:
 
 
 def as_json(seen: CollapseReport) -> str:
-    """Return the same as one JSON document, units in the keys."""
+    """Return the report as a JSON document, units in the keys."""
     clips: dict[int, dict[str, Any]] = {}
     for each in seen.found:
         clips.setdefault(each.number, {"clip": each.clip, "meshes": []})["meshes"].append(_mesh(each.mesh))

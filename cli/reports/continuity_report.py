@@ -1,4 +1,4 @@
-"""How smooth tracks are at their keys, as `inspect --continuity` shows it: a table to read, rows for CSV, JSON."""
+"""Continuity of tracks at their keys for `inspect --continuity`: text table, CSV rows, JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cli.text import format_length, format_number, plural
 
 
 def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
-    """Return the table of a clip's tracks that move at all, and a note on the others."""
+    """Return the table of a clip's moving tracks, and a note on the others."""
     header = [
         tables.escape_control(f"smoothness of {clip_name(clip.name, clip.index)}"),
         "path",
@@ -64,7 +64,7 @@ def rows(files: Sequence[Inspected], smooth: Sequence[Smoothness]) -> tuple[list
 
 
 def cells(track: TrackContinuity | None) -> dict[str, Cell]:
-    """Return one row of that table by column; of None, the columns."""
+    """Return one row of the CSV table by column; for None, the columns."""
     plain = ("target", "path", "interpolation", "unit", "still", "interior_keys", "jumps", "c0", "g1", "c1", "c2")
     found: dict[str, Cell] = {name: getattr(track, name, None) for name in plain}
     for name in ("value", "speed", "acceleration"):
@@ -79,7 +79,7 @@ def cells(track: TrackContinuity | None) -> dict[str, Cell]:
 
 
 def json(track: TrackContinuity) -> dict[str, Any]:
-    """Return one track's smoothness as JSON holds it, with every key between its ends."""
+    """Return a track's continuity as JSON values, with every interior key."""
     about = {name: getattr(track, name) for name in track.__dataclass_fields__ if name != "keys"}
     about |= {name: asdict(value) for name, value in about.items() if isinstance(value, MaxJump | LoopGap)}
     keys = track.keys
@@ -94,7 +94,7 @@ def json(track: TrackContinuity) -> dict[str, Any]:
 
 
 def _seam(track: TrackContinuity) -> str:
-    """The loop's seam in words: "C2", "C0, 0.3 m/s", "jump, 2 cm"."""
+    """Continuity at the loop seam as text: "C2", "C0, 0.3 m/s", "jump, 2 cm"."""
     seam = track.seam
     if seam is None or seam.grade is ContinuityClass.C2:
         return "C2" if seam else ""

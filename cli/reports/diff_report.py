@@ -1,4 +1,4 @@
-"""The report of `diff`: a table for people, one JSON document for scripts."""
+"""Report of `diff`: a table, or a JSON document."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from cli import tables
 from cli.text import format_change, format_length, format_number, format_speed, plural
 
 SCHEMA = 1
-SAME_END = 1e-6  # s; ends that are nearer than this differ by rounding
-LISTED = 5  # names of things that only one file has
+SAME_END = 1e-6  # s; smaller differences of clip ends come from rounding
+LISTED = 5  # listed names that only one file has
 STRANGERS = "no clip and no node has the same name in both files"
 HEADER = ("clip", "joint", "vertex", "at s", "max", "%", "p99", "mean", "turn", "speed", "weights", "pointers", "end s")
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """One of the two files: its name, its bytes, what its animations cost as stored, and the names of its clips."""
+    """One of the two files: its name, its bytes, the stored bytes of its animations, and its clip names."""
 
     name: str
     size: int
@@ -34,10 +34,10 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class DiffReport:
-    """What was found about two files, and how it was measured.
+    """Comparison of two files, and its settings.
 
-    nodes_by_name: how many nodes of the old file have a namesake in the new one. are_named: whether both files call
-    anything by a name. player: who plays both, or two, "spec,nlerp". fps: frames per second of the grid. shell: m.
+    nodes_by_name: number of nodes of the old file with a node of the same name in the new one. are_named: whether
+    both files have names. player: of both files, or two, "spec,nlerp". fps: frames per second of the grid. shell: m.
     measured_at: "surface" or, where the old file has no vertices, "nodes".
     """
 
@@ -53,19 +53,19 @@ class DiffReport:
 
     @property
     def clips_by_name(self) -> int:
-        """How many of the clips that are compared have the same name in both files."""
+        """Number of compared clips with the same name in both files."""
         return sum(bool(each.name) and each.name == each.new_name for each in self.diff.clips)
 
     @property
     def are_strangers(self) -> bool:
-        """Whether names are given, and none is in both files: order alone says what is held against what."""
+        """Whether both files have names and none in common: nodes and clips are matched by order alone."""
         return self.are_named and not self.clips_by_name and not self.nodes_by_name
 
 
 def text(found: DiffReport) -> str:
-    """Return a row per clip, the worst first, then what only one file has, and one line that says it all.
+    """Return a row per clip, the worst first, then the contents of only one file, and a summary line.
 
-    Files in which nothing has the same name are called that before anything else.
+    The first line tells if the files have no name in common.
     """
     head = f"{STRANGERS}: what follows holds things against each other by their order\n" if found.are_strangers else ""
     clips = found.diff.clips
@@ -75,7 +75,7 @@ def text(found: DiffReport) -> str:
 
 
 def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
-    """Return the same as one JSON document, units in the keys. warnings: said of the files."""
+    """Return the report as a JSON document, units in the keys. warnings: on the files."""
     diff = found.diff
     content = {
         "schema": SCHEMA,
@@ -101,7 +101,7 @@ def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
 
 
 def worst(found: DiffReport) -> str:
-    """Return where the largest distance is: "4.3 mm (0.21 %) in 'Run' at 'tail3', vertex 134, 0.458 s"."""
+    """Return the largest distance and its position: "4.3 mm (0.21 %) in 'Run' at 'tail3', vertex 134, 0.458 s"."""
     each = found.diff.clips[0]
     error = each.error
     if not error.max_error:
@@ -137,7 +137,7 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
 
 
 def _alone(found: DiffReport) -> list[str]:
-    """Lines about what only one of the files has."""
+    """Lines on clips, tracks and nodes of only one of the files."""
     diff, lines = found.diff, []
     for names, which in (
         ([clip_name(found.old.clips[i], i) for i in diff.missing_clips], f"clip only in {found.old.name}"),
@@ -224,7 +224,7 @@ def _percent(size: float, diagonal: float) -> float:
 
 
 def _share(value: float) -> str:
-    """A number with two digits, three above 100, never in the form 2.8e-05."""
+    """A number with two digits, three above 100, without exponent."""
     if 0 < value < 1e-4:
         return "<0.0001"
     return format_number(value, 3 if value >= 100 else 2)

@@ -1,4 +1,4 @@
-"""What a conversion from Euler tracks says: lines for a person, or one JSON document."""
+"""Report of a conversion from Euler tracks: text, or a JSON document."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ NEAR_DEG = round(degrees(NEAR))
 
 @dataclass(frozen=True, slots=True)
 class ConversionReport:
-    """A motion, what became of it, and on whom.
+    """A motion, its conversion, and its character.
 
-    scale_words: where meters_per_unit comes from; is_guess: whether that is not certain.
+    scale_words: origin of meters_per_unit; is_guess: whether that is uncertain.
     """
 
     format: str
@@ -44,7 +44,7 @@ class ConversionReport:
 
 
 def warnings(made: ConversionReport) -> Iterator[str]:
-    """Yield what was guessed or put right, a line each: it changes the meaning of times, lengths and poses."""
+    """Yield warnings on guesses and corrections, which change the meaning of times, lengths and poses."""
     yield from made.motion.notes
     if made.is_guess:
         yield f"scale: {made.scale_words}"
@@ -57,7 +57,7 @@ def warnings(made: ConversionReport) -> Iterator[str]:
 
 
 def lines(made: ConversionReport, *, verbose: bool) -> Iterator[str]:
-    """Yield what a person wants to know, one line each; tables where verbose."""
+    """Yield the lines of the text report; tables if verbose."""
     if made.scale_words and not made.is_guess:
         yield f"scale: {made.scale_words}"
     if made.format != "bvh":
@@ -79,7 +79,7 @@ def counts(made: ConversionReport) -> str:
 
 
 def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
-    """Return the report as one JSON document: schema, units in the keys. warnings: said so far."""
+    """Return the report as a JSON document: schema, units in the keys. warnings: issued so far."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "format": made.format,
@@ -110,7 +110,7 @@ def listed(names: list[str]) -> str:
 
 
 def _angles_line(motion: EulerMotion) -> Iterator[str]:
-    """The range of angles, which shows degrees that were read as radians, and the other way round."""
+    """Line with the range of angles, which reveals degrees read as radians and the reverse."""
     curves = [curve for node in motion.nodes for curve in node.rotation if curve is not None]
     if curves:
         low, high = min(curve.values.min() for curve in curves), max(curve.values.max() for curve in curves)
@@ -162,7 +162,7 @@ def _onto_lines(made: ConversionReport, onto: CharacterClip, character: Skeleton
 
 
 def _lying(motion: str, character: str) -> Iterator[str]:
-    """Which of two figures lies at rest while the other one stands; "" for an axis that is not known."""
+    """Note on a rest pose that is lying while the other one is standing; "" for an unknown up axis."""
     if not motion or not character or motion == character or "Y" not in (motion, character):
         return
     where = f"at rest the motion's figure stands along {motion}, the character along {character}"
@@ -173,7 +173,7 @@ def _lying(motion: str, character: str) -> Iterator[str]:
 
 
 def _guesses(onto: CharacterClip) -> Iterator[str]:
-    """What the path and the floor had to do without, where the builds differ."""
+    """Notes on missing data for root path and ground contact, if the proportions differ."""
     if onto.without and onto.measure not in (None, Measure.BUILD):
         made = [WORDS[onto.measure]] if onto.measure in WORDS else []
         made += ["soles are not put on the floor (as with --floor keep)"] if "feet" in onto.without else []

@@ -1,4 +1,4 @@
-"""What there is to say of images that are files of their own, when a document leaves its folder."""
+"""Notes on external images of a document written to another folder."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ LISTED = 3  # names in a note
 
 
 def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: str = "") -> Iterator[str]:
-    """Yield what there is to say of images outside a document that left its folder.
+    """Yield notes on the external images of a document written to another folder.
 
-    copied: whether those that can be read were copied; else they stay behind. embed_hint: what would take them in.
+    copied: whether the readable ones were copied. embed_hint: the hint on embedding them.
     """
     outside = [image for image in json_array(document.json, "images") if external_uri(image)]
     lost = [image["uri"] for image in outside if read_image(folder, image) is None]

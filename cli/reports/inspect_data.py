@@ -1,4 +1,4 @@
-"""What `inspect` knows of a file."""
+"""Types of the data that `inspect` reports."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from anim.measure.inspect.report import Facts
 if TYPE_CHECKING:
     from anim.measure.continuity.continuity import TrackContinuity
 
-Inspected: TypeAlias = tuple[str, int, Facts]  # its name, its bytes, and what is in it
-Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # of each clip, of each of its tracks
+Inspected: TypeAlias = tuple[str, int, Facts]  # name, size in bytes, contents
+Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip and track

@@ -1,4 +1,4 @@
-"""The facts of `inspect` as a page for people and as rows for tables."""
+"""Report of `inspect`: a text page, and rows of tables."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from cli.tables import Cell
 from cli.text import format_bytes, format_length, format_span, format_speed, plural
 
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
-MARKS_OF_SEVERITY = 1e-4  # m; a root that ends this near its start goes nowhere
+MIN_ROOT_DISTANCE_M = 1e-4  # smaller displacements of the root show no speed
 MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
 
 
 def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, tracks: bool) -> str:
-    """Return the whole page for one file: headline, clips, skins, findings; smooth: tracks of each clip, or nothing."""
+    """Return the page of one file: headline, clips, skins, findings. smooth: tracks of each clip, or ()."""
     if facts.faults and not file_bytes:
         return tables.escape_control(f"{name}: nothing can be read") + "\n" + _findings(facts.findings)
     parts = [_headline(name, file_bytes, facts)]
@@ -99,7 +99,7 @@ def _clips(clips: Sequence[ClipReport]) -> str:
     rows: list[list[Cell]] = []
     for clip in clips:
         seam = f"{format_length(clip.seam_m)} {format_speed(clip.seam_speed_m_per_s)}"
-        root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > MARKS_OF_SEVERITY else ""
+        root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > MIN_ROOT_DISTANCE_M else ""
         rows.append(
             [
                 clip_name(clip.name, clip.index),

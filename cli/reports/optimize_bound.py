@@ -1,4 +1,4 @@
-"""What `optimize` says of times at which nobody has looked: a bound that is proven for all of them, or why none is."""
+"""Report of `optimize` on the error between sampled times: the proven bound, or the reason for none."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NOT_PROVEN = "not proven between the times looked at"
 
 
 def summary(verdicts: Iterable[Verification], request: Request, scale: float) -> str:
-    """Return what is proven for every time of all clips; nothing where no vertex moved or only keys count.
+    """Return the bound proven for all times of all clips; "" if no vertex moved or only keys count.
 
     scale: m, the diagonal.
     """
@@ -39,7 +39,7 @@ def of_clip(verdict: Verification, request: Request) -> str:
 
 
 def why_not(verdict: Verification, request: Request) -> str | None:
-    """Return why no bound is proven for a clip, None where one is."""
+    """Return the reason for a missing bound of a clip, None if it is proven."""
     if verdict.certified is not None:
         return None
     if request.policy.reference is Reference.KEYS:
@@ -48,7 +48,7 @@ def why_not(verdict: Verification, request: Request) -> str | None:
 
 
 def _rounded_up(meters: float) -> float:
-    """The length with two digits, no shorter than it is."""
+    """The length rounded up to two digits."""
     if meters <= 0:
         return 0.0
     step = 10.0 ** (math.floor(math.log10(meters)) - 1)

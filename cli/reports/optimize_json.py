@@ -1,4 +1,4 @@
-"""What `optimize` says of its work to a script: every figure, as one JSON document."""
+"""JSON report of `optimize`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SCHEMA = 1
 
 
 def as_json(about: OptimizeReport, *, warnings: Sequence[str] = ()) -> str:
-    """Return the report as a JSON document, schema 1. warnings: said so far."""
+    """Return the report as a JSON document, schema 1. warnings: issued so far."""
     request = about.request
     content = {
         "schema": SCHEMA,

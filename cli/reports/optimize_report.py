@@ -1,4 +1,4 @@
-"""What `optimize` says of its work to a person: a line or two, and the points of a curve."""
+"""Text report of `optimize`, and the points of its rate-distortion curve."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length, plural
 
-LISTED = 3  # places in the file that a note names
-LONG = 60_000  # keys times tracks; above, fresh processes are worth their start
+LISTED = 3  # positions in the file that a note lists
+LONG = 60_000  # keys times tracks; above, worker processes save more time than they cost
 
 
 @dataclass(frozen=True, slots=True)
 class OptimizeReport:
-    """Everything there is to say. size_before, size_after: bytes of the files; scale: m, the diagonal.
+    """Data of the report. size_before, size_after: bytes of the files; scale: m, the diagonal.
 
     measured_at: "surface" or, in a file without vertices, "nodes".
     """
@@ -50,12 +50,12 @@ class OptimizeReport:
 
     @property
     def unchanged(self) -> bool:
-        """Whether the input was given back."""
+        """Whether the output is the input."""
         return self.after is self.before
 
     @property
     def unchanged_because(self) -> str | None:
-        """Why the output is the input, None where it is not."""
+        """Reason for which the output is the input, None if it is not."""
         if not self.unchanged:
             return None
         if self.found.unchanged:
@@ -65,18 +65,18 @@ class OptimizeReport:
 
     @property
     def optimized_before(self) -> bool:
-        """Whether the input says that it came from here."""
+        """Whether the input has the marker of an earlier optimization."""
         extras = self.before.json["asset"].get("extras", {})
         return isinstance(extras, dict) and KEY in extras
 
 
 def is_long(clips: Sequence[Clip], chosen: Sequence[int]) -> bool:
-    """Return whether the work takes so long that several processes are faster than one."""
+    """Return whether several processes are faster than one."""
     return len(chosen) > 1 and sum(track.values.size for i in chosen for track in clips[i].tracks) > LONG
 
 
 def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: float) -> None:
-    """Raise CheckError where a clip does not keep its bounds."""
+    """Raise CheckError if a clip exceeds its bounds."""
     bad = {i: each for i, each in found.verdicts.items() if not each.holds}
     if bad:
         worst = max(bad, key=lambda i: bad[i].usage)
@@ -88,14 +88,14 @@ def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: floa
 
 
 def smaller(found: Optimized, document: Document, size_of: Callable[[Document], int]) -> Document:
-    """Return the optimized document, or the old one where it takes no more bytes."""
+    """Return the optimized document, or the old one if it takes no more bytes."""
     if found.unchanged or size_of(found.document) >= size_of(document):
         return document
     return found.document
 
 
 def kept_keys(document: Document, clips: Iterable[int]) -> str:
-    """Return which extensions keep old keys of `clips` in the file, empty where none does."""
+    """Return the extensions that keep old keys of `clips` in the file, empty if none does."""
     places = extensions_naming_keys(document.json, clips)
     if not places:
         return ""
@@ -109,7 +109,7 @@ def worst(found: Optimized) -> float:
 
 
 def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
-    """Return what is always said."""
+    """Return the lines of the summary."""
     dry = " (dry run: nothing written)" if dry_run else ""
     if about.unchanged:
         said = f"{about.name}  {format_bytes(about.size_after)}, unchanged: {about.unchanged_because}{dry}"
@@ -127,7 +127,7 @@ def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
 
 
 def warnings(about: OptimizeReport) -> list[str]:
-    """Return what is said even when quiet, since it changes what the numbers mean."""
+    """Return the warnings, shown even with -q, since they change the meaning of the figures."""
     return [] if about.found.unchanged else _earlier(about)
 
 
@@ -150,7 +150,7 @@ def _clip_line(about: OptimizeReport, number: int, solution: Solution) -> str:
 
 
 def curve_line(sized: RatePoint, scale: float) -> str:
-    """Return one point of the curve for a person."""
+    """Return one point of the curve as text."""
     percent = 100 * sized.max_error / scale if scale else 0.0
     bound = f"{format_length(sized.max_error)} ({percent:.2g} %)" if sized.max_error else "without loss"
     sizes = f"animation {format_bytes(sized.animation)}, file {format_bytes(sized.size)}"
@@ -158,8 +158,11 @@ def curve_line(sized: RatePoint, scale: float) -> str:
 
 
 def curve_csv(sizes: Sequence[RatePoint], scale: float) -> str:
-    """Return the curve as CSV: bound in metres and as a share of the diagonal, bytes of the file, largest error found,
-    and bytes of the animation alone."""
+    """Return the curve as CSV.
+
+    Columns: bound in metres and as a fraction of the diagonal, bytes of the file, largest measured error, and bytes of
+    the animation alone.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m", "animation_bytes"])
@@ -208,14 +211,14 @@ def _error_words(verdict: Verification, about: OptimizeReport) -> str:
 
 
 def _earlier(about: OptimizeReport) -> list[str]:
-    """What to know where the input was lossy before: nothing in a file tells its motion from its own source's."""
+    """Note on an input that was optimized before: errors add up, since its original motion is not in the file."""
     if not about.optimized_before:
         return []
     return ["the input was optimized before; errors are measured from it, not from its source"]
 
 
 def _policy(about: OptimizeReport) -> list[str]:
-    """What was removed and moved, and under which rule."""
+    """Lines on removed channels and moved vertices, with the rule applied."""
     policy, words = about.request.policy, []
     dropped = Counter(about.clips[i].tracks[k].path for i, each in about.found.solutions.items() for k in each.dropped)
     if dropped:

@@ -1,4 +1,4 @@
-"""A converted motion put on a character of the user's: names, partners, and the limit on those without one."""
+"""Retargeting of a converted motion to a character: clip name, joint pairs, limit on unmatched joints."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from cli.text import Reporter
 
 @dataclass(frozen=True, slots=True)
 class CharacterOptions:
-    """What --onto is told: pairs of names, what heights the hips get, the time of the rest pose, and the limit.
+    """Options of --onto: pairs of names, scaling of hip heights, time of the rest pose, limit on unmatched joints.
 
-    replaced: index of the clip that gives way to the new one; None where it is added.
+    replaced: index of the clip that the new one replaces; None to add it.
     """
 
     names: dict[str, str]
@@ -43,9 +43,9 @@ class CharacterOptions:
 def put_on_character(
     made: ConversionReport, character: Source, casting: CharacterOptions, voice: Reporter
 ) -> tuple[ConversionReport, Document]:
-    """Return the conversion with what became of it on the character, and its document with the clip.
+    """Return the conversion with its retargeting report, and the character's document with the clip.
 
-    Raises CheckError where more joints are without a partner than may be.
+    Raises CheckError if more joints than the limit are unmatched.
     """
     document = character.document
     scene = scenes.read_scene(document, character.name, voice)
@@ -59,7 +59,7 @@ def put_on_character(
             floor=casting.floor,
             rest_at=casting.rest_at,
         )
-    except NotFoundError:  # no joint is matched, or an alias names one that is not there
+    except NotFoundError:  # no joint is matched, or an alias names an unknown joint
         _list_joints(made, scene, voice)
         raise
     left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
@@ -83,7 +83,7 @@ def put_on_character(
 
 
 def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
-    """Say, where details are wanted, which names there are to pair."""
+    """Report the names that can be paired, if details are requested."""
     moving, moved = to_match(made.converted, scene, nested=made.motion.nested)
     for what, skeleton, nodes in (
         ("motion", made.converted.skeleton, moving),
@@ -94,7 +94,7 @@ def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
 
 
 def pairs(path: str | None) -> dict[str, str]:
-    """Return what an alias file says, nothing for none."""
+    """Return the pairs of an alias file, empty for None."""
     if path is None:
         return {}
     with documents.content(path, ending=".csv") as (data, _):
@@ -102,10 +102,10 @@ def pairs(path: str | None) -> dict[str, str]:
 
 
 def named(made: ConversionReport, document: Document, *, name: str | None, replaced: int | None) -> ConversionReport:
-    """Return the conversion with the name that its clip gets in the character's file, and a note where it is taken.
+    """Return the conversion with its clip's name in the character's file, and a note on a duplicate.
 
-    name: as asked for, which stays; None for the motion's own, which gets a number where a clip has it. replaced:
-    index of the clip whose place it takes, and whose name.
+    name: as requested, used unchanged; None for the motion's own, with a numeric suffix if a clip has it. replaced:
+    index of the clip whose position and name it takes.
     """
     names = reader.names(document)
     if replaced is not None:
@@ -123,7 +123,7 @@ def named(made: ConversionReport, document: Document, *, name: str | None, repla
 
 
 def index_of(replaced: str | None, document: Document) -> int | None:
-    """Return the index of the one clip that a name or '#number' means. Raises NotFoundError for none or several."""
+    """Return the index of the clip with a name or '#index'. Raises NotFoundError for none or several."""
     if replaced is None:
         return None
     names = reader.names(document)
@@ -135,7 +135,7 @@ def index_of(replaced: str | None, document: Document) -> int | None:
 
 
 def check_name(name: str | None, replaced: int | None, document: Document) -> None:
-    """Raise UsageError where a clip is to take the place of another under a name that is not that one's."""
+    """Raise UsageError for a replaced clip together with another name."""
     if name is not None and replaced is not None and name != (own := reader.names(document)[replaced]):
         words = f"--replace keeps the name of the clip, '{own}' (got --name '{name}')"
         raise UsageError(words, help="leave --name out")

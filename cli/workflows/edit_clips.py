@@ -1,4 +1,4 @@
-"""What all commands share that turn clips into clips: read, select, change, write, and say what it cost."""
+"""Workflow of the commands that edit clips: read, select, change, write, and report."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from cli.reports import image_notes
 from cli.reports.clip_lengths import clip_lengths
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
-Clips = Mapping[int, Clip]  # by their number in the file
+Clips = Mapping[int, Clip]  # by index in the file
 DRY = " (dry run: nothing written)"
 
 
 @dataclass(frozen=True, slots=True)
 class EditResult:
-    """Clips of a file before and after, by number, and the worst that happened to the surface.
+    """Clips of a file before and after, by index, and the largest error on the surface.
 
-    at_nodes: whether the surface could not be read, so that only nodes were measured.
+    at_nodes: whether only nodes were measured, because the surface could not be read.
     """
 
     before: dict[int, Clip]
@@ -57,12 +57,12 @@ def edit_clips(
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
     advise: Callable[[Clip, int], str] = lambda clip, number: "",
 ) -> None:
-    """Change the selected clips of one file and write it; one line on stderr says what came of it.
+    """Change the selected clips of one file and write it; report the result in one line on stderr.
 
-    change: gets a clip, the numbers of its selected tracks, and what reads the scene; returns the new clip.
+    change: gets a clip, the indices of its selected tracks, and a reader of the scene; returns the new clip.
     measure: compare the motion of the written file with that of the input, on the surface.
-    notes: gets the clips that are changed, before and after, and returns what a user should know, a line each.
-    advise: gets a clip that can't be changed, and its number, and returns what to do, "" where it doesn't know.
+    notes: gets the changed clips, before and after, and returns notes for the user, a line each.
+    advise: gets a clip that can't be changed, and its index, and returns the help of the error, or "".
     """
     began = time.perf_counter()
     if not dry_run:
@@ -109,10 +109,10 @@ def edit_clips(
 
 
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
-    """The scene, without its meshes where their vertices can't be read."""
+    """The scene, without meshes if their vertices can't be read."""
     try:
         return reader.scene(document, accessors)
-    except AnimError:  # `_measured` says so
+    except AnimError:  # reported by `_measured`
         return Scene(skeleton, ())
 
 
@@ -126,7 +126,7 @@ def _measured(
     at_nodes = False
     try:
         scene = scenes.read_scene(source.document, source.name, voice, accessors=accessors)
-    except AnimError as error:  # vertices that can't be read don't stop a change of keys
+    except AnimError as error:  # unreadable vertices don't prevent a change of keys
         hint = f" ({error.help})" if error.help else ""
         voice.warn(f"measured at nodes, not on the surface: {error}{hint}")
         scene, at_nodes = Scene(skeleton, ()), True
@@ -144,7 +144,7 @@ def _measured(
 
 
 def _worst(measured: list[Proof]) -> Proof | None:
-    """The largest of all errors, and a bound for all clips."""
+    """Largest measured error of all clips, and its bound."""
     if not measured:
         return None
     worst = max(measured, key=lambda each: each.error.max_error)
@@ -153,7 +153,7 @@ def _worst(measured: list[Proof]) -> Proof | None:
 
 
 def _warn_of_lengths(edited: EditResult, voice: text.Reporter) -> None:
-    """Warn of rotations off unit length in tracks that changed: the stated error is for players that normalize them."""
+    """Warn of rotations that are not unit length in changed tracks: the error holds for players that normalize them."""
     off: list[tuple[str, int]] = []
     keys = 0
     for i, before in edited.before.items():
@@ -180,7 +180,7 @@ def _summary(name: str, before: int, after: int, edited: EditResult, seconds: fl
 
 
 def _error(found: Proof, diagonal: float) -> str:
-    """The largest error in words; "at least" where more could hide between the times that were looked at."""
+    """The largest error as text; "at least" if errors between the sampled times are not bounded."""
     error = found.error
     least = "" if is_closed(found, diagonal) else "at least "
     where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
@@ -195,7 +195,7 @@ def _keys(clip: Clip) -> int:
 
 
 def note_images(document: Document, source: Source, output: str, voice: text.Reporter) -> None:
-    """Say which images went along to an output in another folder than its input, and which are missing there."""
+    """Report the images copied to the output's folder, and the missing ones."""
     if output != documents.PIPE and not source.is_beside(output):
         for note in image_notes.notes(document, source.folder, copied=True):
             voice.info(note)

@@ -1,4 +1,4 @@
-"""One file on its way through `optimize`: searched as often as it takes, sized as it will be written."""
+"""Optimization of one file: repeated searches, and sizes as written."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from cli.text import Reporter, format_length, plural
 
 @dataclass(frozen=True, slots=True)
 class OptimizeJob:
-    """A file, what of it is to be optimized, and where it goes.
+    """A file, its selected clips, and its output.
 
-    chosen: numbers of clips. scale: m, the diagonal. detailed: whether verdicts are to have statistics.
+    chosen: indices of clips. scale: m, the diagonal. detailed: whether verdicts include statistics.
     """
 
     source: Source
@@ -44,7 +44,7 @@ class OptimizeJob:
     progress: Progress
 
     def run(self, request: Request) -> Optimized:
-        """Return what the search makes of it."""
+        """Return the result of the search."""
         with _errors_for_broken_pipes():
             found = optimize(
                 self.source.document,
@@ -61,24 +61,23 @@ class OptimizeJob:
         return found
 
     def smaller(self, found: Optimized) -> Document:
-        """Return the optimized document, or the source where that takes no more bytes."""
+        """Return the optimized document, or the source if that takes no more bytes."""
         return optimize_report.smaller(found, self.source.document, self.size)
 
     def size(self, document: Document) -> int:
-        """Return the bytes of a document as it would be written."""
+        """Return the size in bytes of a document as written."""
         return documents.write(document, self.output, self.source, dry_run=True)
 
     def sized(self, request: Request, max_error: float) -> RatePoint:
-        """Return what a bound, in m, leads to, searched fast."""
+        """Return the rate-distortion point of a bound, in m, by a fast search."""
         found = self.run(replace(_bounded(request, max_error), effort="fast"))
         smaller = self.smaller(found)
         return RatePoint(max_error, self.size(smaller), optimize_report.worst(found), optimize_report.cost(smaller))
 
     def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
-        """Return what fits with the smallest error, and the request that led there.
+        """Return the request and the result with the smallest error that fits into `max_bytes`.
 
-        ceiling: m, what the error may not exceed; None for a tenth of the diagonal. Raises CheckError where nothing
-        fits.
+        ceiling: m, the greatest allowed error; None for a tenth of the diagonal. Raises CheckError if nothing fits.
         """
         most = MOST * self.scale if ceiling is None else ceiling
         if ceiling is not None:
@@ -89,7 +88,7 @@ class OptimizeJob:
         bound = most if best is None else min(best.max_error, most)
         request = _bounded(request, bound)
         found = self.run(request)
-        if self.size(self.smaller(found)) > max_bytes:  # a fast search fits, and a longer one may end elsewhere
+        if self.size(self.smaller(found)) > max_bytes:  # the fast search fits, but a longer one can give another result
             found = self.run(replace(request, effort="fast"))
         return request, found
 
@@ -108,9 +107,9 @@ class OptimizeJob:
 
 @contextmanager
 def _errors_for_broken_pipes() -> Iterator[None]:
-    """Keep SIGPIPE from ending this process: `concurrent.futures` writes to workers that may be gone, and handles it.
+    """Ignore SIGPIPE inside: `concurrent.futures` handles writes to ended workers itself.
 
-    After an error its thread still may, so that the signal stays off then.
+    After an error its thread may still write, so the signal then stays ignored.
     """
     if not hasattr(signal, "SIGPIPE"):
         yield
@@ -121,7 +120,7 @@ def _errors_for_broken_pipes() -> Iterator[None]:
 
 
 def _bounded(request: Request, max_error: float) -> Request:
-    """The request with a bound in metres that nobody has given."""
+    """The request with a computed bound in metres."""
     return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
 
 
@@ -130,7 +129,7 @@ def optimize_job(
 ) -> OptimizeJob:
     """Return the job for a source. clip: globs. jobs: processes, 0 for one per core.
 
-    Raises NotFoundError; FormatError or UnsupportedError where vertices can't be read: no bound holds on those.
+    Raises NotFoundError; FormatError or UnsupportedError if vertices can't be read, since no bound can be verified.
     """
     document = source.document
     accessors = Accessors(document)

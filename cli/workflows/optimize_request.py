@@ -1,4 +1,4 @@
-"""What `optimize` is asked for: its options, as they were typed, turned into one request in metres and radians."""
+"""Options of `optimize` converted into a request in metres and radians."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from anim.optimization.options import Bounds
 from cli import units
 from cli.errors import UsageError
 
-MAX_ERROR = "0.01%"  # of the diagonal, where nothing else is said
+MAX_ERROR = "0.01%"  # of the diagonal
 ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
 BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
 
@@ -20,7 +20,7 @@ BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "
 def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
     """Return the bounds in metres and radians; percents are of the scene's diagonal. Raises UsageError.
 
-    said: what was typed, by the names of the bounds; None for those that are not wanted.
+    said: option texts by the names of the bounds; None for options not given.
     """
     scale = diagonal(scene)
 
@@ -41,12 +41,12 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
 
 
 def raw_options(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ...]:
-    """Return the same as it was typed where that is a share of the diagonal, and the number of metres elsewhere."""
+    """Return bounds as typed if they are fractions of the diagonal, else in metres."""
     return tuple(_fraction(text) or f"{getattr(bounds, name)}" for name, text in said.items())
 
 
 def notes(said: Mapping[str, str | None]) -> Iterator[str]:
-    """Yield what may have been meant otherwise: lengths without a unit, which are metres."""
+    """Yield notes on lengths without a unit, which are metres."""
     for name in ("max_error", "shell"):
         text = (said[name] or "").strip()
         if text and text[-1].isdigit() and not ZERO.fullmatch(text):
@@ -59,7 +59,7 @@ def _fraction(text: str | None) -> str:
 
 
 def kept_nodes(globs: Sequence[str], scene: Scene) -> frozenset[int]:
-    """Return the numbers of the nodes that match any glob; none without globs. Raises NotFoundError."""
+    """Return the indices of the nodes that match any glob; none without globs. Raises NotFoundError."""
     return frozenset(Selection((), globs).chosen_nodes(scene.skeleton)) if globs else frozenset()
 
 
