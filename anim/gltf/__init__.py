@@ -1,4 +1,4 @@
-"""The only room with glTF bytes: container, accessors, reading and writing."""
+"""glTF files: container, validation, accessors, reading and writing."""
 
 from anim.gltf.document import Document
 

@@ -1,4 +1,4 @@
-"""A Document made from nothing: a skeleton, its clips, and skinned bodies on it. Built with pygltflib."""
+"""Create a Document from a skeleton, clips and skinned meshes, with pygltflib."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 def build_document(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[tuple[Mesh, Skin]] = ()) -> Document:
-    """Return a new document with the nodes of the skeleton, then a node for each body, and the clips.
+    """Return a new document with the nodes of the skeleton, one node per body, and the clips.
 
-    Node numbers are those of the skeleton, which the clips and skins use. Parts of nodes that are the identity are
-    left out. bodies: a mesh and its skin; joints of the mesh are places among the skin's joints.
+    Node indices are those of the skeleton, which the clips and skins use. TRS properties equal to the identity are
+    omitted. bodies: a mesh and its skin; the joints of the mesh are indices into the skin's joints.
     """
     from pygltflib import Node
 
@@ -40,7 +40,10 @@ def build_document(skeleton: Skeleton, clips: Sequence[Clip], bodies: Sequence[t
 
 
 def add_clips(document: Document, clips: Sequence[Clip]) -> Document:
-    """Return the document with the clips behind its animations; nothing else changes. Clips without tracks stay out."""
+    """Return the document with the clips appended to its animations. Clips without tracks are omitted.
+
+    Everything else is unchanged.
+    """
     clips = [clip for clip in clips if clip.tracks]
     if not clips:
         return document
@@ -92,14 +95,14 @@ def _add_body(gltf: GLTF2, blob: bytearray, mesh: Mesh, skin: Skin) -> None:
 
 
 def _columns(matrices: Floats) -> NDArray[np.float32]:
-    """Affine (J, 3, 4) as whole matrices (J, 16), column by column."""
+    """Affine (J, 3, 4) as 4 × 4 matrices (J, 16) in column-major order."""
     whole = np.zeros((len(matrices), 4, 4))
     whole[:, :3], whole[:, 3, 3] = matrices, 1.0
     return whole.transpose(0, 2, 1).reshape(-1, 16).astype("<f4")
 
 
 def _add(gltf: GLTF2, blob: bytearray, rows: AnyArray, target: int | None = None, *, bounds: bool = False) -> int:
-    """Append rows (n, C) to the blob and return the number of their accessor."""
+    """Append rows (n, C) to the blob and return the index of their accessor."""
     data = np.ascontiguousarray(rows).tobytes()
     offset = len(blob)
     blob += data + bytes(-len(data) % 4)
@@ -107,7 +110,7 @@ def _add(gltf: GLTF2, blob: bytearray, rows: AnyArray, target: int | None = None
 
 
 def _document(gltf: GLTF2, blob: bytes) -> Document:
-    """The document, read back by the same door as any other file, so that it is checked too."""
+    """The document, read back with `container.read`, so that it is validated like any other file."""
     from pygltflib import Buffer
 
     data = gltf.to_json().encode()

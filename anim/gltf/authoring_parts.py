@@ -1,4 +1,4 @@
-"""Parts that all documents made from nothing share, as pygltflib's objects."""
+"""pygltflib objects shared by all authored documents."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 COMPONENT_TYPES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-VERTICES, INDICES = 34962, 34963  # targets of buffer views
+VERTICES, INDICES = 34962, 34963  # buffer view targets
 BODY_COLOR = (0.8, 0.55, 0.25, 1.0)  # linear RGBA
 
 
@@ -25,7 +25,7 @@ def create_document() -> GLTF2:
 
 
 def create_material(name: str | None = None, *, double_sided: bool = False) -> Material:
-    """Return the plain material of a mesh that has none of its own."""
+    """Return the default material of a mesh without one."""
     from pygltflib import Material, PbrMetallicRoughness
 
     surface = PbrMetallicRoughness(baseColorFactor=list(BODY_COLOR), metallicFactor=0.0, roughnessFactor=0.7)
@@ -43,9 +43,9 @@ def add_accessor(
     normalized: bool | None = False,
     bounds: bool = False,
 ) -> int:
-    """Add an accessor of rows (n, C) with a view of its own into buffer 0; return the accessor's index.
+    """Add an accessor of rows (n, C) with a buffer view of its own into buffer 0; return its index.
 
-    offset, length: of the view, in bytes. stride: bytes from row to row, None where they are packed.
+    offset, length: of the view, in bytes. stride: bytes per row, None where rows are tightly packed.
     normalized: None leaves the property out of the JSON.
     """
     from pygltflib import Accessor, BufferView

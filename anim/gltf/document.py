@@ -1,4 +1,4 @@
-"""Document: the file's own JSON, verbatim, and its buffers, opened only when something in them is needed."""
+"""glTF document: the file's JSON, unmodified, and its buffers, loaded on first use."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Json: TypeAlias = dict[str, Any]
 
 
 class Buffer:
-    """One buffer: a promise of bytes that is kept on first use.
+    """One buffer, loaded on first use.
 
-    byte_length: as the JSON says; the bytes behind may be longer, never shorter.
-    uri: where the JSON says they are: None for the BIN chunk of a GLB, or for a buffer without bytes.
-    replaced: whether the bytes are new, so that the uri only says how they were kept.
+    byte_length: as in the JSON; the data may be longer, never shorter.
+    uri: as in the JSON; None for the BIN chunk of a GLB, or for a buffer without data.
+    replaced: True if the bytes are new; the uri then only tells how the buffer was stored before.
     """
 
     def __init__(
@@ -40,21 +40,21 @@ class Buffer:
         self._where = where
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Buffer:
-        return self  # nothing in it changes
+        return self  # immutable
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the bytes themselves, for other processes: what loads them may be tied to this one."""
+        """Pickle the bytes themselves: the loader may not work in other processes."""
         data = np.array(self.data) if self.has_data else None
         return _restored, (self.byte_length, self.uri, data, self._where, self.replaced)
 
     @property
     def has_data(self) -> bool:
-        """Whether there are bytes behind it: a fallback buffer of compressed views has none."""
+        """True if the buffer has bytes; a fallback buffer of compressed views has none."""
         return self._load is not None
 
     @cached_property
     def data(self) -> Bytes:
-        """The bytes (byte_length,), read-only. Raises FormatError where they can't be had."""
+        """Bytes (byte_length,), read-only. Raises FormatError if they cannot be read."""
         if self._load is None:
             raise FormatError("has no data (no uri, and no BIN chunk)", where=self._where)
         try:
@@ -75,13 +75,13 @@ def _restored(byte_length: int, uri: str | None, data: Bytes | None, where: str,
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A glTF file as it stands: never mutated.
+    """A glTF file, immutable.
 
     json: the whole JSON as parsed, keys in the file's order.
     buffers: one for each of the JSON's `buffers`.
     chunks: unknown chunks of a GLB after JSON and BIN, (type, bytes): kept and written again.
-    indent: spaces per level of a .gltf text, None where it was compact or a GLB.
-    expanded: numbers of nodes that had a `matrix` although a channel animates them; the JSON here has TRS instead.
+    indent: spaces per level of a .gltf text, None for compact text or a GLB.
+    expanded: indices of animated nodes that had a `matrix`; the JSON here has TRS instead.
     """
 
     json: Json
@@ -98,19 +98,19 @@ class Document:
 
 
 def node_label(json: Json, number: int) -> str:
-    """Return how messages call a node: "node 7 'hip'"."""
+    """Return a node's label for messages: "node 7 'hip'"."""
     name = json_array(json, "nodes")[number].get("name")
     return f"node {number} '{name}'" if name else f"node {number}"
 
 
 def json_array(json: Json, key: str) -> list[Json]:
-    """Return the objects of a top-level array, empty where the file has none."""
+    """Return the objects of a top-level array, empty if the file has none."""
     found: list[Json] = json.get(key, [])
     return found
 
 
 def copy_json(json: Json) -> Json:
-    """Return a copy that shares no object and no list with `json`, however deep it is nested."""
+    """Return a deep copy that shares no object and no list with `json`."""
     result = dict(json)
     stack: list[Any] = [result]
     while stack:

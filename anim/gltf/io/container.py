@@ -1,4 +1,4 @@
-"""Bytes ↔ Document: GLB and .gltf text, read without copying buffers and written as pieces that are never joined."""
+"""Bytes ↔ Document: read GLB and .gltf without copying buffers, write them as chunks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from anim.gltf.validation import structure
 MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
 BIN_CHUNK = 0x004E4942
-MAX_GLB = 2**32 - 1  # the header's length field has 32 bits
+MAX_GLB = 2**32 - 1  # bytes; the header's length field has 32 bits
 LFS_POINTER = b"version https://git-lfs"
 
 Resolve: TypeAlias = Callable[[str], Bytes | bytes | bytearray | memoryview]
@@ -30,10 +30,10 @@ Choose: TypeAlias = Callable[[int, str, Bytes], str]
 def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None = None) -> Document:
     """Return the document in `data`, a GLB or a .gltf text.
 
-    data: uint8 array, best a memory map: nothing of a GLB's BIN chunk is copied or even touched; or bytes.
-    resolve: gives the bytes of a file beside the input by its relative path, when they are first needed; None where
-    there is no such place.
-    Raises FormatError with what is wrong and where, ShapeError for what are no bytes.
+    data: bytes, or a uint8 array, best a memory map: a GLB's BIN chunk is neither copied nor read.
+    resolve: returns the bytes of a file in the input's folder by its relative path, on first use; None if the input has
+    no folder.
+    Raises FormatError with the fault and its position, ShapeError if `data` is not bytes.
     """
     if isinstance(data, (bytes, bytearray, memoryview)):
         data = np.frombuffer(data, np.uint8)
@@ -62,14 +62,14 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
 
 
 def is_glb(data: Bytes) -> bool:
-    """Return whether bytes are a GLB from the first to the last, by its header."""
+    """Return True if the bytes are a complete GLB, by its header."""
     return data[:4].tobytes() == MAGIC and int.from_bytes(data[8:12].tobytes(), "little") == len(data)
 
 
 def glb(document: Document) -> list[Bytes]:
-    """Return the pieces of a self-contained GLB: buffer 0 as BIN, any further buffer as a data URI.
+    """Return the chunks of a self-contained GLB: buffer 0 as BIN, other buffers as data URIs.
 
-    Raises UnsupportedError beyond 4 GiB, FormatError where a buffer's bytes can't be had.
+    Raises UnsupportedError above 4 GiB, FormatError if a buffer's bytes cannot be read.
     """
     content = dict(document.json)
     described = json_array(content, "buffers")
@@ -96,11 +96,11 @@ def glb(document: Document) -> list[Bytes]:
 def gltf(
     document: Document, stem: str, *, keep_external: bool = False, choose: Choose = lambda _, name, __: name
 ) -> dict[str, list[Bytes]]:
-    """Return the files of a .gltf by name: `stem`.gltf last, before it the .bin files that it needs.
+    """Return the files of a .gltf by name: first the new .bin files, then `stem`.gltf.
 
-    A buffer that was a data URI stays one; others become `stem`.bin, `stem`-1.bin, … With `keep_external` a buffer
-    that was a file of its own and has not changed stays that file. choose: gets the index, this name and the bytes of
-    each buffer that is to be a file, and returns its name.
+    A data URI remains one; other buffers become `stem`.bin, `stem`-1.bin, … With `keep_external` an unchanged external
+    buffer keeps its file. choose: takes the index, this name and the bytes of each buffer that becomes a file, and
+    returns its name.
     """
     content = dict(document.json)
     described = json_array(content, "buffers")
@@ -128,7 +128,7 @@ def _is_bytes(data: object) -> TypeGuard[Bytes]:
 
 
 def _kind(value: object) -> str:
-    """How messages call what some value is: "an array of float64 with shape (2, 3)", "str"."""
+    """Description of a value's type: "an array of float64 with shape (2, 3)", "str"."""
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} with shape {value.shape}"
     return "None" if value is None else type(value).__name__
@@ -139,12 +139,12 @@ def _too_large(size: int) -> UnsupportedError:
 
 
 def _stays(buffer: Buffer) -> bool:
-    """Whether a buffer is a file of its own that has not changed."""
+    """True for an unchanged external buffer."""
     return buffer.uri is not None and not uri.is_data(buffer.uri) and not buffer.replaced
 
 
 def _names(stem: str, number: int) -> Iterator[str]:
-    """File names for a buffer, the best first."""
+    """File names for a buffer, the preferred one first."""
     yield f"{stem}.bin" if number == 0 else f"{stem}-{number}.bin"
     yield from (f"{stem}-{number}-{k}.bin" for k in count(1))
 
@@ -195,7 +195,7 @@ def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
 
 
 def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
-    """The JSON, and the nodes that had a matrix in it although they are animated."""
+    """The JSON, and the indices of animated nodes that had a matrix in it."""
     parsed = json_text.parse(raw)
     structure.validate(parsed)
     return expand_matrices(parsed)
@@ -204,7 +204,10 @@ def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
 def buffers_of(
     parsed: Json, binary: Bytes | None, resolve: Resolve | None, *, glb: bool, check: bool = True
 ) -> tuple[Buffer, ...]:
-    """Return the buffers of a JSON. check: refuse a BIN chunk that is missing or too short for the first one."""
+    """Return the buffers of a JSON.
+
+    check: raise FormatError for a BIN chunk that is missing or shorter than the first buffer.
+    """
     buffers = []
     for i, about in enumerate(json_array(parsed, "buffers")):
         load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
@@ -264,7 +267,7 @@ def _in_glb(number: int, about: Json, buffer: Buffer) -> Json:
 
 
 def _kept_data_uri(buffer: Buffer) -> str:
-    """The URI as it was where it already holds these bytes, else a new one with its media type."""
+    """The original URI if it already encodes these bytes, else a new one with its media type."""
     if buffer.uri is not None and uri.is_data(buffer.uri) and not buffer.replaced:
         return buffer.uri
     media = re.match(r"data:([^;,]+)", buffer.uri or "", re.IGNORECASE)

@@ -1,8 +1,9 @@
-"""A .gltf and the buffers beside it: the rename of the .gltf is the only moment at which the pair changes.
+"""Write a .gltf and its .bin files; only the rename of the .gltf changes existing files.
 
 New buffers take names that are free: `walk.bin`, else one made from their content (`walk-1a2b3c4d.bin`). So neither the
-.gltf that is there nor any other file loses its buffer before, and after it each reader finds a whole pair. A buffer
-of the .gltf that was replaced goes afterwards, if it is one of ours (`anim.gltf.io.unused_buffers`).
+existing .gltf nor any other file loses a buffer before the rename, and afterwards every reader finds complete files.
+Buffers that the replaced .gltf no longer uses are removed last, if this program wrote them
+(`anim.gltf.io.unused_buffers`).
 """
 
 from __future__ import annotations
@@ -33,11 +34,12 @@ def write(
     dry_run: bool = False,
     note: Note = lambda words: None,
 ) -> int:
-    """Write a .gltf and those of its buffers that are files; return the bytes of what this is or would be.
+    """Write a .gltf and its external buffers; return their total size in bytes, also in a dry run.
 
-    same_folder: as the input; buffers that are files there and have not changed stay these. spared: files that are
-    never removed, since the input needs them. text: the document's own, which stays where all its buffers do. note: is
-    told of files that were buffers of the .gltf and stay. A link is followed: the pair lies where it leads to.
+    same_folder: the output is in the input's folder, so unchanged external buffers keep their files. spared: files that
+    are never removed, since the input needs them. text: bytes of the input's .gltf, written again if no buffer changes
+    its URI. note: called with a line about old buffers that are not removed. Links are followed: the files are written
+    to the link's target folder.
     """
     named, path = path, links.resolve_links(path)
     if path.exists() and not path.is_file():
@@ -59,9 +61,10 @@ def write(
 
 @dataclass
 class _Names:
-    """Names of new buffers in a folder. old: buffers of the .gltf that is there, "" for those that are no files.
+    """Names of new buffers in a folder.
 
-    reused: chosen names of files that hold the bytes already.
+    old: buffers of the existing .gltf, "" for those that are not files. reused: chosen names of existing files with the
+    same bytes.
     """
 
     folder: Path
@@ -69,7 +72,7 @@ class _Names:
     reused: set[str] = field(default_factory=set)
 
     def choose(self, number: int, preferred: str, data: Bytes) -> str:
-        """Return the name for buffer `number`: that of a file with equal bytes, else one that is free."""
+        """Return the name for buffer `number`: an existing file with equal bytes, else a free name."""
         before = self.old[number : number + 1]
         if before and before[0] and self._holds(before[0], data):
             return before[0]
@@ -94,7 +97,7 @@ def _candidates(preferred: str, data: Bytes) -> Iterator[str]:
 
 
 def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> None:
-    """Put new buffers where nothing is, then the .gltf; where that fails, they are gone again."""
+    """Write new buffers to free names, then the .gltf; remove the buffers if that fails."""
     with atomic.temporary_files() as made:
         waiting = {place: atomic.write_temporary(place, pieces, made) for place, pieces in new.items()}
         is_there = atomic.has_bytes(path, text)

@@ -1,4 +1,4 @@
-"""The images of a glTF that are files of their own: taken along to another folder, or into the file."""
+"""External images of a glTF: copied to the output's folder or embedded in the file."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from anim.gltf.io import uri
 
 
 def copy_images(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Bytes]]:
-    """Return a document that is to go from `folder` to `target`, and the images that it needs there, by path.
+    """Return a document moved from `folder` to `target`, and the images to copy, by path.
 
-    They keep their relative paths, and the URIs stay. Where another file has the name, the copy is named after its
-    content (`skin-1a2b3c4d.png`). Images that can't be read stay as they are.
+    They keep their relative paths, and the URIs are unchanged. If another file has the name, the copy is named after
+    its content (`skin-1a2b3c4d.png`). References to images that cannot be read are unchanged.
     """
     copies: dict[Path, Bytes] = {}
     images: list[Json] = []
@@ -34,7 +34,7 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
 
 
 def write_copies(copies: Mapping[Path, Bytes]) -> None:
-    """Write images where nothing is; one that is there already is the same. Raises OutputError."""
+    """Write images to free names; an existing file there has the same bytes. Raises OutputError."""
     for path, data in copies.items():
         with atomic.name_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -44,7 +44,7 @@ def write_copies(copies: Mapping[Path, Bytes]) -> None:
 
 
 def embed(document: Document, folder: Path | None) -> Document:
-    """Return the document with those of its external images that can be read as data URIs."""
+    """Return the document with its readable external images as data URIs."""
     images = [
         image if (data := read_image(folder, image)) is None else {**image, "uri": _data_uri(data)}
         for image in json_array(document.json, "images")
@@ -53,13 +53,13 @@ def embed(document: Document, folder: Path | None) -> Document:
 
 
 def external_uri(image: Json) -> str:
-    """Return the URI of an image that is a file of its own, else nothing."""
+    """Return the URI of an external image, else ""."""
     address = str(image.get("uri", ""))
     return "" if uri.is_data(address) else address
 
 
 def read_image(folder: Path | None, image: Json) -> Bytes | None:
-    """Return the bytes of an image that is a file beside the input; None for others, and where it can't be read."""
+    """Return the bytes of an external image; None for others, or if the file cannot be read."""
     address = external_uri(image)
     if not address or folder is None:
         return None
@@ -70,7 +70,7 @@ def read_image(folder: Path | None, image: Json) -> Bytes | None:
 
 
 def _free(target: Path, name: str, data: Bytes, copies: Mapping[Path, Bytes]) -> str:
-    """The name that a copy gets in the folder."""
+    """The free name for a copy in the folder."""
     digest = hashlib.sha256(data.data).hexdigest()
     path = PurePosixPath(name)
     for each in (name, *(str(path.with_name(f"{path.stem}-{digest[:n]}{path.suffix}")) for n in (8, 16, 64))):

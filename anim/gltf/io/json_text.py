@@ -1,4 +1,4 @@
-"""JSON text of a glTF file: parsed without loss, written small, or indented as it was."""
+"""JSON text of a glTF file: parse without loss, write compact or with the input's indent."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from anim.gltf.document import Json
 def parse(raw: bytes) -> Json:
     """Return the JSON object in `raw`, keys in its order.
 
-    Raises FormatError, with line and column, for anything that is no JSON object in UTF-8; NaN and Infinity are none.
+    Raises FormatError, with line and column, for anything but a JSON object in UTF-8; NaN and Infinity are invalid.
     """
     try:
         parsed = json.loads(raw.decode("utf-8"), parse_float=_number, parse_constant=_refuse_constant)
@@ -26,7 +26,7 @@ def parse(raw: bytes) -> Json:
         raise FormatError(f"JSON is broken at line {error.lineno}, column {error.colno}: {hint}") from None
     except RecursionError:
         raise FormatError("JSON is nested too deep") from None
-    except ValueError as error:  # a number of thousands of digits
+    except ValueError as error:  # for example a number of thousands of digits
         raise FormatError(f"JSON holds a number that can't be read ({str(error).split(':')[0].lower()})") from None
     if not isinstance(parsed, dict):
         raise FormatError(f"JSON is a {type(parsed).__name__} (expected an object)")
@@ -34,23 +34,23 @@ def parse(raw: bytes) -> Json:
 
 
 def dump(content: Json, indent: int | None = None) -> bytes:
-    """Return `content` as UTF-8: without any spaces, or with `indent` spaces a level.
+    """Return `content` as UTF-8: compact, or with `indent` spaces per level.
 
-    Raises FormatError for a number that JSON can't hold.
+    Raises FormatError for a number that JSON cannot represent.
     """
     separators = (",", ": ") if indent else (",", ":")
     text = functools.partial(json.dumps, content, indent=indent or None, separators=separators, allow_nan=False)
     try:
         try:
             return text(ensure_ascii=False).encode("utf-8")
-        except UnicodeEncodeError:  # a lone surrogate, which only an escape can carry
+        except UnicodeEncodeError:  # a lone surrogate, which can be written only as an escape
             return text().encode("ascii")
     except ValueError as error:
         raise FormatError(f"a number can't be written as JSON ({str(error).lower()})") from None
 
 
 def indent_of(raw: bytes) -> int | None:
-    """Return how many spaces (a tab counts as one) the text indents a level by, None where it is on one line."""
+    """Return the spaces per indent level (a tab counts as one), None for text on one line."""
     match = re.match(rb"\s*\{[ \t]*\r?\n([ \t]+)", raw)
     return len(match[1]) if match else None
 

@@ -1,4 +1,4 @@
-"""Files that `container.read` refuses, opened as far as they go: for commands that only look."""
+"""Read the valid parts of files that `container.read` rejects, for read-only commands."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from anim.gltf.validation import salvage
 
 @dataclass(frozen=True, slots=True)
 class BrokenFile:
-    """document: the parts that can be looked at. faults: what is wrong with the rest, never empty.
+    """document: the valid parts. faults: errors in the rest, never empty.
 
-    lost_clips, lost_skins: numbers of those that nothing can be said about.
+    lost_clips, lost_skins: indices of those that cannot be read at all.
     """
 
     document: Document
@@ -27,7 +27,7 @@ class BrokenFile:
 
 
 def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimError) -> BrokenFile:
-    """Return what is left of a file. refusal: why it was refused, raised again where its JSON can't be read."""
+    """Return the valid parts of a file. refusal: its error, raised again for unreadable JSON."""
     try:
         raw, binary = _chunks(data)
         parsed = json_text.parse(raw)
@@ -39,7 +39,7 @@ def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimErr
     if not any(str(refusal) == str(fault) for fault in faults):  # of the container, or a sheared matrix
         faults = (refusal, *faults)
     expanded: tuple[int, ...] = ()
-    with suppress(FormatError):  # a shear stays as it is
+    with suppress(FormatError):  # a sheared matrix is kept
         json, expanded = expand_matrices(json)
     is_glb = data[:4].tobytes() == container.MAGIC
     buffers = container.buffers_of(json, binary, resolve, glb=is_glb, check=False)
@@ -47,7 +47,7 @@ def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimErr
 
 
 def unread_buffers(document: Document) -> tuple[AnimError, ...]:
-    """Return a fault for each buffer whose bytes can't be had, also where nothing refers to it."""
+    """Return a fault for each buffer with unreadable bytes, also if nothing refers to it."""
     faults = []
     for buffer in document.buffers:
         try:
@@ -58,7 +58,7 @@ def unread_buffers(document: Document) -> tuple[AnimError, ...]:
 
 
 def _chunks(data: Bytes) -> tuple[bytes, Bytes | None]:
-    """The text of the JSON, and the BIN chunk as far as it is there."""
+    """The text of the JSON, and the BIN chunk as far as the file contains it."""
     if data[:4].tobytes() != container.MAGIC:
         return data.tobytes(), None
     json_end, kind = _chunk(data, 12)
@@ -71,7 +71,7 @@ def _chunks(data: Bytes) -> tuple[bytes, Bytes | None]:
 
 
 def _chunk(data: Bytes, start: int) -> tuple[int, int]:
-    """Where a chunk ends, and its kind."""
+    """End offset and type of a chunk."""
     header = data[start : start + 8].tobytes()
     if len(header) < 8:
         raise FormatError("chunk header is cut off")
@@ -80,7 +80,7 @@ def _chunk(data: Bytes, start: int) -> tuple[int, int]:
 
 
 def _drop_zero_rotations(json: Json) -> tuple[Json, list[AnimError]]:
-    """The JSON without rotations that turn nowhere, and a fault for each."""
+    """The JSON without rotations of length zero, and a fault for each."""
     faults: list[AnimError] = []
     nodes = list(json.get("nodes", ()))
     for i, node in enumerate(nodes):

@@ -1,4 +1,4 @@
-"""Documents and the files that hold them: opened with the buffers beside them, written whole or not at all."""
+"""Read documents with their external buffers from files, and write them atomically."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from anim.files import atomic, links, resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, gltf_files, images, uri
 
-MAX_TRIES = 20  # of opening a .gltf with its buffers, while others replace it
+MAX_TRIES = 20  # attempts to open a .gltf with its buffers, while others replace it
 
 Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An input: its document, what messages call it, its size with its .bin files, its real folder, its own bytes.
+    """An input: document, label for messages, size with its .bin files, real folder, own bytes.
 
-    folder: None where the input came as bytes, so that nothing lies beside it.
+    folder: None for input from bytes, which has no other files.
     """
 
     document: Document
@@ -33,22 +33,22 @@ class Source:
     data: Bytes
 
     def is_beside(self, output: str) -> bool:
-        """Return whether `output` lies in the same folder, so that relative URIs stay right."""
+        """Return True if `output` is in the same folder, so that relative URIs remain valid."""
         return self.folder is not None and links.resolve_links(Path(output)).parent.resolve() == self.folder.resolve()
 
     def bytes_of(self, document: Document) -> Bytes | None:
-        """Return the bytes of the input where they are still those of a document: nothing of it was changed."""
+        """Return the input's bytes if the document is unchanged since it was read, else None."""
         return self.data if document is self.document and not document.expanded else None
 
     def is_at(self, path: str) -> bool:
-        """Return whether this is the file at `path`."""
+        """Return True if this is the file at `path`."""
         return self.folder is not None and os.path.realpath(self.name) == os.path.realpath(path)
 
 
 def open_file(path: str, opener: Opener = container.read) -> Source:
-    """Return the document at `path`; a link is followed, and buffers beside it must lie in or below its folder.
+    """Return the document at `path`; links are followed, external buffers must be in its folder or below.
 
-    opener: makes a document of bytes. If the file is replaced while its buffers are opened, it is opened again.
+    opener: converts bytes to a document. If the file is replaced while its buffers are opened, it is opened again.
     Raises FormatError.
     """
     real = links.resolve_links(Path(path))
@@ -58,7 +58,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
         document = opener(data, buffers.open)
         outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
         for address in outside:
-            with suppress(FormatError):  # raised again where its bytes are asked for
+            with suppress(FormatError):  # raised again when the bytes are read
                 buffers.open(uri.relative_path(address))
         if not outside or _stamp(real) == before:
             break
@@ -66,7 +66,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
 
 
 def open_bytes(data: Bytes, name: str, opener: Opener = container.read) -> Source:
-    """Return the document in `data`, with nothing beside it. name: what messages call it. Raises FormatError."""
+    """Return the document in `data`, without a folder. name: its label in messages. Raises FormatError."""
     document = opener(data, resolver.refuse_relative)
     return Source(document, name, len(data) + external_size(document), None, data)
 
@@ -80,19 +80,20 @@ def write_file(
     dry_run: bool = False,
     note: gltf_files.Note = lambda words: None,
 ) -> int:
-    """Write a document and return its size in bytes: a GLB or, where `path` ends in .gltf, text with its .bin beside.
+    """Write a document and return its size: a GLB or, for a `path` ending in .gltf, text and .bin files.
 
-    The size is that of all these files, also of those that stay as they are. source: the input that the document comes
-    from: external buffers and images that are still right from the output's folder keep their URI, and none of its
-    files is ever removed. In another folder images are copied beside the output, and no file is overwritten. Files
-    appear whole or not at all, and only if their bytes differ from what is there; else the time of the file at `path`
-    is updated. unchanged: bytes that say the same already (`Source.bytes_of`), written where they do as they are.
-    note: is told of files that were buffers of a replaced .gltf and stay. Raises OutputError.
+    The size in bytes includes files that remain unchanged. source: the input of the document: external buffers and
+    images with a URI that is also valid in the output's folder keep it, and none of the input's files is ever removed.
+    In another folder images are copied to the output's folder, and no file is overwritten. Files are written
+    atomically, and only if their bytes differ from the existing ones; otherwise only the modification time of the file
+    at `path` is updated. unchanged: the input's bytes of the same content (`Source.bytes_of`), written instead of new
+    ones where possible.
+    note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and not source.is_beside(path):
         document, copies = images.copy_images(document, source.folder, links.resolve_links(Path(path)).parent)
-        unchanged = None if copies else unchanged  # some may have got other names
+        unchanged = None if copies else unchanged  # copies may have got other names
     if not dry_run:
         images.write_copies(copies)
     if not path.lower().endswith(".gltf"):
@@ -110,7 +111,7 @@ def write_file(
 
 
 def glb_chunks(document: Document, unchanged: Bytes | None = None) -> list[Bytes]:
-    """Return the pieces of a GLB; `unchanged` as it is where that is one, with all its buffers."""
+    """Return the chunks of a GLB; `unchanged` itself if it is a GLB with all its buffers."""
     content = container.glb(document)
     return (
         [unchanged]
@@ -120,12 +121,12 @@ def glb_chunks(document: Document, unchanged: Bytes | None = None) -> list[Bytes
 
 
 def external_size(document: Document) -> int:
-    """Return the bytes of the buffers that are files of their own."""
+    """Return the total bytes of the external buffers."""
     return sum(map(_size_outside, document.buffers))
 
 
 def _stamp(path: Path) -> tuple[int, ...]:
-    """What changes when a file is replaced."""
+    """File status that changes if a file is replaced."""
     try:
         found = path.stat()
     except (OSError, ValueError):
@@ -134,7 +135,7 @@ def _stamp(path: Path) -> tuple[int, ...]:
 
 
 def _files_beside(source: Source) -> Iterator[Path]:
-    """Yield where the buffers and images of an input lie."""
+    """Yield the paths of an input's buffers and images."""
     for about in (*json_array(source.document.json, "buffers"), *json_array(source.document.json, "images")):
         address = about.get("uri")
         if source.folder is not None and address is not None and not uri.is_data(address):
@@ -143,6 +144,6 @@ def _files_beside(source: Source) -> Iterator[Path]:
 
 
 def _size_outside(buffer: Buffer) -> int:
-    """Bytes of a buffer that is a file of its own, 0 of others."""
+    """Bytes of an external buffer, 0 for others."""
     is_file = buffer.uri is not None and not uri.is_data(buffer.uri) and not buffer.replaced
     return buffer.byte_length if is_file else 0

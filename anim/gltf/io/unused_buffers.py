@@ -1,7 +1,8 @@
-"""Buffers that a replaced .gltf no longer names: those that we wrote go, others stay for their owner to decide.
+"""Remove buffers that a replaced .gltf no longer uses, if this program wrote them.
 
-Ours are called after the .gltf (`walk.bin` of walk.gltf) or after their content (`walk-1a2b3c4d.bin`). They go if no
-glTF in the folder or in the one above names them too, whatever that is called (walk.gltf.bak), and no link leads there.
+Their names derive from the .gltf (`walk.bin` of walk.gltf) or from their content (`walk-1a2b3c4d.bin`). They are
+removed unless another glTF in the folder or its parent, of any file name (walk.gltf.bak), or a link refers to them.
+Other files remain.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container, uri
 
 GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
-DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name, for as long as others have the shorter ones
-_HEAD = 64  # bytes that tell a glTF from other files
+DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
+_HEAD = 64  # bytes to detect a glTF
 _BLANK = b"\xef\xbb\xbf \t\r\n"
 
 
 def external_buffers(path: Path) -> tuple[str, ...]:
-    """Return names of the buffers that the .gltf at `path` has as files, "" for others; none where there is none."""
+    """Return names of the external buffers of the .gltf at `path`, "" for others; () without a file."""
     try:
         return tuple(_file_of(buffer.uri) for buffer in _opened(path).buffers)
     except (AnimError, OSError, RecursionError):
@@ -36,9 +37,10 @@ def external_buffers(path: Path) -> tuple[str, ...]:
 
 
 def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared: Sequence[Path]) -> list[str]:
-    """Remove those of the buffers `old` that the .gltf at `path` no longer names and nothing else is known to need.
+    """Remove the buffers `old` that neither the .gltf at `path` nor any other known file uses.
 
-    text: of the .gltf. spared: files that others need. Returns names of unused files that stay: we did not make them.
+    text: of the .gltf. spared: files that others need. Returns the names of unused files that remain, since this
+    program did not write them.
     """
     left = []
     needed = [*(path.parent / each for each in _named(container.read(np.concatenate(text)))), *spared]
@@ -57,7 +59,7 @@ def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared:
 
 
 def _is_ours(buffer: Path, stem: str) -> bool:
-    """Whether a buffer is called after its .gltf or after its content."""
+    """True if a buffer is named after its .gltf or after its content."""
     lengths = "|".join(f"[0-9a-f]{{{length}}}" for length in DIGEST_LENGTHS)
     if re.fullmatch(rf"{re.escape(stem)}(-\d+){{0,2}}(-({lengths}))?\.bin", buffer.name):
         return True
@@ -69,7 +71,7 @@ def _is_ours(buffer: Path, stem: str) -> bool:
 
 
 def _is_needed_elsewhere(buffer: Path, path: Path) -> bool:
-    """Whether a glTF in the folder or the one above needs the file, or can't be asked, or a link leads to it."""
+    """True if a glTF in the folder or its parent, an unreadable file there or a link uses the buffer."""
     folder = path.parent.resolve()
     name = posixpath.normpath(buffer.relative_to(path.parent).as_posix())
     for place, address in ((folder, name), (folder.parent, f"{folder.name}/{name}")):
@@ -83,11 +85,11 @@ def _is_needed_elsewhere(buffer: Path, path: Path) -> bool:
 
 
 def _needs(other: Path, buffer: Path, address: str) -> bool:
-    """Whether a file is a glTF that names the buffer, or a link to it. address: from the file's folder."""
+    """True if a file is a glTF or a link that refers to the buffer. address: from the file's folder."""
     try:
         if other.is_symlink() and other.name != buffer.name and other.samefile(buffer):
             return True
-    except OSError:  # a link to nowhere
+    except OSError:  # a broken link
         return False
     is_called_so = any(suffix in other.name.lower() for suffix in GLTF_SUFFIXES)
     try:
@@ -105,7 +107,7 @@ def _begins_like_gltf(path: Path) -> bool:
 
 
 def _may_name(data: mmap.mmap | bytes, name: str) -> bool:
-    """Return False where the name does not occur in the JSON: quick, in folders of many files."""
+    """Return False if the name is not in the JSON: a fast test for folders with many files."""
     is_glb = data[:4] == container.MAGIC
     end = 20 + int.from_bytes(data[12:16], "little") if is_glb else len(data)
     is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and data.find(b"%", 0, end) < 0

@@ -1,4 +1,4 @@
-"""URIs of buffers and images: data URIs are decoded, relative ones confined to the file's own folder."""
+"""URIs of buffers and images: decode data URIs, confine relative ones to the file's folder."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from urllib.parse import quote, unquote, unquote_to_bytes
 from anim.errors import FormatError
 
 BUFFER_TYPES = ("application/octet-stream", "application/gltf-buffer")  # glTF 2.0, 3.6.1.1
-IMAGE_TYPES = ("image/png", "image/jpeg", "image/jpg", "image/webp")  # the third is wrong, and frequent
+IMAGE_TYPES = ("image/png", "image/jpeg", "image/jpg", "image/webp")  # the third is invalid, but frequent
 _DATA = re.compile(r"data:([\w.+-]+/[\w.+-]+)?((?:;[\w.+-]+=[^;,]*)*)(;base64)?,", re.ASCII | re.IGNORECASE)
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.ASCII | re.IGNORECASE)
 
 
 def is_data(uri: str) -> bool:
-    """Return whether the URI holds its bytes itself."""
+    """Return True for a data URI."""
     return uri[:5].lower() == "data:"
 
 
 def decode_data(uri: str, types: Sequence[str] = BUFFER_TYPES) -> bytes:
     """Return the bytes of a data URI.
 
-    types: media types that it may have; glTF's for buffers. Raises FormatError for a broken one, or another type.
+    types: allowed media types; glTF's for buffers. Raises FormatError for an invalid URI, or another type.
     decode_data("data:application/octet-stream;base64,AAE=") → b"\\0\\1"
     """
     match = _DATA.match(uri)
@@ -51,10 +51,10 @@ def encode_data(data: bytes, media: str = BUFFER_TYPES[0]) -> str:
 
 
 def relative_path(uri: str) -> str:
-    """Return the path that a relative URI names, percent-decoded, with forward slashes.
+    """Return the path of a relative URI, percent-decoded, with forward slashes.
 
-    Bytes that are no UTF-8 become what `os.fsdecode` makes of them, so that they name the file with these bytes.
-    Raises FormatError unless it stays in the file's own folder: no scheme, no absolute path, no "..".
+    Bytes that are not UTF-8 are decoded with `os.fsdecode`, so that the path names the file with these bytes.
+    Raises FormatError unless the path is in the file's folder: no scheme, no absolute path, no "..".
     relative_path("walk%20data.bin") → "walk data.bin"
     """
     if _SCHEME.match(uri):
@@ -70,12 +70,12 @@ def relative_path(uri: str) -> str:
 
 
 def from_path(path: str) -> str:
-    """Return the relative URI of a file name, percent-encoded, also of one that is no UTF-8 (`os.fsdecode`)."""
+    """Return the relative URI of a file name, percent-encoded, also if not UTF-8 (`os.fsdecode`)."""
     return quote(path, errors="surrogateescape")
 
 
 def _is_encodable(path: str) -> bool:
-    """Whether a path has bytes: half of a surrogate pair, which JSON can hold, has none."""
+    """True if a path can be encoded: a lone surrogate, valid in JSON, cannot."""
     try:
         path.encode(errors="surrogateescape")
     except UnicodeEncodeError:

@@ -1,4 +1,4 @@
-"""Views compressed by EXT_meshopt_compression or KHR_meshopt_compression, both ways, by the package `meshopt`."""
+"""Encode and decode buffer views of EXT_/KHR_meshopt_compression with the package `meshopt`."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ from anim.gltf.document import Bytes, Json
 
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
-VERSIONS = {"EXT_meshopt_compression": 0, "KHR_meshopt_compression": 1}  # of the attribute bitstream
-MAX_STRIDE = 256  # bytes of a row that the codec takes, by both extensions
+VERSIONS = {"EXT_meshopt_compression": 0, "KHR_meshopt_compression": 1}  # version of the attribute bitstream
+MAX_STRIDE = 256  # bytes per row, by both extensions
 
 
 def row_size(key_size: int, element_size: int) -> int:
-    """Return the bytes of a row of a stream: a whole key, or an element where the codec takes no key as long as that.
+    """Return the bytes per row of a stream: a whole key, or one element for keys above the maximum stride.
 
     Both are in bytes; an element is a multiple of 4, a key one or more of them (weights have an element per target).
-    Rows of whole keys compress better: each number lies above the same one of the key before.
+    Rows of whole keys compress better: each value is predicted from the same one of the previous key.
     (40 weights, 160, 4) → 160; (65 weights, 260, 4) → 4
     """
     return key_size if key_size % element_size == 0 and key_size <= MAX_STRIDE else element_size
 
 
 def encode(rows: Bytes, extension: str) -> bytes:
-    """Return rows (count, byteStride), already filtered, as a stream of mode ATTRIBUTES under an extension."""
+    """Return rows (count, byteStride), already filtered, as a stream of mode ATTRIBUTES."""
     from meshopt import encode_gltf_buffer
 
     return bytes(encode_gltf_buffer(rows, "ATTRIBUTES", VERSIONS[extension]))
 
 
 def decode(stored: Bytes, about: Json) -> Bytes:
-    """Return the plain bytes (count × byteStride,) of a compressed view.
+    """Return the decoded bytes (count × byteStride,) of a compressed view.
 
     stored: the compressed bytes. about: the extension's object: byteStride, count, mode, filter.
-    Raises FormatError where the stream does not hold what the object says, UnsupportedError for an unknown mode.
+    Raises FormatError if the stream does not match the object, UnsupportedError for an unknown mode.
     """
     mode, chosen_filter = about.get("mode"), about.get("filter", "NONE")
     if mode not in MODES or chosen_filter not in FILTERS:
@@ -68,7 +68,7 @@ def _check_stride(mode: str, chosen_filter: str, stride: int, count: int) -> Non
 
 
 def _narrow(indices: np.ndarray[tuple[int, ...], np.dtype[np.uint32]], count: int, stride: int) -> Bytes:
-    """Indices come back as 32-bit numbers; the view holds them in 2 or 4 bytes."""
+    """Convert 32-bit indices to the view's 2 or 4 bytes."""
     flat = indices.reshape(-1)
     if len(flat) != count:
         raise FormatError(f"meshopt stream holds {len(flat)} indices (expected {count})")

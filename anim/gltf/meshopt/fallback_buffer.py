@@ -1,4 +1,4 @@
-"""Buffers without bytes that compressed views stand in, and the names of the extensions that such views need."""
+"""Fallback buffers without bytes for compressed views, and the extension names of such views."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ NAMES = ("extensionsUsed", "extensionsRequired")
 
 
 def fallback_json(length: int, extension: str) -> Json:
-    """Return the JSON of a buffer that only stands for bytes."""
+    """Return the JSON of a fallback buffer."""
     return {"byteLength": length, "extensions": {extension: {"fallback": True}}}
 
 
 def is_marked(buffer: Json, *extensions: str) -> bool:
-    """Return whether a buffer's JSON calls it a fallback, of one of these extensions or of any."""
+    """Return True if a buffer's JSON marks it as fallback, of one of these extensions or of any."""
     there = buffer.get("extensions", {})
     return any(isinstance(there.get(name), dict) and there[name].get("fallback") for name in extensions or MESHOPT)
 
 
 def drop_data(json: Json, buffers: tuple[Buffer, ...], frozen: Set[int]) -> set[int]:
-    """Return the buffers that have no bytes and only stand for what compressed views become.
+    """Return the buffers without bytes that are only fallbacks for decompressed views.
 
-    frozen: buffers in which nothing may move.
+    frozen: buffers with immovable bytes.
     """
     there = json_array(json, "buffers")
     compressed, others = set[int](), set[int]()
@@ -41,9 +41,9 @@ def drop_data(json: Json, buffers: tuple[Buffer, ...], frozen: Set[int]) -> set[
 
 
 def find_fallback(buffers: Sequence[Json], views: Sequence[Json], possible: Set[int], extension: str) -> int | None:
-    """Return the buffer that new views of an extension can stand in; None where there is none.
+    """Return a fallback buffer for new views of an extension; None if there is none.
 
-    views: those that stay. One that no view is left on can become this extension's.
+    views: the remaining ones. A buffer without remaining views can become this extension's.
     """
     users: dict[int, set[str]] = {i: set() for i in possible}
     for view in views:
@@ -54,7 +54,7 @@ def find_fallback(buffers: Sequence[Json], views: Sequence[Json], possible: Set[
 
 
 def overhead(json: Json, extension: str) -> int:
-    """Return what the first view of an extension costs beside its own JSON: its name, and a buffer."""
+    """Return the bytes that an extension's first view adds beside its own JSON: name and buffer."""
     if extension in _used(json):
         return 0
     named = sum(len(json_text.dump({key: [extension]})) - 1 for key in NAMES if extension not in json.get(key, []))
@@ -62,9 +62,9 @@ def overhead(json: Json, extension: str) -> int:
 
 
 def name_extensions(json: Json, before: Json, extension: str) -> None:
-    """Make `extensionsUsed` and `extensionsRequired` of `json` say what it uses, in place.
+    """Update `extensionsUsed` and `extensionsRequired` of `json` to its content, in place.
 
-    A name that `before` used and `json` does not goes; a new one, `extension`, comes last.
+    A name used in `before` but not in `json` is removed; a new one, `extension`, is appended.
     """
     used = _used(json)
     gone = _used(before) - used
@@ -79,7 +79,7 @@ def name_extensions(json: Json, before: Json, extension: str) -> None:
 
 
 def _used(json: Json) -> set[str]:
-    """Which of meshopt's extensions any view or buffer carries."""
+    """meshopt extensions of any view or buffer."""
     objects = [*json_array(json, "bufferViews"), *json_array(json, "buffers")]
     return {name for each in objects for name in MESHOPT if name in each.get("extensions", {})}
 

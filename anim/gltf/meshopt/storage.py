@@ -1,4 +1,4 @@
-"""How new animation data is stored: plain, or compressed under one of meshopt's extensions. What a caller chooses."""
+"""Storage options for new animation data: plain, or compressed by a meshopt extension."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from anim.gltf.meshopt import codec
 from anim.gltf.reading.accessors import denormalized
 from anim.gltf.validation.buffer_layout import MESHOPT
 
-STRIDES = {"QUATERNION": 8}  # bytes of an element's codes; the others have 4 per component
+STRIDES = {"QUATERNION": 8}  # bytes per encoded element; the others have 4 per component
 
 
 @dataclass(frozen=True, slots=True)
 class FilteredValues:
-    """Values as one of meshopt's filters takes them, before the codec.
+    """Values in the form of a meshopt filter, before the codec.
 
     name: "QUATERNION" (8 bytes a key, int16 normalized when decoded) or "EXPONENTIAL" (4 bytes a number, float32 when
-    decoded). codes: key after key; with tangents as glTF orders them: in, value, out per key.
+    decoded). codes: in key order; with tangents in glTF's order: in, value, out per key.
     """
 
     name: str
@@ -37,10 +37,10 @@ class FilteredValues:
 
 @dataclass(frozen=True, slots=True)
 class AccessorStorage:
-    """How the numbers of new animations are stored.
+    """Storage of new accessors.
 
-    extension: meshopt's that compressed views use; empty for plain ones only.
-    filtered: codes by id() of the track whose values they decode to; a track without any is stored as it is.
+    extension: meshopt extension of compressed views; empty for plain views only.
+    filtered: codes by id() of the track with the decoded values; other tracks are stored unfiltered.
     """
 
     extension: str = ""
@@ -51,8 +51,9 @@ UNCOMPRESSED = AccessorStorage()
 
 
 def compress_document(extension: str, filtered: Mapping[int, FilteredValues]) -> AccessorStorage:
-    """Return a packing into views of "EXT_meshopt_compression" or "KHR_meshopt_compression", each where it pays.
+    """Return storage that compresses views by a meshopt extension where that is smaller.
 
+    extension: "EXT_meshopt_compression" or "KHR_meshopt_compression".
     filtered: by id(track), for the tracks (those objects, which must stay alive) given to `replace_clips`.
     Raises RangeError for another extension.
     """
@@ -62,7 +63,7 @@ def compress_document(extension: str, filtered: Mapping[int, FilteredValues]) ->
 
 
 def decompress_document(filtered: FilteredValues, columns: int) -> Floats:
-    """Return the values (n, columns) that the codes decode to, by meshopt's own decoder: what a track has to hold.
+    """Return the values (n, columns) decoded by meshopt's own decoder: the values that a track must have.
 
     Computing them in float64 instead differs by one step of int16 in up to 0.5 % of quaternions.
     """
@@ -74,7 +75,7 @@ def decompress_document(filtered: FilteredValues, columns: int) -> Floats:
 
 
 def decompressed_bytes(filtered: FilteredValues) -> bytes:
-    """Return the bytes that the codes decode to, as many as there are codes."""
+    """Return the decoded bytes of all codes."""
     stride = STRIDES.get(filtered.name, 4)
     rows = np.frombuffer(filtered.codes, np.uint8).reshape(-1, stride)
     about = {"count": len(rows), "byteStride": stride, "mode": "ATTRIBUTES", "filter": filtered.name}

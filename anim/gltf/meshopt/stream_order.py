@@ -1,7 +1,7 @@
-"""The order in which the contents of one stream compress best: each begins near where the one before it ends.
+"""Order of the contents of one stream that compresses best: similar end and start values adjoin.
 
-meshopt's codec stores by how much each byte of an element differs from the one before, 16 elements at a time, so what
-an order costs shows where one content follows another, and exactly only in the compressed bytes.
+meshopt's codec stores byte differences between consecutive elements, 16 elements at a time. So the cost of an order
+arises where one content follows another; only the compressed bytes give it exactly.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.gltf.meshopt import codec
 
-STARTS = 8  # contents that a chain is begun with, in turn
-COMPARED = 500_000  # pairs of contents for all of these chains together, but for the first
-# Of a byte that differs by 0, ±1, … from the one before: about the bytes that it takes (none, 2 bits, 4 bits, a byte).
+STARTS = 8  # contents tried as the first of a chain
+COMPARED = 500_000  # pairs of contents compared for all of these chains together, except the first
+# Approximate bytes per byte difference of 0, ±1, … (none, 2 bits, 4 bits, a byte).
 PRICES = np.select([np.arange(256) == 0, np.arange(256) < 3, np.arange(256) < 15], [0.0, 0.3, 0.8], 1.3)
 
 
 def ordered(codes: Sequence[bytes], stride: int, extension: str) -> list[int]:
-    """Return the numbers of contents in the order that takes fewest bytes among those tried; always the same one.
+    """Return content indices in the smallest of the tried orders, deterministically.
 
-    codes: of each content, elements of `stride` bytes, the last filled up. extension: whose codec it is.
+    codes: of each content, elements of `stride` bytes, the last one padded. extension: the codec's.
     """
     stream = _Stream(codes, stride, extension)
     count = len(codes)
@@ -32,7 +32,7 @@ def ordered(codes: Sequence[bytes], stride: int, extension: str) -> list[int]:
 
 
 class _Stream:
-    """Contents, and what any order of them costs."""
+    """Contents, and the cost of any order."""
 
     def __init__(self, codes: Sequence[bytes], stride: int, extension: str) -> None:
         self._stride = stride
@@ -40,11 +40,11 @@ class _Stream:
         self._rows = [np.frombuffer(each, np.uint8).reshape(-1, stride) for each in codes]
 
     def size(self, order: Sequence[int]) -> int:
-        """Return the bytes of an order when compressed."""
+        """Return the compressed bytes of an order."""
         return len(codec.encode(np.concatenate([self._rows[i] for i in order]), self._extension))
 
     def chain(self, start: int) -> list[int]:
-        """Return the order that goes from each content to the one that begins most like it ends."""
+        """Return the order by greedy nearest neighbour: each content's start is closest to the previous end."""
         firsts = np.array([rows[0] for rows in self._rows])
         lasts = np.array([rows[-1] for rows in self._rows])
         left = np.arange(len(firsts))
@@ -56,6 +56,6 @@ class _Stream:
 
 
 def _apart(firsts: Ints, last: Ints) -> Floats:
-    """What elements (n, stride) cost after the element `last` (stride,)."""
+    """Cost of elements (n, stride) after the element `last` (stride,)."""
     steps = (firsts - last).view(np.int8).astype(np.int64)
     return np.asarray(PRICES[np.where(steps >= 0, 2 * steps, -2 * steps - 1)].sum(axis=1))

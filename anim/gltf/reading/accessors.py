@@ -1,4 +1,4 @@
-"""Numbers out of a document: every component type, stride, normalized, sparse, zero-filled, compressed."""
+"""Read accessors of every component type, stride and compression, normalized or sparse."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 class Accessors:
-    """Reads accessors of one document; views are opened, and decompressed, once."""
+    """Accessors of one document; each view is opened, and decompressed, once."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -33,7 +33,7 @@ class Accessors:
         self._given: Mapping[int, NDArray[Any]] = {}
 
     def over(self, given: Mapping[int, NDArray[Any]]) -> Accessors:
-        """Return accessors in which some, by number, hold these numbers (count, components) instead of their own."""
+        """Return accessors with replaced values (count, components), by accessor index."""
         other = copy(self)
         other._given = {**self._given, **given}
         return other
@@ -43,18 +43,18 @@ class Accessors:
         return self._accessors[index]
 
     def raw(self, index: int) -> NDArray[Any]:
-        """Return the stored numbers (count, components) in their own type, matrices column by column; read-only.
+        """Return the stored values (count, components) in their own type, column-major; read-only.
 
-        Sparse values are put in, accessors without data are zeros. Raises FormatError, UnsupportedError.
+        Sparse values are applied, accessors without data are zeros. Raises FormatError, UnsupportedError.
         """
         return self._located(index, self._raw)
 
     def floats(self, index: int) -> Floats:
-        """Return the numbers (count, components) as float64, normalized integers as fractions (glTF 2.0, 3.11).
+        """Return the values (count, components) as float64, normalized integers as fractions.
 
-        Raises FormatError for NaN or infinity.
+        Normalized integers: glTF 2.0, 3.11. Raises FormatError for NaN or infinity.
         """
-        with np.errstate(invalid="ignore"):  # a signaling NaN is found below
+        with np.errstate(invalid="ignore"):  # a signaling NaN is rejected below
             values = self._located(index, self._floats)
         if not np.isfinite(values).all():
             row = int(np.argwhere(~np.isfinite(values))[0][0])
@@ -62,27 +62,30 @@ class Accessors:
         return values
 
     def unchecked(self, index: int) -> Floats:
-        """Return what `floats` does, without looking for NaN: for callers whose own types do.
+        """Return `floats` without the NaN check, for callers with validating types.
 
-        numpy warns of a signaling NaN; callers that read many accessors turn that off once, which is not free.
+        numpy warns of a signaling NaN; callers that read many accessors disable that warning once, which takes time.
         """
         return self._located(index, self._floats)
 
     def integers(self, index: int) -> Ints:
-        """Return the numbers (count, components) as int64. Raises FormatError where they are floats."""
+        """Return the values (count, components) as int64. Raises FormatError for floats."""
         raw = self.raw(index)
         if raw.dtype.kind == "f":
             raise FormatError("holds floats (expected integers)", where=f"accessor {index}")
         return raw.astype(np.int64)
 
     def indices(self, index: int) -> Ints:
-        """Return what `integers` does. Raises FormatError for signed types, which can't number vertices or joints."""
+        """Return `integers`. Raises FormatError for signed types, which are invalid as indices."""
         if self.raw(index).dtype.kind == "i":
             raise FormatError("holds signed integers (expected unsigned ones)", where=f"accessor {index}")
         return self.integers(index)
 
     def matrices(self, index: int) -> Floats:
-        """Return MAT4 as (count, 4, 4) for column vectors: glTF's column-major order is transposed here only."""
+        """Return MAT4 as (count, 4, 4) for column vectors.
+
+        glTF's column-major order is transposed here only.
+        """
         return self.floats(index).reshape(-1, 4, 4).transpose(0, 2, 1)
 
     def _located(self, index: int, read: Callable[[int], T]) -> T:
@@ -126,7 +129,7 @@ class Accessors:
         return values
 
     def view(self, number: int) -> Bytes:
-        """Return the bytes of a buffer view, decompressed. Raises FormatError, UnsupportedError."""
+        """Return the decompressed bytes of a buffer view. Raises FormatError, UnsupportedError."""
         found = self._bytes.get(number)
         if found is None:
             found = self._bytes[number] = self._opened(number)
@@ -153,7 +156,7 @@ class Accessors:
 
 
 def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:
-    """Return stored normalized integers as the fractions that they mean: c / max, signed ones not below −1."""
+    """Return normalized integers as fractions: c / max, signed ones clamped at −1."""
     scaled = values / float(np.iinfo(dtype).max)
     return np.maximum(scaled, -1.0) if dtype.kind == "i" else scaled
 
@@ -165,7 +168,7 @@ def _slice(data: Bytes, place: Json) -> Bytes:
 
 @dataclass(frozen=True, slots=True)
 class ElementLayout:
-    """How one element lies in memory: columns of rows numbers, `column` bytes from column to column."""
+    """Memory layout of one element: columns of `rows` values, `column` bytes per column."""
 
     dtype: np.dtype[Any]
     columns: int
@@ -181,7 +184,7 @@ def _element_layout(component_type: int, kind: str) -> ElementLayout:
 
 
 def _strided(view: Bytes, offset: int, count: int, stride: int, form: ElementLayout) -> NDArray[Any]:
-    """Elements (count, columns × rows) as a view into the bytes; `stride` in bytes from element to element."""
+    """Elements (count, columns × rows) as a view into the bytes; `stride` in bytes per element."""
     size = form.dtype.itemsize
     if form.columns == 1:
         array: NDArray[Any] = np.ndarray((count, form.rows), form.dtype, view, offset, (stride, size))

@@ -1,4 +1,4 @@
-"""Channel + sampler → Track: the rules of glTF 2.0, 3.11, and of KHR_animation_pointer."""
+"""Channel + sampler → Track, by glTF 2.0, 3.11, and KHR_animation_pointer."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from anim.model.track import WIDTHS
 
 INTERPOLATIONS = {name.value: name for name in Interpolation}
 TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
-FRACTIONS = (5120, 5121, 5122, 5123)  # component types that rotations and weights may have, normalized
+FRACTIONS = (5120, 5121, 5122, 5123)  # component types allowed for normalized rotations and weights
 
 
 class Reader:
-    """Reads tracks of one document; tracks on one input accessor share one array of times."""
+    """Reader of one document's tracks; tracks on one input accessor share one array of times."""
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
         self._nodes = json_array(document.json, "nodes")
@@ -29,7 +29,7 @@ class Reader:
         self._values: dict[int, Floats] = {}
 
     def track(self, animation: Json, number: int) -> Track | None:
-        """Return a channel of `animation` as a track, None where it has no target that is understood."""
+        """Return a channel of `animation` as a track, None without a supported target."""
         channel = animation["channels"][number]
         found = channel_targets.channel_target(channel)
         if found is None:
@@ -38,7 +38,7 @@ class Reader:
         try:
             return self._track(animation["samplers"][channel["sampler"]], node, path, address)
         except AnimError as error:
-            if isinstance(error, RangeError | ShapeError):  # of the file, not of a caller
+            if isinstance(error, RangeError | ShapeError):  # caused by the file, not by a caller
                 error = FormatError(error.problem, where=error.where, help=error.help)
             raise error.at(f"track {number} ({self._target_label(node, path, address)})", ": ") from None
 
@@ -58,7 +58,7 @@ class Reader:
             values = arrays.freeze(self._accessors.unchecked(sampler["output"]))
             self._values[sampler["output"]] = values
         rows = len(times) * (3 if cubic else 1)
-        if width is None:  # a pointer: an array of elements per key where the count says so
+        if width is None:  # a pointer: an array of elements per key if the count requires it
             width = values.size // rows
         if values.size != rows * width or not width:
             raise FormatError(
@@ -93,7 +93,7 @@ class Reader:
         return found
 
     def _width(self, node: int | None, path: str, output: Json) -> int | None:
-        """Components per key, None where only the numbers themselves can say; checks the output's type."""
+        """Components per key, None if only the data determines it; checks the output's type."""
         if path == "pointer":
             return None
         if output["type"] != TYPES[path]:

@@ -1,6 +1,6 @@
-"""KHR_draco_mesh_compression: vertices and faces of a primitive, decoded by Google's Draco (the package DracoPy).
+"""KHR_draco_mesh_compression: decode vertices and faces of a primitive with the package DracoPy.
 
-Only what is looked at is decoded: documents are written with their Draco bytes as they are.
+Data is decoded only on use: documents are written with their original Draco bytes.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ EXTENSION = "KHR_draco_mesh_compression"
 
 @dataclass(frozen=True, slots=True)
 class DracoMesh:
-    """What one piece of Draco data holds: arrays (V, C) by unique id, and faces (T, 3)."""
+    """Decoded Draco data: arrays (V, C) by unique id, and faces (T, 3)."""
 
     attributes: Mapping[int, NDArray[Any]]
     faces: Ints
 
 
 def read_primitive(primitive: Json, accessors: Accessors, *, views: int) -> tuple[Accessors, Ints]:
-    """Return accessors that hold the decoded attributes of a primitive with the extension, and its faces (T, 3).
+    """Return accessors with the decoded attributes of a primitive, and its faces (T, 3).
 
-    views: how many buffer views the file has. Attributes that the extension does not name stay as they are.
-    Raises FormatError where the data is not as the file says, UnsupportedError without DracoPy.
+    views: count of the file's buffer views. Attributes that are not in the extension are unchanged.
+    Raises FormatError if the data contradicts the file, UnsupportedError without DracoPy.
     """
     extension = primitive["extensions"][EXTENSION]
     view, names = _parsed(extension, views)
@@ -47,7 +47,7 @@ def read_primitive(primitive: Json, accessors: Accessors, *, views: int) -> tupl
 
 
 def decode(data: Bytes) -> DracoMesh:
-    """Return what Draco data holds. Raises FormatError where it is broken, UnsupportedError without DracoPy."""
+    """Decode Draco data. Raises FormatError for invalid data, UnsupportedError without DracoPy."""
     try:
         import DracoPy
     except ImportError:
@@ -55,9 +55,9 @@ def decode(data: Bytes) -> DracoMesh:
         raise UnsupportedError(problem, help="pip install 'gltf-anim[draco]'") from None
     try:
         found = DracoPy.decode(data.tobytes())
-    except Exception as error:  # its own kinds, and whatever the compiled code throws
+    except Exception as error:  # DracoPy's own types, and anything from the compiled code
         raise FormatError(f"Draco data can't be decoded ({str(error).lower()})") from None
-    faces = getattr(found, "faces", None)  # a cloud of points has none
+    faces = getattr(found, "faces", None)  # a point cloud has none
     return DracoMesh(
         {int(each["unique_id"]): np.asarray(each["data"]) for each in found.attributes},
         np.empty((0, 3), np.int64) if faces is None else np.asarray(faces, np.int64).reshape(-1, 3),
@@ -65,7 +65,7 @@ def decode(data: Bytes) -> DracoMesh:
 
 
 def _parsed(extension: object, views: int) -> tuple[int, dict[str, int]]:
-    """The buffer view and the unique ids by attribute that the extension names."""
+    """The extension's buffer view, and its unique ids by attribute."""
     about = extension if isinstance(extension, dict) else {}
     view, names = about.get("bufferView"), about.get("attributes")
     if type(view) is not int or not 0 <= view < views:
@@ -76,7 +76,7 @@ def _parsed(extension: object, views: int) -> tuple[int, dict[str, int]]:
 
 
 def _as_accessor(mesh: DracoMesh, number: int, name: str, about: Json) -> NDArray[Any]:
-    """A decoded attribute as the numbers that its accessor describes."""
+    """A decoded attribute in the form that its accessor describes."""
     found = mesh.attributes.get(number)
     if found is None:
         raise FormatError(f"Draco data has no attribute {number} ({name})")

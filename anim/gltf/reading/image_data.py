@@ -1,4 +1,4 @@
-"""Bytes of an image as the file keeps it: in a buffer view, in a data URI, or in a file beside it."""
+"""Encoded bytes of an image from a buffer view, a data URI or an external file."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from anim.gltf.reading.accessors import Accessors
 def image_data(document: Document, index: int, accessors: Accessors, resolve: Resolve | None = None) -> Bytes:
     """Return the encoded bytes of an image.
 
-    resolve: gives the bytes of a file beside the input by its relative path; None where there is no such place.
-    Raises FormatError where they can't be had.
+    resolve: returns the bytes of a file in the input's folder by its relative path; None if the input has no folder.
+    Raises FormatError if they cannot be read.
     """
     image = json_array(document.json, "images")[index]
     if "bufferView" in image:

@@ -1,4 +1,4 @@
-"""EXT_mesh_gpu_instancing: nodes whose mesh a player shows in many copies, of which a Scene holds one."""
+"""EXT_mesh_gpu_instancing: nodes with many instances of a mesh, of which a Scene has one."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ EXTENSION = "EXT_mesh_gpu_instancing"
 
 
 def instanced_nodes(json: Json) -> list[int]:
-    """Return the numbers of the nodes whose mesh is shown in copies."""
+    """Return the indices of the nodes with mesh instances."""
     nodes = enumerate(json_array(json, "nodes"))
     return [i for i, node in nodes if "mesh" in node and EXTENSION in node.get("extensions", {})]
 
 
 def check_not_required(document: Document) -> None:
-    """Raise UnsupportedError where copies of a mesh are required: no bound on one copy holds on the others."""
+    """Raise UnsupportedError if the file requires mesh instancing.
+
+    An error bound of one instance does not hold for the others.
+    """
     json = document.json
     if EXTENSION in json.get("extensionsRequired", ()) and (found := instanced_nodes(json)):
         raise UnsupportedError(

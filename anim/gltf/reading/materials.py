@@ -1,4 +1,4 @@
-"""Materials → base color: factor, texture and alpha mode; nothing else of a material is read."""
+"""Materials → base color: factor, texture and alpha mode only."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from anim.gltf.validation.rules import Check, ObjectRule, at_least, numbers, tex
 REPEAT, CLAMP_TO_EDGE, MIRRORED_REPEAT = 10497, 33071, 33648  # wrap modes of samplers
 NEAREST = 9728
 WHITE = (1.0, 1.0, 1.0, 1.0)
-ALPHA_CUTOFF = 0.5  # of MASK where a material says none (glTF 2.0, 3.9.4)
+ALPHA_CUTOFF = 0.5  # of MASK without a cutoff (glTF 2.0, 3.9.4)
 TRANSFORM, WEBP, BASISU = "KHR_texture_transform", "EXT_texture_webp", "KHR_texture_basisu"
 
 
 @dataclass(frozen=True, slots=True)
 class Texture:
-    """An image on a surface. image: its index in the file. texcoord: n of TEXCOORD_n.
+    """A base color texture. image: its index in the file. texcoord: n of TEXCOORD_n.
 
-    wrap: modes along u and v. nearest: whether texels are magnified without interpolation. transform: (2, 3), from
-    the file's texture coordinates (u, v, 1) to those that the image is sampled at.
+    wrap: modes along u and v. nearest: True if texels are magnified without interpolation. transform: (2, 3), from the
+    file's texture coordinates (u, v, 1) to the sampled ones.
     """
 
     image: int
@@ -47,9 +47,9 @@ class Material:
 
 
 def read_materials(document: Document, note: Callable[[str], None] = lambda _: None) -> tuple[Material, ...]:
-    """Return the materials of a file in its order; broken ones are opaque white, or have no texture.
+    """Return the materials of a file in its order; invalid ones are opaque white, or untextured.
 
-    note: called with what can't be shown, a line each.
+    note: called with a line for each unsupported property.
     """
     found = []
     for i, about in enumerate(json_array(document.json, "materials")):
@@ -85,7 +85,7 @@ _SOURCE = ObjectRule({"source": at_least(0)}, ("source",))
 
 
 def _material(about: Json) -> tuple[Material, Json | None]:
-    """A material without its texture, and what the file says of that."""
+    """A material without its texture, and the JSON of its texture."""
     _MATERIAL(about)
     surface = about.get("pbrMetallicRoughness", {})
     factor = tuple(float(each) for each in surface.get("baseColorFactor", WHITE))
@@ -109,7 +109,7 @@ def _texture(json: Json, info: Json) -> Texture:
 
 
 def _image(json: Json, texture: Json) -> int:
-    """The image that can be decoded: WebP where an extension names one, else the source that all players know."""
+    """Index of a decodable image: WebP of the extension, else the core source."""
     extensions = texture.get("extensions", {})
     ObjectRule({WEBP: _SOURCE, BASISU: _SOURCE})(extensions)
     named = extensions.get(WEBP, texture)
@@ -121,7 +121,7 @@ def _image(json: Json, texture: Json) -> int:
 
 
 def _matrix(transform: Json) -> Floats:
-    """Scale, then rotation counter-clockwise where v points down, then offset."""
+    """Scale, then rotation counter-clockwise for v pointing down, then offset."""
     (x, y), (across, down) = transform.get("offset", (0, 0)), transform.get("scale", (1, 1))
     rotation = transform.get("rotation", 0)
     cosine, sine = math.cos(rotation), math.sin(rotation)

@@ -1,4 +1,4 @@
-"""Primitives → Mesh: vertices, faces, influences and morph targets, whatever form the file keeps them in."""
+"""Primitives → Mesh: vertices, faces, influences and morph targets, in any encoding."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = 
 
 
 class Meshes:
-    """Reads meshes of one document, each once per skin size. normals, tangents: whether to read those too."""
+    """Reader of one document's meshes, each once per skin size.
+
+    normals, tangents: read those too.
+    """
 
     def __init__(
         self, document: Document, accessors: Accessors, *, normals: bool = False, tangents: bool = False
@@ -30,7 +33,7 @@ class Meshes:
         self._done: dict[tuple[int, int], Mesh] = {}
 
     def mesh(self, number: int, *, joint_count: int) -> Mesh:
-        """Return a mesh, its primitives one after another. joint_count: of the skin it is used with, 0 without one.
+        """Return a mesh, its primitives concatenated. joint_count: of its skin, 0 without one.
 
         Raises FormatError for influences outside the skin, UnsupportedError for Draco without DracoPy.
         """
@@ -117,7 +120,7 @@ class Meshes:
         return self._displacements(targets, name, vertices)
 
     def _displacements(self, targets: Sequence[Json], attribute: str, vertices: int) -> Floats:
-        """What targets add to an attribute (M, V, 3); nothing where one doesn't have it."""
+        """Morph displacements of an attribute (M, V, 3); empty if a target has none."""
         result = np.zeros((len(targets), vertices, 3))
         for i, target in enumerate(targets):
             if attribute in target:
@@ -137,7 +140,7 @@ class Meshes:
 
 
 def _triangles(indices: Ints, mode: int) -> Ints:
-    """Faces (T, 3) of triangles, a strip (every second one turned round) or a fan; none of points and lines."""
+    """Faces (T, 3) of triangles, a fan or a strip (every second one reversed); none of points, lines."""
     if mode == TRIANGLES:
         return indices[: len(indices) // 3 * 3].reshape(-1, 3)
     if mode in (TRIANGLE_STRIP, TRIANGLE_FAN) and len(indices) >= 3:
@@ -150,19 +153,19 @@ def _triangles(indices: Ints, mode: int) -> Ints:
 
 
 def _stack(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarray:
-    """Parts (V, I) under each other, filled up with zeros to the same number of influences."""
+    """Parts (V, I) concatenated, padded with zeros to the same influence count."""
     filled = [np.pad(part, ((0, 0), (0, influences - part.shape[1]))) for part in parts]
     return np.concatenate([np.empty((0, influences), dtype), *filled])
 
 
 def _of_all(parts: list[Floats | None]) -> Floats | None:
-    """Normals or tangents of all primitives, None where one has none: normals then come from the faces."""
+    """Normals or tangents of all primitives; None if one has none: faces then give the normals."""
     found = [part for part in parts if part is not None]
     return np.concatenate(found) if found and len(found) == len(parts) else None
 
 
 def _sums_of_all(parts: list[Mesh]) -> Floats | None:
-    """Sums of skin weights as stored of all primitives, None where all are 1."""
+    """Stored sums of skin weights of all primitives, None if all are 1."""
     if all(part.weight_sums is None for part in parts):
         return None
     sums = (np.ones(len(part.positions)) if part.weight_sums is None else part.weight_sums for part in parts)
@@ -170,7 +173,7 @@ def _sums_of_all(parts: list[Mesh]) -> Floats | None:
 
 
 def _targets_of_all(parts: list[tuple[Floats | None, Floats]]) -> Floats | None:
-    """What targets add to directions in all primitives, with what they add to positions: 0 where one says nothing."""
+    """Morph displacements of directions of all primitives, from (directions, positions); 0 if absent."""
     if all(turns is None for turns, _ in parts):
         return None
     return np.concatenate([np.zeros(moves.shape) if turns is None else turns for turns, moves in parts], axis=1)

@@ -1,4 +1,4 @@
-"""Nodes whose pose is a `matrix`: taken apart where a channel animates them, since glTF animates only TRS."""
+"""Decompose the `matrix` of animated nodes, since glTF animates only TRS."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from anim.gltf.document import Json, json_array, node_label
 from anim.gltf.validation import channel_targets
 from anim.maths import matrix
 
-MAX_SHEAR = 1e-4  # relative; what float32 products of rotations and scales leave behind is below
-DIGITS = 9  # significant ones of what is written: enough for any float32
+MAX_SHEAR = 1e-4  # relative; above the error of float32 products of rotations and scales
+DIGITS = 9  # significant digits written: enough for any float32
 IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 
 def animated_matrices(animations: Iterable[Json], nodes: list[Json]) -> list[int]:
-    """Return the numbers of the nodes with a `matrix` whose translation, rotation or scale a channel animates."""
+    """Return the indices of nodes with a `matrix` and animated translation, rotation or scale."""
     found = (channel_targets.channel_target(channel) for animation in animations for channel in animation["channels"])
     numbers = {target[0] for target in found if target is not None and target[1] != "weights"}
     return sorted(n for n in numbers if n is not None and "matrix" in nodes[n])
 
 
 def expand_matrices(json: Json) -> tuple[Json, tuple[int, ...]]:
-    """Return the JSON with TRS in place of the `matrix` of every animated node, and the numbers of those nodes.
+    """Return the JSON with TRS instead of `matrix` for animated nodes, and the indices of those nodes.
 
-    What is the identity is left out, as everywhere in glTF; nodes that nothing animates keep their matrix.
-    Raises FormatError for a matrix that no translation, rotation and scale give.
+    Identity properties are omitted; nodes without animation keep their matrix.
+    Raises FormatError for a matrix that is not a product of translation, rotation and scale.
     {"matrix": [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 1, 0, 0, 1]} → {"translation": [1, 0, 0], "scale": [2, 2, 2]}
     """
     nodes = json_array(json, "nodes")
@@ -45,9 +45,9 @@ def expand_matrices(json: Json) -> tuple[Json, tuple[int, ...]]:
 
 
 def decompose(values: list[float]) -> tuple[Floats, Floats, Floats, Floats | None]:
-    """Return translation (3,), rotation (4,) and scale (3,) of a node's `matrix`; and itself (3, 4) if it is sheared.
+    """Return translation (3,), rotation (4,), scale (3,) of a `matrix`; and itself (3, 4) if sheared.
 
-    values: 16 numbers, column by column. Sheared: no translation, rotation and scale give it within float32.
+    values: 16 numbers, column-major. Sheared: not a product of translation, rotation and scale within float32.
     """
     whole = np.array(values, float).reshape(4, 4).T
     translation, rotation, scale, shear = matrix.decompose(whole[:3])
@@ -56,14 +56,14 @@ def decompose(values: list[float]) -> tuple[Floats, Floats, Floats, Floats | Non
 
 
 def _expand(node: Json) -> Json:
-    """The node with TRS where its matrix stood."""
+    """The node with TRS instead of its matrix."""
     translation, rotation, scale, sheared = decompose(node["matrix"])
     if sheared is not None:
         raise FormatError(
             "is animated and has a sheared matrix (expected a product of translation, rotation and scale)",
             help="remove the shear where the file was made: apply the scale of the nodes above this one, then export",
         )
-    rotation = -rotation if rotation[3] < 0 else rotation  # both mean the same; w ≥ 0 is what most tools write
+    rotation = -rotation if rotation[3] < 0 else rotation  # both are the same rotation; most tools write w ≥ 0
     pose = {key: _round_values(part) for key, part in zip(IDENTITY, (translation, rotation, scale), strict=True)}
     pose = {key: part for key, part in pose.items() if part != list(IDENTITY[key])}
     new: Json = {}

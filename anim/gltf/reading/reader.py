@@ -1,4 +1,4 @@
-"""Document → Skeleton, Clips, Scene: what the file's numbers mean, every fault named with its place."""
+"""Document → Skeleton, Clips, Scene; errors state the position in the file."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from anim.gltf.reading.meshes import Meshes
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin
 
-LISTED = 3  # clips that a message names
+LISTED = 3  # clips in a message
 
 
 def skeleton(document: Document) -> Skeleton:
-    """Return all nodes in their rest pose; a `matrix` is taken apart, and kept whole where it is sheared."""
+    """Return all nodes in their rest pose; a `matrix` is decomposed, or kept whole if sheared."""
     _check(document)
     nodes = json_array(document.json, "nodes")
     n = len(nodes)
@@ -49,9 +49,10 @@ def skeleton(document: Document) -> Skeleton:
 
 
 def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip, ...]:
-    """Return the animations of the file in its order; channels without any target are left out, as glTF says.
+    """Return the animations of the file in its order, without channels that have no target.
 
-    Raises FormatError with clip, track and target for the first fault.
+    Channels without a target are ignored as glTF requires. Raises FormatError with clip, track and target for the first
+    fault.
     """
     _check(document)
     accessors = accessors or Accessors(document)
@@ -61,7 +62,7 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
 
 
 def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, Clip], list[AnimError]]:
-    """Return the animations that can be read, by number, and what is wrong with each of the others."""
+    """Return the readable animations by index, and the errors of the others."""
     reader = animations.Reader(document, accessors)
     found: dict[int, Clip] = {}
     faults: list[AnimError] = []
@@ -75,7 +76,7 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
 
 
 def names(document: Document) -> tuple[str, ...]:
-    """Return the names of the animations, empty where one has none, without reading them."""
+    """Return the animation names, "" for unnamed ones, without reading the animations."""
     _check(document)
     return tuple(animation.get("name", "") for animation in json_array(document.json, "animations"))
 
@@ -83,11 +84,11 @@ def names(document: Document) -> tuple[str, ...]:
 def scene(
     document: Document, accessors: Accessors | None = None, *, normals: bool = False, tangents: bool = False
 ) -> Scene:
-    """Return the skeleton with every mesh on it, nodes depth-first in the order of the file's scenes.
+    """Return the skeleton and its meshes, nodes depth-first in the order of the file's scenes.
 
-    normals, tangents: read those of vertices and morph targets too. A mesh that EXT_mesh_gpu_instancing shows in copies
-    is there once, on its node (`instancing.instanced_nodes`).
-    Raises UnsupportedError where vertices can't be had: Draco without the package DracoPy, an unknown compression,
+    normals, tangents: read those of vertices and morph targets too. A mesh with EXT_mesh_gpu_instancing is included
+    once, on its node (`instancing.instanced_nodes`).
+    Raises UnsupportedError if vertices cannot be read: Draco without the package DracoPy, an unknown compression,
     EXT_mesh_gpu_instancing where the file requires it.
     """
     _check(document)
@@ -108,7 +109,7 @@ def scene(
 
 
 def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
-    """Return the nodes that hold a skinned mesh, each with its skin, without reading any vertex."""
+    """Return the nodes with a skinned mesh, each with its skin, without reading vertices."""
     accessors = Accessors(document)
     found = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     return tuple(
@@ -117,7 +118,7 @@ def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
 
 
 def depth_first(json: Json) -> Iterator[int]:
-    """Yield node numbers depth-first: from the roots of the scenes, each once, then from roots in no scene."""
+    """Yield node indices depth-first: from the scenes' roots, each once, then from other roots."""
     nodes = json_array(json, "nodes")
     parents = hierarchy.parents(json)
     roots = [root for scene in json_array(json, "scenes") for root in scene.get("nodes", ())]
@@ -134,12 +135,12 @@ def depth_first(json: Json) -> Iterator[int]:
 
 
 def clip_label(name: str, number: int, what: str = "clip") -> str:
-    """Return how messages call a clip (or another thing): "clip 'walk'", or "clip #3" where it has no name."""
+    """Return a label for messages: "clip 'walk'", or "clip #3" for an unnamed clip (or another `what`)."""
     return f"{what} '{name}'" if name else f"{what} {clip_name(name, number)}"
 
 
 def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
-    """Return how messages call several clips, by names and numbers: "clips 'walk', #3, 'run' and 4 more"."""
+    """Return a label for several clips, by names and indices: "clips 'walk', #3, 'run' and 4 more"."""
     if len(clips) == 1:
         return clip_label(*clips[0])
     names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:LISTED]]
@@ -148,7 +149,7 @@ def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
 
 
 def clip_name(name: str, number: int) -> str:
-    """Return how tables and lists call a clip: its name, or "#3" without one, as selections take it."""
+    """Return a clip's name for tables and lists, "#3" for an unnamed one, as in selections."""
     return name or f"#{number}"
 
 

@@ -1,4 +1,4 @@
-"""JOINTS_n and WEIGHTS_n → the joints that move each vertex, and weights that add up to 1."""
+"""JOINTS_n and WEIGHTS_n → influences with weights that sum to 1."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from anim.errors import FormatError
 from anim.gltf.document import Json
 from anim.gltf.reading.accessors import Accessors
 
-SUM_TOLERANCE = 1e-4  # of a sum of floats; what a careful exporter rounds stays far below
+SUM_TOLERANCE = 1e-4  # of a sum of floats; above the rounding of careful exporters
 
 
 class Influences(NamedTuple):
-    """Joints and weights (V, I), I = 0 without a skin; each vertex's weights add up to 1.
+    """Joints and weights (V, I), I = 0 without a skin; each vertex's weights sum to 1.
 
-    sums: (V,) what they add up to as stored, 1 where they are only rounded; None where that is all of them.
+    sums: (V,) sums as stored, 1 if they deviate only by rounding; None if all are 1.
     """
 
     joints: Ints
@@ -26,12 +26,14 @@ class Influences(NamedTuple):
 
 
 def read_influences(accessors: Accessors, attributes: Json, vertices: int, joint_count: int) -> Influences:
-    """Return the influences of a primitive's vertices, all sets of four together. joint_count: of the skin, 0 for none.
+    """Return the influences of a primitive's vertices, all sets of four together.
 
-    Weights are divided by their sum, as players do that get any others (three.js, Babylon.js, Blender); a vertex
-    without weight follows the first joint of its first set, as in three.js and Babylon.js.
+    joint_count: of the skin, 0 for none.
+
+    Weights are divided by their sum, as in players that normalize (three.js, Babylon.js, Blender); a vertex without
+    weight follows the first joint of its first set, as in three.js and Babylon.js.
     weights 0.5, 0.25, 0, 0 → 2/3, 1/3, 0, 0 and a sum of 0.75
-    Raises FormatError for influences outside the skin, or none where a skin needs them.
+    Raises FormatError for influences outside the skin, or missing ones with a skin.
     """
     joints: list[Ints] = []
     weights: list[Floats] = []
@@ -59,7 +61,7 @@ def read_influences(accessors: Accessors, attributes: Json, vertices: int, joint
 
 
 def _normalize(joints: Ints, weights: Floats, tolerance: float) -> Influences:
-    """Weights as shares of their sum. Rows with a negative one are left for `Mesh` to refuse."""
+    """Weights divided by their sum. Rows with a negative weight are rejected by `Mesh`."""
     sums = weights.sum(axis=1)
     whole = weights.copy()
     none = ~weights.any(axis=1)
@@ -71,5 +73,5 @@ def _normalize(joints: Ints, weights: Floats, tolerance: float) -> Influences:
 
 
 def _step(dtype: np.dtype[Any]) -> float:
-    """The step between two weights as stored, which is as much as one can be rounded; 0 of floats."""
+    """The step between two stored weights, the maximum rounding error; 0 for floats."""
     return 0.0 if dtype.kind == "f" else 1 / float(np.iinfo(dtype).max)

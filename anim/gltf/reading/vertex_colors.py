@@ -1,4 +1,4 @@
-"""Texture coordinates and colors of vertices: what only pictures need, so that nobody else reads it."""
+"""Texture coordinates and colors of vertices, read only for rendering."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from anim.gltf.reading.materials import Texture
 
 @dataclass(frozen=True, slots=True)
 class VertexColors:
-    """Of the vertices of a primitive. texcoords: (V, 2), where its base color texture is sampled; zeros without any.
+    """Colors of a primitive's vertices.
 
+    texcoords: (V, 2) of the base color texture; zeros without any.
     colors: (V, 4) linear RGBA that multiply the base color; ones without any.
     """
 
@@ -30,9 +31,9 @@ class VertexColors:
 def read_vertex_colors(
     document: Document, primitive: Json, accessors: Accessors, texture: Texture | None
 ) -> VertexColors:
-    """Return the texture coordinates that a texture uses, transformed as it says, and COLOR_0.
+    """Return COLOR_0 and the texture coordinates of a texture, transformed as it requires.
 
-    Raises FormatError for numbers that don't fit the vertices, and what `Accessors` does.
+    Raises FormatError for a count other than the vertices', and the errors of `Accessors`.
     """
     attributes, count = primitive["attributes"], vertex_count(primitive, accessors)
     name = f"TEXCOORD_{texture.texcoord}" if texture is not None else ""
@@ -52,12 +53,12 @@ def read_vertex_colors(
 
 
 def no_vertex_colors(count: int) -> VertexColors:
-    """Return what a primitive of `count` vertices has where the file says nothing."""
+    """Return the defaults of a primitive with `count` vertices: zeros and ones."""
     return VertexColors(np.zeros((count, 2)), np.ones((count, 4)), False, False)
 
 
 def vertex_count(primitive: Json, accessors: Accessors) -> int:
-    """Return how many vertices a primitive has: none without POSITION."""
+    """Return the vertex count of a primitive, 0 without POSITION."""
     attributes = primitive["attributes"]
     return int(accessors.about(attributes["POSITION"])["count"]) if "POSITION" in attributes else 0
 

@@ -1,4 +1,4 @@
-"""Where numbers lie: does every accessor fit its view, every view its buffer, before anything is opened?"""
+"""Check that accessors fit their views and views their buffers, before buffers are opened."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from anim.gltf.document import Json, json_array
 COMPONENT_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes by componentType
 COMPONENTS = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4)}  # (columns, rows) by type
 COMPONENTS |= {"MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4)}
-MAX_ZERO_FILLED = 2**23  # components of an accessor without data; its size is bounded by nothing in the file
+MAX_ZERO_FILLED = 2**23  # components of an accessor without data; nothing in the file bounds its size
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 def check(json: Json) -> None:
-    """Raise FormatError at the first view or accessor that leaves its bounds or is misaligned."""
+    """Raise FormatError at the first view or accessor that exceeds its bounds or is misaligned."""
     buffers, views = json_array(json, "buffers"), json_array(json, "bufferViews")
     for i, view in enumerate(views):
         try:
@@ -31,7 +31,10 @@ def check(json: Json) -> None:
 
 
 def element(component_type: int, kind: str) -> tuple[int, int, int]:
-    """Return (columns, rows, bytes from column to column) of one element: matrix columns start on 4-byte boundaries."""
+    """Return (columns, rows, bytes per column) of one element.
+
+    Matrix columns start on 4-byte boundaries.
+    """
     columns, rows = COMPONENTS[kind]
     size = rows * COMPONENT_SIZES[component_type]
     return columns, rows, (size + 3) & ~3 if columns > 1 else size
@@ -39,13 +42,13 @@ def element(component_type: int, kind: str) -> tuple[int, int, int]:
 
 @cache
 def element_size(component_type: int, kind: str) -> int:
-    """Return the bytes of one element; of a matrix's last column too, with its padding."""
+    """Return the bytes of one element, including the padding of a matrix's last column."""
     columns, _, column = element(component_type, kind)
     return columns * column
 
 
 def compression(view: Json) -> Json | None:
-    """Return the meshopt extension object of a view, None where it is not compressed."""
+    """Return the meshopt extension object of a view, None for an uncompressed one."""
     extensions = view.get("extensions")
     if not extensions:
         return None
@@ -78,7 +81,7 @@ def _check_compressed(compressed: Any, buffers: list[Json]) -> None:
     if type(compressed.get("byteOffset", 0)) is not int or compressed.get("byteOffset", 0) < 0:
         raise FormatError(f"byteOffset is {compressed['byteOffset']!r}", where=where)
     _check_range(compressed, compressed["byteLength"], buffers[compressed["buffer"]]["byteLength"])
-    # Equal elements shrink by about 1000 : 1 at best (a block of 256 bytes to two bits); beyond that the count lies.
+    # Equal elements shrink by about 1000 : 1 at best (a block of 256 bytes to two bits); a higher count is false.
     if compressed["count"] * compressed["byteStride"] > 4096 * (compressed["byteLength"] + 256):
         raise FormatError(
             f"claims {compressed['count']} elements in {compressed['byteLength']} bytes (not possible)", where=where
@@ -94,7 +97,7 @@ def _check_range(place: Json, length: int, available: int) -> None:
 def _check_accessor(accessor: Json, views: list[Json]) -> None:
     kind, component_type, count = accessor["type"], accessor["componentType"], accessor["count"]
     if kind not in COMPONENTS:
-        return  # the schema leaves the list open; whoever needs the data refuses
+        return  # the schema allows other types; readers of the data reject them
     size = element_size(component_type, kind)
     if "bufferView" in accessor:
         view = views[accessor["bufferView"]]

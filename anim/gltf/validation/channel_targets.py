@@ -1,4 +1,4 @@
-"""Which property a channel animates: a node's own, or by KHR_animation_pointer anything that a JSON pointer names."""
+"""Target properties of channels: a node's own, or any property by KHR_animation_pointer."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Target: TypeAlias = tuple[int | None, str, str | None]  # node, path, pointer
 
 
 def channel_target(channel: Json) -> Target | None:
-    """Return (node, path, pointer) that a channel animates, None where glTF says to ignore it or it is not known.
+    """Return (node, path, pointer) of a channel, None if glTF ignores the target or it is unknown.
 
-    A pointer at a node's translation, rotation, scale or weights gives that node and path: plain channels could do it.
-    of_channel({"sampler": 0, "target": {"node": 3, "path": "scale"}}) → (3, "scale", None)
+    A pointer at a node's translation, rotation, scale or weights gives that node and path, like a plain channel.
+    channel_target({"sampler": 0, "target": {"node": 3, "path": "scale"}}) → (3, "scale", None)
     """
     target = channel["target"]
     path = target["path"]
@@ -31,9 +31,9 @@ def channel_target(channel: Json) -> Target | None:
 
 
 def check(json: Json) -> None:
-    """Raise FormatError for a channel on a node that is missing, or a second one for its property.
+    """Raise FormatError for a channel on a missing node, or a second one for the same property.
 
-    Two channels for one pointer outside the nodes stand in files of real exporters; they are read and kept as they are.
+    Files of real exporters contain two channels for one pointer outside the nodes; they are read and kept.
     """
     nodes = json_array(json, "nodes")
     for i, animation in enumerate(json_array(json, "animations")):
@@ -49,7 +49,7 @@ def check(json: Json) -> None:
 
 
 def check_node(json: Json, node: int, path: str, width: int) -> None:
-    """Raise NotFoundError or RangeError where no node has a `path` of `width` numbers to animate."""
+    """Raise NotFoundError or RangeError unless the node has an animatable `path` of `width` values."""
     nodes = json_array(json, "nodes")
     if node >= len(nodes):
         raise NotFoundError(f"there is no node {node} (the file has {len(nodes)}, from 0 on)")
@@ -60,7 +60,7 @@ def check_node(json: Json, node: int, path: str, width: int) -> None:
 
 
 def target_count(json: Json, node: int) -> int:
-    """Return how many morph targets the mesh of a node has."""
+    """Return the morph target count of a node's mesh."""
     mesh = json_array(json, "nodes")[node].get("mesh")
     primitives = json_array(json, "meshes")[mesh]["primitives"] if mesh is not None else []
     return len(primitives[0].get("targets", ())) if primitives else 0

@@ -1,4 +1,4 @@
-"""Are the nodes a forest, and do skins and animation targets fit them?"""
+"""Check that nodes form a forest, and that skins and animation targets fit them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def parents(json: Json) -> list[int]:
 
 
 def check(json: Json) -> None:
-    """Raise FormatError where nodes are no forest, or a skin's matrices don't fit its joints."""
+    """Raise FormatError unless nodes form a forest and each skin's matrices match its joints."""
     parents(json)
     accessors = json_array(json, "accessors")
     for i, skin in enumerate(json_array(json, "skins")):
@@ -40,7 +40,7 @@ def check(json: Json) -> None:
 
 def _check_forest(nodes: list[Json], parent: list[int]) -> None:
     reached = [i for i, above in enumerate(parent) if above < 0]
-    for node in reached:  # grows while it is gone through
+    for node in reached:  # grows during the loop
         reached.extend(nodes[node].get("children", ()))
     if len(reached) < len(nodes):
         lost = min(set(range(len(nodes))) - set(reached))

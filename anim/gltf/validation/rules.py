@@ -1,4 +1,4 @@
-"""What JSON values must look like: checks that raise FormatError, with the place as a path."""
+"""Rules for JSON values: checks that raise FormatError with the position as a path."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any, TypeAlias
 from anim.errors import FormatError
 
 Check: TypeAlias = Callable[[Any], None]
-LARGEST = 3.4e38  # what float32 holds
+LARGEST = 3.4e38  # near float32's maximum
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectRule:
-    """What an object must look like: a check per property, what must be there, and a check of the whole."""
+    """Rule for an object: a check per property, required properties, and a check of the object."""
 
     properties: Mapping[str, Check]
     required: tuple[str, ...] = ()
@@ -39,7 +39,7 @@ class ObjectRule:
 
 
 def check_property(key: str, rule: Check, value: Any) -> None:
-    """Check the value of a property; errors name it."""
+    """Check the value of a property; errors include its name."""
     try:
         rule(value)
     except FormatError as error:
@@ -47,7 +47,7 @@ def check_property(key: str, rule: Check, value: Any) -> None:
 
 
 def check_items(values: list[Any], rule: Check, key: str) -> None:
-    """Check every value of an array; errors name its place."""
+    """Check every value of an array; errors include its index."""
     i = 0
     try:
         for i, value in enumerate(values):  # noqa: B007 (i is read after the loop broke)
@@ -61,7 +61,7 @@ def _join_path(error: FormatError) -> str:
 
 
 def list_of(rule: Check) -> Check:
-    """Return the check of an array whose values pass a rule."""
+    """Return a check for an array of values that pass a rule."""
 
     def check_list(value: Any) -> None:
         of_type(value, list, "an array")
@@ -71,7 +71,7 @@ def list_of(rule: Check) -> Check:
 
 
 def map_of(rule: Check) -> Check:
-    """Return the check of an object whose values pass a rule, whatever their names."""
+    """Return a check for an object of any keys with values that pass a rule."""
 
     def check_map(value: Any) -> None:
         of_type(value, dict, "an object")
@@ -82,7 +82,7 @@ def map_of(rule: Check) -> Check:
 
 
 def index(of: str, count: int) -> Check:
-    """Return the check of a number of one of the file's `count` things."""
+    """Return a check for an index into `count` objects."""
 
     def check_index(value: Any) -> None:
         if type(value) is not int or not 0 <= value < count:
@@ -93,7 +93,7 @@ def index(of: str, count: int) -> Check:
 
 
 def at_least(least: int) -> Check:
-    """Return the check of a whole number that is not less."""
+    """Return a check for a whole number ≥ `least`."""
 
     def check_whole(value: Any) -> None:
         if type(value) is not int or value < least:
@@ -104,7 +104,7 @@ def at_least(least: int) -> Check:
 
 
 def one_of(*allowed: int) -> Check:
-    """Return the check of a number out of a few."""
+    """Return a check for one of a few whole numbers."""
 
     def check_one(value: Any) -> None:
         if type(value) is not int or value not in allowed:
@@ -114,7 +114,7 @@ def one_of(*allowed: int) -> Check:
 
 
 def numbers(count: int | None) -> Check:
-    """Return the check of an array of finite numbers, `count` of them where that is fixed."""
+    """Return a check for an array of finite numbers, of length `count` unless None."""
 
     def check_numbers(value: Any) -> None:
         of_type(value, list, "an array")
@@ -139,7 +139,7 @@ def boolean(value: Any) -> None:
 
 
 def of_type(value: Any, kind: type, words: str, where: str = "") -> None:
-    """Check the type of a value. words: what it should be."""
+    """Check the type of a value. words: the expected type."""
     if type(value) is not kind:
         raise FormatError(f"is {_name(value)} (expected {words})", where=where)
 

@@ -1,4 +1,4 @@
-"""What is left of a file that is not all glTF 2.0: the parts that are, for commands that only look."""
+"""Valid parts of an invalid glTF file, for read-only commands."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from anim.gltf.document import Json, json_array
 from anim.gltf.validation import structure
 from anim.gltf.writing.references import views_of
 
-MAX_FAULTS = 32  # every one of them takes a look at the whole file
+MAX_FAULTS = 32  # each fault needs a check of the whole file
 JSON_POINTER = re.compile(r"(\w+)(?:\[(\d+)\])?\.?(\w*)(?:\[(\d+)\])?")
 STUB: Json = {"componentType": 5121, "count": 1, "type": "SCALAR"}
 
 
 @dataclass(frozen=True, slots=True)
 class Salvage:
-    """json: valid where it matters, with numbers as they were. faults: what is wrong with the rest.
+    """json: the valid parts, with the original indices. faults: errors in the rest.
 
-    lost_clips, lost_skins: numbers of those that nothing can be said about.
+    lost_clips, lost_skins: indices of those that cannot be read at all.
     """
 
     json: Json
@@ -31,7 +31,7 @@ class Salvage:
 
 
 def salvage(json: Json) -> Salvage:
-    """Return the parts of the JSON that pass `structure.check`; what rests on a faulty part goes with it."""
+    """Return the parts of the JSON that pass `schema.validate`, without those that depend on faulty parts."""
     left = _Remaining(json)
     for _ in range(MAX_FAULTS):
         try:
@@ -47,7 +47,7 @@ def salvage(json: Json) -> Salvage:
 
 
 class _Remaining:
-    """What is left of a JSON, growing smaller."""
+    """Remaining JSON, reduced by each fault."""
 
     def __init__(self, json: Json) -> None:
         self.json = dict(json)
@@ -65,7 +65,7 @@ class _Remaining:
         }
 
     def remove(self, where: str) -> None:
-        """Take away what a fault lies in."""
+        """Remove the part with a fault."""
         match = JSON_POINTER.match(where)
         kind, number, key, inner = match.groups() if match else ("asset", None, "", None)
         if kind == "asset":
@@ -79,7 +79,7 @@ class _Remaining:
             self._put(kind, int(number), {})
 
     def _whole(self, kind: str) -> None:
-        """Take away an array that is none, and what rests on all of it."""
+        """Remove a value that is not an array, and everything that depends on it."""
         self.json.pop(kind, None)
         if kind == "buffers":
             self._whole("bufferViews")
@@ -98,7 +98,7 @@ class _Remaining:
         self.json[kind] = [value if i == number else old for i, old in enumerate(self.json[kind])]
 
     def _lose(self, kind: str, key: str, number: int, lose: Callable[[int], None]) -> None:
-        """Take away everything of a kind that names `number` by this property."""
+        """Remove every object of a kind that refers to index `number` by this property."""
         for i, each in enumerate(_objects(self.json, kind)):
             if each.get(key) == number:
                 lose(i)
@@ -130,7 +130,7 @@ class _Remaining:
         old = self.json["animations"][number]
         name = old.get("name") if type(old) is dict else None
         if key == "channels" and channel is not None and len(old["channels"]) > 1:
-            idle = {"sampler": 0, "target": {"path": "unreadable"}}  # which glTF says to ignore
+            idle = {"sampler": 0, "target": {"path": "unreadable"}}  # ignored by readers, as glTF requires
             channels = [idle if k == channel else each for k, each in enumerate(old["channels"])]
             self._put("animations", number, {**old, "channels": channels})
             return
@@ -146,7 +146,7 @@ class _Remaining:
             self._put("nodes", number, _drop_items(node, key))
         elif "matrix" in node and node.keys() & {"translation", "rotation", "scale"}:
             self._node(number, "matrix")
-        else:  # on a cycle, or under two parents: it becomes a root
+        else:  # in a cycle, or with two parents: it becomes a root
             self.json["nodes"] = [_drop_child(each, number) for each in self.json["nodes"]]
 
     def _skin(self, number: int, key: str) -> None:
@@ -162,7 +162,7 @@ class _Remaining:
 
 
 def _objects(json: Json, kind: str) -> list[Json]:
-    """The objects of an array, an empty one for what is none."""
+    """The objects of an array; empty if it is not an array."""
     return [each if type(each) is dict else {} for each in json_array(json, kind)]
 
 
@@ -174,7 +174,7 @@ def _list(value: Json, key: str) -> list[Json]:
 def _views_named(accessor: Json) -> Iterable[Any]:
     try:
         return views_of(accessor)
-    except (KeyError, TypeError):  # its own fault comes up later
+    except (KeyError, TypeError):  # reported as a fault of its own later
         return [accessor.get("bufferView")]
 
 

@@ -1,4 +1,4 @@
-"""What glTF's schema asks of each kind of object, as far as animation, skinning and buffers rest on it."""
+"""glTF's schema, for the properties used by animation, skinning and buffers."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from anim.gltf.validation.rules import (
     text,
 )
 
-Counts: TypeAlias = Mapping[str, int]  # how many of each kind the file has
-ANYTHING = ObjectRule({})  # an object, whatever is in it
+Counts: TypeAlias = Mapping[str, int]  # count of each kind of object
+ANYTHING = ObjectRule({})  # an object with any content
 
 
 def rules(counts: Counts) -> dict[str, Check]:
-    """Return the check of each kind of object, by the name of its array in the file; "asset" is none."""
+    """Return the check of each kind of object by its array's name, and of "asset"."""
     return {
         "asset": ObjectRule({"version": _version, "minVersion": text}, ("version",)),
         "accessors": _accessor(counts),

@@ -1,7 +1,7 @@
-"""Is the JSON what glTF's schema says? Checked once at the door, so that nothing behind it meets a missing key.
+"""Validate the JSON by glTF's schema once on reading, so that later code needs no checks.
 
-Only what animation, skinning and buffers rest on is checked, and only faults that leave no single meaning: an empty
-array, a wrong min/max or an unknown property does no harm and is left to `inspect`'s findings.
+Only properties used by animation, skinning and buffers are checked, and only ambiguous faults: an empty array, a wrong
+min/max or an unknown property is harmless and left to `inspect`'s findings.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TOP_ARRAYS = frozenset(
 
 
 def validate(json: Json) -> None:
-    """Raise FormatError, with the place as a path into the JSON, at the first thing that is not glTF 2.0."""
+    """Raise FormatError, with a JSON path, at the first violation of glTF 2.0."""
     for key in TOP_ARRAYS:
         of_type(json.get(key, []), list, "an array", key)
     counts = {key: len(json.get(key, [])) for key in TOP_ARRAYS}

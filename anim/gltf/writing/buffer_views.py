@@ -1,4 +1,4 @@
-"""Contents → views: which lie together and in which order, and which views are compressed because that pays."""
+"""Accessor contents → buffer views: grouping, order and compression by size."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from anim.gltf.meshopt import codec, stream_order
 from anim.gltf.meshopt.storage import AccessorStorage
 from anim.gltf.writing.encoding import AccessorData
 
-TYPICAL = 10_000  # stands for an offset or a length where the price of their digits is asked
-PLAIN_VIEW = 50  # bytes of the JSON of the one plain view
+TYPICAL = 10_000  # typical offset or length, to estimate the cost of its digits
+PLAIN_VIEW = 50  # JSON bytes of the plain view
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A new view: the bytes to store, and what a reader makes of them.
+    """A new view: the bytes to store, and their decoded layout.
 
-    length: bytes when decoded. stride: bytes of an element of a compressed stream, 0 for a plain view.
+    length: decoded bytes. stride: bytes per element of a compressed stream, 0 for a plain view.
     """
 
     stored: bytes
@@ -30,7 +30,7 @@ class View:
     filter: str = "NONE"
 
     def about(self, place: tuple[int, int], decoded: tuple[int, int], extension: str) -> Json:
-        """Return the JSON. place, decoded: (buffer, offset) of the stored bytes, and of what they become."""
+        """Return the JSON. place, decoded: (buffer, offset) of the stored and of the decoded bytes."""
         if not self.stride:
             return {**_at(place), "byteLength": self.length}
         stream = {**_at(place), "byteLength": len(self.stored), "byteStride": self.stride}
@@ -42,7 +42,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """New views, and for each content (place among them, byte offset)."""
+    """New views, and for each content (view index, byte offset)."""
 
     views: tuple[View, ...]
     places: tuple[tuple[int, int], ...]
@@ -50,16 +50,16 @@ class Layout:
 
 @dataclass(frozen=True, slots=True)
 class _Stream:
-    """A view to be, and the contents in it, in order."""
+    """A view under construction, and its contents in order."""
 
     view: View
     members: tuple[int, ...]
 
 
 def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> Layout:
-    """Return where all contents go: one plain view, and under an extension those compressed ones that pay.
+    """Return the layout of all contents: one plain view, and compressed views where they are smaller.
 
-    overhead: bytes that the first compressed view costs beside its own JSON and data.
+    overhead: bytes of the first compressed view besides its own JSON and data.
     """
     streams = _worth_sharing(contents, packing, overhead) if packing.extension else []
     apart = {i for stream in streams for i in stream.members}
@@ -77,26 +77,29 @@ def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, ov
 
 
 def _worth_sharing(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> list[_Stream]:
-    """The compressed streams with which all data and JSON take fewest bytes."""
+    """The compressed streams that give the fewest bytes of data and JSON in total."""
     groups: dict[tuple[str, int], list[int]] = {}
     for i, content in enumerate(contents):
         groups.setdefault(_kind(content), []).append(i)
     streams = [s for members in groups.values() for s in _streams(contents, members, packing.extension)]
     gains = [stream.view.length - _price(stream.view, packing.extension) for stream in streams]
     good = [stream for stream, gain in zip(streams, gains, strict=True) if gain > 0]
-    # Where nothing at all is left for the plain view, its JSON is saved too.
+    # If nothing remains for the plain view, its JSON is saved too.
     candidates = [([], 0), (good, sum(gain for gain in gains if gain > 0) - overhead)]
     candidates.append((streams, sum(gains) - overhead + PLAIN_VIEW))
     return max(candidates, key=lambda candidate: candidate[1])[0]
 
 
 def _kind(content: AccessorData) -> tuple[str, int]:
-    """The filter, and the bytes of an element, whole fours."""
+    """The filter, and the bytes per element, a multiple of four."""
     return content.filtered.name if content.filtered else "NONE", content.element_size + -content.element_size % 4
 
 
 def _streams(contents: Sequence[AccessorData], members: Sequence[int], extension: str) -> list[_Stream]:
-    """One stream of elements; or several, of whole keys, so that a weight stands above the same one of the last key."""
+    """Streams of the members: one of elements, or several of whole keys.
+
+    In streams of keys each weight is predicted from the same weight of the previous key.
+    """
     name, stride = _kind(contents[members[0]])
     one = [_encode(contents, members, name, stride, extension)]
     by_key: dict[int, list[int]] = {}
@@ -123,7 +126,7 @@ def _codes(content: AccessorData) -> bytes:
 
 
 def _price(view: View, extension: str) -> int:
-    """Bytes of a compressed view, its JSON with the comma included."""
+    """Bytes of a compressed view, including its JSON with the comma."""
     about = view.about((0, TYPICAL), (1, TYPICAL), extension)
     return _size(view.stored) + len(json_text.dump(about)) + 1
 
@@ -142,5 +145,5 @@ def _at(place: tuple[int, int]) -> Json:
 
 
 def total(views: Iterable[View]) -> int:
-    """Return the bytes that the views take in a buffer, each on a multiple of four."""
+    """Return the bytes of the views in a buffer, each aligned to four."""
     return sum(_size(view.stored) for view in views)

@@ -1,4 +1,4 @@
-"""The buffers of a document while clips are replaced: dead bytes go, and the bytes of new views come."""
+"""Rebuild the buffers while clips are replaced: drop unused bytes, add those of new views."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from anim.gltf.writing.buffer_views import View
 from anim.gltf.writing.byte_ranges import OffsetMap
 from anim.gltf.writing.references import References
 
-MIN_FREED_BYTES = 4  # bytes of a buffer that nothing is left of: glTF knows none without
+MIN_FREED_BYTES = 4  # bytes of an otherwise empty buffer: glTF requires at least one
 
 
 @dataclass(frozen=True, slots=True)
 class RebuiltBuffers:
     """Buffers after the change.
 
-    described: their JSON. views: JSON of the new views. shift: for each old buffer, where its bytes are now.
-    target: the buffer that new bytes go to.
+    described: their JSON. views: JSON of the new views. shift: new byte offsets of each old buffer.
+    target: the buffer of the new bytes.
     """
 
     buffers: tuple[Buffer, ...]
@@ -35,7 +35,7 @@ class RebuiltBuffers:
 def rebuild_buffers(
     document: Document, freed: Set[int], unused: Set[int], outside: References, new: Sequence[View], extension: str
 ) -> RebuiltBuffers:
-    """Return the buffers without what only `freed` accessors and `unused` views used, and with the `new` views.
+    """Return the buffers without the bytes of `freed` accessors and `unused` views, plus `new` views.
 
     extension: of the compressed ones among `new`.
     """
@@ -63,9 +63,9 @@ def rebuild_buffers(
 
 
 def _target(document: Document, shift: Sequence[OffsetMap]) -> int:
-    """The buffer that new data goes to: where most was dropped, else the first with data, else one more.
+    """Index of the buffer for new data: the one with most dropped bytes, else the first, else a new one.
 
-    Never one that holds what compressed views become: nothing else may lie there.
+    Never a fallback buffer: it must contain decompressed views only.
     """
     described = json_array(document.json, "buffers")
     candidates = [
@@ -77,7 +77,7 @@ def _target(document: Document, shift: Sequence[OffsetMap]) -> int:
 
 
 def _free_some(shift: OffsetMap, length: int) -> OffsetMap:
-    """The same, but that a buffer which would end up empty keeps its first bytes."""
+    """The same map, but an otherwise empty buffer keeps its first bytes."""
     return shift if shift(length) else OffsetMap(byte_ranges.difference(shift.dropped, [(0, MIN_FREED_BYTES)]))
 
 
@@ -101,9 +101,9 @@ def _make_room(
     new: Sequence[View],
     extension: str,
 ) -> tuple[int, int] | None:
-    """Let a buffer without bytes stand for those of new compressed views, in place; return (its number, offset).
+    """Reserve a fallback buffer for new compressed views, in place; return (its index, offset).
 
-    None where no view is compressed. left: the old views that stay. imagined: the buffers without bytes there are.
+    None if no view is compressed. left: the remaining old views. imagined: the existing buffers without bytes.
     """
     room = sum(_whole_views(view.length) for view in new if view.stride)
     if not room:
@@ -122,7 +122,7 @@ def _make_room(
 
 
 def _spare(document: Document, unused: Set[int], left: Sequence[Json]) -> set[int]:
-    """Buffers that an unused view lay in, and that no view is left in."""
+    """Buffers of unused views without any remaining view."""
     views = json_array(document.json, "bufferViews")
     lost = {buffer for i in unused for buffer, _ in compaction.referenced_ranges(views[i])}
     return lost - {buffer for view in left for buffer, _ in compaction.referenced_ranges(view)}

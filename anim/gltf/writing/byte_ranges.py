@@ -1,4 +1,4 @@
-"""Sets of byte ranges, and where bytes end up when some of them are dropped."""
+"""Sets of byte ranges, and byte offsets after some of them are dropped."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from typing import TypeAlias
 
-Range: TypeAlias = tuple[int, int]  # first byte, byte after the last
+Range: TypeAlias = tuple[int, int]  # first byte, end
 
-ALIGNMENT = 4  # bytes; nothing in a glTF buffer needs more
+ALIGNMENT = 4  # bytes; the maximum alignment in a glTF buffer
 
 
 def union(ranges: Iterable[Range]) -> list[Range]:
@@ -44,13 +44,13 @@ def difference(ranges: Iterable[Range], without: Iterable[Range]) -> list[Range]
 
 
 def aligned(ranges: Iterable[Range]) -> list[Range]:
-    """Return the part of each range that starts and ends on a multiple of four, so that what follows stays aligned."""
+    """Return each range shrunk to multiples of four, so that later bytes remain aligned."""
     inward = [(-(-start // ALIGNMENT) * ALIGNMENT, end // ALIGNMENT * ALIGNMENT) for start, end in ranges]
     return [(start, end) for start, end in inward if start < end]
 
 
 class OffsetMap:
-    """Where bytes go when `dropped` ranges are taken out of a buffer."""
+    """New byte offsets of a buffer without its `dropped` ranges."""
 
     def __init__(self, dropped: list[Range]) -> None:
         self.dropped = union(dropped)
@@ -61,11 +61,11 @@ class OffsetMap:
 
     @property
     def dropped_bytes(self) -> int:
-        """How many bytes go."""
+        """Total dropped bytes."""
         return self._before[-1]
 
     def __call__(self, at: int) -> int:
-        """Return the new position of byte `at`; of a dropped one, that of the next that stays."""
+        """Return the new offset of byte `at`; for a dropped one, that of the next kept byte."""
         i = bisect_right(self._starts, at)
         inside = max(self.dropped[i - 1][1] - at, 0) if i else 0
         return at - self._before[i] + inside

@@ -1,4 +1,4 @@
-"""Bytes that nobody uses any more are taken out of buffers; views and accessors behind them move up."""
+"""Drop unused bytes of buffers and relocate the views and accessors after them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anim.gltf.writing.references import References, views_of
 
 
 def unused_views(document: Document, freed: Set[int], outside: References) -> set[int]:
-    """Return the views that only the accessors in `freed` lie in."""
+    """Return the views that only accessors in `freed` use."""
     accessors = json_array(document.json, "accessors")
     theirs = {view for number in freed for view in views_of(accessors[number])}
     others = {view for i, accessor in enumerate(accessors) if i not in freed for view in views_of(accessor)}
@@ -24,10 +24,10 @@ def unused_views(document: Document, freed: Set[int], outside: References) -> se
 def offset_maps(
     document: Document, freed: Set[int], unused: Set[int], outside: References, movable: Set[int]
 ) -> list[OffsetMap]:
-    """Return, for each buffer, where its bytes go when freed accessors and unused views are dropped.
+    """Return the offset map of each buffer without its freed accessors and unused views.
 
-    A view that freed accessors share with others loses their bytes too, unless someone refers to the view itself.
-    movable: buffers in which bytes may move; those of other buffers stay.
+    A view shared by freed accessors and others loses their bytes too, unless something refers to the view itself.
+    movable: buffers with movable bytes; others are unchanged.
     """
     dropped: list[list[Range]] = [[] for _ in document.buffers]
     needed: list[list[Range]] = [[] for _ in document.buffers]
@@ -50,12 +50,12 @@ def offset_maps(
 
 
 def is_placeholder(view: Json) -> bool:
-    """Return whether a view can be one that only holds a number: it names a byte, but that is not its own."""
+    """Return True for a possible placeholder view: one byte that is not its own."""
     return view.keys() == {"buffer", "byteLength"} and view["byteLength"] == 1
 
 
 def relocate_view(view: Json, shift: list[OffsetMap]) -> Json:
-    """Return a view with its range, and that of its compressed data, where the bytes are now."""
+    """Return a view with the new offsets of its bytes and of its compressed data."""
     moved = _relocate_offsets(view, shift[view["buffer"]])
     compressed = buffer_layout.compression(view)
     if compressed is not None:
@@ -66,7 +66,7 @@ def relocate_view(view: Json, shift: list[OffsetMap]) -> Json:
 
 
 def relocate_accessor(accessor: Json, views: list[Json], shift: list[OffsetMap]) -> Json:
-    """Return an accessor with its offsets into its views where the bytes are now. views: as they were."""
+    """Return an accessor with the new offsets into its views. views: the old ones."""
     moved = _relocate_offset(accessor, views, shift)
     if "sparse" in accessor:
         parts = {part: _relocate_offset(accessor["sparse"][part], views, shift) for part in ("indices", "values")}
@@ -76,9 +76,9 @@ def relocate_accessor(accessor: Json, views: list[Json], shift: list[OffsetMap])
 
 
 def rebuild_buffer(buffer: Buffer, shift: OffsetMap, appended: list[Bytes], where: str) -> Buffer:
-    """Return the buffer without dropped bytes and with `appended` ones, which start on a multiple of four.
+    """Return the buffer without dropped bytes and with `appended` ones, aligned to four.
 
-    One without data gets shorter only.
+    A buffer without data only gets shorter.
     """
     if not shift.dropped and not appended:
         return buffer
@@ -96,7 +96,7 @@ def rebuild_buffer(buffer: Buffer, shift: OffsetMap, appended: list[Bytes], wher
 
 
 def referenced_ranges(view: Json) -> Iterator[tuple[int, Range]]:
-    """Yield (buffer, range) of a view's bytes: decoded, and compressed where it is."""
+    """Yield (buffer, range) of a view's decoded bytes, and of its compressed ones."""
     yield view["buffer"], _span(view, view["byteLength"])
     compressed = buffer_layout.compression(view)
     if compressed is not None:
@@ -104,7 +104,7 @@ def referenced_ranges(view: Json) -> Iterator[tuple[int, Range]]:
 
 
 def _spans(json: Json, freed: Set[int]) -> dict[int, list[tuple[int, Range]]]:
-    """For each view that a freed accessor lies in: (accessor, range) of everything in it, from the view's start."""
+    """For each view of a freed accessor: (accessor, range) of all its accessors, from the view's start."""
     accessors, views = json_array(json, "accessors"), json_array(json, "bufferViews")
     wanted = {view for number in freed for view in views_of(accessors[number])}
     spans: dict[int, list[tuple[int, Range]]] = {view: [] for view in wanted}
@@ -116,7 +116,7 @@ def _spans(json: Json, freed: Set[int]) -> dict[int, list[tuple[int, Range]]]:
 
 
 def _accessor_spans(accessor: Json, views: list[Json]) -> Iterator[tuple[int, Range]]:
-    if accessor["type"] not in buffer_layout.COMPONENTS:  # unknown: its size is unknown too
+    if accessor["type"] not in buffer_layout.COMPONENTS:  # unknown type: its size is unknown too
         yield from ((view, (0, views[view]["byteLength"])) for view in views_of(accessor))
         return
     size = buffer_layout.element_size(accessor["componentType"], accessor["type"])
@@ -140,7 +140,10 @@ def _relocate(span: Range, by: int) -> Range:
 
 
 def _droppable(dropped: list[Range], needed: list[Range], length: int) -> list[Range]:
-    """What can go: no byte of it needed, padding between dropped ranges included, whole multiples of four."""
+    """Droppable ranges: no needed byte, whole multiples of four.
+
+    Padding between dropped ranges is included.
+    """
     free = byte_ranges.difference(dropped, needed)
     if not free:
         return []

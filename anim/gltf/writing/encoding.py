@@ -1,4 +1,4 @@
-"""Track → the numbers that a file holds, in the track's own storage where that keeps every value."""
+"""Track → accessor contents, in the track's own storage type where that is lossless."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 DECODED = {
     "QUATERNION": AccessorFormat(5122, normalized=True),
     "EXPONENTIAL": AccessorFormat(),
-}  # what a filter's codes become
+}  # of a filter's decoded codes
 
 
 @dataclass(frozen=True, slots=True)
 class AccessorData:
-    """The content of one accessor: stored bytes and what they are. Equal ones can share an accessor.
+    """The content of one accessor: stored bytes and their type. Equal contents can share an accessor.
 
-    filtered: the same as one of meshopt's filters takes it. key_size: bytes of a key, many elements for weights.
+    filtered: the same values in the form of a meshopt filter. key_size: bytes of a key, several elements for weights.
     """
 
     data: bytes
@@ -42,12 +42,12 @@ class AccessorData:
 
     @property
     def element_size(self) -> int:
-        """Bytes of one element."""
+        """Bytes per element."""
         columns, rows = COMPONENTS[self.element]
         return np.dtype(DTYPES[self.component_type]).itemsize * columns * rows
 
     def accessor(self, view: int, offset: int) -> Json:
-        """Return the JSON of an accessor that finds these bytes at `offset` of `view`; defaults are left out."""
+        """Return the JSON of an accessor at `offset` of `view`; defaults are omitted."""
         about: Json = {"bufferView": view}
         if offset:
             about["byteOffset"] = offset
@@ -62,9 +62,9 @@ class AccessorData:
 
 
 def times(track: Track) -> AccessorData:
-    """Return the key times as float32, with bounds that are exact in float32 and short as text.
+    """Return the key times as float32, with min and max exact in float32 and short as text.
 
-    Raises RangeError where rounding to float32 makes two keys one.
+    Raises RangeError if two keys are equal in float32.
     """
     stored = track.times.astype("<f4")
     if len(stored) > 1 and not (np.diff(stored) > 0).all():
@@ -74,10 +74,10 @@ def times(track: Track) -> AccessorData:
 
 
 def values(track: Track, filtered: FilteredValues | None = None) -> AccessorData:
-    """Return the values, with tangents for CUBICSPLINE as glTF orders them: in, value, out per key.
+    """Return the values, with tangents for CUBICSPLINE in glTF's order: in, value, out per key.
 
-    Integers, as the track's storage asks for, only where they give every value back; float32 otherwise.
-    filtered: codes that the values were decoded from. Raises ShapeError where they decode to anything else.
+    Integers of the track's storage type if they reproduce every value, else float32.
+    filtered: codes of the same values. Raises ShapeError if they decode to different values.
     """
     rows = track.values
     if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
@@ -106,7 +106,7 @@ def _quantize(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
 
 
 def _as_client_decodes(stored: NDArray[Any], element: str, filtered: FilteredValues) -> bytes:
-    """The bytes that the codes decode to, which differ from `stored` in nothing but the sign of zeros."""
+    """The decoded bytes of the codes, equal to `stored` except for the sign of zeros."""
     decoded = storage.decompressed_bytes(filtered)
     same = stored.nbytes == len(decoded) and np.array_equal(np.frombuffer(decoded, stored.dtype), stored.ravel())
     if not same or (filtered.name == "QUATERNION") is not (element == "VEC4" and stored.dtype.kind == "i"):
@@ -127,6 +127,6 @@ def _integers(rows: Floats, dtype: np.dtype[Any], normalized: bool) -> NDArray[A
 
 
 def _shortest(value: np.float32) -> float:
-    """The number with the shortest text that rounds to this float32: 1.0416666, not 1.0416666269302368; 2, not 2.0."""
+    """The number of the shortest text for this float32: 1.0416666, not 1.0416666269302368; 2, not 2.0."""
     number = float(str(value))
     return int(number) if number.is_integer() else number

@@ -1,4 +1,4 @@
-"""Numbers in a list that others refer to by number: freed ones are used again, and no other one moves."""
+"""Indices for new objects in a list: freed ones are reused, all others remain valid."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from anim.gltf.document import Json
 
 
 class IndexAllocator:
-    """Numbers for new objects in a list: freed ones first, then beyond its end.
+    """Indices for new objects in a list: freed ones first, then appended ones.
 
-    named: for each new object, how often its number will be written: the shortest numbers go to those named most.
-    fixed: freed numbers that are given out already, by new object.
+    named: for each new object, its count of references: the shortest indices have the most references.
+    fixed: freed indices that are already assigned, by new object.
     """
 
     def __init__(
@@ -27,7 +27,7 @@ class IndexAllocator:
         self._holes = ordered[count:]
 
     def fill(self, objects: list[Json], new: list[Json], placeholder: Json) -> None:
-        """Put new objects at their numbers, in place; what is left over goes, or becomes a placeholder."""
+        """Store new objects at their indices, in place; remove unused ones or fill in a placeholder."""
         for number, about in sorted(zip(self.numbers, new, strict=True), key=lambda pair: pair[0]):
             if number < len(objects):
                 objects[number] = about

@@ -1,4 +1,4 @@
-"""New accessors into a document: freed numbers used again, new views behind what is left of the buffers."""
+"""Insert new accessors into a document: reuse freed indices, append new views to the buffers."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from anim.gltf.writing.buffers import rebuild_buffers
 from anim.gltf.writing.encoding import AccessorData
 from anim.gltf.writing.index_allocator import IndexAllocator
 
-# What stands where a number is left over; on the next write it is free again.
+# Placeholders at unused indices; the next write reuses them.
 EMPTY_ACCESSOR: Json = {"componentType": 5121, "count": 1, "type": "SCALAR"}
 
 
 class PendingIndex(int):
-    """A place among the new contents, where the number of an accessor will stand."""
+    """An index among the new contents, to be replaced by that of an accessor."""
 
 
 def insert_accessors(
@@ -29,10 +29,11 @@ def insert_accessors(
     packing: AccessorStorage = UNCOMPRESSED,
     sources: Sequence[Set[int]] = (),
 ) -> Document:
-    """Return the document with these animations, whose samplers name `contents` by Place, else accessors as before.
+    """Return the document with these animations and the accessors of `contents`.
 
-    replaced: numbers of the animations of `document` that are no longer there as they were. sources: for each content,
-    the accessors that it takes the place of: its name, extras and number stay where that is one for one.
+    The samplers of the animations refer to new contents by `PendingIndex`, else to existing accessors.
+    replaced: indices of the animations of `document` that are replaced or gone. sources: for each content, the
+    accessors that it replaces: name, extras and index are kept if it replaces exactly one, alone.
     """
     outside = references.references_outside(document.json, replaced)
     old_views = json_array(document.json, "bufferViews")
@@ -71,7 +72,7 @@ def insert_accessors(
 
 
 def _kept_words(accessors: list[Json], freed: Set[int], sources: Sequence[Set[int]]) -> dict[int, tuple[int, Json]]:
-    """By content, the one accessor whose place it alone takes, with its name and extras; where it has any."""
+    """By content, the one accessor that it alone replaces, with its name and extras, if any."""
     uses = Counter(number for each in sources for number in each)
     kept: dict[int, tuple[int, Json]] = {}
     for i, each in enumerate(sources):
@@ -88,12 +89,12 @@ def _accessors_of(json: Json, animations: Set[int]) -> set[int]:
 
 
 def placeholders(json: Json) -> set[int]:
-    """Return the accessors that only hold a number."""
+    """Return the placeholder accessors."""
     return {i for i, accessor in enumerate(json_array(json, "accessors")) if accessor == EMPTY_ACCESSOR}
 
 
 def empty_views(json: Json, outside: references.References) -> set[int]:
-    """Return the views that only hold a number: of one byte, which nobody names."""
+    """Return the placeholder views: of one byte, without references."""
     named = {
         view for accessor in json_array(json, "accessors") for view in references.views_of(accessor)
     } | outside.views
@@ -102,7 +103,7 @@ def empty_views(json: Json, outside: references.References) -> set[int]:
 
 
 def _name_key(animations: Sequence[Json], contents: int) -> list[int]:
-    """How often each of the new contents is named by a sampler."""
+    """For each new content, its count of references by samplers."""
     named = [0] * contents
     for animation in animations:
         for sampler in animation["samplers"]:

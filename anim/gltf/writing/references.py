@@ -1,4 +1,4 @@
-"""Who refers to which accessor and view: what may be dropped when animations are replaced, and what must not move."""
+"""References to accessors and views: droppable and immovable ones while clips are replaced."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 from anim.gltf.document import Json, json_array
 
-# Extensions known to hold no number of an accessor or view, other than those collected below. Numbers inside any
-# other extension are taken for both: whatever they might name stays where it is. Extras are the application's own:
+# Extensions known to contain no index of an accessor or view, other than those collected below. Numbers inside any
+# other extension are taken for both: everything they may refer to is kept. Extras belong to the application:
 # by the specification no number in them is a reference.
 HARMLESS = frozenset(
     """
@@ -26,17 +26,17 @@ HARMLESS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class References:
-    """Numbers of accessors and views that something other than the replaced animations refers to."""
+    """Indices of accessors and views with references outside the replaced animations."""
 
     accessors: frozenset[int]
     views: frozenset[int]
 
 
 def references_outside(json: Json, replaced: Iterable[int]) -> References:
-    """Return what everything but the samplers of the animations `replaced` refers to.
+    """Return all references except those of the samplers of the animations `replaced`.
 
-    Accessors in the result stay with number and bytes. Views in it are named by someone who is not an accessor;
-    views under an accessor in the result are the caller's to add, since parts of those may be dropped.
+    Accessors in the result keep index and bytes. Views in it have references other than accessors; views of an accessor
+    in the result must be added by the caller, since parts of those may be dropped.
     """
     skipped = set(replaced)
     accessors = set(_of_meshes(json)) | set(_of_skins(json)) | set(_of_instancing(json))
@@ -50,20 +50,20 @@ def references_outside(json: Json, replaced: Iterable[int]) -> References:
 
 
 def unknown_indices(json: Json) -> set[int]:
-    """Return all whole numbers in unknown extensions: any of them might name an accessor or a view."""
+    """Return all whole numbers in unknown extensions: each may be an index of an accessor or view."""
     return {number for _, part in unknown_extensions(json) for number in _whole_numbers(part)}
 
 
 def frozen_buffers(json: Json) -> set[int]:
-    """Return the buffers that unknown extensions point into by themselves: nothing in them may move."""
+    """Return the buffers that unknown extensions refer to directly: their bytes must not move."""
     parts = [part for _, part in unknown_extensions(json)]
     return {part["buffer"] for part in _objects(parts) if type(part.get("buffer")) is int}
 
 
 def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
-    """Return where unknown extensions hold numbers that might name key data of `animations`: those bytes stay.
+    """Return positions in unknown extensions that may refer to key data of `animations`.
 
-    As JSON pointers: ["/nodes/3/extensions/ACME_path"].
+    As JSON pointers: ["/nodes/3/extensions/ACME_path"]. Those bytes are kept.
     """
     accessors, samplers = json_array(json, "accessors"), json_array(json, "animations")
     keys = {s[k] for i in animations for s in samplers[i]["samplers"] for k in ("input", "output")}
@@ -80,7 +80,7 @@ def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
 
 
 def views_of(accessor: Json) -> list[int]:
-    """Return the views that an accessor's numbers lie in: its own, and those of its sparse part."""
+    """Return the views of an accessor: its own, and those of its sparse part."""
     views = [accessor["bufferView"]] if "bufferView" in accessor else []
     if "sparse" in accessor:
         views += [accessor["sparse"][part]["bufferView"] for part in ("indices", "values")]
@@ -114,12 +114,12 @@ def _of_instancing(json: Json) -> Iterator[int]:
 def _of_draco(json: Json) -> Iterator[int]:
     for primitive in _primitives(json):
         draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
-        if isinstance(draco, dict):  # its other numbers name attributes inside the Draco data
+        if isinstance(draco, dict):  # its other numbers are ids inside the Draco data
             yield from _whole_numbers(draco.get("bufferView"))
 
 
 def unknown_extensions(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (JSON pointer, content) of the extensions that are not known to be harmless, wherever they stand."""
+    """Yield (JSON pointer, content) of unknown extensions at any depth."""
     if isinstance(value, list):
         for i, item in enumerate(value):
             if isinstance(item, dict | list):
@@ -155,5 +155,5 @@ def _whole_numbers(value: Any) -> Iterator[int]:
 
 
 def _inside(value: Json | list[Any]) -> Iterator[Any]:
-    """What an object or a list holds, without extras."""
+    """Values of an object or a list, without extras."""
     yield from (item for key, item in value.items() if key != "extras") if isinstance(value, dict) else value

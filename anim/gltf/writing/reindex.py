@@ -1,4 +1,4 @@
-"""Document → the same without placeholders: accessors and views close up, and all who name them follow."""
+"""Drop placeholder accessors and views, and renumber all references."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from anim.gltf.document import Document, Json, json_array
 from anim.gltf.writing import references
 from anim.gltf.writing.insertion import empty_views, placeholders
 
-IndexMaps: TypeAlias = list[int]  # by old number, the new one
+IndexMaps: TypeAlias = list[int]  # new index by old index
 
 DRACO = "KHR_draco_mesh_compression"
 INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 def drop_placeholders(document: Document) -> Document:
-    """Return the document without the placeholders that writing clips leaves in the middle of accessors and views.
+    """Return the document without the placeholders that `replace_clips` leaves in accessors and views.
 
-    Meshes, skins, animations, images, sparse accessors, EXT_mesh_gpu_instancing and KHR_draco_mesh_compression follow.
-    Where a number in extras or in an unknown extension might be one of those that would change, all stay as they are:
-    the document itself comes back where there is nothing to do.
+    References in meshes, skins, animations, images, sparse accessors, EXT_mesh_gpu_instancing and
+    KHR_draco_mesh_compression are renumbered. If a number in extras or in an unknown extension may be one of the
+    changed indices, nothing is dropped. An unchanged document is returned itself.
     """
     json = document.json
     named, unknown = references.references_outside(json, ()), references.unknown_indices(json)
@@ -42,7 +42,7 @@ def drop_placeholders(document: Document) -> Document:
 
 
 def _is_safe(gone: Set[int], unknown: Set[int], count: int) -> bool:
-    """Whether no unknown number can mean something behind the first that goes."""
+    """True if no unknown number can be an index after the first dropped one."""
     return not gone or not any(min(gone) <= number < count for number in unknown)
 
 
@@ -55,7 +55,7 @@ def _index_maps(gone: Set[int], count: int) -> IndexMaps:
 
 
 def _close_over(json: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
-    """The JSON with every reference to the new numbers."""
+    """The JSON with renumbered references."""
     closed = dict(json)
     change: dict[str, Callable[[Json], Json]] = {
         "meshes": lambda mesh: _mesh(mesh, accessors, views),
@@ -97,7 +97,7 @@ def _map(attributes: Json, accessors: IndexMaps) -> Json:
 
 
 def _new(number: Any, numbers: IndexMaps) -> Any:
-    """The new number; what names nothing stays, since extensions are not checked when a file is read."""
+    """The new index; invalid ones are unchanged, since extensions are not validated on reading."""
     return numbers[number] if type(number) is int and 0 <= number < len(numbers) else number
 
 

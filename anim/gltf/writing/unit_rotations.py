@@ -1,4 +1,4 @@
-"""Rotation keys of unit length, as glTF wants them, in tracks that were not off in the file before."""
+"""Normalize rotation keys as glTF requires, except in tracks that were not unit in the file."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Clip, Track
 
-MAX_OFF_UNIT = 0.00769  # of a length, by the Khronos validator: what normalized bytes leave
+MAX_OFF_UNIT = 0.00769  # deviation of a length from 1, by the Khronos validator: the rounding of normalized bytes
 
 
 def normalize_new(document: Document, clips: Mapping[int, Clip], *, skipped: Container[int]) -> Mapping[int, Clip]:
-    """Return the clips, by number, with rotations of unit length; those of tracks that were off before stay.
+    """Return the clips, by index, with unit rotations; tracks that were not unit in the file are kept.
 
-    skipped: ids of tracks to leave as they are. Raises RangeError for a rotation of length 0.
+    skipped: ids of tracks to keep unchanged. Raises RangeError for a rotation of length 0.
     """
     off = {
         i: [n for n, track in enumerate(clip.tracks) if id(track) not in skipped and _is_off(track)]
@@ -32,10 +32,10 @@ def normalize_new(document: Document, clips: Mapping[int, Clip], *, skipped: Con
 
 
 def _tracks_off(document: Document) -> dict[int, set[tuple[int | None, str]]]:
-    """By clip, the targets of the tracks that are off unit length in the document."""
+    """By clip, the targets of tracks with non-unit rotations in the document."""
     try:
         clips = reader.clips(document)
-    except AnimError:  # animations that can't be read are replaced as a whole
+    except AnimError:  # unreadable animations are replaced as a whole
         return {}
     return {i: {track.target for track in clip.tracks if _is_off(track)} for i, clip in enumerate(clips)}
 

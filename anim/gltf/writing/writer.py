@@ -1,8 +1,8 @@
-"""Clips → a new Document in which only the animations were replaced.
+"""Clips → a new Document with replaced animations.
 
-Everything else keeps its JSON, its order and its numbers. Accessors and views that only the replaced animations used
-are used again for the new ones, and their old bytes leave the buffer. A number left over in the middle gets the
-smallest legal placeholder, so that no other number moves.
+Everything else keeps its JSON, order and indices. Accessors and views that only the replaced animations used are reused
+for the new ones, and their old bytes are dropped from the buffer. An unused index inside a list gets the smallest valid
+placeholder, so that no other index changes.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ _SAMPLER_KEYS = ("input", "output", "interpolation")
 def replace_clips(
     document: Document, clips: Mapping[int, Clip], *, packing: AccessorStorage = UNCOMPRESSED
 ) -> Document:
-    """Return a new document with the animations numbered in `clips` replaced; all others stay as they are.
+    """Return a new document with the animations in `clips` replaced, by index; others are unchanged.
 
-    Its JSON is a copy, which can be edited without a change of the old document. Without clips it is the document
-    itself.
+    Its JSON is a copy, which can be edited without changing the old document. Without clips the document itself is
+    returned.
 
-    Channels that are not understood stay with their samplers; channels whose track is gone go; tracks without a
-    channel get one, and their nodes TRS in place of a `matrix`. Names, extras and extensions of animations, channels
-    and samplers stay; name, extras and number of an accessor where its keys become those of one other.
-    Rotation keys off unit length are normalized, with their tangents, unless the track was off in the document before.
-    packing: how the new numbers are stored, see `pack`.
-    Raises RangeError where keys fall together in float32, a rotation is zero, no channel is left, or weights are not as
-    many as the node's morph targets; NotFoundError for a number that no animation or node has.
+    Unsupported channels are kept with their samplers; channels without a track are removed; tracks without a channel
+    get one, and their nodes TRS instead of a `matrix`. Names, extras and extensions of animations, channels and
+    samplers are kept; name, extras and index of an accessor if its keys replace those of exactly one.
+    Rotation keys are normalized, with their tangents, unless the track was not unit in the document before.
+    packing: storage of the new values, see `AccessorStorage`.
+    Raises RangeError for keys equal in float32, a zero rotation, no remaining channel, or a weight count other than the
+    node's morph targets; NotFoundError for an unknown animation or node.
     replace_clips(document, {0: clip}): the first animation becomes `clip`
     """
     if not clips:
@@ -60,7 +60,7 @@ def replace_clips(
 
 
 def _checked_number(number: object, count: int) -> int:
-    """The number of an animation as a plain integer. Raises ShapeError or NotFoundError."""
+    """The index of an animation as int. Raises ShapeError or NotFoundError."""
     try:
         if isinstance(number, bool):
             raise TypeError
@@ -76,7 +76,7 @@ def _checked_number(number: object, count: int) -> int:
 
 
 class _Pool:
-    """Contents of new accessors, each kept once; numbers are given out later, so samplers hold places in here."""
+    """Contents of new accessors, without duplicates; samplers refer to them by PendingIndex."""
 
     def __init__(self, filtered: Mapping[int, FilteredValues]) -> None:
         self.numbers: list[AccessorData] = []
@@ -91,16 +91,16 @@ class _Pool:
             place = self._places[numbers] = len(self.numbers)
             self.numbers.append(numbers)
             self.sources.append(set())
-        elif self.numbers[place].filtered is None:  # codes do for an equal content without
+        elif self.numbers[place].filtered is None:  # codes also apply to an equal content without
             self.numbers[place] = numbers
         return place
 
     def values(self, track: Track) -> int:
-        """The place of a track's values."""
+        """The pending index of a track's values."""
         return self._place(encoding.values(track, self._filtered.get(id(track))))
 
     def axis(self, track: Track) -> int:
-        """The place of a track's times; tracks that share one array are encoded once."""
+        """The pending index of a track's times; tracks that share one array are encoded once."""
         found = self._axes.get(id(track.times))
         if found is None:
             found = self._axes[id(track.times)] = self._place(encoding.times(track))
@@ -144,7 +144,7 @@ def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
 
 
 class _Samplers:
-    """Samplers of one new animation; equal ones are shared unless they carry something of their own."""
+    """Samplers of one new animation; equal ones are shared unless they have names, extras or extensions."""
 
     def __init__(self, animation: Json, pool: _Pool) -> None:
         self.list: list[Json] = []
