@@ -39,7 +39,7 @@ def command(
         if embed:
             document = images.embed(document, source.folder)
         size = documents.write(document, output, source, dry_run=dry_run, voice=voice)
-    if not dry_run and (embed or output == documents.PIPE or not source.is_beside(output)):
+    if not dry_run and (embed or output == documents.PIPE or not source.is_in_folder(output)):
         copied = output != documents.PIPE
         for note in image_notes.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
             voice.info(note)

@@ -196,6 +196,6 @@ def _keys(clip: Clip) -> int:
 
 def note_images(document: Document, source: Source, output: str, voice: text.Reporter) -> None:
     """Report the images copied to the output's folder, and the missing ones."""
-    if output != documents.PIPE and not source.is_beside(output):
+    if output != documents.PIPE and not source.is_in_folder(output):
         for note in image_notes.notes(document, source.folder, copied=True):
             voice.info(note)

@@ -14,7 +14,7 @@ from anim.arrays import AnyArray, Floats
 from anim.caches.storage import COPY_BYTES, Outputs
 from anim.errors import UnsupportedError
 from anim.gltf.authoring_parts import INDICES, VERTICES, add_accessor, create_document, create_material
-from anim.gltf.io.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB
+from anim.gltf.io.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB_BYTES
 
 if TYPE_CHECKING:
     from pygltflib import GLTF2
@@ -80,8 +80,8 @@ class GlbFile:
         text = self.gltf.to_json(separators=(",", ":"), indent=None).encode()
         text += b" " * (-len(text) % 4)
         total = 12 + 8 + len(text) + 8 + self.size
-        if total > MAX_GLB:
-            raise UnsupportedError(f"a GLB can't hold {total} bytes (its limit is {MAX_GLB})")
+        if total > MAX_GLB_BYTES:
+            raise UnsupportedError(f"a GLB can't hold {total} bytes (its limit is {MAX_GLB_BYTES})")
         with self._bin, outputs.create(name) as file:
             file.write(struct.pack("<4sII", MAGIC, 2, total) + struct.pack("<II", len(text), JSON_CHUNK) + text)
             file.write(struct.pack("<II", self.size, BIN_CHUNK))

@@ -15,12 +15,12 @@ from anim.errors import FormatError, ShapeError, UnsupportedError
 from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.io import json_text, uri
 from anim.gltf.reading.node_matrix import expand_matrices
-from anim.gltf.validation import structure
+from anim.gltf.validation import schema
 
 MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
 BIN_CHUNK = 0x004E4942
-MAX_GLB = 2**32 - 1  # bytes; the header's length field has 32 bits
+MAX_GLB_BYTES = 2**32 - 1  # bytes; the header's length field has 32 bits
 LFS_POINTER = b"version https://git-lfs"
 
 Resolve: TypeAlias = Callable[[str], Bytes | bytes | bytearray | memoryview]
@@ -80,7 +80,7 @@ def glb(document: Document) -> list[Bytes]:
     pieces = [_chunk_head(0, JSON_CHUNK), *_padded(json_text.dump(content), b" ")]
     pieces[0] = _chunk_head(_size(pieces[1:]), JSON_CHUNK)
     chunks: list[tuple[int, list[Bytes]]] = []
-    if described and document.buffers[0].byte_length > MAX_GLB:
+    if described and document.buffers[0].byte_length > MAX_GLB_BYTES:
         raise _too_large(document.buffers[0].byte_length)
     if described:
         chunks.append((BIN_CHUNK, _padded(document.buffers[0].data, b"\0")))
@@ -88,7 +88,7 @@ def glb(document: Document) -> list[Bytes]:
     for kind, body in chunks:
         pieces += [_chunk_head(_size(body), kind), *body]
     total = 12 + _size(pieces)
-    if total > MAX_GLB:
+    if total > MAX_GLB_BYTES:
         raise _too_large(total)
     return [_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
 
@@ -110,7 +110,7 @@ def gltf(
     for i, (about, buffer) in enumerate(zip(described, document.buffers, strict=True)):
         about = dict(about)
         if buffer.uri is not None and uri.is_data(buffer.uri):
-            about["uri"] = _kept_data_uri(buffer)
+            about["uri"] = _data_uri(buffer)
         elif buffer.has_data and not (keep_external and _stays(buffer)):
             name = choose(i, next(n for n in _names(stem, i) if n not in taken), buffer.data)
             taken.add(name)
@@ -135,7 +135,7 @@ def _kind(value: object) -> str:
 
 
 def _too_large(size: int) -> UnsupportedError:
-    return UnsupportedError(f"a GLB can't hold {size} bytes (its limit is {MAX_GLB})", help="write a .gltf")
+    return UnsupportedError(f"a GLB can't hold {size} bytes (its limit is {MAX_GLB_BYTES})", help="write a .gltf")
 
 
 def _stays(buffer: Buffer) -> bool:
@@ -197,7 +197,7 @@ def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
 def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
     """The JSON, and the indices of animated nodes that had a matrix in it."""
     parsed = json_text.parse(raw)
-    structure.validate(parsed)
+    schema.validate(parsed)
     return expand_matrices(parsed)
 
 
@@ -223,10 +223,10 @@ def _loader(about: Json, binary: Bytes | None, resolve: Resolve | None) -> Calla
         return None if binary is None else lambda: binary
     if uri.is_data(address):
         return lambda: _bytes(uri.decode_data(address))
-    return lambda: _beside(address, resolve)
+    return lambda: _read_external(address, resolve)
 
 
-def _beside(address: str, resolve: Resolve | None) -> Bytes:
+def _read_external(address: str, resolve: Resolve | None) -> Bytes:
     path = uri.relative_path(address)
     if resolve is None:
         raise FormatError(
@@ -263,10 +263,10 @@ def _in_glb(number: int, about: Json, buffer: Buffer) -> Json:
         return {key: value for key, value in about.items() if key != "uri"}
     if buffer.uri is None:
         return about
-    return {**about, "uri": _kept_data_uri(buffer)}
+    return {**about, "uri": _data_uri(buffer)}
 
 
-def _kept_data_uri(buffer: Buffer) -> str:
+def _data_uri(buffer: Buffer) -> str:
     """The original URI if it already encodes these bytes, else a new one with its media type."""
     if buffer.uri is not None and uri.is_data(buffer.uri) and not buffer.replaced:
         return buffer.uri

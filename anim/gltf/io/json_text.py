@@ -18,7 +18,7 @@ def parse(raw: bytes) -> Json:
     Raises FormatError, with line and column, for anything but a JSON object in UTF-8; NaN and Infinity are invalid.
     """
     try:
-        parsed = json.loads(raw.decode("utf-8"), parse_float=_number, parse_constant=_refuse_constant)
+        parsed = json.loads(raw.decode("utf-8"), parse_float=_parse_number, parse_constant=_refuse_constant)
     except UnicodeDecodeError as error:
         raise FormatError(f"JSON is not UTF-8 (byte {error.start})") from None
     except json.JSONDecodeError as error:
@@ -59,7 +59,7 @@ def _refuse_constant(name: str) -> NoReturn:
     raise FormatError(f"JSON holds {name} (no JSON number)")
 
 
-def _number(literal: str) -> float:
+def _parse_number(literal: str) -> float:
     value = float(literal)
     if math.isinf(value):
         raise FormatError(f"JSON holds a number too large for float64 (got {literal}, expected at most 1.8e308)")

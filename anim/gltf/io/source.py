@@ -14,7 +14,7 @@ from anim.files import atomic, links, resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, gltf_files, images, uri
 
-MAX_TRIES = 20  # attempts to open a .gltf with its buffers, while others replace it
+MAX_OPEN_ATTEMPTS = 20  # attempts to open a .gltf with its buffers, while others replace it
 
 Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
 
@@ -32,7 +32,7 @@ class Source:
     folder: Path | None
     data: Bytes
 
-    def is_beside(self, output: str) -> bool:
+    def is_in_folder(self, output: str) -> bool:
         """Return True if `output` is in the same folder, so that relative URIs remain valid."""
         return self.folder is not None and links.resolve_links(Path(output)).parent.resolve() == self.folder.resolve()
 
@@ -52,7 +52,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     Raises FormatError.
     """
     real = links.resolve_links(Path(path))
-    for _ in range(MAX_TRIES):
+    for _ in range(MAX_OPEN_ATTEMPTS):
         before = _stamp(real)
         data, buffers = resolver.map_file(real), resolver.CompanionFiles(real.parent)
         document = opener(data, buffers.open)
@@ -91,7 +91,7 @@ def write_file(
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
     copies: dict[Path, Bytes] = {}
-    if source is not None and source.folder is not None and not source.is_beside(path):
+    if source is not None and source.folder is not None and not source.is_in_folder(path):
         document, copies = images.copy_images(document, source.folder, links.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
     if not dry_run:
@@ -101,8 +101,8 @@ def write_file(
         if not dry_run:
             atomic.write_file(Path(path), content)
         return sum(len(piece) for piece in content)
-    same_folder = source is not None and source.is_beside(path)
-    spared = [] if source is None or source.is_at(path) else list(_files_beside(source))
+    same_folder = source is not None and source.is_in_folder(path)
+    spared = [] if source is None or source.is_at(path) else list(_external_files(source))
     text = None if unchanged is None or unchanged[:4].tobytes() == container.MAGIC else unchanged
     size = gltf_files.write(
         document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run, note=note
@@ -134,7 +134,7 @@ def _stamp(path: Path) -> tuple[int, ...]:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
-def _files_beside(source: Source) -> Iterator[Path]:
+def _external_files(source: Source) -> Iterator[Path]:
     """Yield the paths of an input's buffers and images."""
     for about in (*json_array(source.document.json, "buffers"), *json_array(source.document.json, "images")):
         address = about.get("uri")

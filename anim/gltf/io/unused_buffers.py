@@ -24,7 +24,7 @@ from anim.gltf.io import container, uri
 
 GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
-_HEAD = 64  # bytes to detect a glTF
+_HEAD_BYTES = 64  # bytes to detect a glTF
 _BLANK = b"\xef\xbb\xbf \t\r\n"
 
 
@@ -48,7 +48,7 @@ def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared:
         there = path.parent / name
         if not there.is_file() or any(each.exists() and each.samefile(there) for each in needed):
             continue
-        if _is_needed_elsewhere(there, path):
+        if _is_used_elsewhere(there, path):
             continue
         if PurePath(name).name == name and not there.is_symlink() and _is_ours(there, path.stem):
             with suppress(OSError):
@@ -70,7 +70,7 @@ def _is_ours(buffer: Path, stem: str) -> bool:
         return hashlib.file_digest(file, "sha256").hexdigest().startswith(found[1])
 
 
-def _is_needed_elsewhere(buffer: Path, path: Path) -> bool:
+def _is_used_elsewhere(buffer: Path, path: Path) -> bool:
     """True if a glTF in the folder or its parent, an unreadable file there or a link uses the buffer."""
     folder = path.parent.resolve()
     name = posixpath.normpath(buffer.relative_to(path.parent).as_posix())
@@ -102,7 +102,7 @@ def _needs(other: Path, buffer: Path, address: str) -> bool:
 
 def _begins_like_gltf(path: Path) -> bool:
     with path.open("rb") as file:
-        head = file.read(_HEAD)
+        head = file.read(_HEAD_BYTES)
     return head.startswith(container.MAGIC) or head.lstrip(_BLANK).startswith(b"{")
 
 

@@ -10,7 +10,7 @@ from anim.gltf.document import Bytes, Json
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 VERSIONS = {"EXT_meshopt_compression": 0, "KHR_meshopt_compression": 1}  # version of the attribute bitstream
-MAX_STRIDE = 256  # bytes per row, by both extensions
+MAX_STRIDE_BYTES = 256  # bytes per row, by both extensions
 
 
 def row_size(key_size: int, element_size: int) -> int:
@@ -20,7 +20,7 @@ def row_size(key_size: int, element_size: int) -> int:
     Rows of whole keys compress better: each value is predicted from the same one of the previous key.
     (40 weights, 160, 4) → 160; (65 weights, 260, 4) → 4
     """
-    return key_size if key_size % element_size == 0 and key_size <= MAX_STRIDE else element_size
+    return key_size if key_size % element_size == 0 and key_size <= MAX_STRIDE_BYTES else element_size
 
 
 def encode(rows: Bytes, extension: str) -> bytes:
@@ -51,13 +51,13 @@ def decode(stored: Bytes, about: Json) -> Bytes:
         raise FormatError(f"meshopt stream is broken ({error})") from None
     plain = np.ascontiguousarray(decoded).reshape(-1).view(np.uint8)
     if len(plain) != count * stride:
-        plain = _narrow(np.asarray(decoded), count, stride)
+        plain = _cast_indices(np.asarray(decoded), count, stride)
     return plain
 
 
 def _check_stride(mode: str, chosen_filter: str, stride: int, count: int) -> None:
     if mode == "ATTRIBUTES":
-        good = stride % 4 == 0 and stride <= MAX_STRIDE
+        good = stride % 4 == 0 and stride <= MAX_STRIDE_BYTES
         good &= {"OCTAHEDRAL": stride in (4, 8), "QUATERNION": stride == 8, "COLOR": stride in (4, 8)}.get(
             chosen_filter, True
         )
@@ -67,7 +67,7 @@ def _check_stride(mode: str, chosen_filter: str, stride: int, count: int) -> Non
         raise FormatError(f"meshopt byteStride {stride} and count {count} don't fit {mode} with filter {chosen_filter}")
 
 
-def _narrow(indices: np.ndarray[tuple[int, ...], np.dtype[np.uint32]], count: int, stride: int) -> Bytes:
+def _cast_indices(indices: np.ndarray[tuple[int, ...], np.dtype[np.uint32]], count: int, stride: int) -> Bytes:
     """Convert 32-bit indices to the view's 2 or 4 bytes."""
     flat = indices.reshape(-1)
     if len(flat) != count:

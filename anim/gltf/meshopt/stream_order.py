@@ -13,20 +13,20 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.gltf.meshopt import codec
 
-STARTS = 8  # contents tried as the first of a chain
-COMPARED = 500_000  # pairs of contents compared for all of these chains together, except the first
+MAX_CHAINS = 8  # contents tried as the first of a chain
+MAX_COMPARED_PAIRS = 500_000  # pairs of contents compared for all of these chains together, except the first
 # Approximate bytes per byte difference of 0, ±1, … (none, 2 bits, 4 bits, a byte).
 PRICES = np.select([np.arange(256) == 0, np.arange(256) < 3, np.arange(256) < 15], [0.0, 0.3, 0.8], 1.3)
 
 
-def ordered(codes: Sequence[bytes], stride: int, extension: str) -> list[int]:
+def order_contents(codes: Sequence[bytes], stride: int, extension: str) -> list[int]:
     """Return content indices in the smallest of the tried orders, deterministically.
 
     codes: of each content, elements of `stride` bytes, the last one padded. extension: the codec's.
     """
     stream = _Stream(codes, stride, extension)
     count = len(codes)
-    starts = range(min(count, max(1, min(STARTS, COMPARED // count**2))))
+    starts = range(min(count, max(1, min(MAX_CHAINS, MAX_COMPARED_PAIRS // count**2))))
     orders = [list(range(count)), *(stream.chain(start) for start in starts)]
     return min(orders, key=stream.size)
 
@@ -51,11 +51,11 @@ class _Stream:
         order = [start]
         while len(left) > 1:
             left = left[left != order[-1]]
-            order.append(int(left[_apart(firsts[left], lasts[order[-1]]).argmin()]))
+            order.append(int(left[_step_costs(firsts[left], lasts[order[-1]]).argmin()]))
         return order
 
 
-def _apart(firsts: Ints, last: Ints) -> Floats:
+def _step_costs(firsts: Ints, last: Ints) -> Floats:
     """Cost of elements (n, stride) after the element `last` (stride,)."""
     steps = (firsts - last).view(np.int8).astype(np.int64)
     return np.asarray(PRICES[np.where(steps >= 0, 2 * steps, -2 * steps - 1)].sum(axis=1))

@@ -36,7 +36,7 @@ def read_primitive(primitive: Json, accessors: Accessors, *, views: int) -> tupl
     Raises FormatError if the data contradicts the file, UnsupportedError without DracoPy.
     """
     extension = primitive["extensions"][EXTENSION]
-    view, names = _parsed(extension, views)
+    view, names = _parse_extension(extension, views)
     mesh = decode(accessors.view(view))
     named = {name: number for name, number in names.items() if name in primitive["attributes"]}
     given = {
@@ -64,7 +64,7 @@ def decode(data: Bytes) -> DracoMesh:
     )
 
 
-def _parsed(extension: object, views: int) -> tuple[int, dict[str, int]]:
+def _parse_extension(extension: object, views: int) -> tuple[int, dict[str, int]]:
     """The extension's buffer view, and its unique ids by attribute."""
     about = extension if isinstance(extension, dict) else {}
     view, names = about.get("bufferView"), about.get("attributes")

@@ -17,7 +17,7 @@ from anim.gltf.validation.rules import Check, ObjectRule, at_least, numbers, tex
 REPEAT, CLAMP_TO_EDGE, MIRRORED_REPEAT = 10497, 33071, 33648  # wrap modes of samplers
 NEAREST = 9728
 WHITE = (1.0, 1.0, 1.0, 1.0)
-ALPHA_CUTOFF = 0.5  # of MASK without a cutoff (glTF 2.0, 3.9.4)
+DEFAULT_ALPHA_CUTOFF = 0.5  # of MASK without a cutoff (glTF 2.0, 3.9.4)
 TRANSFORM, WEBP, BASISU = "KHR_texture_transform", "EXT_texture_webp", "KHR_texture_basisu"
 
 
@@ -43,7 +43,7 @@ class Material:
     factor: tuple[float, float, float, float] = WHITE
     texture: Texture | None = None
     alpha_mode: str = "OPAQUE"
-    alpha_cutoff: float = ALPHA_CUTOFF
+    alpha_cutoff: float = DEFAULT_ALPHA_CUTOFF
 
 
 def read_materials(document: Document, note: Callable[[str], None] = lambda _: None) -> tuple[Material, ...]:
@@ -66,7 +66,7 @@ def read_materials(document: Document, note: Callable[[str], None] = lambda _: N
     return tuple(found)
 
 
-def _number(value: Any) -> None:
+def _check_number(value: Any) -> None:
     numbers(1)([value])
 
 
@@ -76,11 +76,11 @@ _MATERIAL = ObjectRule(
     {
         "pbrMetallicRoughness": ObjectRule(_SURFACE),
         "alphaMode": text,
-        "alphaCutoff": _number,
+        "alphaCutoff": _check_number,
         "extensions": ObjectRule({}),
     }
 )
-_TRANSFORM = ObjectRule({"offset": numbers(2), "rotation": _number, "scale": numbers(2), "texCoord": at_least(0)})
+_TRANSFORM = ObjectRule({"offset": numbers(2), "rotation": _check_number, "scale": numbers(2), "texCoord": at_least(0)})
 _SOURCE = ObjectRule({"source": at_least(0)}, ("source",))
 
 
@@ -89,7 +89,7 @@ def _material(about: Json) -> tuple[Material, Json | None]:
     _MATERIAL(about)
     surface = about.get("pbrMetallicRoughness", {})
     factor = tuple(float(each) for each in surface.get("baseColorFactor", WHITE))
-    cutoff = float(about.get("alphaCutoff", ALPHA_CUTOFF))
+    cutoff = float(about.get("alphaCutoff", DEFAULT_ALPHA_CUTOFF))
     material = Material((factor[0], factor[1], factor[2], factor[3]), None, about.get("alphaMode", "OPAQUE"), cutoff)
     return material, surface.get("baseColorTexture")
 

@@ -12,8 +12,8 @@ from anim.gltf.document import Json, json_array, node_label
 from anim.gltf.validation import channel_targets
 from anim.maths import matrix
 
-MAX_SHEAR = 1e-4  # relative; above the error of float32 products of rotations and scales
-DIGITS = 9  # significant digits written: enough for any float32
+MAX_RELATIVE_SHEAR = 1e-4  # relative; above the error of float32 products of rotations and scales
+SIGNIFICANT_DIGITS = 9  # significant digits written: enough for any float32
 IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 
@@ -51,7 +51,7 @@ def decompose(values: list[float]) -> tuple[Floats, Floats, Floats, Floats | Non
     """
     whole = np.array(values, float).reshape(4, 4).T
     translation, rotation, scale, shear = matrix.decompose(whole[:3])
-    is_sheared = bool(shear > MAX_SHEAR) or bool(np.abs(whole[3] - (0, 0, 0, 1)).max() > MAX_SHEAR)
+    is_sheared = bool(shear > MAX_RELATIVE_SHEAR) or bool(np.abs(whole[3] - (0, 0, 0, 1)).max() > MAX_RELATIVE_SHEAR)
     return translation, rotation, scale, whole[:3] if is_sheared else None
 
 
@@ -73,4 +73,4 @@ def _expand(node: Json) -> Json:
 
 
 def _round_values(part: Floats) -> list[float]:
-    return [float(f"{value:.{DIGITS}g}") + 0.0 for value in part.tolist()]
+    return [float(f"{value:.{SIGNIFICANT_DIGITS}g}") + 0.0 for value in part.tolist()]

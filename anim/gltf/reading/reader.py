@@ -15,7 +15,7 @@ from anim.gltf.reading.meshes import Meshes
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin
 
-LISTED = 3  # clips in a message
+MAX_LISTED_CLIPS = 3  # clips in a message
 
 
 def skeleton(document: Document) -> Skeleton:
@@ -143,8 +143,8 @@ def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
     """Return a label for several clips, by names and indices: "clips 'walk', #3, 'run' and 4 more"."""
     if len(clips) == 1:
         return clip_label(*clips[0])
-    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:LISTED]]
-    more = f" and {len(clips) - LISTED} more" if len(clips) > LISTED else ""
+    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:MAX_LISTED_CLIPS]]
+    more = f" and {len(clips) - MAX_LISTED_CLIPS} more" if len(clips) > MAX_LISTED_CLIPS else ""
     return f"clips {', '.join(names)}{more}"
 
 

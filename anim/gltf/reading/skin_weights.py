@@ -11,7 +11,7 @@ from anim.errors import FormatError
 from anim.gltf.document import Json
 from anim.gltf.reading.accessors import Accessors
 
-SUM_TOLERANCE = 1e-4  # of a sum of floats; above the rounding of careful exporters
+WEIGHT_SUM_TOLERANCE = 1e-4  # of a sum of floats; above the rounding of careful exporters
 
 
 class Influences(NamedTuple):
@@ -57,7 +57,9 @@ def read_influences(accessors: Accessors, attributes: Json, vertices: int, joint
             f"vertex {int(np.argmax(outside.any(axis=1)))} uses joint {int(all_joints[outside][0])} "
             f"(the skin has {joint_count})"
         )
-    return _normalize(np.where(all_joints < joint_count, all_joints, 0), all_weights, SUM_TOLERANCE + 4 * sum(steps))
+    return _normalize(
+        np.where(all_joints < joint_count, all_joints, 0), all_weights, WEIGHT_SUM_TOLERANCE + 4 * sum(steps)
+    )
 
 
 def _normalize(joints: Ints, weights: Floats, tolerance: float) -> Influences:

@@ -11,7 +11,7 @@ from anim.gltf.document import Json, json_array
 COMPONENT_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes by componentType
 COMPONENTS = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4)}  # (columns, rows) by type
 COMPONENTS |= {"MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4)}
-MAX_ZERO_FILLED = 2**23  # components of an accessor without data; nothing in the file bounds its size
+MAX_ZERO_FILLED_COMPONENTS = 2**23  # components of an accessor without data; nothing in the file bounds its size
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -108,8 +108,8 @@ def _check_accessor(accessor: Json, views: list[Json]) -> None:
         _check_inside(accessor.get("byteOffset", 0), stride * (count - 1) + size, view)
     elif accessor.get("byteOffset"):
         raise FormatError("has a byteOffset but no bufferView", where="byteOffset")
-    elif count * COMPONENTS[kind][0] * COMPONENTS[kind][1] > MAX_ZERO_FILLED:
-        raise UnsupportedError(f"claims {count} elements without any data (limit {MAX_ZERO_FILLED} numbers)")
+    elif count * COMPONENTS[kind][0] * COMPONENTS[kind][1] > MAX_ZERO_FILLED_COMPONENTS:
+        raise UnsupportedError(f"claims {count} elements without any data (limit {MAX_ZERO_FILLED_COMPONENTS} numbers)")
     if "sparse" in accessor:
         _check_sparse(accessor["sparse"], size, count, views)
 

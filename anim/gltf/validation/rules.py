@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from anim.errors import FormatError
 
 Check: TypeAlias = Callable[[Any], None]
-LARGEST = 3.4e38  # near float32's maximum
+MAX_NUMBER = 3.4e38  # near float32's maximum
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ def numbers(count: int | None) -> Check:
         if count is not None and len(value) != count:
             raise FormatError(f"has {len(value)} numbers (expected {count})")
         for item in value:
-            if (type(item) is not float and type(item) is not int) or not -LARGEST < item < LARGEST:
+            if (type(item) is not float and type(item) is not int) or not -MAX_NUMBER < item < MAX_NUMBER:
                 raise FormatError(f"holds {_name(item)} (expected finite numbers)")
 
     return check_numbers

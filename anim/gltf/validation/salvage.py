@@ -9,7 +9,7 @@ from typing import Any
 
 from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Json, json_array
-from anim.gltf.validation import structure
+from anim.gltf.validation import schema
 from anim.gltf.writing.references import views_of
 
 MAX_FAULTS = 32  # each fault needs a check of the whole file
@@ -35,7 +35,7 @@ def salvage(json: Json) -> Salvage:
     left = _Remaining(json)
     for _ in range(MAX_FAULTS):
         try:
-            structure.validate(left.json)
+            schema.validate(left.json)
             break
         except (FormatError, UnsupportedError) as error:
             left.faults.append(error)
@@ -69,7 +69,7 @@ class _Remaining:
         match = JSON_POINTER.match(where)
         kind, number, key, inner = match.groups() if match else ("asset", None, "", None)
         if kind == "asset":
-            self.json = {k: v for k, v in self.json.items() if k not in structure.TOP_ARRAYS or type(v) is list}
+            self.json = {k: v for k, v in self.json.items() if k not in schema.TOP_ARRAYS or type(v) is list}
             self.json["asset"] = {"version": "2.0"}
         elif number is None:
             self._whole(kind)

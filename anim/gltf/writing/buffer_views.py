@@ -13,8 +13,8 @@ from anim.gltf.meshopt import codec, stream_order
 from anim.gltf.meshopt.storage import AccessorStorage
 from anim.gltf.writing.encoding import AccessorData
 
-TYPICAL = 10_000  # typical offset or length, to estimate the cost of its digits
-PLAIN_VIEW = 50  # JSON bytes of the plain view
+TYPICAL_OFFSET_BYTES = 10_000  # typical offset or length, to estimate the cost of its digits
+PLAIN_VIEW_JSON_BYTES = 50  # JSON bytes of the plain view
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, ov
 
     overhead: bytes of the first compressed view besides its own JSON and data.
     """
-    streams = _worth_sharing(contents, packing, overhead) if packing.extension else []
+    streams = _choose_streams(contents, packing, overhead) if packing.extension else []
     apart = {i for stream in streams for i in stream.members}
     rest = tuple(i for i in range(len(contents)) if i not in apart)
     if rest:
@@ -76,7 +76,7 @@ def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, ov
     return Layout(tuple(each.view for each in streams), tuple(places[i] for i in range(len(contents))))
 
 
-def _worth_sharing(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> list[_Stream]:
+def _choose_streams(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> list[_Stream]:
     """The compressed streams that give the fewest bytes of data and JSON in total."""
     groups: dict[tuple[str, int], list[int]] = {}
     for i, content in enumerate(contents):
@@ -86,7 +86,7 @@ def _worth_sharing(contents: Sequence[AccessorData], packing: AccessorStorage, o
     good = [stream for stream, gain in zip(streams, gains, strict=True) if gain > 0]
     # If nothing remains for the plain view, its JSON is saved too.
     candidates = [([], 0), (good, sum(gain for gain in gains if gain > 0) - overhead)]
-    candidates.append((streams, sum(gains) - overhead + PLAIN_VIEW))
+    candidates.append((streams, sum(gains) - overhead + PLAIN_VIEW_JSON_BYTES))
     return max(candidates, key=lambda candidate: candidate[1])[0]
 
 
@@ -115,7 +115,7 @@ def _encode(
     contents: Sequence[AccessorData], members: Sequence[int], name: str, stride: int, extension: str
 ) -> _Stream:
     codes = [_codes(contents[i]) for i in members]
-    order = stream_order.ordered(codes, stride, extension)
+    order = stream_order.order_contents(codes, stride, extension)
     data = b"".join(codes[k] for k in order)
     stored = codec.encode(np.frombuffer(data, np.uint8).reshape(-1, stride), extension)
     return _Stream(View(stored, len(data), stride, name), tuple(members[k] for k in order))
@@ -127,7 +127,7 @@ def _codes(content: AccessorData) -> bytes:
 
 def _price(view: View, extension: str) -> int:
     """Bytes of a compressed view, including its JSON with the comma."""
-    about = view.about((0, TYPICAL), (1, TYPICAL), extension)
+    about = view.about((0, TYPICAL_OFFSET_BYTES), (1, TYPICAL_OFFSET_BYTES), extension)
     return _size(view.stored) + len(json_text.dump(about)) + 1
 
 

@@ -44,17 +44,17 @@ def rebuild_buffers(
     imagined = fallback_buffer.drop_data(json, document.buffers, frozen)
     movable = {i for i, buffer in enumerate(document.buffers) if buffer.has_data} - frozen | imagined
     shift = compaction.offset_maps(document, freed, unused, outside, movable)
-    target = _target(document, shift)
+    target = _choose_target(document, shift)
     pieces = [_bytes(view.stored) for view in new]
     shift = [
-        moved if pieces and i == target else _free_some(moved, document.buffers[i].byte_length)
+        moved if pieces and i == target else _leave_bytes(moved, document.buffers[i].byte_length)
         for i, moved in enumerate(shift)
     ]
     buffers = _rebuild(document, shift, target, pieces)
     described = [*json_array(json, "buffers"), *({} for _ in buffers[len(document.buffers) :])]
     left = [view for i, view in enumerate(json_array(json, "bufferViews")) if i not in unused]
-    decoded = _make_room(buffers, described, left, imagined, new, extension)
-    spare = _spare(document, unused, left) - frozen - {target} - ({decoded[0]} if decoded else set())
+    decoded = _reserve_fallback(buffers, described, left, imagined, new, extension)
+    spare = _emptied_buffers(document, unused, left) - frozen - {target} - ({decoded[0]} if decoded else set())
     while len(buffers) - 1 in spare and fallback_buffer.is_marked(described[-1]):
         del buffers[-1], described[-1]
     at = (target, buffers[target].byte_length - sum(map(len, pieces)) if new else 0)
@@ -62,7 +62,7 @@ def rebuild_buffers(
     return RebuiltBuffers(tuple(buffers), list(map(_buffer_json, described, buffers)), views, shift, target)
 
 
-def _target(document: Document, shift: Sequence[OffsetMap]) -> int:
+def _choose_target(document: Document, shift: Sequence[OffsetMap]) -> int:
     """Index of the buffer for new data: the one with most dropped bytes, else the first, else a new one.
 
     Never a fallback buffer: it must contain decompressed views only.
@@ -76,7 +76,7 @@ def _target(document: Document, shift: Sequence[OffsetMap]) -> int:
     return max(candidates, key=lambda i: (shift[i].dropped_bytes, -i), default=len(document.buffers))
 
 
-def _free_some(shift: OffsetMap, length: int) -> OffsetMap:
+def _leave_bytes(shift: OffsetMap, length: int) -> OffsetMap:
     """The same map, but an otherwise empty buffer keeps its first bytes."""
     return shift if shift(length) else OffsetMap(byte_ranges.difference(shift.dropped, [(0, MIN_FREED_BYTES)]))
 
@@ -93,7 +93,7 @@ def _rebuild(document: Document, shift: Sequence[OffsetMap], target: int, data: 
     return buffers
 
 
-def _make_room(
+def _reserve_fallback(
     buffers: list[Buffer],
     described: list[Json],
     left: Sequence[Json],
@@ -121,7 +121,7 @@ def _make_room(
     return place, start
 
 
-def _spare(document: Document, unused: Set[int], left: Sequence[Json]) -> set[int]:
+def _emptied_buffers(document: Document, unused: Set[int], left: Sequence[Json]) -> set[int]:
     """Buffers of unused views without any remaining view."""
     views = json_array(document.json, "bufferViews")
     lost = {buffer for i in unused for buffer, _ in compaction.referenced_ranges(views[i])}
@@ -143,8 +143,8 @@ def _buffer_json(about: Json, buffer: Buffer) -> Json:
 
 
 def _bytes(data: bytes) -> Bytes:
-    return np.frombuffer(data + bytes(-len(data) % byte_ranges.ALIGNMENT), np.uint8)
+    return np.frombuffer(data + bytes(-len(data) % byte_ranges.ALIGNMENT_BYTES), np.uint8)
 
 
 def _whole_views(length: int) -> int:
-    return length + -length % byte_ranges.ALIGNMENT
+    return length + -length % byte_ranges.ALIGNMENT_BYTES

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 Range: TypeAlias = tuple[int, int]  # first byte, end
 
-ALIGNMENT = 4  # bytes; the maximum alignment in a glTF buffer
+ALIGNMENT_BYTES = 4  # bytes; the maximum alignment in a glTF buffer
 
 
 def union(ranges: Iterable[Range]) -> list[Range]:
@@ -45,7 +45,10 @@ def difference(ranges: Iterable[Range], without: Iterable[Range]) -> list[Range]
 
 def aligned(ranges: Iterable[Range]) -> list[Range]:
     """Return each range shrunk to multiples of four, so that later bytes remain aligned."""
-    inward = [(-(-start // ALIGNMENT) * ALIGNMENT, end // ALIGNMENT * ALIGNMENT) for start, end in ranges]
+    inward = [
+        (-(-start // ALIGNMENT_BYTES) * ALIGNMENT_BYTES, end // ALIGNMENT_BYTES * ALIGNMENT_BYTES)
+        for start, end in ranges
+    ]
     return [(start, end) for start, end in inward if start < end]
 
 

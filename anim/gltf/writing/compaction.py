@@ -149,7 +149,7 @@ def _droppable(dropped: list[Range], needed: list[Range], length: int) -> list[R
         return []
     unnamed = byte_ranges.difference([(0, length)], [*free, *needed])
     edges = {edge for span in free for edge in span}
-    padding = [(s, e) for s, e in unnamed if e - s < byte_ranges.ALIGNMENT and (s in edges or e in edges)]
+    padding = [(s, e) for s, e in unnamed if e - s < byte_ranges.ALIGNMENT_BYTES and (s in edges or e in edges)]
     return byte_ranges.aligned(byte_ranges.union([*free, *padding]))
 
 

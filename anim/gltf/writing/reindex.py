@@ -31,7 +31,7 @@ def drop_placeholders(document: Document) -> Document:
     views = views if _is_safe(views, unknown, view_count) else set()
     if not holes and not views:
         return document
-    closed = _close_over(json, _index_maps(holes, accessor_count), _index_maps(views, view_count))
+    closed = _renumber(json, _index_maps(holes, accessor_count), _index_maps(views, view_count))
     for key, gone in (("accessors", holes), ("bufferViews", views)):
         left = [each for i, each in enumerate(json_array(closed, key)) if i not in gone]
         if left:
@@ -54,7 +54,7 @@ def _index_maps(gone: Set[int], count: int) -> IndexMaps:
     return numbers
 
 
-def _close_over(json: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
+def _renumber(json: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
     """The JSON with renumbered references."""
     closed = dict(json)
     change: dict[str, Callable[[Json], Json]] = {
@@ -72,7 +72,7 @@ def _close_over(json: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
 
 
 def _replace_references(about: Json, key: str, numbers: IndexMaps) -> Json:
-    return {**about, key: _new(about[key], numbers)} if key in about else about
+    return {**about, key: _new_index(about[key], numbers)} if key in about else about
 
 
 def _mesh(mesh: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
@@ -93,10 +93,10 @@ def _primitive(primitive: Json, accessors: IndexMaps, views: IndexMaps) -> Json:
 
 
 def _map(attributes: Json, accessors: IndexMaps) -> Json:
-    return {name: _new(number, accessors) for name, number in attributes.items()}
+    return {name: _new_index(number, accessors) for name, number in attributes.items()}
 
 
-def _new(number: Any, numbers: IndexMaps) -> Any:
+def _new_index(number: Any, numbers: IndexMaps) -> Any:
     """The new index; invalid ones are unchanged, since extensions are not validated on reading."""
     return numbers[number] if type(number) is int and 0 <= number < len(numbers) else number
 

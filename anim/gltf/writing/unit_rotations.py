@@ -13,7 +13,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Clip, Track
 
-MAX_OFF_UNIT = 0.00769  # deviation of a length from 1, by the Khronos validator: the rounding of normalized bytes
+MAX_LENGTH_ERROR = 0.00769  # deviation of a length from 1, by the Khronos validator: the rounding of normalized bytes
 
 
 def normalize_new(document: Document, clips: Mapping[int, Clip], *, skipped: Container[int]) -> Mapping[int, Clip]:
@@ -22,25 +22,25 @@ def normalize_new(document: Document, clips: Mapping[int, Clip], *, skipped: Con
     skipped: ids of tracks to keep unchanged. Raises RangeError for a rotation of length 0.
     """
     off = {
-        i: [n for n, track in enumerate(clip.tracks) if id(track) not in skipped and _is_off(track)]
+        i: [n for n, track in enumerate(clip.tracks) if id(track) not in skipped and _has_non_unit_keys(track)]
         for i, clip in clips.items()
     }
     if not any(off.values()):
         return clips
-    before = _tracks_off(document)
-    return {i: _normalized(clip, i, off[i], before.get(i, set())) for i, clip in clips.items()}
+    before = _non_unit_targets(document)
+    return {i: _normalize(clip, i, off[i], before.get(i, set())) for i, clip in clips.items()}
 
 
-def _tracks_off(document: Document) -> dict[int, set[tuple[int | None, str]]]:
+def _non_unit_targets(document: Document) -> dict[int, set[tuple[int | None, str]]]:
     """By clip, the targets of tracks with non-unit rotations in the document."""
     try:
         clips = reader.clips(document)
     except AnimError:  # unreadable animations are replaced as a whole
         return {}
-    return {i: {track.target for track in clip.tracks if _is_off(track)} for i, clip in enumerate(clips)}
+    return {i: {track.target for track in clip.tracks if _has_non_unit_keys(track)} for i, clip in enumerate(clips)}
 
 
-def _normalized(clip: Clip, number: int, off: list[int], before: set[tuple[int | None, str]]) -> Clip:
+def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | None, str]]) -> Clip:
     tracks = list(clip.tracks)
     for n in off:
         lengths = _lengths(tracks[n])
@@ -48,12 +48,12 @@ def _normalized(clip: Clip, number: int, off: list[int], before: set[tuple[int |
             where = f"{reader.clip_label(clip.name, number)}, rotation of node {tracks[n].node}"
             raise RangeError(f"key {int(lengths.argmin())} is zero (expected a unit quaternion)", where=where)
         if tracks[n].target not in before:
-            tracks[n] = _divided(tracks[n], lengths[:, None])
+            tracks[n] = _divide(tracks[n], lengths[:, None])
     return replace(clip, tracks=tuple(tracks))
 
 
-def _is_off(track: Track) -> bool:
-    return track.path == "rotation" and bool((np.abs(_lengths(track) - 1) > MAX_OFF_UNIT).any())
+def _has_non_unit_keys(track: Track) -> bool:
+    return track.path == "rotation" and bool((np.abs(_lengths(track) - 1) > MAX_LENGTH_ERROR).any())
 
 
 def _lengths(track: Track) -> Floats:
@@ -61,7 +61,7 @@ def _lengths(track: Track) -> Floats:
     return lengths
 
 
-def _divided(track: Track, lengths: Floats) -> Track:
+def _divide(track: Track, lengths: Floats) -> Track:
     if track.in_tangents is None or track.out_tangents is None:
         return replace(track, values=track.values / lengths)
     before, after = track.in_tangents / lengths, track.out_tangents / lengths

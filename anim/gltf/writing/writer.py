@@ -46,20 +46,20 @@ def replace_clips(
     if not clips:
         return document
     count = len(json_array(document.json, "animations"))
-    clips = {_checked_number(number, count): clip for number, clip in clips.items()}
+    clips = {_check_index(number, count): clip for number, clip in clips.items()}
     for clip in clips.values():
         check_type(clip, Clip, "a clip")
     clips = unit_rotations.normalize_new(document, clips, skipped=packing.filtered)
-    pool = _Pool(packing.filtered)
+    pool = _ContentPool(packing.filtered)
     animations = [
-        _named_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
+        _replace_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
         for i, animation in enumerate(json_array(document.json, "animations"))
     ]
-    written = insert_accessors(document, animations, set(clips), pool.numbers, packing, pool.sources)
+    written = insert_accessors(document, animations, set(clips), pool.contents, packing, pool.sources)
     return replace(written, json=copy_json(expand_matrices(written.json)[0]))
 
 
-def _checked_number(number: object, count: int) -> int:
+def _check_index(number: object, count: int) -> int:
     """The index of an animation as int. Raises ShapeError or NotFoundError."""
     try:
         if isinstance(number, bool):
@@ -75,39 +75,39 @@ def _checked_number(number: object, count: int) -> int:
     return found
 
 
-class _Pool:
+class _ContentPool:
     """Contents of new accessors, without duplicates; samplers refer to them by PendingIndex."""
 
     def __init__(self, filtered: Mapping[int, FilteredValues]) -> None:
-        self.numbers: list[AccessorData] = []
+        self.contents: list[AccessorData] = []
         self.sources: list[set[int]] = []  # for each content, the accessors of the samplers that it replaces
         self._filtered = filtered
-        self._places: dict[AccessorData, int] = {}
+        self._indices: dict[AccessorData, int] = {}
         self._axes: dict[int, int] = {}
 
-    def _place(self, numbers: AccessorData) -> int:
-        place = self._places.get(numbers)
-        if place is None:
-            place = self._places[numbers] = len(self.numbers)
-            self.numbers.append(numbers)
+    def _add(self, content: AccessorData) -> int:
+        index = self._indices.get(content)
+        if index is None:
+            index = self._indices[content] = len(self.contents)
+            self.contents.append(content)
             self.sources.append(set())
-        elif self.numbers[place].filtered is None:  # codes also apply to an equal content without
-            self.numbers[place] = numbers
-        return place
+        elif self.contents[index].filtered is None:  # codes also apply to an equal content without
+            self.contents[index] = content
+        return index
 
     def values(self, track: Track) -> int:
         """The pending index of a track's values."""
-        return self._place(encoding.values(track, self._filtered.get(id(track))))
+        return self._add(encoding.values(track, self._filtered.get(id(track))))
 
     def axis(self, track: Track) -> int:
         """The pending index of a track's times; tracks that share one array are encoded once."""
         found = self._axes.get(id(track.times))
         if found is None:
-            found = self._axes[id(track.times)] = self._place(encoding.times(track))
+            found = self._axes[id(track.times)] = self._add(encoding.times(track))
         return found
 
 
-def _named_animation(json: Json, animation: Json, clip: Clip, number: int, pool: _Pool) -> Json:
+def _replace_animation(json: Json, animation: Json, clip: Clip, number: int, pool: _ContentPool) -> Json:
     try:
         for track in clip.tracks:
             _check_target(json, track)
@@ -116,7 +116,7 @@ def _named_animation(json: Json, animation: Json, clip: Clip, number: int, pool:
         raise error.at(reader.clip_label(clip.name, number)) from None
 
 
-def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
+def _animation(animation: Json, clip: Clip, pool: _ContentPool) -> Json:
     waiting: dict[tuple[int | None, str], deque[Track]] = {}
     for track in clip.tracks:
         waiting.setdefault(track.target, deque()).append(track)
@@ -125,7 +125,7 @@ def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
     for channel in animation["channels"]:
         target = channel_targets.channel_target(channel)
         if target is None:
-            channels.append({**channel, "sampler": samplers.kept(channel["sampler"])})
+            channels.append({**channel, "sampler": samplers.keep(channel["sampler"])})
             continue
         node, path, pointer = target
         queue = waiting.get((None, pointer or "") if node is None else (node, path))
@@ -146,14 +146,14 @@ def _animation(animation: Json, clip: Clip, pool: _Pool) -> Json:
 class _Samplers:
     """Samplers of one new animation; equal ones are shared unless they have names, extras or extensions."""
 
-    def __init__(self, animation: Json, pool: _Pool) -> None:
+    def __init__(self, animation: Json, pool: _ContentPool) -> None:
         self.list: list[Json] = []
         self._old = animation["samplers"]
         self._pool = pool
-        self._numbers: dict[tuple[object, ...], int] = {}
+        self._indices: dict[tuple[object, ...], int] = {}
 
-    def kept(self, old: int) -> int:
-        return self._number(("kept", old), self._old[old])
+    def keep(self, old: int) -> int:
+        return self._add(("kept", old), self._old[old])
 
     def new(self, track: Track, old: int | None) -> int:
         try:
@@ -167,14 +167,14 @@ class _Samplers:
         sampler: Json = {"input": PendingIndex(times), "output": PendingIndex(values), **own}
         if track.interpolation is not Interpolation.LINEAR:
             sampler["interpolation"] = str(track.interpolation)
-        return self._number((times, values, track.interpolation, old if own else None), sampler)
+        return self._add((times, values, track.interpolation, old if own else None), sampler)
 
-    def _number(self, key: tuple[object, ...], sampler: Json) -> int:
-        number = self._numbers.get(key)
-        if number is None:
-            number = self._numbers[key] = len(self.list)
+    def _add(self, key: tuple[object, ...], sampler: Json) -> int:
+        index = self._indices.get(key)
+        if index is None:
+            index = self._indices[key] = len(self.list)
             self.list.append(sampler)
-        return number
+        return index
 
 
 def _check_target(json: Json, track: Track) -> None:

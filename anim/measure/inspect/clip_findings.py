@@ -37,7 +37,7 @@ def choose_option(numbers: Collection[int]) -> str:
 
     choosing([0, 2]) → " --clip '#0' --clip '#2'"
     """
-    return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= reader.LISTED else ""
+    return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= reader.MAX_LISTED_CLIPS else ""
 
 
 def skin_findings(skins: Iterable[SkinReport]) -> Iterator[Finding]:

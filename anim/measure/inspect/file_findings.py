@@ -10,7 +10,7 @@ from anim.errors import AnimError
 from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import reader
 from anim.gltf.validation import buffer_layout, channel_targets, hierarchy
-from anim.gltf.validation.structure import TOP_ARRAYS
+from anim.gltf.validation.schema import TOP_ARRAYS
 
 INVALID = "invalid"  # the finding for what other commands refuse
 LISTED = 10  # faults of one file

@@ -28,19 +28,19 @@ def _size(codes: list[bytes], order: list[int], extension: str, stride: int = 8)
 def test_neighbors_are_alike(extension: str) -> None:
     """Two kinds of contents that take turns: apart, they take fewer bytes."""
     codes = [_content(20 if i % 2 else 200, 9) for i in range(24)]
-    order = stream_order.ordered(codes, 8, extension)
+    order = stream_order.order_contents(codes, 8, extension)
     assert sorted(order) == list(range(24))
     changes = sum(a % 2 != b % 2 for a, b in pairwise(order))
     assert changes == 1
     assert _size(codes, order, extension) < 0.87 * _size(codes, list(range(24)), extension)
-    assert stream_order.ordered(codes, 8, extension) == order
+    assert stream_order.order_contents(codes, 8, extension) == order
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_never_larger_than_as_they_come(seed: int) -> None:
     rng = np.random.default_rng(seed)
     codes = [rng.integers(0, 256, (int(n), 4), np.uint8).tobytes() for n in rng.integers(1, 20, 12)]
-    order = stream_order.ordered(codes, 4, MESHOPT[0])
+    order = stream_order.order_contents(codes, 4, MESHOPT[0])
     assert sorted(order) == list(range(12))
     assert _size(codes, order, MESHOPT[0], 4) <= _size(codes, list(range(12)), MESHOPT[0], 4)
 
@@ -48,7 +48,7 @@ def test_never_larger_than_as_they_come(seed: int) -> None:
 @pytest.mark.parametrize("count", [1, 2])
 def test_few_contents(count: int) -> None:
     codes = [_content(90, 3) for _ in range(count)]
-    assert sorted(stream_order.ordered(codes, 8, MESHOPT[0])) == list(range(count))
+    assert sorted(stream_order.order_contents(codes, 8, MESHOPT[0])) == list(range(count))
 
 
 def test_a_byte_costs_what_the_codec_takes_for_it() -> None:

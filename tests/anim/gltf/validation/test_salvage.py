@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from anim.gltf.io import json_text
-from anim.gltf.validation import structure
+from anim.gltf.validation import schema
 from anim.gltf.validation.salvage import MAX_FAULTS, salvage
 from tests.files import opened_fixture
 
@@ -57,7 +57,7 @@ def test_one_fault_takes_what_rests_on_it_and_no_more(
     given = json.dumps(biped)
     found = salvage(biped)
     assert json.dumps(biped) == given != before  # is not changed itself
-    structure.validate(found.json)
+    schema.validate(found.json)
     assert found.faults
     assert found.lost_clips == lost_clips
     assert found.lost_skins == lost_skins
@@ -81,7 +81,7 @@ def test_a_file_of_faults_ends() -> None:
     content = {"asset": {"version": "2.0"}, "nodes": [{"rotation": []} for _ in range(1000)]}
     found = salvage(content)
     assert len(found.faults) == MAX_FAULTS + 1
-    structure.validate(found.json)
+    schema.validate(found.json)
 
 
 def test_random_damage_is_survived(biped: Json) -> None:
@@ -100,4 +100,4 @@ def test_random_damage_is_survived(biped: Json) -> None:
                     continue
                 part[key] = values[int(rng.integers(len(values)))]()
                 break
-        structure.validate(salvage(damaged).json)
+        schema.validate(salvage(damaged).json)
