@@ -9,11 +9,9 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
 
-# Rooms from the bottom up; a room may import from its own level only where NEIGHBORS says so.
+# Packages from the bottom up; one may import from its own level only where NEIGHBORS says so.
 LEVELS = (
     {"errors"},
     {"arrays", "units"},
@@ -29,7 +27,7 @@ LEVELS = (
     {"api"},
 )
 NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning"), ("simulation", "skinning")}
-LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
+LEVEL = {package: level for level, packages in enumerate(LEVELS) for package in packages}
 
 MODULES = sorted(path for path in (ROOT / "anim").rglob("*.py") if path.name != "__main__.py")  # which runs the command
 COMMANDS = sorted((ROOT / "cli").rglob("*.py"))
@@ -48,69 +46,116 @@ OPENING = {  # modules of the library that may open a path
     "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }
+FORBIDDEN_CALLS = {"print", "open", "input", "exit", "sys.exit"}
+FORBIDDEN_METHODS = {"read_bytes", "write_bytes", "read_text", "write_text"}
+FORBIDDEN_ATTRIBUTES = {"sys.stdout", "sys.stderr", "sys.stdin", "sys.argv", "os.environ"}
+FORBIDDEN_ATTRIBUTES |= {"time.time", "np.random.seed", "np.fromfile", "np.load", "np.memmap"}
 LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplotlib", "PIL", "png"}
 LAZY |= {"mujoco", "pxr", "dask"}
+# The modules of sub-packages that other packages may import; all others are internal to theirs.
+PUBLIC = {
+    "caches.formats": "gltf mesh_sequence",
+    "caches.transforms": "bounds resample up_axis vertex_order",
+    "caches.vat": "presets",
+    "curves.easing": "function table",
+    "curves.fitting": "adaptive_keys easing_fit rotation_fit",
+    "curves.tangents": "rule table",
+    "exchange.euler": (
+        "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"
+    ),
+    "exchange.formats": "bvh_reader registry",
+    "exchange.retarget": "aliases apply bind_pose ground_contact kept_tracks rest_alignment retarget vrm_humanoid",
+    "gltf.io": "container images json_text lenient source unused_buffers uri",
+    "gltf.meshopt": "codec storage",
+    "gltf.reading": "accessors image_data instancing materials reader vertex_colors",
+    "gltf.validation": "buffer_layout channel_targets hierarchy structure",
+    "gltf.writing": "byte_ranges references reindex writer",
+    "measure.compare": "diff name_matching",
+    "measure.continuity": "continuity knots",
+    "measure.continuous_bound": "largest_error prover",
+    "measure.error": "error_curve metric point_matrix shell_points statistics surface",
+    "measure.inspect": (
+        "clip_findings file_findings frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"
+    ),
+    "measure.loops": "loop_analysis recommendations seam",
+    "optimization.search": "solution",
+    "show.filmstrip": "camera clips filmstrip image_file",
+    "show.plots": (
+        "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations tangent_plot track_plot "
+        "track_selection"
+    ),
+    "skinning.analysis": (
+        "collapse collapsed_clips inbetween_error method_deviation method_scores recommendations weight_sums"
+    ),
+    "skinning.kernels": "jit",
+    "skinning.methods": "registry",
+}
 
 
-def test_there_is_something_to_look_at() -> None:
-    assert len(MODULES) > 30
-    assert len(COMMANDS) > 5
+def test_modules_are_found() -> None:
+    assert len(MODULES) > 200
+    assert len(COMMANDS) > 30
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_a_module_imports_only_from_below(path: Path) -> None:
-    room = _room(path)
-    for name in _imported(path):
-        parts = name.split(".")
-        assert parts[0] not in {"cli", "fixtures", "tests"}, name
-        if parts[0] != "anim" or len(parts) == 1 or room is None:
-            continue
-        other = parts[1]
-        assert other in LEVEL, f"{name}: a room that the design doesn't know"
-        assert other == room or LEVEL[other] < LEVEL[room] or (room, other) in NEIGHBORS, name
+def test_a_module_imports_only_from_below() -> None:
+    wrong = []
+    for path in MODULES:
+        package = _package(path)
+        for name in _imported(path):
+            parts = name.split(".")
+            if parts[0] in {"cli", "fixtures", "tests"}:
+                wrong.append((_short(path), name))
+            if parts[0] != "anim" or len(parts) == 1 or package is None:
+                continue
+            other = parts[1]
+            assert other in LEVEL, f"{_short(path)} imports {name}, a package without a level"
+            if other != package and LEVEL[other] >= LEVEL[package] and (package, other) not in NEIGHBORS:
+                wrong.append((_short(path), name))
+    assert not wrong
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_the_library_neither_prints_nor_opens_files(path: Path) -> None:
-    assert not {name.split(".")[0] for name in _imported(path)} & TERMINAL
-    if path.relative_to(ROOT).as_posix() not in OPENING:
-        assert not _imported(path) & {"pathlib.Path", "pathlib", "mmap"}, "paths are opened elsewhere"
-    for node in ast.walk(_tree(path)):
-        if isinstance(node, ast.Call):
-            assert ast.unparse(node.func) not in {"print", "open", "input", "exit", "sys.exit"}, node.lineno
-        if isinstance(node, ast.Attribute):
-            assert node.attr not in {"read_bytes", "write_bytes", "read_text", "write_text"}, node.lineno
-            assert ast.unparse(node) not in {"sys.stdout", "sys.stderr", "sys.stdin", "sys.argv", "os.environ"}
-            assert ast.unparse(node) not in {"time.time", "np.random.seed", "np.fromfile", "np.load", "np.memmap"}
+def test_internal_modules_are_imported_by_their_own_package_only() -> None:
+    used = _modules_used_outside_their_package()
+    public = {f"{package}.{name}" for package, names in PUBLIC.items() for name in names.split()}
+    assert not {name: users for name, users in used.items() if name not in public}, "add it to PUBLIC, or move code"
+    assert not public - used.keys(), "PUBLIC lists what nobody imports from outside"
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_no_circles(path: Path) -> None:
-    seen: set[Path] = set()
-    waiting = [path]
-    while waiting:
-        for other in _modules_of(waiting.pop()):
-            assert other != path, f"{path.name} comes back to itself"
-            if other not in seen:
-                seen.add(other)
-                waiting.append(other)
+def test_the_library_neither_prints_nor_opens_files() -> None:
+    wrong = []
+    for path in MODULES:
+        found = {name for name in _imported(path) if name.split(".")[0] in TERMINAL}
+        if _short(path) not in OPENING:
+            found |= _imported(path) & {"pathlib.Path", "pathlib", "mmap"}
+        for node in ast.walk(_tree(path)):
+            if isinstance(node, ast.Call):
+                found |= {ast.unparse(node.func)} & FORBIDDEN_CALLS
+            if isinstance(node, ast.Attribute):
+                found |= {node.attr} & FORBIDDEN_METHODS
+                found |= {ast.unparse(node)} & FORBIDDEN_ATTRIBUTES
+        wrong += [(_short(path), name) for name in sorted(found)]
+    assert not wrong
 
 
-@pytest.mark.parametrize("path", COMMANDS, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_the_command_line_imports_the_library_only(path: Path) -> None:
-    for name in _imported(path):
-        assert name.split(".")[0] not in {"fixtures", "tests", "click", "pygltflib", "scipy", "trimesh"}, name
+def test_no_module_imports_itself_through_others() -> None:
+    assert not [_short(path) for path in MODULES if path in _reachable(path)]
 
 
-@pytest.mark.parametrize("path", [*MODULES, *COMMANDS], ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_heavy_packages_are_imported_late(path: Path) -> None:
+def test_the_command_line_imports_the_library_only() -> None:
+    others = {"fixtures", "tests", "click", "pygltflib", "scipy", "trimesh"}
+    assert not [(_short(p), name) for p in COMMANDS for name in _imported(p) if name.split(".")[0] in others]
+
+
+def test_heavy_packages_are_imported_late() -> None:
     """Kernels load numba, and are themselves imported late."""
-    names = {name for node in _tree(path).body for name in _names(node)}
-    if path in KERNELS:
-        assert not {name.split(".")[0] for name in names} & (LAZY - {"numba"})
-    else:
-        assert not {name.split(".")[0] for name in names} & LAZY
-        assert not [name for name in names if name.startswith(tuple(map(_dotted, KERNELS)))]
+    kernels = tuple(map(_dotted, KERNELS))
+    wrong = []
+    for path in (*MODULES, *COMMANDS):
+        heavy = LAZY - {"numba"} if path in KERNELS else LAZY
+        for name in {name for node in _tree(path).body for name in _names(node)}:
+            if name.split(".")[0] in heavy or (path not in KERNELS and name.startswith(kernels)):
+                wrong.append((_short(path), name))
+    assert not wrong
 
 
 def test_importing_the_library_loads_nothing_heavy() -> None:
@@ -120,8 +165,34 @@ def test_importing_the_library_loads_nothing_heavy() -> None:
     assert not set(run.stdout.split()) & (LAZY | TERMINAL)
 
 
-def _room(path: Path) -> str | None:
-    """The room of a module, None for the package itself."""
+def _modules_used_outside_their_package() -> dict[str, set[str]]:
+    """Modules of sub-packages that other packages import, "curves.easing.table", and the files that do."""
+    used: dict[str, set[str]] = {}
+    for path in (*MODULES, *COMMANDS):
+        for file in _modules_of(path, with_types=True):
+            parts = file.relative_to(ROOT / "anim").with_suffix("").parts
+            if len(parts) == 3 and (path in COMMANDS or _package(path) != parts[0]):
+                used.setdefault(".".join(parts), set()).add(_short(path))
+    return used
+
+
+def _reachable(path: Path) -> set[Path]:
+    """Modules of the library that a module imports, itself or through others."""
+    seen: set[Path] = set()
+    waiting = [path]
+    while waiting:
+        new = _modules_of(waiting.pop()) - seen
+        seen |= new
+        waiting.extend(new)
+    return seen
+
+
+def _short(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def _package(path: Path) -> str | None:
+    """The package of a module below `anim`, None for `anim` itself."""
     parts = path.relative_to(ROOT / "anim").with_suffix("").parts
     return None if parts[0] == "__init__" else parts[0]
 
@@ -142,7 +213,7 @@ def _imported(path: Path) -> frozenset[str]:
 
 
 def _names(node: ast.AST) -> list[str]:
-    """What an import statement names: "anim.gltf" and "anim.gltf.reading.reader" for `from anim.gltf import read`."""
+    """The names in an import statement: "anim.gltf.reading.reader" for `from anim.gltf.reading import reader`."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     if isinstance(node, ast.ImportFrom):
@@ -152,9 +223,10 @@ def _names(node: ast.AST) -> list[str]:
 
 
 @cache
-def _modules_of(path: Path) -> frozenset[Path]:
-    """Modules of the library that one imports when it runs: the packages on the way are only names."""
-    names = {name for name in _imported(path) - set(_only_for_types(path)) if name.startswith("anim.")}
+def _modules_of(path: Path, with_types: bool = False) -> frozenset[Path]:
+    """Modules of the library that one imports, those for type checkers only if asked for; no packages."""
+    left_out = set() if with_types else set(_only_for_types(path))
+    names = {name for name in _imported(path) - left_out if name.startswith("anim.")}
     both = names | {name.rpartition(".")[0] for name in names}  # `from anim.arrays import Floats` names a module's part
     files = {ROOT / (name.replace(".", "/") + ".py") for name in both}
     return frozenset(file for file in files if file.is_file())

@@ -1,4 +1,4 @@
-"""What a run imports: little to show help, and nothing heavy that a command doesn't need."""
+"""Modules that command lines import: few for help and completion, no heavy package that a command does not use."""
 
 from __future__ import annotations
 
@@ -7,148 +7,122 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from cli import main
 from tests.cli.running import ENVIRONMENT, ROOT, built
 
-# Runs one command line and says on stderr which modules it left behind.
-SCRIPT = """
-import json, os, sys
+# Runs command lines in one process, and writes its exit codes and the modules loaded so far to stderr.
+RUN = """
+import json, sys
 from cli import main
-code = main.run(json.loads(sys.argv[1]))
+found = []
+for line in json.loads(sys.argv[1]):
+    found.append([main.run(line), sorted(sys.modules)])
 sys.stdout.flush()
-print(json.dumps([code, sorted(sys.modules)]), file=sys.stderr)
+print(json.dumps(found), file=sys.stderr)
 """
-NEVER = {
-    "rich",
-    "trimesh",
-    "pygltflib",
-    "numba",
-    "matplotlib",
-    "PIL",
-    "png",
-    "mujoco",
-    "pxr",
-    "dask",
-}
+# Completes the last of some words, as a shell asks for it.
+COMPLETE = """
+import contextlib, io, json, os, sys
+from cli import main
+sys.argv = ["gltf-anim"]
+found = []
+for words, shell in json.loads(os.environ["CASES"]):
+    os.environ["_GLTF_ANIM_COMPLETE"] = f"complete_{shell}"
+    os.environ["COMP_WORDS"] = os.environ["_TYPER_COMPLETE_ARGS"] = words
+    os.environ["COMP_CWORD"] = str(len(words.split(" ")) - 1)
+    with contextlib.redirect_stdout(io.StringIO()) as shown, contextlib.suppress(SystemExit):
+        main.run([])
+    found.append([shown.getvalue(), sorted(sys.modules)])
+print(json.dumps(found))
+"""
+NEVER = {"rich", "trimesh", "pygltflib", "numba", "matplotlib", "PIL", "png", "mujoco", "pxr", "dask"}
 HEAVY = NEVER | {"scipy", "meshopt"}
 STARTING = {"asyncio", "http", "multiprocessing", "unittest", "urllib.request", "xml"}
 
 
-def modules(*line: str | Path, stdin: bytes = b"") -> set[str]:
-    """The modules that one command line imports, in a process of its own."""
+def test_the_first_help_imports_no_command_and_no_numbers() -> None:
+    for _, names in _run(["--help"], ["--version"], []):
+        assert not _packages(names) & (HEAVY | {"numpy"})
+        assert not names & STARTING
+        assert not _commands(names)
+
+
+def test_the_help_of_a_command_imports_that_command_only() -> None:
+    results = _run(*([command, "--help"] for command in main.COMMANDS))
+    before: set[str] = set()
+    for command, (code, names) in zip(main.COMMANDS, results, strict=True):
+        assert code == 0
+        assert not _packages(names) & HEAVY, command
+        assert _commands(names) - before == {f"cli.commands.{command.replace('-', '_')}"}
+        before = _commands(names)
+
+
+def test_a_run_imports_only_packages_that_it_uses(tmp_path: Path) -> None:
+    path = tmp_path / "biped.glb"
+    path.write_bytes(built("biped"))
+    lines = [
+        ["inspect", str(path)],
+        ["inspect", str(path), "--tracks"],
+        ["inspect", str(path), "--format", "json"],
+        ["sample", str(path), "--at", "0", "--space", "world", "--format", "csv"],
+        ["resample", str(path), "--fps", "12"],
+        ["resample", str(path), "--fps", "12", "--interpolation", "cubicspline", "--clip", "walk"],
+        ["convert", str(path), "-"],
+        ["inspect", str(path), "--continuity"],
+        ["resampel"],
+        ["resample", "--fps", "x"],
+    ]
+    results = _run(*lines)
+    assert [code for code, _ in results] == [0] * 8 + [2] * 2
+    continuity = {"anim.measure.continuity.continuity", "cli.reports.continuity_report"}
+    assert not results[0][1] & (continuity | {"numpy.ma"})
+    assert results[7][1] >= continuity
+    assert not _packages(results[-1][1]) & HEAVY
+
+
+def test_completion_of_commands_imports_none() -> None:
+    cases = {"gltf-anim re": {"resample", "retime", "render"}, "gltf-anim ": set(main.COMMANDS), "gltf-anim zzz": set()}
+    *results, (described, _) = _complete(*((words, "bash") for words in cases), ("gltf-anim ren", "zsh"))
+    for (shown, names), expected in zip(results, cases.values(), strict=True):
+        assert set(shown.split()) == expected
+        assert not _packages(names) & (HEAVY | {"numpy"})
+        assert not _commands(names)
+    assert main.COMMANDS["render"].about in described  # some shells show words beside names
+
+
+def test_options_and_their_choices_are_completed() -> None:
+    cases = {
+        "gltf-anim --ver": {"--version"},
+        "gltf-anim resample --f": {"--fps"},
+        "gltf-anim resample --interpolation c": {"cubicspline"},
+    }
+    *results, (unknown, _) = _complete(*((words, "bash") for words in cases), ("gltf-anim zzz re", "bash"))
+    for (shown, _), expected in zip(results, cases.values(), strict=True):
+        assert set(shown.split()) == expected
+    assert "resample" in unknown  # a command that does not exist stops nothing
+
+
+def _run(*lines: list[str]) -> list[tuple[int, set[str]]]:
+    """Exit codes of command lines that run one after the other in a new process, and the modules loaded by then."""
     run = subprocess.run(
-        [sys.executable, "-c", SCRIPT, json.dumps([str(arg) for arg in line])],
-        cwd=ROOT,
-        env=ENVIRONMENT,
-        input=stdin,
-        capture_output=True,
-        check=True,
+        [sys.executable, "-c", RUN, json.dumps(lines)], cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=True
     )
-    code, names = json.loads(run.stderr.splitlines()[-1])
-    assert code == 0, run.stderr
-    return set(names)
+    return [(code, set(names)) for code, names in json.loads(run.stderr.splitlines()[-1])]
 
 
-def tops(names: set[str]) -> set[str]:
+def _complete(*cases: tuple[str, str]) -> list[tuple[str, set[str]]]:
+    """Output for words and shells, in a new process that writes nothing to stderr, and the modules loaded by then."""
+    environment = {**ENVIRONMENT, "CASES": json.dumps(cases)}
+    run = subprocess.run(
+        [sys.executable, "-c", COMPLETE], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+    )
+    assert not run.stderr
+    return [(shown, set(names)) for shown, names in json.loads(run.stdout)]
+
+
+def _packages(names: set[str]) -> set[str]:
     return {name.split(".")[0] for name in names}
 
 
-@pytest.mark.parametrize("line", [["--help"], ["--version"], []])
-def test_help_imports_no_command_and_no_numbers(line: list[str]) -> None:
-    names = modules(*line)
-    assert not tops(names) & (HEAVY | {"numpy"})
-    assert not names & STARTING
-    assert not {name for name in names if name.startswith("cli.commands.")}
-
-
-@pytest.mark.parametrize("command", main.COMMANDS)
-def test_the_help_of_a_command_imports_that_command_only(command: str) -> None:
-    names = modules(command, "--help")
-    assert not tops(names) & HEAVY
-    own = f"cli.commands.{command.replace('-', '_')}"
-    assert {name for name in names if name.startswith("cli.commands.")} == {own}
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        ["inspect", "--tracks"],
-        ["inspect", "--format", "json"],
-        ["sample", "--at", "0", "--space", "world", "--format", "csv"],
-        ["resample", "--fps", "12"],
-        ["resample", "--fps", "12", "--interpolation", "cubicspline", "--clip", "walk"],
-        ["convert", "-", "-"],
-    ],
-)
-def test_a_run_imports_nothing_heavy(line: list[str]) -> None:
-    assert not tops(modules(*line, stdin=built("biped"))) & HEAVY
-
-
-def test_inspect_imports_no_more_of_numpy_and_of_us_than_it_shows() -> None:
-    names = modules("inspect", stdin=built("biped"))
-    assert not names & {"numpy.ma", "anim.measure.continuity.continuity", "cli.reports.continuity_report"}
-    assert "anim.measure.continuity.continuity" in modules("inspect", "--continuity", stdin=built("biped"))
-
-
-def test_a_wrong_command_line_imports_nothing_heavy_either() -> None:
-    script = SCRIPT.replace("code = main", "code = 0 * main")
-    for line in (["resampel"], ["resample", "--fps", "x"]):
-        run = subprocess.run(
-            [sys.executable, "-c", script, json.dumps(line)], cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=True
-        )
-        assert not tops(set(json.loads(run.stderr.splitlines()[-1])[1])) & HEAVY
-
-
-def completed(words: str, shell: str = "bash") -> tuple[str, set[str]]:
-    """What a shell is told that completes the last of these words, and the modules that took."""
-    environment = {
-        **ENVIRONMENT,
-        "_GLTF_ANIM_COMPLETE": f"complete_{shell}",
-        "COMP_WORDS": words,
-        "COMP_CWORD": str(len(words.split(" ")) - 1),
-        "_TYPER_COMPLETE_ARGS": words,
-    }
-    script = (
-        "import sys, atexit; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); sys.argv = ['gltf-anim']; "
-    )
-    script += "from cli import main; main.run([])"
-    run = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
-    (modules,) = run.stderr.splitlines()  # and no word to the person who types
-    return run.stdout, set(modules.split())
-
-
-@pytest.mark.parametrize(
-    ("words", "found"),
-    [("gltf-anim re", {"resample", "retime", "render"}), ("gltf-anim ", set(main.COMMANDS)), ("gltf-anim zzz", set())],
-)
-def test_completion_of_a_command_imports_none(words: str, found: set[str]) -> None:
-    shown, names = completed(words)
-    assert set(shown.split()) == found
-    assert not tops(names) & (HEAVY | {"numpy"})
-    assert not {name for name in names if name.startswith("cli.commands.")}
-
-
-def test_a_shell_that_shows_words_beside_names_gets_those_of_the_table() -> None:
-    shown, names = completed("gltf-anim ren", "zsh")
-    assert main.COMMANDS["render"].about in shown
-    assert "cli.commands.render" not in names
-
-
-@pytest.mark.parametrize(
-    ("words", "found"),
-    [
-        ("gltf-anim --ver", {"--version"}),
-        ("gltf-anim resample --f", {"--fps"}),
-        ("gltf-anim resample --interpolation c", {"cubicspline"}),
-    ],
-)
-def test_options_and_their_choices_are_completed(words: str, found: set[str]) -> None:
-    assert set(completed(words)[0].split()) == found
-
-
-def test_completion_behind_a_command_that_is_none_says_nothing_of_it() -> None:
-    assert "resample" in completed("gltf-anim zzz re")[0]
+def _commands(names: set[str]) -> set[str]:
+    return {name for name in names if name.startswith("cli.commands.")}
