@@ -10,7 +10,7 @@ from anim.errors import RangeError
 from cli.errors import UsageError
 
 
-def parse_share(text: str, option: str) -> float:
+def parse_fraction(text: str, option: str) -> float:
     """Return a fraction above 0: "0.1%" or a number without unit. Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_fraction(text, option)

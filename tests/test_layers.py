@@ -64,7 +64,7 @@ PUBLIC = {
         "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"
     ),
     "exchange.formats": "bvh_reader registry",
-    "exchange.retarget": "aliases apply bind_pose ground_contact kept_tracks rest_alignment retarget vrm_humanoid",
+    "exchange.retarget": "aliases apply bind_pose ground_contact rest_alignment retained_tracks retarget vrm_humanoid",
     "gltf.io": "container images json_text lenient source unused_buffers uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors image_data instancing materials reader vertex_colors",

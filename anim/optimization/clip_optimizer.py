@@ -57,7 +57,7 @@ class ClipOptimizer:
             return self._default_context
         return self._context(extra)
 
-    def judged(self, number: int, after: Clip) -> Verification:
+    def verify(self, number: int, after: Clip) -> Verification:
         """Return how far a new version of clip `number` is from its source."""
         return verify(
             self._ruler,
@@ -118,12 +118,12 @@ def optimize_clip(site: ClipOptimizer, item: tuple[int, Task]) -> ClipResult:
     if best is not None and best.solution.size(setting.coding) <= exact.size(setting.coding):
         return best
     is_last_resort = best is None and site.request.bounds.max_error > 0
-    return ClipResult(exact, site.judged(number, exact.clip), without_loss=is_last_resort)
+    return ClipResult(exact, site.verify(number, exact.clip), without_loss=is_last_resort)
 
 
 def verify_solution(site: ClipOptimizer, item: tuple[int, Clip]) -> Verification:
     """Return how far a new version of clip `item[0]` is from its source."""
-    return site.judged(*item)
+    return site.verify(*item)
 
 
 def _keys(clip: Clip) -> int:
@@ -140,7 +140,7 @@ def _within(site: ClipOptimizer, number: int, task: Task, effort: Effort) -> Cli
         solution = solve(replace(site.context(extra), effort=effort), task)
         if solution is None:
             return None
-        found = site.judged(number, solution.clip)
+        found = site.verify(number, solution.clip)
         if found.holds:
             return ClipResult(solution, found)
         worst = site.worst_vertex(found)

@@ -89,7 +89,7 @@ def optimize(
     new = write_solutions(base.document if base else document, solutions, request.packing)
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):
-        verdicts[number] = site.judged(number, read_back[number])
+        verdicts[number] = site.verify(number, read_back[number])
     done = fingerprint.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 

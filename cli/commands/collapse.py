@@ -14,7 +14,7 @@ from anim.operations.selection import Selection
 from anim.sampling.times import frame_times
 from anim.show.plots.collapse_plot import collapse_plot as picture_of
 from anim.skinning.analysis.collapse import Comparison
-from anim.skinning.analysis.recommendations import Found
+from anim.skinning.analysis.recommendations import CollapseFinding
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
 from cli.io import documents, scenes
@@ -59,7 +59,7 @@ def command(
     _check(fps, plot)
     voice = Reporter(quiet)
     methods = tuple(dict.fromkeys(str(each) for each in method)) if method else USUAL
-    found: list[Found] = []
+    found: list[CollapseFinding] = []
     with documents.source(input, voice) as source:
         document = source.document
         clips = reader.clips(document)
@@ -75,7 +75,8 @@ def command(
         for done, i in enumerate(numbers):
             times = frame_times(clips[i].start, clips[i].end, fps=fps)
             found += [
-                Found(i, reader.clip_name(clips[i].name, i), each) for each in comparison.of(clips[i], times=times)
+                CollapseFinding(i, reader.clip_name(clips[i].name, i), each)
+                for each in comparison.of(clips[i], times=times)
             ]
             progress(done + 1)
         progress.close()

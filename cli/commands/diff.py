@@ -34,7 +34,7 @@ from cli.reports import diff_report
 from cli.reports.diff_report import DiffReport, File
 from cli.text import Reporter, format_bytes, format_length, plural
 
-OFF = ("0", "0%", "0m")
+DISABLED = ("0", "0%", "0m")
 
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
@@ -95,7 +95,7 @@ def command(
     other = one if new is None else _opened(new, voice)
     scale = diagonal(one.scene)
     limit = None if fail_above is None else units.parse_length(fail_above, "--fail-above", lambda: scale)
-    radius = 0.0 if shell.strip() in OFF else units.parse_length(shell, "--shell", lambda: scale)
+    radius = 0.0 if shell.strip() in DISABLED else units.parse_length(shell, "--shell", lambda: scale)
     ruler = ErrorMetric(one.scene, other.scene, shell=radius / scale if radius and scale else None)
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)

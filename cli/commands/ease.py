@@ -76,7 +76,10 @@ def command(
         documents.write_text(_table())
         return
     easing = parse(ease)
-    share, angle = units.parse_share(tolerance, "--tolerance"), units.parse_angle(angle_tolerance, "--angle-tolerance")
+    share, angle = (
+        units.parse_fraction(tolerance, "--tolerance"),
+        units.parse_angle(angle_tolerance, "--angle-tolerance"),
+    )
     if per is Per.RANGE and easing.stepped:
         raise UsageError(f"'{easing.name}' jumps, and time can't", help="--per segment makes STEP keys of it")
     tolerances = by_segment.Tolerances(share, angle)

@@ -160,7 +160,11 @@ def command(
         request = Request(
             bounds,
             Policy(
-                drop, reference, rebase_rest, drop_invisible, optimize_request.kept_nodes(keep_node or (), work.scene)
+                drop,
+                reference,
+                rebase_rest,
+                drop_invisible,
+                optimize_request.nodes_to_keep(keep_node or (), work.scene),
             ),
             Packing.CORE if meshopt is None else Packing(meshopt.value),
             objective,

@@ -132,7 +132,7 @@ def _ending(inputs: cache_folders.CacheFolder) -> str:
     if own in CACHE_FORMATS:
         return own
     frames = () if inputs.main in inputs.names() else mesh_sequence.sequence_files(inputs.main, inputs.names())
-    head, size = inputs.beginning(frames[0] if frames else inputs.main)
+    head, size = inputs.read_head(frames[0] if frames else inputs.main)
     try:
         return sniff_format(head, size)
     except FormatError:

@@ -67,7 +67,7 @@ class CacheFolder:
             where = "" if name == self.main else f"'{name}'"
             raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})", where=where) from None
 
-    def beginning(self, name: str) -> tuple[bytes, int]:
+    def read_head(self, name: str) -> tuple[bytes, int]:
         """First bytes of a file, and its size."""
         with self.open(name) as file:
             return file.read(HEAD), self.sizes[name]

@@ -11,7 +11,7 @@ from typing import Any
 from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
 from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed
 from anim.skinning.analysis.method_scores import BULGE, MethodScore
-from anim.skinning.analysis.recommendations import Found, recommend
+from anim.skinning.analysis.recommendations import CollapseFinding, recommend
 from cli import tables
 from cli.text import plural
 
@@ -31,7 +31,7 @@ class CollapseReport:
     methods: tuple[str, ...]
     clamped: bool
     fps: float
-    found: Sequence[Found]
+    found: Sequence[CollapseFinding]
     warnings: Sequence[str] = ()
 
     @property
@@ -40,9 +40,9 @@ class CollapseReport:
         return len({each.number for each in self.found})
 
 
-def worst_of_clips(found: Sequence[Found]) -> list[Found]:
+def worst_of_clips(found: Sequence[CollapseFinding]) -> list[CollapseFinding]:
     """Return the worst mesh of each clip, in the order of the clips."""
-    worst: dict[int, Found] = {}
+    worst: dict[int, CollapseFinding] = {}
     for each in found:
         if each.number not in worst or each.mesh.worst.index < worst[each.number].mesh.worst.index:
             worst[each.number] = each
@@ -91,7 +91,7 @@ def _head(seen: CollapseReport, *, every: bool) -> str:
     return "; ".join(parts)
 
 
-def _row(found: Found) -> list[tables.Cell]:
+def _row(found: CollapseFinding) -> list[tables.Cell]:
     mesh = found.mesh
     worst = mesh.worst
     two = worst.joint != worst.other

@@ -60,7 +60,7 @@ class OptimizeReport:
             return None
         if self.found.unchanged:
             return "optimized like this before"
-        kept = kept_keys(self.before, self.found.solutions)
+        kept = retained_keys(self.before, self.found.solutions)
         return f"no smaller file within the bound{'; ' if kept else ''}{kept}"
 
     @property
@@ -94,7 +94,7 @@ def smaller(found: Optimized, document: Document, size_of: Callable[[Document], 
     return found.document
 
 
-def kept_keys(document: Document, clips: Iterable[int]) -> str:
+def retained_keys(document: Document, clips: Iterable[int]) -> str:
     """Return the extensions that keep old keys of `clips` in the file, empty if none does."""
     places = extensions_naming_keys(document.json, clips)
     if not places:
@@ -122,7 +122,7 @@ def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
         _worst_words(about),
         format_duration(about.seconds),
     ]
-    kept = kept_keys(about.before, about.found.solutions)
+    kept = retained_keys(about.before, about.found.solutions)
     return [", ".join(summary) + dry, *_policy(about), *([f"note: {kept}"] if kept else [])]
 
 

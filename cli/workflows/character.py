@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from anim.errors import NotFoundError
 from anim.exchange.retarget import aliases
 from anim.exchange.retarget.apply import apply_to_character, to_match
-from anim.exchange.retarget.kept_tracks import add_kept_tracks, kept_tracks
+from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks
 from anim.exchange.retarget.retarget import GroundMode
 from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
 from anim.gltf import authoring
@@ -71,13 +71,13 @@ def put_on_character(
     made = replace(made, onto=done, character=scene.skeleton)
     if casting.replaced is not None:
         old = reader.clips(document)[casting.replaced]
-        stay, num_gone = kept_tracks(old, done)
+        stay, num_gone = retained_tracks(old, done)
         if stay:
             voice.info(f"note: {text.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
         if num_gone:
             what = f"{text.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
             voice.warn(f"{what} go with it: it is another figure's motion")
-        clip = add_kept_tracks(done, stay, scene.skeleton)
+        clip = add_retained_tracks(done, stay, scene.skeleton)
         return made, writer.replace_clips(document, {casting.replaced: clip})
     return made, authoring.add_clips(document, [done.clip])
 

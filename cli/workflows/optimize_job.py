@@ -95,7 +95,7 @@ class OptimizeJob:
     def _check_fit(self, sized: RatePoint, max_bytes: int) -> None:
         if sized.size > max_bytes:
             percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
-            kept = optimize_report.kept_keys(self.source.document, self.chosen)
+            kept = optimize_report.retained_keys(self.source.document, self.chosen)
             raise CheckError(
                 f"doesn't fit {plural(max_bytes, 'byte')}: "
                 f"with an error of up to {format_length(sized.max_error)}{percent} it still takes "

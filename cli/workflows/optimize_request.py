@@ -34,7 +34,7 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
     return Bounds(
         length("max_error") or 0.0,
         length("shell") or 0.0,
-        0.0 if ZERO.fullmatch(pointer) else units.parse_share(pointer, "--max-pointer-error"),
+        0.0 if ZERO.fullmatch(pointer) else units.parse_fraction(pointer, "--max-pointer-error"),
         None if angle is None else units.parse_angle(angle, "--max-angle"),
         None if speed is None else units.parse_length(speed, "--max-speed-error", lambda: scale),
     )
@@ -58,7 +58,7 @@ def _fraction(text: str | None) -> str:
     return f"{float(number[:-1])}%" if number.endswith("%") else ""
 
 
-def kept_nodes(globs: Sequence[str], scene: Scene) -> frozenset[int]:
+def nodes_to_keep(globs: Sequence[str], scene: Scene) -> frozenset[int]:
     """Return the indices of the nodes that match any glob; none without globs. Raises NotFoundError."""
     return frozenset(Selection((), globs).chosen_nodes(scene.skeleton)) if globs else frozenset()
 

@@ -12,7 +12,7 @@ from pygltflib import GLTF2
 
 from anim.gltf.reading import reader
 from anim.skinning.analysis.collapse import collapse
-from anim.skinning.analysis.recommendations import Found
+from anim.skinning.analysis.recommendations import CollapseFinding
 from cli.reports.collapse_report import CollapseReport, text
 from tests.anim.show.reading import words
 from tests.cli.conftest import Call, Fixture
@@ -151,7 +151,9 @@ def test_clips_of_a_picture_have_one_scale(call: Call, fixture: Fixture, tmp_pat
 def test_the_whole_is_100_percent() -> None:
     inside_out = clip(track("scale", [0], [[-1, 1, 1]]))
     (found,) = collapse(reader.scene(opened_fixture("tube")), inside_out, times=np.zeros(1))
-    table = text(CollapseReport("tube.glb", 1, ("lbs", "dqs"), False, 30, [Found(0, "mirrored", found)]), every=True)
+    table = text(
+        CollapseReport("tube.glb", 1, ("lbs", "dqs"), False, 30, [CollapseFinding(0, "mirrored", found)]), every=True
+    )
     assert "  100 %     100 %  0.00 s" in table
     assert "e+" not in table
 

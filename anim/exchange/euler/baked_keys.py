@@ -66,7 +66,7 @@ class Float32Times:
         _, times, kept = found
         if len(kept) == len(curve.times):
             return replace(curve, times=times)
-        return curve.kept(kept, times)
+        return curve.select_keys(kept, times)
 
 
 def _is_dense(curve: Curve, first: Curve) -> bool:

@@ -79,7 +79,7 @@ class Curve:
         leaving = None if self.out_tangents is None else self.out_tangents * factor
         return replace(self, values=self.values * factor, in_tangents=arriving, out_tangents=leaving)
 
-    def kept(self, keys: Ints, times: Floats) -> Curve:
+    def select_keys(self, keys: Ints, times: Floats) -> Curve:
         """Return the curve with these keys (K,) only, at other times (K,)."""
         parts = {name: getattr(self, name) for name in HANDLES}
         handles = {name: None if part is None else part[keys] for name, part in parts.items()}

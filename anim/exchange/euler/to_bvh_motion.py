@@ -57,7 +57,7 @@ def to_bvh(
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 
-PlacedJoint = tuple[
+JointTransform = tuple[
     Floats, Floats, Floats
 ]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
 
@@ -74,7 +74,7 @@ class _Skeleton:
         self._turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
         self.size = float(np.ptp(self._home[chosen], axis=0).max()) or 1.0
 
-    def placed(self, node: int) -> PlacedJoint:
+    def placed(self, node: int) -> JointTransform:
         """Where a node is in the world; −1 is the world itself."""
         if node < 0:
             return ZERO, IDENTITY[None], ZERO
@@ -104,7 +104,7 @@ def _node(
     )
 
 
-def _relative_to(node: PlacedJoint, parent: PlacedJoint) -> PlacedJoint:
+def _relative_to(node: JointTransform, parent: JointTransform) -> JointTransform:
     """The same from the parent: offset at rest, turn, and offset at all times."""
     back = quaternion.conjugate(parent[1])
     return node[0] - parent[0], quaternion.multiply(back, node[1]), quaternion.rotate(back, node[2] - parent[2])

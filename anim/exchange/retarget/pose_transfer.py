@@ -22,7 +22,7 @@ from anim.sampling import sample_pose as posed
 from anim.sampling.pose import local_by_node, world_by_node
 
 FLAT = 1e-9  # of a unit cube's volume, below which a scale leaves nothing of an axis
-LOOKS = 64  # times at which the height of the motion is looked at
+NUM_HEIGHT_SAMPLES = 64  # times at which the height of the motion is looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +237,7 @@ def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int,
 def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
     """Positions (N, 3) of the source's nodes at rest, standing on the floor."""
     at_rest = world_matrices(source, rest_pose(source))[0, :, :, 3]
-    looks = np.linspace(clip.start, clip.end, LOOKS)
+    looks = np.linspace(clip.start, clip.end, NUM_HEIGHT_SAMPLES)
     heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
     return at_rest + with_offset(at_rest, target.positions, heights, top) * UP
 

@@ -12,7 +12,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.measure.loops.clip_ends import poses_of_clips
 from anim.model import Clip, Skeleton
-from anim.sampling.joined import ConcatenatedTracks
+from anim.sampling.concatenation import ConcatenatedTracks
 from anim.sampling.pose import world_by_node
 
 ONWARD = 0.7

@@ -11,7 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Interpolation, Skeleton, Track, ValueKind
-from anim.sampling.joined import ConcatenatedTracks, concatenate
+from anim.sampling.concatenation import ConcatenatedTracks, concatenate
 
 FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two stored values are the same
 REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing

@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.measure.continuity.knots import FLOAT32, PAIR
 from anim.measure.error import orientation_probes
 from anim.model import Clip, Interpolation, Pose, Skeleton
-from anim.sampling.joined import ConcatenatedTracks, concatenate
+from anim.sampling.concatenation import ConcatenatedTracks, concatenate
 from anim.sampling.pose import world_by_node
 
 PARTS = ("translation", "rotation", "scale")
@@ -28,7 +28,7 @@ DIFFERENCES = np.array(
     float,
 )
 SPEED = 1  # its row
-HELD = [0, 1, 1, 3, 4, 6, 6, 7]  # when a STEP track is looked at: it has no speed
+STEP_TIME_INDEX = [0, 1, 1, 3, 4, 6, 6, 7]  # when a STEP track is looked at: it has no speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,9 @@ def poses_around_ends(
     groups: the tracks of all their clips, `joined`, for callers that have them.
     """
     times = np.array([part.times() for part in parts])
-    whole, weights = poses_of_clips(skeleton, [part.clip for part in parts], times, held=times[:, HELD], groups=groups)
+    whole, weights = poses_of_clips(
+        skeleton, [part.clip for part in parts], times, held=times[:, STEP_TIME_INDEX], groups=groups
+    )
     world = world_by_node(skeleton, whole)
     world = world.reshape(len(skeleton), *times.shape, 3, 4)
     for i, part in enumerate(parts):

@@ -16,7 +16,7 @@ from anim.measure.error.surface import Surface, has_vertices, morph_points, skin
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Pose, Scene
-from anim.sampling.joined import ConcatenatedTracks
+from anim.sampling.concatenation import ConcatenatedTracks
 from anim.sampling.pose import rest_pose, sample_pose, world_by_node
 
 PARTS = ("translation", "rotation", "scale")

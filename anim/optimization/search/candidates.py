@@ -18,7 +18,7 @@ from anim.optimization.tracks.loop_closure import close_ends
 from anim.optimization.tracks.quantization import EncodedKeys, Form
 from anim.sampling.track import KeyInterval, find_interval
 
-MAX_KEPT = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
+MAX_CACHED_VALUES = 10_000_000  # numbers; beyond, all that is kept for other trials is let go
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Candidates:
                 self._keys[name, i] = keys[:, k]
 
     def _make_room(self) -> None:
-        if self._kept <= MAX_KEPT:
+        if self._kept <= MAX_CACHED_VALUES:
             return
         for kept in (self._places, self._fits, self._keys, self._made):
             kept.clear()

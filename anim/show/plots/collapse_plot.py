@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from anim.arrays import Floats
 from anim.show.plots.figure import ACCENT, COLORS, HAIR, LINE, SMALL, SOFT, TITLE, Figure, separate_labels, style
 from anim.skinning.analysis.collapse import LOW_INDEX
-from anim.skinning.analysis.recommendations import Found
+from anim.skinning.analysis.recommendations import CollapseFinding
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,10 +17,10 @@ LIMIT = 12  # clips on one sheet, the worst ones
 COLUMN, WIDE = 5.2, 9.2  # inches: a cell of a grid, and one alone
 MARGIN, LEFT, RIGHT, HEAD, CAPTION, FOOT = 0.2, 0.55, 0.55, 0.36, 0.3, 0.42
 TOP, TALL = 0.62, 1.15
-ROOM = 0.04  # of the scale, above and below
+PADDING_FRACTION = 0.04  # of the scale, above and below
 
 
-def collapse_plot(found: Sequence[Found], *, title: str, kind: str) -> bytes:
+def collapse_plot(found: Sequence[CollapseFinding], *, title: str, kind: str) -> bytes:
     """Return a picture of clips as the bytes of a PNG or SVG file: of many the worst twelve, in their own order,
     without those of one frame.
 
@@ -47,7 +47,7 @@ def collapse_plot(found: Sequence[Found], *, title: str, kind: str) -> bytes:
         return sheet.render(kind)
 
 
-def _cell(sheet: Figure, found: Found, x: float, y: float, width: float, scale: tuple[float, float]) -> None:
+def _cell(sheet: Figure, found: CollapseFinding, x: float, y: float, width: float, scale: tuple[float, float]) -> None:
     """One clip. scale: least and greatest volume of all clips, %."""
     mesh, left, across = found.mesh, x + LEFT, width - LEFT - RIGHT
     at = left + 0.14 + sheet.text(left, y + 0.2, found.clip, fontsize=TITLE, weight="bold")
@@ -63,7 +63,7 @@ def _cell(sheet: Figure, found: Found, x: float, y: float, width: float, scale: 
 
 
 def _draw_index(axes: Axes, times: Floats, indices: Floats) -> None:
-    axes.set_ylim(-ROOM, 1 + ROOM)
+    axes.set_ylim(-PADDING_FRACTION, 1 + PADDING_FRACTION)
     axes.set_yticks([0, 0.5, LOW_INDEX, 1])
     axes.axhline(LOW_INDEX, color=COLORS[0], linewidth=0.8, linestyle=(0, (4, 3)))
     axes.fill_between(
@@ -74,7 +74,7 @@ def _draw_index(axes: Axes, times: Floats, indices: Floats) -> None:
     axes.set_xticklabels([])
 
 
-def _volume_range(found: Sequence[Found]) -> tuple[float, float]:
+def _volume_range(found: Sequence[CollapseFinding]) -> tuple[float, float]:
     """The least and the greatest volume of any clip by any method, % of bind pose."""
     volumes = [each.volume for one in found for each in one.mesh.methods if each.volume is not None]
     low = min((100 * float(each.min()) for each in volumes), default=100.0)
@@ -84,7 +84,7 @@ def _volume_range(found: Sequence[Found]) -> tuple[float, float]:
 
 def _draw_volumes(axes: Axes, times: Floats, volumes: dict[str, Floats], scale: tuple[float, float]) -> None:
     low, high = scale
-    room = ROOM * (high - low)
+    room = PADDING_FRACTION * (high - low)
     axes.set_ylim(low - room, high + room)
     axes.axhline(100, color=HAIR, linewidth=0.8)
     ends = [100 * float(each[-1]) for each in volumes.values()]

@@ -17,7 +17,7 @@ COLUMN, WIDE = 5.4, 9.2  # inches: a cell of a grid, and one alone
 MARGIN, LEFT, RIGHT, MOST_RIGHT, HEAD, FOOT = 0.2, 0.62, 0.3, 1.5, 0.36, 0.46
 TOP, TALL = 0.62, 1.7
 THIN = 1.1
-ROOM = 0.06  # of the scale, above
+TOP_PADDING_FRACTION = 0.06  # of the scale, above
 GAP = 0.12  # of the height, from name to name
 LONGEST = 22  # letters of a joint's name; the end of a longer one
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"))  # from so many m on
@@ -75,7 +75,7 @@ def _cell(sheet: Figure, profile: ErrorCurve, x: float, y: float, width: float, 
 
 def _draw(axes: Axes, profile: ErrorCurve, names: Sequence[str], factor: float, limit: float | None) -> None:
     times, error = profile.times, factor * profile.error
-    high = (1 + ROOM) * float(error.max(initial=0.0)) or 1.0
+    high = (1 + TOP_PADDING_FRACTION) * float(error.max(initial=0.0)) or 1.0
     axes.set_ylim(0, high)
     axes.set_xlim(*_span(times))
     axes.fill_between(times, error, color=HAIR, alpha=0.45, linewidth=0)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 8.4, 4.8  # inches
 LEFT, RIGHT, TOP, BOTTOM = 0.75, 0.45, 1.05, 0.62
-ROOM = 0.08  # of the logarithm of the bytes, on both sides
+PADDING_PER_RANGE = 0.08  # of the logarithm of the bytes, on both sides
 ABOVE = 0.13, 0.17  # inches from the panel to the lowest words above it, and from line to line
 APART = 1.5  # inches; words of lines that are nearer go into different lines
 TICKS = (1, 2, 3, 5)
@@ -62,7 +62,7 @@ def _scale(axes: Axes, counts: Sequence[int]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     low, high = np.log10(max(min(counts), 1)), np.log10(max(max(counts), 1))
-    room = max(ROOM * (high - low), 0.015)
+    room = max(PADDING_PER_RANGE * (high - low), 0.015)
     axes.set_xscale("log")
     axes.set_xlim(10 ** (low - room), 10 ** (high + room))
     first, last = axes.get_xlim()

@@ -24,7 +24,7 @@ SOME = 0.01  # share of vertices that has to bulge to be worth a word
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class CollapseFinding:
     """A mesh in a clip, by the clip's number and name."""
 
     number: int
@@ -32,7 +32,7 @@ class Found:
     mesh: MeshCollapse
 
 
-def recommend(found: Sequence[Found], *, clamped: bool = False) -> Iterator[str]:
+def recommend(found: Sequence[CollapseFinding], *, clamped: bool = False) -> Iterator[str]:
     """Yield what to do, a line each, the worst of all first; one line that all is well, or that there is no clip.
 
     Methods that were measured are recommended by what they did, others only to be measured. clamped: whether methods
@@ -48,7 +48,7 @@ def recommend(found: Sequence[Found], *, clamped: bool = False) -> Iterator[str]
         yield "there is no clip to look at"
 
 
-def _unusable(found: Sequence[Found]) -> Iterator[str]:
+def _unusable(found: Sequence[CollapseFinding]) -> Iterator[str]:
     """Of each method that loses the model, where it does most."""
     lost = [(fared.max_distance, fared, each) for each in found for fared in each.mesh.methods if fared.unusable]
     for method in dict.fromkeys(fared.method for _, fared, _ in lost):
@@ -67,7 +67,7 @@ def twist_joints(angle: float) -> int:
     return max(1, math.ceil(angle / (2 * math.acos(GOOD)) - 1e-9))
 
 
-def _all_is_well(found: Sequence[Found], *, clamped: bool) -> str:
+def _all_is_well(found: Sequence[CollapseFinding], *, clamped: bool) -> str:
     meshes = [each.mesh for each in found]
     index = min(each.worst.index for each in meshes)
     told = f"no vertex falls below {LOW_INDEX} (least {index:.3f})"
@@ -88,7 +88,7 @@ def _remaining_collapse(meshes: list[MeshCollapse]) -> float | None:
     return min((float(each.min()) for each in volumes), default=None)
 
 
-def _against_pinching(pinched: list[Found], *, clamped: bool) -> Iterator[str]:
+def _against_pinching(pinched: list[CollapseFinding], *, clamped: bool) -> Iterator[str]:
     yield _worst(pinched)
     found = rank_methods([each.mesh for each in pinched])
     chosen = best_method(found)
@@ -99,7 +99,7 @@ def _against_pinching(pinched: list[Found], *, clamped: bool) -> Iterator[str]:
         yield from _against_bulging(pinched, chosen.method, clamped=clamped)
 
 
-def _worst(pinched: list[Found]) -> str:
+def _worst(pinched: list[CollapseFinding]) -> str:
     first, clips = pinched[0], len({each.number for each in pinched})
     worst, left = first.mesh.worst, _remaining_collapse([first.mesh])
     told = "1 clip pinches" if clips == 1 else f"{clips} clips pinch"
@@ -108,7 +108,9 @@ def _worst(pinched: list[Found]) -> str:
     return f"{told}; worst {worst.index:.2f} in '{first.clip}': {places}{loss}"
 
 
-def _bake(found: Sequence[RankedMethod], chosen: RankedMethod | None, pinched: list[Found], *, clamped: bool) -> str:
+def _bake(
+    found: Sequence[RankedMethod], chosen: RankedMethod | None, pinched: list[CollapseFinding], *, clamped: bool
+) -> str:
     if chosen is None and any(each.unusable for each in found):
         return "no other method that was measured can be used"
     if chosen is None:
@@ -140,7 +142,7 @@ def _keeps(found: Sequence[RankedMethod]) -> str:
     )
 
 
-def _sharing_the_twist(pinched: list[Found]) -> Iterator[str]:
+def _sharing_the_twist(pinched: list[CollapseFinding]) -> Iterator[str]:
     """The worst twist, if any: bends have no use for twist joints."""
     worst = next((each.mesh.worst for each in pinched if each.mesh.worst.twist), None)
     if worst is not None and (count := twist_joints(worst.angle)) > 1:
@@ -150,8 +152,8 @@ def _sharing_the_twist(pinched: list[Found]) -> Iterator[str]:
         )
 
 
-def _against_bulging(pinched: list[Found], method: str, *, clamped: bool) -> Iterator[str]:
-    swollen: list[tuple[MethodScore, Found]] = []
+def _against_bulging(pinched: list[CollapseFinding], method: str, *, clamped: bool) -> Iterator[str]:
+    swollen: list[tuple[MethodScore, CollapseFinding]] = []
     for each in pinched:
         linear = max((fared.bulge for fared in each.mesh.methods if fared.method == "lbs"), default=1.0)
         swollen += [(fared, each) for fared in each.mesh.methods if fared.method == method and _swells(fared, linear)]
@@ -170,13 +172,13 @@ def _swells(fared: MethodScore, linear: float) -> bool:
     return fared.bulge > max(MUCH, linear + MORE) and fared.bulging > SOME
 
 
-def _unmeasured(found: Sequence[Found]) -> list[str]:
+def _unmeasured(found: Sequence[CollapseFinding]) -> list[str]:
     """The methods whose effect is not known yet."""
     known = {"lbs", *(fared.method for each in found for fared in each.mesh.methods)}
     return [name for name in SKINNING_METHODS if name not in known]
 
 
-def _measuring(found: Sequence[Found], others: Sequence[str], *, clamped: bool) -> str:
+def _measuring(found: Sequence[CollapseFinding], others: Sequence[str], *, clamped: bool) -> str:
     """The line that looks at these clips again: by the methods that were measured and can be used, and by others."""
     lost = {fared.method for each in found for fared in each.mesh.methods if fared.unusable}
     known = [fared.method for each in found for fared in each.mesh.methods if fared.method not in lost]
@@ -184,7 +186,7 @@ def _measuring(found: Sequence[Found], others: Sequence[str], *, clamped: bool) 
     return f"gltf-anim collapse IN{methods}{CLAMP if clamped else ''}{choose_option(_numbers(found))}"
 
 
-def _numbers(found: Sequence[Found]) -> list[int]:
+def _numbers(found: Sequence[CollapseFinding]) -> list[int]:
     """The clips' numbers, each once."""
     return sorted({each.number for each in found})
 

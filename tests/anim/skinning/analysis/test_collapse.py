@@ -18,7 +18,7 @@ from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_colla
 from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces
 from anim.skinning.analysis.method_scores import MethodScore
 from anim.skinning.analysis.ranking import RankedMethod, best_method, rank_methods
-from anim.skinning.analysis.recommendations import Found, recommend, twist_joints
+from anim.skinning.analysis.recommendations import CollapseFinding, recommend, twist_joints
 from anim.skinning.bake import bake
 from fixtures.shapes import cube
 from tests.anim.skinning.methods.test_linear_blend import TIMES, moving
@@ -61,7 +61,7 @@ def test_a_candy_wrapper_and_its_share() -> None:
 
 def test_indices_are_the_determinants_of_the_blend() -> None:
     """Scales and shears divided out, for random joints; scales alone are no collapse."""
-    of = random_scene(4, scale_shear=0.5)
+    of = random_scene(4, stretch=0.5)
     played = moving(of, 1)
     matrices, body = skinning_matrices(of, played, TIMES)[..., :3], of.instances[0].mesh
     blended = np.einsum("vi,fviab->fvab", body.weights, matrices[:, body.joints])
@@ -159,17 +159,19 @@ def told(axis: str, angle: float, *methods: str, clamped: bool = False) -> list[
     """The advice on a tube that is turned by an angle."""
     time, methods = np.array([1.0]), methods or ("lbs", "dqs")
     seen = collapse(tube(), turned(axis, 0, angle), times=time, methods=methods, bulge_clamp=clamped)
-    return list(recommend([Found(0, "turn", each) for each in seen], clamped=clamped))
+    return list(recommend([CollapseFinding(0, "turn", each) for each in seen], clamped=clamped))
 
 
-def made_up(index: float, *, closed: bool = True, **methods: tuple[float | None, float]) -> Found:
+def made_up(index: float, *, closed: bool = True, **methods: tuple[float | None, float]) -> CollapseFinding:
     """A mesh with an index, and of each method the volume and the bulge."""
     worst = CollapsePoint(index, 0, "arm", "hand", 0.0, 1.5, twist=False)
     fared = tuple(
         MethodScore(name, None if volume is None else np.full(2, volume), bulge, 0.5, 0, "arm", 0.5)
         for name, (volume, bulge) in methods.items()
     )
-    return Found(0, "turn", MeshCollapse("m", 0, 9, np.arange(2.0), np.ones(2), worst, 0, 0, float(closed), fared))
+    return CollapseFinding(
+        0, "turn", MeshCollapse("m", 0, 9, np.arange(2.0), np.ones(2), worst, 0, 0, float(closed), fared)
+    )
 
 
 def test_advice() -> None:
@@ -210,7 +212,7 @@ def test_what_every_method_loses_is_no_pinching() -> None:
     assert found.methods[0].volume is not None
     assert found.methods[0].volume[0] < 0.8
     assert not is_collapsed(found)
-    (line,) = recommend([Found(0, "shrink", found)])
+    (line,) = recommend([CollapseFinding(0, "shrink", found)])
     assert "good enough" not in line
     assert line.endswith("is left at worst, and no method that was measured keeps more")
 

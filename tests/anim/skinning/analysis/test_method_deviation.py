@@ -9,7 +9,7 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Scene
 from anim.skinning.analysis.collapse import collapse
 from anim.skinning.analysis.method_deviation import deviation, linear_baker, model_size
-from anim.skinning.analysis.recommendations import Found, recommend
+from anim.skinning.analysis.recommendations import CollapseFinding, recommend
 from anim.skinning.bake import prepare_bake
 from tests.clips import about, clip, track
 from tests.files import opened_fixture
@@ -52,7 +52,7 @@ def test_collapse_never_advises_such_a_method() -> None:
     (mesh,) = collapse(of, played, times=TIMES, methods=("lbs", "dqs", "cor"))
     unusable = {each.method: each.unusable for each in mesh.methods}
     assert unusable == {"lbs": False, "dqs": True, "cor": False}
-    lines = list(recommend([Found(0, "torn", mesh)]))
+    lines = list(recommend([CollapseFinding(0, "torn", mesh)]))
     assert lines[0].startswith("dqs can't be used: a vertex is 19.7 m from")
     assert "('torn', 1.00 s)" in lines[0]
     assert not [line for line in lines if "--method dqs" in line or "dqs keeps" in line]

@@ -17,7 +17,7 @@ from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
 
 
-def kept_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], int]:
+def retained_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], int]:
     """Return the tracks of a clip that gives way which stay, and how many go though the motion has no node for them.
 
     Those are of nodes that no joint of the motion is matched to, of morph weights and of pointers. They stay where the
@@ -28,7 +28,7 @@ def kept_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], int]
     return (found, 0) if done.measure is Measure.BUILD else ((), len(found))
 
 
-def add_kept_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
+def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
     """Return the motion's clip with tracks that stay. Joints keep their way in the world below nodes that move now."""
     moving = {track.node for track in stay if track.path != "weights"}
     known = set(done.matching.pairs.values())
