@@ -21,7 +21,25 @@ FORBIDDEN = frozenset(
     wrapped
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
-PENDING = ("anim/", "cli/")  # packages whose docstrings are not rewritten yet
+PENDING = (  # packages whose docstrings are not rewritten yet
+    "anim/api.py",
+    "anim/arrays.py",
+    "anim/asset.py",
+    "anim/caches",
+    "anim/curves",
+    "anim/errors.py",
+    "anim/exchange",
+    "anim/files",
+    "anim/maths",
+    "anim/measure",
+    "anim/model",
+    "anim/operations",
+    "anim/optimization",
+    "anim/sampling",
+    "anim/show",
+    "anim/skinning",
+    "cli/reports",
+)
 OPENINGS = re.compile(r"(what|how|which|whose|whether)\b", re.IGNORECASE)
 
 
