@@ -68,7 +68,7 @@ PUBLIC = {
     "gltf.io": "container images json_text lenient source unused_buffers uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors image_data instancing materials reader vertex_colors",
-    "gltf.validation": "buffer_layout channel_targets hierarchy structure",
+    "gltf.validation": "buffer_layout channel_targets hierarchy schema",
     "gltf.writing": "byte_ranges references reindex writer",
     "measure.compare": "diff name_matching",
     "measure.continuity": "continuity knots",
