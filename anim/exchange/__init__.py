@@ -1,1 +1,1 @@
-"""Euler tracks in and out: BVH, CSV and JSON curves, and what they become in glTF."""
+"""Euler motion ↔ glTF: BVH, CSV and JSON curves, and retargeting to characters."""

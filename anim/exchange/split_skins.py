@@ -1,4 +1,4 @@
-"""A body taken apart into one for each tree of the skeleton: the joints of a glTF skin must have a common root."""
+"""Split a skinned mesh by skeleton tree: the joints of a glTF skin must have a common root."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from anim.model import Mesh, Skeleton, Skin
 
 
 def split_by_root(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh, Skin]]:
-    """Return a mesh and its skin for each root that has joints, numbered by name where there are several.
+    """Return a mesh and its skin for each root that has joints, with numbered names if several.
 
-    mesh: each triangle hangs on joints of one tree, and has its vertices for itself.
+    mesh: each triangle is bound to joints of one tree, without shared vertices.
     """
     root_of = _roots(skeleton)[skin.joints]
     roots = np.unique(root_of)
@@ -42,7 +42,7 @@ def split_by_root(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh
 
 
 def _roots(skeleton: Skeleton) -> Ints:
-    """Number of the root above each node (N,)."""
+    """Index of the root above each node (N,)."""
     found: Ints = np.arange(len(skeleton))
     for level in skeleton.levels()[1:]:
         found[level] = found[skeleton.parents[level]]

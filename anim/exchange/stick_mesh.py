@@ -1,4 +1,4 @@
-"""A body of sticks for a skeleton: a slim bipyramid from each joint to each of its children, for viewers."""
+"""Stick mesh for a skeleton: a slim bipyramid from each joint to each of its children."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from anim.model import Mesh, Skeleton, Skin
 from anim.sampling import rest_pose, world_matrices
 
 NAME = "sticks"
-SHOULDER = 0.18  # share of a stick's length from the joint, where it is widest
-SLIMNESS = 0.07  # radius by length
-MIN_LENGTH = 1e-4  # share of the skeleton's size below which a stick is left out
-MAX_RADIUS, MIN_RADIUS = 0.02, 0.004  # shares of the skeleton's size
-KNOB = 0.02  # share of the size: length of the stick of a joint without children
+SHOULDER = 0.18  # fraction of a stick's length from the joint to its widest point
+SLIMNESS = 0.07  # radius / length
+MIN_LENGTH = 1e-4  # fraction of the skeleton's size; shorter sticks are omitted
+MAX_RADIUS, MIN_RADIUS = 0.02, 0.004  # fractions of the skeleton's size
+KNOB = 0.02  # fraction of the size: stick length of a joint without children
 
 
 def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[Mesh, Skin]:
-    """Return a mesh and the skin that hangs it on the skeleton; each stick follows the joint it starts from.
+    """Return a mesh bound to the skeleton, and its skin; each stick follows its start joint.
 
-    ends: nodes that are no joints and only mark where their parent ends. Normals are those of flat faces.
+    ends: nodes that only mark the end of their parent. Normals are those of flat faces.
     """
     joints: Ints = np.array([i for i in range(len(skeleton)) if i not in ends], np.int64)
     place_of = {int(node): place for place, node in enumerate(joints)}

@@ -1,4 +1,4 @@
-"""Where keys must stand so that what a player makes between them follows a path within a tolerance."""
+"""Adaptive keys: interpolation between them follows a path within a tolerance."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.errors import RangeError
 from anim.maths import quaternion
 
-MAX_ANGLE_RAD = np.radians(120)  # of a piece; beyond half a turn slerp goes the other way round
-MAX_TRAVEL = np.radians(360)  # of all axes in a piece before it is sampled, so that no turn hides between samples
-ROUNDING = 1e-4  # share of a piece that float32 times make it longer or shorter
+MAX_ANGLE_RAD = np.radians(120)  # per segment; above 180° slerp takes the other arc
+MAX_TRAVEL = np.radians(360)  # sum over all axes per segment before sampling, so that no rotation is between samples
+ROUNDING = 1e-4  # fraction of a segment's length that float32 times may add or remove
 SAMPLES = np.arange(1, 16) / 16
-SAFETY = 1.02  # the greatest error lies between samples
-MAX_SUBDIVISIONS = 64  # that one piece is split into at a time
+SAFETY = 1.02  # the greatest error is between samples
+MAX_SUBDIVISIONS = 64  # segments that one segment is split into at a time
 MAX_KEYS = 2_000_000
 ROUNDS = 40
 
@@ -28,9 +28,10 @@ Travel: TypeAlias = Callable[[Floats, Floats], Floats]
 class SampledPath:
     """A value (..., C) at any times (...) in seconds.
 
-    value(times, before): before asks for the value just before each time, where it jumps.
-    travel(a, b): a bound (B,) of how far its angles run in radians from a to b (B,); 0 for a path of no angles.
-    turns: whether values are unit quaternions, hence errors angles.
+    value(times, before): `before` gives the left limit at each time, different at jumps.
+    travel(a, b): a bound (B,) of the path length of its angles in radians from a to b (B,); 0 for a path without
+    angles.
+    turns: True for unit quaternions, so that errors are angles.
     """
 
     value: Callable[[Floats, bool], Floats]
@@ -39,13 +40,13 @@ class SampledPath:
 
 
 def adaptive_keys(path: SampledPath, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
-    """Return key times (K,) and values (K, C) whose slerp, or lerp, follows the path within `tolerance`.
+    """Return key times (K,) and values (K, C) with slerp, or lerp, within `tolerance` of the path.
 
-    knots: (T,) float32-exact times between which the path is smooth; each one is a key. Where the value jumps, a key
-    stands at the float32 time just before too. No piece turns by more than 120°; signs are continuous.
+    knots: (T,) float32-exact times between which the path is smooth; each one is a key. At a jump of the value there is
+    another key at the previous float32 time. No segment rotates by more than 120°; signs are continuous.
     tolerance: radians for rotations, the value's own unit otherwise; > 0.
     XYZ (0, 0, 0) → (90°, 90°, 0) at 0.1° → 15 keys
-    Source: the chord of a piece of length h is off by about h² · α / 8, so an error e wants √(e / tolerance) pieces.
+    Source: the chord error of a segment of length h is about h² · α / 8, so an error e needs √(e / tolerance) segments.
     Raises RangeError for over two million keys.
     """
     times = _follow_path(path, knots, tolerance) if len(knots) > 1 else knots
@@ -64,10 +65,11 @@ def _follow_path(path: SampledPath, knots: Floats, tolerance: float) -> Floats:
 
 
 def refine_keys(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floats:
-    """Return times (K,) and more between them, until no piece wants to be split.
+    """Return times (K,) and added ones, until no segment needs to be split.
 
-    times: (T,) float32-exact. wanted: how many pieces (B,), up to MOST_PIECES, those from a to b (B,) should become;
-    1 where one is good. Raises RangeError for over two million keys.
+    times: (T,) float32-exact. wanted: takes segments from a to b (B,), returns for each the segment count (B,), up to
+    MAX_SUBDIVISIONS, to split it into; 1 for none.
+    Raises RangeError for over two million keys.
     """
     found, a, b = [times], times[:-1], times[1:]
     for _ in range(ROUNDS):
@@ -84,7 +86,7 @@ def refine_keys(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floa
 
 
 def _required_keys(path: SampledPath, a: Floats, b: Floats, tolerance: float) -> Ints:
-    """How many pieces (B,) each should become; 1 where it is good."""
+    """Segment count (B,) to split each segment into; 1 for none."""
     u = np.concatenate(([0.0], SAMPLES, [1.0]))
     at = a[:, None] + (b - a)[:, None] * u
     at[:, -1] = b
@@ -105,7 +107,7 @@ def _required_keys(path: SampledPath, a: Floats, b: Floats, tolerance: float) ->
 
 
 def _split_interval(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats, Floats]:
-    """The ends (B,) of all pieces from a to b, evenly split at times that float32 holds; none has no length."""
+    """Segments from a to b (B,) split evenly at float32-exact times, without empty ones: starts, ends."""
     counts = np.maximum(pieces, 1)
     if counts.sum() > MAX_KEYS:
         raise RangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")

@@ -1,4 +1,4 @@
-"""Are curves frames of a recording, or keys that somebody set? And key times as a glTF can hold them."""
+"""Detect baked curves (one key per frame), and convert key times to glTF's float32."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from anim.exchange.euler.motion import EulerMotion, EulerNode
 
 MIN_RATE = 10.0  # keys per second
 MIN_KEYS = 4
-EVEN = 0.01  # share of a step by which steps may differ
+EVEN = 0.01  # fraction by which steps may differ
 
 
 class KeyPlacement(StrEnum):
-    """Where the keys of what is written stand."""
+    """Placement of the keys in the output."""
 
     AUTO = "auto"
     GRID = "grid"
@@ -25,9 +25,9 @@ class KeyPlacement(StrEnum):
 
 
 def is_baked(motion: EulerMotion, node: EulerNode, keys: KeyPlacement) -> bool:
-    """Return whether a node keeps the source's key times and gets no others.
+    """Return True if a node keeps the source's key times without added keys.
 
-    AUTO: recordings do: BVH, or straight curves on one even grid of ten keys a second or more.
+    AUTO: True for recordings: BVH, or linear curves on one even grid of ten keys a second or more.
     """
     if keys != KeyPlacement.AUTO:
         return keys == KeyPlacement.GRID
@@ -43,7 +43,7 @@ def curves_of(node: EulerNode) -> list[Curve]:
 
 
 class Float32Times:
-    """Rounds key times to float32, once per array, so that curves that share their times go on sharing them."""
+    """Key times rounded to float32, once per array, so that curves still share their times."""
 
     def __init__(self) -> None:
         self._found: dict[int, tuple[Floats, Floats, Ints]] = {}
@@ -61,7 +61,9 @@ class Float32Times:
         found = self._found.get(id(curve.times))
         if found is None:
             stored = curve.times.astype(np.float32).astype(np.float64)
-            last: Ints = np.flatnonzero(np.append(np.diff(stored) > 0, True))  # of keys that fall together
+            last: Ints = np.flatnonzero(
+                np.append(np.diff(stored) > 0, True)
+            )  # the last of keys with equal float32 times
             found = self._found[id(curve.times)] = (curve.times, stored[last], last)
         _, times, kept = found
         if len(kept) == len(curve.times):

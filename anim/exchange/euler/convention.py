@@ -1,4 +1,4 @@
-"""Which of the 24 conventions a source means, and the unit: said by the file or by the options, never guessed."""
+"""Euler convention (one of 24) and angle unit: stated by the file or the options, never guessed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from anim.maths.euler import ORDERS, AxesConvention, check_order
 
 @dataclass(frozen=True, slots=True)
 class PartialConvention:
-    """What one side says; None where it says nothing."""
+    """Stated parts of a convention, None for the others."""
 
     order: str | None = None
     frame: AxesConvention | None = None
@@ -23,9 +23,9 @@ UNSPECIFIED = PartialConvention()
 
 
 def parse_convention(values: dict[str, Any], where: str) -> PartialConvention:
-    """Return what a file says under "order", "frame" and "unit", in letters of any case.
+    """Return the convention of a file's "order", "frame" and "unit", in any case.
 
-    Raises FormatError for words that are none.
+    Raises FormatError for unknown words.
     """
     order = values.get("order")
     frame, unit = (word.casefold() if isinstance(word, str) else word for word in map(values.get, ("frame", "unit")))
@@ -43,7 +43,7 @@ def parse_convention(values: dict[str, Any], where: str) -> PartialConvention:
 
 
 def merge_strict(file: PartialConvention, options: PartialConvention) -> PartialConvention:
-    """Return what file and options say together. Raises RangeError where both name a part of it and differ."""
+    """Return the parts of file and options together. Raises RangeError for contradicting parts."""
     if options.order is not None:
         options = PartialConvention(check_order(options.order), options.frame, options.unit)
     for name in ("order", "frame", "unit"):
@@ -54,7 +54,7 @@ def merge_strict(file: PartialConvention, options: PartialConvention) -> Partial
 
 
 def require_complete(said: PartialConvention) -> Convention:
-    """Return the convention in full. Raises RangeError where nobody names a part of it."""
+    """Return the complete convention. Raises RangeError for a missing part."""
     if said.order is not None and said.frame is not None and said.unit is not None:
         return Convention(said.order, said.frame, said.unit)
     missing = next(name for name in ("order", "frame", "unit") if getattr(said, name) is None)
@@ -65,7 +65,7 @@ def require_complete(said: PartialConvention) -> Convention:
 
 
 def fill_from(first: PartialConvention, otherwise: PartialConvention) -> PartialConvention:
-    """Return what `first` says, and where it says nothing what `otherwise` does."""
+    """Return `first`, with missing parts from `otherwise`."""
     return PartialConvention(
         first.order if first.order is not None else otherwise.order,
         first.frame if first.frame is not None else otherwise.frame,
@@ -74,10 +74,10 @@ def fill_from(first: PartialConvention, otherwise: PartialConvention) -> Partial
 
 
 def axis_index(axis: str, order: str) -> int | None:
-    """Return which angle of the order an axis name means: "x" … "z" by axis, "1" … "3" by place; None where unclear.
+    """Return the index of an axis in an order: "x" … "z" by axis, "1" … "3" by index; None if ambiguous.
 
-    place_of_axis("y", "ZXY") → 2
-    place_of_axis("z", "ZXZ") → None
+    axis_index("y", "ZXY") → 2
+    axis_index("z", "ZXZ") → None
     """
     if axis in "123":
         return int(axis) - 1
@@ -86,6 +86,6 @@ def axis_index(axis: str, order: str) -> int | None:
 
 
 def axis_names(order: str) -> tuple[str, str, str]:
-    """Return what the three angles of an order are called: their axes, or their places where an axis comes twice."""
+    """Return the names of an order's three angles: the axes, or indices if an axis is repeated."""
     names = tuple(order.lower()) if len(set(order)) == 3 else ("1", "2", "3")
     return names[0], names[1], names[2]

@@ -1,4 +1,4 @@
-"""Curve: one number over time with keys of its own, as Maya and FBX keep them; and its value at any time."""
+"""Animation curve: a scalar with its own keys, as in Maya and FBX, and its evaluation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HANDLES = ("in_tangents", "out_tangents", *WEIGHTS)
 
 
 class Mode(IntEnum):
-    """How a curve goes on from a key to the next."""
+    """Interpolation from a key to the next."""
 
     STEP = 0
     LINEAR = 1
@@ -33,11 +33,11 @@ MODES = {mode.name.lower(): mode for mode in Mode}
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Keys of one number. Outside its keys a curve holds its end values.
+    """Keys of a scalar, constant before the first and after the last key.
 
     times: (K,) s, ≥ 0, strictly increasing. values: (K,) radians, metres or factors.
-    modes: (K,) Mode after each key. in_tangents, out_tangents: (K,) per second, for CUBIC; None means none are.
-    in_weights, out_weights: (K,) lengths of the handles as shares of their piece, 0 … 1; None means a third.
+    modes: (K,) Mode after each key. in_tangents, out_tangents: (K,) per second, for CUBIC; None without any.
+    in_weights, out_weights: (K,) handle lengths as fractions of their segment, 0 … 1; None means a third.
     """
 
     times: Floats
@@ -63,7 +63,7 @@ class Curve:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it never changes."""
+        """True if all values are equal."""
         if len(self.values) == 1:
             return True
         flat = (
@@ -80,13 +80,13 @@ class Curve:
         return replace(self, values=self.values * factor, in_tangents=arriving, out_tangents=leaving)
 
     def select_keys(self, keys: Ints, times: Floats) -> Curve:
-        """Return the curve with these keys (K,) only, at other times (K,)."""
+        """Return the curve with these keys (K,) only, at the new times (K,)."""
         parts = {name: getattr(self, name) for name in HANDLES}
         handles = {name: None if part is None else part[keys] for name, part in parts.items()}
         return Curve(times, self.values[keys], self.modes[keys], **handles)
 
     def weights(self, left: Ints, right: Ints) -> tuple[Floats, Floats]:
-        """Return how far the handles after keys `left` and before keys `right` reach, as shares of the piece."""
+        """Return the handle lengths after keys `left` and before keys `right`, as fractions of the segment."""
         third = np.full(len(self.times), weighted_bezier.PLAIN)
         leaving = third if self.out_weights is None else self.out_weights
         arriving = third if self.in_weights is None else self.in_weights
@@ -94,12 +94,12 @@ class Curve:
 
 
 def constant(value: float) -> Curve:
-    """Return a curve that holds one value: a single key at 0 s."""
+    """Return a constant curve: a single key at 0 s."""
     return linear(np.zeros(1), np.array([value]))
 
 
 def linear(times: Floats, values: Floats) -> Curve:
-    """Return a curve of straight lines through keys (K,)."""
+    """Return a linear curve through keys (K,)."""
     return Curve(times, values, uniform_modes(len(times), Mode.LINEAR))
 
 
@@ -109,9 +109,9 @@ def uniform_modes(count: int, mode: Mode) -> NDArray[np.uint8]:
 
 
 def evaluate(curve: Curve, at: Floats, *, before: bool = False) -> Floats:
-    """Return the value at times `at` (any shape) in seconds; at a key its own value, also where it jumps there.
+    """Return the value at times `at` (any shape) in seconds; at a jump, the value after it.
 
-    before: the value just before instead, which differs at the jumps of steps.
+    before: the value before the jump instead.
     (0 s: 1, 2 s: 3, linear) at 0.5 → 1.5
     """
     place: Ints = np.searchsorted(curve.times, at, side="left" if before else "right")
@@ -138,9 +138,9 @@ def evaluate(curve: Curve, at: Floats, *, before: bool = False) -> Floats:
 
 
 def travel(curve: Curve, a: Floats, b: Floats) -> Floats:
-    """Return a bound (B,) of how far the value runs, there and back added up, from times a to b (B,).
+    """Return a bound (B,) of the value's total variation from times a to b (B,).
 
-    a, b: between the same two keys, or outside all. The bound of a cubic is that of the whole piece between its keys.
+    a, b: between the same two keys, or outside all. The bound of a cubic is that of its whole segment.
     """
     straight = np.abs(evaluate(curve, b, before=True) - evaluate(curve, a))
     if not (curve.modes == Mode.CUBIC).any():

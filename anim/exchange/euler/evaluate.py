@@ -1,4 +1,4 @@
-"""What an EulerNode is at any time: its local translation, rotation and scale, and its rest."""
+"""Local translation, rotation and scale of an EulerNode at any time, and its rest pose."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from anim.sampling import rest_pose, world_matrices
 def evaluate_rotation(node: EulerNode, at: Floats, before: bool = False) -> Floats:
     """Return the local rotation (..., 4) of a node at times (...) in seconds: Rpre · R(angles) · Rpost⁻¹.
 
-    before: just before each time, where steps jump.
+    before: the left limit at each time, different at steps.
     """
     angles = [
         np.full(at.shape, still) if curve is None else evaluate(curve, at, before=before)
@@ -38,9 +38,9 @@ def evaluate_scale(node: EulerNode, at: Floats, before: bool = False) -> Floats:
 
 
 def evaluate_translation(node: EulerNode, at: Floats, before: bool = False) -> Floats:
-    """Return the local translation (..., 3) of a node at times (...), with what its pivots add.
+    """Return the local translation (..., 3) of a node at times (...), including the effect of pivots.
 
-    T·Roff·Rp·Q·Rp⁻¹·Soff·Sp·S·Sp⁻¹ takes 0 to T + Roff + Rp + Q (Soff + Sp − Rp − S Sp).
+    T·Roff·Rp·Q·Rp⁻¹·Soff·Sp·S·Sp⁻¹ maps 0 to T + Roff + Rp + Q (Soff + Sp − Rp − S Sp).
     """
     moved = _by_axis(node.translation, node.moves, at, before)
     pivots = node.pivots
@@ -53,7 +53,7 @@ def evaluate_translation(node: EulerNode, at: Floats, before: bool = False) -> F
 
 
 def skeleton(motion: EulerMotion) -> Skeleton:
-    """Return all nodes at rest: axes at their rest angles, no curve moving anything."""
+    """Return all nodes in the rest pose: axes at their rest angles, without curves."""
     start = np.zeros(1)
     still = [replace(node, rotation=(None,) * len(node.order), moves={}, scales={}) for node in motion.nodes]
     return Skeleton(
@@ -66,12 +66,12 @@ def skeleton(motion: EulerMotion) -> Skeleton:
 
 
 def rest_positions(skeleton: Skeleton) -> Floats:
-    """Return where all nodes are at rest, in world space (N, 3) in metres."""
+    """Return the rest positions of all nodes in world space (N, 3) in metres."""
     return world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
 
 
 def bounding_size(skeleton: Skeleton) -> float:
-    """Return the longest side of the box around all nodes at rest, in metres."""
+    """Return the longest side of the bounding box of all rest positions, in metres."""
     return float(np.ptp(rest_positions(skeleton), axis=0).max()) if len(skeleton) else 0.0
 
 

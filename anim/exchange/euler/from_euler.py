@@ -1,4 +1,4 @@
-"""Euler curves → a skeleton and a clip of quaternion tracks that is right between its keys too."""
+"""Euler curves → a skeleton and a clip of quaternion tracks, correct between keys too."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, Track
 
-MIN_TOLERANCE = 1e-6  # rad; float32 quaternions resolve no less
-CONSTANT_TOLERANCE = 1e-9  # share of the skeleton's size
+MIN_TOLERANCE = 1e-6  # rad; the resolution of float32 quaternions
+CONSTANT_TOLERANCE = 1e-9  # fraction of the skeleton's size
 
 
 @dataclass(frozen=True, slots=True)
 class ImportedMotion:
     """A skeleton in its rest pose, and its motion.
 
-    ends: numbers of nodes that only mark where their parent ends. tolerance: rad, within which the clip follows the
-    source between its keys; None for recordings, which keep their grid.
+    ends: indices of nodes that only mark the end of their parent. tolerance: rad, the clip's maximum error between its
+    keys; None for recordings, which keep their grid.
     """
 
     skeleton: Skeleton
@@ -45,15 +45,15 @@ class ImportedMotion:
 def from_euler(
     motion: EulerMotion, *, tolerance: float, keys: KeyPlacement = KeyPlacement.AUTO, name: str = ""
 ) -> ImportedMotion:
-    """Return the skeleton of the motion, and a clip in which slerp follows the Euler motion.
+    """Return the skeleton of the motion, and a clip with slerp following the Euler motion.
 
     Every axis curve is evaluated on its own keys, then the axes are combined; source key times are kept (rounded to
-    float32, as glTF holds them), and keys are added where slerp would leave the path, or a piece would turn by more
-    than 120°. Steps stay steps. Signs are continuous.
+    float32, as in glTF), and keys are added where slerp would leave the path, or a segment would rotate by more than
+    120°. Steps remain steps. Signs are continuous.
 
-    tolerance: rad; translations are held within tolerance × the skeleton's size, scales within tolerance × 1.
-    keys: ADAPTIVE as above; GRID adds no key, and takes angles that jump by whole turns for the same; AUTO takes GRID
-    for recordings: BVH, or straight curves on one even grid of 10 keys a second or more.
+    tolerance: rad; the maximum error of translations is tolerance × the skeleton's size, of scales tolerance × 1.
+    keys: ADAPTIVE as above; GRID adds no key and ignores jumps of angles by multiples of 360°; AUTO is GRID for
+    recordings: BVH, or linear curves on one even grid of 10 keys a second or more.
     Raises RangeError for a tolerance below 1e-6 or above pi.
     XYZ (0, 0, 0) at 0 s → (90°, 90°, 0) at 1 s, tolerance 0.1° → a rotation track of 15 keys
     """
@@ -76,7 +76,7 @@ def from_euler(
 
 
 class _Axes:
-    """Time axes, one array for each content, so that tracks share them."""
+    """Time axes, one array for each content, shared by tracks."""
 
     def __init__(self) -> None:
         self._unions: dict[tuple[int, ...], Floats] = {}
@@ -94,7 +94,7 @@ class _Axes:
 
 
 def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, axes: _Axes) -> list[Track]:
-    """Tracks of one node; tolerance None keeps the keys where they are."""
+    """Tracks of one node; tolerance None adds no keys."""
     turning = [curve for curve in node.rotation if curve is not None]
     moving, scaling = [*node.moves.values()], [*node.scales.values()]
     if node.pivots is not NO_PIVOTS:
@@ -137,7 +137,7 @@ def _track(
 
 
 def _is_rest(track: Track, node: EulerNode, size: float) -> bool:
-    """Whether it holds what is at rest there anyway: many recorders write six channels for every joint."""
+    """True for a track equal to the rest pose: many recorders write six channels for every joint."""
     if track.path != "translation" or (node.parent < 0 and node.pivots is NO_PIVOTS):
         return False
     still = evaluate_translation(node, track.times[:1])[0] if node.pivots is not NO_PIVOTS else node.translation

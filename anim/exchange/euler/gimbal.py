@@ -1,4 +1,4 @@
-"""How near a motion comes to gimbal lock, joint by joint, and which order would keep farthest from it."""
+"""Distance from gimbal lock for each joint, and the order with the greatest distance."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from anim.maths.euler import ORDERS, AxesConvention
 from anim.model import Clip, Interpolation, Track
 from anim.sampling.track import sample
 
-NEAR = np.radians(5.0)  # from lock: rates are 23 times amplified there
-MANY, BETWEEN = 500, 29  # keys that are enough; times looked at between two where they are not
-SAME = 1e-9  # rad; nearer than this nothing is nearer: the first counts
-CELLS = 200_000  # quaternions looked at together
+NEAR = np.radians(5.0)  # from lock: rates are amplified 23 times there
+MANY, BETWEEN = 500, 29  # sufficient keys; samples per interval with fewer keys
+SAME = 1e-9  # rad; smaller differences are ignored: the first counts
+CELLS = 200_000  # quaternions evaluated together
 
 
 @dataclass(frozen=True, slots=True)
 class GimbalStats:
     """One joint under its own order.
 
-    nearest_deg: least distance from lock, and when (at_s). near_s: time within 5° of it.
+    nearest_deg: minimum distance from lock, at time at_s. near_s: time within 5° of it.
     worst_condition: greatest ratio of singular values of the map from rates of angles to angular velocity; 1 is best.
-    aligned: the two axes that fall together at lock. best_order: of all 12 (intrinsic, or extrinsic read backwards)
-    the one whose nearest distance, best_nearest_deg, is greatest for this motion.
+    aligned: the two axes that align at lock. best_order: of all 12 (intrinsic, or extrinsic reversed) the one with the
+    greatest minimum distance for this motion, best_nearest_deg.
     """
 
     node: str
@@ -42,10 +42,10 @@ class GimbalStats:
 
 
 def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
-    """Return a row for each node that turns about three axes, in the order of nodes.
+    """Return the statistics of each node that rotates about three axes, in the order of nodes.
 
-    clip: the motion as quaternions, whose node numbers are the motion's. Looked at are its keys; where they are few,
-    also what lies between them. Pre and post rotations are taken off: the three angles are between them.
+    clip: the motion as quaternions, with the motion's node indices. Its keys are evaluated; with few keys also times
+    between them. Pre and post rotations are removed: the three angles are between them.
     Source: the Jacobian's singular values are 1, √(1 + s), √(1 − s), s the cosine of the distance from lock.
     """
     turning = [(t.node, t) for t in clip.tracks if t.path == "rotation" and t.node is not None]
@@ -71,7 +71,7 @@ def _can_lock(motion: EulerMotion, node: int) -> bool:
 
 
 def _check_times(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
-    """Node, times and the rotations of its angles: at the track's keys, or with BETWEEN more in each piece."""
+    """Node, times and rotations of its angles: at the track's keys, or with BETWEEN more per interval."""
     if len(track.times) > MANY or track.interpolation is Interpolation.STEP or len(track.times) == 1:
         return node, track.times, _stats_of_angles(motion.nodes[node].pivots, track.values)
     shares = np.arange(BETWEEN + 1) / (BETWEEN + 1)
@@ -88,7 +88,7 @@ def _stats_of_angles(pivots: Pivots, q: Floats) -> Floats:
 
 
 def _stack_angles(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, list[int], Floats]]:
-    """Tracks on one time axis together: times (K,), node numbers, values (K, G, 4), of a size that caches like."""
+    """Tracks on one time axis, stacked: times (K,), node indices, values (K, G, 4), sized for CPU caches."""
     groups: dict[int, list[tuple[int, Floats, Floats]]] = {}
     for track in tracks:
         groups.setdefault(id(track[1]), []).append(track)
@@ -106,7 +106,7 @@ def _row(
 ) -> GimbalStats:
     about = motion.nodes[node]
     least = int((distance <= distance.min() + SAME).argmax())
-    spans = np.zeros(len(times))  # each key stands for half the way to its neighbors
+    spans = np.zeros(len(times))  # each key covers half the interval to its neighbors
     spans[1:] += np.diff(times) / 2
     spans[:-1] += np.diff(times) / 2
     sine = min(float(np.cos(distance[least])), 1 - 1e-12)

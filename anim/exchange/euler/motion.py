@@ -1,4 +1,4 @@
-"""EulerMotion: what every track format is read into: nodes with one curve per axis, and how the axes combine."""
+"""EulerMotion, the common form of all track formats: nodes with one curve per axis."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ IDENTITY = np.array((0.0, 0.0, 0.0, 1.0))
 
 
 class Unit(StrEnum):
-    """What angles are measured in."""
+    """Unit of angles."""
 
     DEG = "deg"
     RAD = "rad"
 
     @property
     def radians(self) -> float:
-        """One of it in radians."""
+        """Radians per unit."""
         return np.pi / 180 if self is Unit.DEG else 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """How three angles make a rotation: one of 24 conventions, and the unit. See `anim.maths.euler`."""
+    """Combination of three angles to a rotation: one of 24 conventions, and the unit."""
 
     order: str
     frame: AxesConvention
@@ -42,7 +42,7 @@ class Convention:
 
 @dataclass(frozen=True, slots=True)
 class Pivots:
-    """What FBX and Maya put around the rotation: T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹.
+    """Offsets of FBX and Maya around the rotation: T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹.
 
     pre_rotation, post_rotation: unit quaternions (4,). The others: offsets (3,) in metres.
     """
@@ -61,13 +61,13 @@ OFFSETS = ("rotation_offset", "rotation_pivot", "scaling_offset", "scaling_pivot
 
 @dataclass(frozen=True, slots=True)
 class EulerNode:
-    """One node: its place in the tree, its rest, and the curves that move it.
+    """One node: parent, rest pose, and animation curves.
 
-    parent: number of the parent, −1 for a root. translation, scale: (3,) at rest.
-    order, frame: how `angles` and the rotation curves combine; as many axes as angles. Angles at rest are in radians.
-    rotation: a curve per axis of the order, None where the axis keeps its angle at rest.
+    parent: index of the parent, −1 for a root. translation, scale: (3,) at rest.
+    order, frame: convention of `angles` and the rotation curves; as many axes as angles. Angles at rest are in radians.
+    rotation: a curve per axis of the order, None for an axis with its constant rest angle.
     moves, scales: curves by 0, 1, 2 for x, y, z; metres and factors.
-    end: whether it only marks where its parent ends: an End Site of BVH.
+    end: True for a node that only marks the end of its parent: an End Site of BVH.
     """
 
     name: str
@@ -86,12 +86,12 @@ class EulerNode:
 
 @dataclass(frozen=True, slots=True)
 class EulerMotion:
-    """All nodes, parents before children, and what a reader wants to be known.
+    """All nodes, parents before children, and facts about the source.
 
-    sampled: whether the curves are frames of a recording: between them there is nothing to follow, and an angle that
-    jumps by whole turns does not turn. None where only the keys themselves can tell.
-    nested: whether the source says which node belongs to which; if not, `parent` is −1 everywhere.
-    notes: lines for a person about oddities that were put right.
+    sampled: True for a recording: curves are frames without defined motion between them, and a jump of an angle by a
+    multiple of 360° is no rotation. None if only the keys can tell.
+    nested: True if the source has a hierarchy; if not, `parent` is −1 everywhere.
+    notes: lines for the user about corrected faults.
     """
 
     nodes: tuple[EulerNode, ...]
@@ -106,9 +106,9 @@ def scale_motion(motion: EulerMotion, factor: float) -> EulerMotion:
 
 
 def z_up_to_y_up(motion: EulerMotion) -> EulerMotion:
-    """Return a motion with Z up as one with Y up: every coordinate (x, y, z) becomes (x, z, −y).
+    """Return a Z-up motion as a Y-up one: every coordinate (x, y, z) becomes (x, z, −y).
 
-    Axes change their names, rotations stay Euler rotations: about Z becomes about Y, about Y becomes about −Z.
+    Axes are renamed, rotations remain Euler rotations: about Z becomes about Y, about Y becomes about −Z.
     """
     return replace(motion, nodes=tuple(_rotate_node(node) for node in motion.nodes))
 

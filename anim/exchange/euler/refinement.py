@@ -1,4 +1,4 @@
-"""More keys between keys, for many joints at once, where slerp and straight lines would leave a motion."""
+"""Add keys for many joints at once until slerp and lerp follow a motion within a tolerance."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ Motion: TypeAlias = Callable[[Floats], tuple[dict[int, Floats], Floats]]
 
 
 def refine_linear(times: Floats, motion: Motion, *, tolerance: float, size: float) -> Floats:
-    """Return key times, `times` among them, between which slerp and lerp stay within the tolerance of the motion.
+    """Return key times, including `times`, with slerp and lerp within the tolerance of the motion.
 
     times: (K,) s, float32-exact. motion: at times (F,) → unit quaternions (F, 4) by node, and paths (F, P, 3), m.
-    tolerance: rad for each rotation; paths are held within tolerance × size. No joint turns by over 120° in a piece.
+    tolerance: rad for each rotation; the error of paths is at most tolerance × size. No joint rotates by more than 120°
+    in a segment.
     Raises RangeError for over two million keys.
     """
     return adaptive_keys.refine_keys(times, lambda a, b: _intervals_to_split(motion, a, b, tolerance, size))
 
 
 def _intervals_to_split(motion: Motion, a: Floats, b: Floats, tolerance: float, size: float) -> Ints:
-    """How many pieces (B,) each should become; 1 where it is good."""
+    """Segment count (B,) to split each segment into; 1 for none."""
     shares = np.concatenate(([0.0], SAMPLES, [1.0]))
     at = a[:, None] + (b - a)[:, None] * shares
     at[:, -1] = b

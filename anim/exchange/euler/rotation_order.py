@@ -1,4 +1,4 @@
-"""Which order each node's angles get: the same for all, one of its own, or the one that keeps farthest from lock."""
+"""Euler order of each node: one for all, by name pattern, or the one farthest from gimbal lock."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from anim.maths import euler
 from anim.maths.euler import ORDERS, AxesConvention
 
 BEST = "auto"
-USUAL = "ZXY"  # what most recorders write
+USUAL = "ZXY"  # the order of most recorders
 CANDIDATES = (USUAL, *(order for order in ORDERS if not euler.is_proper(order) and order != USUAL))
 
 
 @dataclass(frozen=True, slots=True)
 class OrderRules:
-    """Orders by node name. rules: (glob, order), the first that fits counts; `otherwise` where none does.
+    """Orders by node name. rules: (glob, order), the first match counts; `otherwise` without a match.
 
-    An order is one of the twelve or "auto": of the six without a repeated axis, which are what BVH, Maya and FBX
-    know, the one that keeps farthest from gimbal lock.
+    An order is one of the twelve or "auto": of the six without a repeated axis, supported by BVH, Maya and FBX, the one
+    farthest from gimbal lock.
     """
 
     otherwise: str = USUAL
@@ -32,7 +32,7 @@ class OrderRules:
 
     @property
     def is_one(self) -> bool:
-        """Whether all nodes have the same."""
+        """True if all nodes have the same order."""
         return not self.rules and self.otherwise != BEST
 
     def of(self, name: str, q: Floats, frame: AxesConvention = AxesConvention.INTRINSIC) -> str:
@@ -44,7 +44,7 @@ class OrderRules:
         return found if frame == AxesConvention.INTRINSIC else found[::-1]
 
     def check(self, names: Sequence[str]) -> None:
-        """Raise NotFoundError for a rule that fits no name."""
+        """Raise NotFoundError for a rule without a matching name."""
         for glob, order in self.rules:
             if not any(fnmatchcase(name, glob) for name in names):
                 near = difflib.get_close_matches(glob, names, n=1)
@@ -53,9 +53,9 @@ class OrderRules:
 
 
 def parse(text: str) -> OrderRules:
-    """Return what "ZXY", "auto" or "hips=ZXY,*arm=YZX,auto" says, in letters of any case.
+    """Parse rules such as "ZXY", "auto" or "hips=ZXY,*arm=YZX,auto", in any case.
 
-    Raises RangeError for an order that is none, or more than one without a name.
+    Raises RangeError for an unknown order, or more than one without a name.
     """
     rules, otherwise = [], list[str]()
     for item in text.split(","):
@@ -71,7 +71,7 @@ def parse(text: str) -> OrderRules:
 
 
 def _best(q: Floats) -> str:
-    """The intrinsic order farthest from lock; the usual one where others are no better."""
+    """The intrinsic order farthest from lock; the usual one if no other is better."""
     nearest = {order: float(euler.gimbal_distance(q, order=order).min()) for order in CANDIDATES}
     best = max(CANDIDATES, key=lambda order: nearest[order])
     return USUAL if nearest[best] <= nearest[USUAL] + np.radians(1.0) else best

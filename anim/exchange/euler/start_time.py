@@ -1,4 +1,4 @@
-"""Key times before zero, where DCC scenes may begin and glTF can't."""
+"""Shift of negative key times, valid in DCC scenes but not in glTF."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 
 def shift_to_zero(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
-    """Return by how many seconds all keys must come later for none to be before 0, and a note where they must.
+    """Return the shift in seconds of all keys to times ≥ 0, and a note if it is not 0.
 
-    start([-0.5, 0, 1]) → 0.5, ("the first key is at -0.5 s: all are moved by 0.5 s, to begin at 0",)
+    shift_to_zero([-0.5, 0, 1]) → 0.5, ("the first key is at -0.5 s: all are moved by 0.5 s, to begin at 0",)
     """
     first = min(times, default=0.0)
     if first >= 0:

@@ -1,4 +1,4 @@
-"""A glTF clip → a motion such as BVH holds: no rest rotation, no scale, frames on an even grid, End Sites."""
+"""glTF clip → BVH motion: no rest rotation, no scale, frames on an even grid, End Sites."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from anim.maths.euler import AxesConvention
 from anim.model import Clip, Skeleton
 from anim.sampling import rest_pose, sample_pose, world_matrices
 
-EVEN = 1e-3  # share of a frame by which frames may be off an even grid
+EVEN = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 MAX_FRAMES = 10_000_000
-ROUNDING = 2e-7  # share of a time that float32 may be off
-CONSTANT_TOLERANCE = 1e-6  # share of the skeleton's size by which an offset may differ and still be one
+ROUNDING = 2e-7  # relative rounding error of float32 times
+CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
 BRACES = "{}"
-END = "_end"  # a leaf of this name that nothing moves is where its parent ends
+END = "_end"  # a static leaf of this name marks the end of its parent
 
 
 def to_bvh(
@@ -36,14 +36,14 @@ def to_bvh(
     joints: Collection[int] = (),
     meters_per_unit: float = 1.0,
 ) -> EulerMotion:
-    """Return the clip with angles seen from the rest pose along world axes, so that all zero is the rest pose.
+    """Return the clip with angles relative to the rest pose, about world axes: all 0 is the rest pose.
 
-    Every joint stands where it stands in the glTF, at every frame: joints that move in their parent, and roots, have
-    translation curves too; what BVH has no place for is in the notes. Frame k lies at the clip's start + k / fps, the
-    last at or behind its end.
-    order: one of the twelve for all joints, or `Orders`. fps: None for the grid of the keys. Raises RangeError where
-    they have none.
-    joints: nodes to write, with what lies between them; empty for all. Lengths are divided by meters_per_unit.
+    Every joint has its world position of the glTF at every frame: joints that move in their parent, and roots, have
+    translation curves too; the notes list properties that BVH does not support. Frame k is at the clip's start + k /
+    fps, the last at or after its end.
+    order: one of the twelve for all joints, or `OrderRules`. fps: None for the grid of the keys. Raises RangeError for
+    keys without a grid.
+    joints: nodes to write, with the nodes between them; empty for all. Lengths are divided by meters_per_unit.
     """
     orders = order if isinstance(order, OrderRules) else OrderRules(euler.check_order(order))
     chosen, names = _choose_frames(skeleton, clip, joints), _names(skeleton)
@@ -59,11 +59,11 @@ def to_bvh(
 
 JointTransform = tuple[
     Floats, Floats, Floats
-]  # place at rest (3,), turn away from rest (F, 4), places (F, 3), in the world
+]  # rest position (3,), rotation from rest (F, 4), positions (F, 3), in world space
 
 
 class _Skeleton:
-    """The nodes to write, numbered in their order, and where they are at times (F,) and at rest."""
+    """The nodes to write, in their order, with world positions at rest and at times (F,)."""
 
     def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
         moving, still = sample_pose(skeleton, clip, times), rest_pose(skeleton)
@@ -75,7 +75,7 @@ class _Skeleton:
         self.size = float(np.ptp(self._home[chosen], axis=0).max()) or 1.0
 
     def placed(self, node: int) -> JointTransform:
-        """Where a node is in the world; −1 is the world itself."""
+        """World position and rotation of a node; −1 is the world itself."""
         if node < 0:
             return ZERO, IDENTITY[None], ZERO
         return self._home[node], self._turns[node], self._places[:, node]
@@ -84,7 +84,7 @@ class _Skeleton:
 def _node(
     figure: _Skeleton, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
 ) -> EulerNode:
-    """A joint with the curves that it needs; lengths in the file's unit, keys at times `shown`."""
+    """A joint with its required curves; lengths in the file's unit, keys at times `shown`."""
     parent = _ancestors_outside(figure.skeleton, node, figure.numbers)
     offset, turn, path = _relative_to(figure.placed(node), figure.placed(parent))
     moved = parent < 0 or bool(np.abs(path - offset).max() > CONSTANT_TOLERANCE * figure.size)
@@ -105,13 +105,13 @@ def _node(
 
 
 def _relative_to(node: JointTransform, parent: JointTransform) -> JointTransform:
-    """The same from the parent: offset at rest, turn, and offset at all times."""
+    """The joint relative to its parent: offset at rest, rotation, and offset at all times."""
     back = quaternion.conjugate(parent[1])
     return node[0] - parent[0], quaternion.multiply(back, node[1]), quaternion.rotate(back, node[2] - parent[2])
 
 
 def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
-    """Frame times (F,) on an even grid from 0, and where to sample the clip for them: at its keys where they meet."""
+    """Frame times (F,) on an even grid from 0, and clip times to sample: its keys where they coincide."""
     start, end = clip.start, clip.end
     arrays = {id(track.times): track.times for track in clip.tracks}
     keys: Floats = unique_sorted(np.concatenate([*arrays.values()])) if arrays else np.zeros(1)
@@ -131,7 +131,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
 
 
 def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
-    """Nodes to write, parents first: the joints, what lies between them, and leaves that mark where they end."""
+    """Nodes to write, parents first: the joints, the nodes between them, and leaves as end markers."""
     wanted = set(joints) or set(range(len(skeleton)))
     top = set(wanted)
     for node in list(wanted):
@@ -154,7 +154,7 @@ def _is_end(skeleton: Skeleton, clip: Clip, node: int, among: Collection[int]) -
 
 
 def _names(skeleton: Skeleton) -> list[str]:
-    """Names of all nodes; braces, between which a BVH has its joints, become parentheses."""
+    """Names of all nodes; braces become parentheses, since BVH uses them as delimiters."""
     return unique([name.translate(str.maketrans(BRACES, "()")) for name in labels(skeleton)])
 
 
@@ -168,7 +168,7 @@ def _shift_start(clip: Clip) -> tuple[str, ...]:
 
 
 def _lost_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
-    """What of the clip a BVH of the chosen nodes doesn't show, in words."""
+    """Descriptions of the tracks that a BVH of the chosen nodes cannot represent."""
     carrying = set(chosen)
     for node in chosen:
         while (node := int(skeleton.parents[node])) >= 0 and node not in carrying:

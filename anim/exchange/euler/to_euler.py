@@ -1,4 +1,4 @@
-"""A glTF clip → Euler curves of every node, in any order, that run on without jumps."""
+"""glTF clip → continuous Euler curves of every node, in any order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from anim.sampling import frame_times
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
 
-FILE_LOCK = 1e-6  # rad; what a file's float32 quaternions leave of a lock
+FILE_LOCK = 1e-6  # rad; uncertainty of a lock in a file's float32 quaternions
 BETWEEN = np.array((0.25, 0.5, 0.75))
 MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
 ROUNDS, MOST_PIECES, MAX_KEYS = 24, 32, 500_000
@@ -28,9 +28,9 @@ ROUNDS, MOST_PIECES, MAX_KEYS = 24, 32, 500_000
 
 @dataclass(frozen=True, slots=True)
 class EulerCurves:
-    """Curves of all nodes, in local space; what has no place in them is in the notes.
+    """Curves of all nodes, in local space; the notes list unsupported tracks.
 
-    deviation: rad, the most that straight curves leave the motion between keys.
+    deviation: rad, the maximum error of linear curves between keys.
     """
 
     motion: EulerMotion
@@ -47,14 +47,14 @@ def to_euler(
     tolerance: float | None = None,
     without: Collection[int] = (),
 ) -> EulerCurves:
-    """Return the clip as Euler curves in radians, straight between keys, and the rest of all nodes.
+    """Return the clip as Euler curves in radians, linear between keys, and the rest pose of all nodes.
 
-    Each key gets the equivalent triple nearest to the key before; at lock see `euler.continuous`. Keys stand where the
-    tracks have theirs, or at `fps` frames per second; steps stay steps, at their times. Translations and scales keep
-    their cubics where no `fps` is given.
-    order: one of the twelve for all nodes, or `Orders`; auto looks at the clip's keys and half way between.
-    tolerance: rad; keys are added where straight curves would leave the motion by more. Raises RangeError below 1e-6.
-    without: nodes to leave out where nothing moves them and nothing hangs on them, such as those that hold a skin.
+    Each key gets the equivalent triple nearest to the previous key; at lock see `euler.continuous`. Keys are at the
+    tracks' key times, or at `fps` frames per second; steps remain steps, at their times. Translations and scales keep
+    their cubics without `fps`.
+    order: one of the twelve for all nodes, or `OrderRules`; auto evaluates the clip's keys and the midpoints.
+    tolerance: rad; keys are added where linear curves would exceed it. Raises RangeError below 1e-6.
+    without: nodes to omit if they are static and have no children, such as those with a skinned mesh.
     """
     orders = order if isinstance(order, OrderRules) else OrderRules(euler.check_order(order))
     if tolerance is not None and not 1e-6 <= tolerance < np.inf:
@@ -72,7 +72,7 @@ def to_euler(
 
 @dataclass(frozen=True, slots=True)
 class _Options:
-    """How curves shall be. frames: (F,) s, where their keys stand; None for the tracks' own. tolerance: rad."""
+    """Curve options. frames: (F,) s, key times; None for the tracks' own. tolerance: rad."""
 
     orders: OrderRules
     frame: AxesConvention
@@ -81,7 +81,7 @@ class _Options:
 
 
 def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]], list[str]]:
-    """Tracks by node and path, and words for those that have no place in Euler curves."""
+    """Tracks by node and path, and descriptions of those that Euler curves cannot represent."""
     by_node: dict[int, dict[str, Track]] = {}
     lost = []
     for track in clip.tracks:
@@ -95,7 +95,7 @@ def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]],
 def _node(
     skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Options
 ) -> tuple[EulerNode, float]:
-    """A node with curves of its tracks by path, and how far those of its rotation leave it between keys, rad."""
+    """A node with curves of its tracks by path, and the error of its rotation between keys, rad."""
     turn, still, frame = tracks.get("rotation"), skeleton.rotation[number], asked.frame
     order = asked.orders.of(name, still if turn is None else _observed_angles(turn), frame)
     rotation: tuple[Curve | None, ...] = (None, None, None)
@@ -123,13 +123,13 @@ def _renumber_nodes(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode,
 
 
 def _observed_angles(track: Track) -> Floats:
-    """Rotations at the keys and half way between."""
+    """Rotations at the keys and midpoints."""
     halves = (track.times[1:] + track.times[:-1]) / 2
     return sample(track, unique_sorted(np.concatenate((track.times, halves))))
 
 
 def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, ...], float]:
-    """The three curves of a rotation, and how far they leave it between keys."""
+    """The three curves of a rotation, and their error between keys."""
     stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
     times = track.times if asked.frames is None or stepped else asked.frames
     for _ in range(ROUNDS):
@@ -148,7 +148,7 @@ def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, .
 
 
 def _between(track: Track, times: Floats, angles: Floats, order: str, frame: AxesConvention) -> Floats:
-    """How far straight curves leave the motion in each piece (K − 1,), rad; 0 in a jump, where no float32 time lies."""
+    """Error of linear curves in each interval (K − 1,), rad; 0 at a jump without a float32 time inside."""
     u = BETWEEN[:, None]
     at = times[:-1] + (times[1:] - times[:-1]) * u
     straight = angles[:-1] + (angles[1:] - angles[:-1]) * u[..., None]

@@ -1,11 +1,11 @@
-"""What length a skeleton's unit may be: BVH doesn't say."""
+"""Guess the unit of length of a skeleton, which BVH does not state."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-PERSON_HEIGHT_M = 1.7  # m; recorded skeletons are people's more often than not
+PERSON_HEIGHT_M = 1.7  # most recorded skeletons are human
 
 # m. CMU's skeletons are in inches × 0.45 (asfmt "length 0.45" of the ASF files).
 UNIT_METRES = {
@@ -20,7 +20,7 @@ UNIT_METRES = {
 
 
 class UnitGuess(NamedTuple):
-    """Metres per unit, what the unit is called, and the height in metres that the skeleton then has."""
+    """Metres per unit, name of the unit, and the resulting height of the skeleton in metres."""
 
     scale: float
     unit: str
@@ -28,7 +28,7 @@ class UnitGuess(NamedTuple):
 
 
 def guess_unit(height: float) -> UnitGuess:
-    """Return the unit in which a skeleton of this `height` comes nearest to a person's 1.7 m, by ratio.
+    """Return the unit that gives a skeleton of this `height` the ratio nearest to a height of 1.7 m.
 
     guess_unit(172) → 0.01, "centimeters", 1.72
     """

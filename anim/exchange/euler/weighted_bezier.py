@@ -1,4 +1,4 @@
-"""Cubics whose handles are longer or shorter than a third of the piece: Maya's weighted tangents, Blender's handles."""
+"""Weighted Bézier segments: handles of any length, as in Maya's weighted tangents and Blender."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from anim.arrays import Floats
 
-PLAIN = 1 / 3  # of a piece; with both handles so long the cubic is the one of `maths.hermite`
-ROUNDS = 60  # halvings of the bracket at worst; some six steps as a rule
+PLAIN = 1 / 3  # of a segment; with both handles of this length the cubic equals `maths.hermite`
+ROUNDS = 60  # bracket halvings at worst; usually six steps
 
 
 def evaluate(
     share: Floats, p0: Floats, rise0: Floats, p1: Floats, rise1: Floats, weights: tuple[Floats, Floats]
 ) -> Floats:
-    """Return the value at `share` (…), 0 … 1 of the piece's duration, of the Bézier cubic from p0 to p1.
+    """Return the value at `share` (…), 0 … 1 of the segment's duration, of the Bézier cubic from p0 to p1.
 
-    rise0, rise1: slopes per share: per second times the piece's duration. weights: 0 … 1, how far the handles after
-    the first key and before the second reach, as shares of the piece.
+    rise0, rise1: slopes per fraction: per second times the segment's duration. weights: 0 … 1, lengths of the handles
+    after the first key and before the second, as fractions of the segment.
     evaluate(0.5, 0, 0, 1, 0, (1/3, 1/3)) → 0.5
     """
     u = parameter(share, *weights)
@@ -24,10 +24,10 @@ def evaluate(
 
 
 def parameter(share: Floats, leaving: Floats, arriving: Floats) -> Floats:
-    """Return the cubic's parameter u (…) at which it has come `share` of the way in time.
+    """Return the cubic's parameter u (…) at the fraction `share` of the segment's duration.
 
-    leaving, arriving: lengths of the handles, 0 … 1: then time never runs back. Newton's steps, halving where one
-    leaves the bracket.
+    leaving, arriving: handle lengths, 0 … 1: then time is monotonic in u. Newton's method, with bisection outside the
+    bracket.
     """
     share, leaving, arriving = np.broadcast_arrays(share, leaving, arriving)
     low, high, u = np.zeros(share.shape), np.ones(share.shape), share.astype(np.float64)

@@ -1,4 +1,4 @@
-"""The MOTION of a BVH: frame time and rows of numbers, read by count and not by what the header claims."""
+"""MOTION section of a BVH: frame time and rows, counted independently of the header."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from anim.exchange.formats.text import parse_number as number_of
 
 RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100,
          120, 144, 150, 200, 240, 250, 300, 480, 500, 1000)  # fmt: skip
-SNAP = 1e-3  # share of a frame; a frame time is written with few digits
-ROUNDED = 1e-7  # share of a frame that nine digits leave
+SNAP = 1e-3  # fraction of a frame; a frame time has few digits
+ROUNDED = 1e-7  # fraction of a frame; rounding error of nine digits
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 
 
 @dataclass(frozen=True, slots=True)
 class BvhFrames:
-    """Rows (F, C) in file units and degrees, frames per second, and lines about what was odd."""
+    """Rows (F, C) in file units and degrees, frames per second, and notes about corrected faults."""
 
     rows: Floats
     fps: float
@@ -29,10 +29,10 @@ class BvhFrames:
 
 
 def read_frames(lines: list[str], start: int, column: int, channels: int) -> BvhFrames:
-    """Return what stands behind MOTION, which is in line `start` (from 0) and ends at `column`.
+    """Return the MOTION section, with the word in line `start` (from 0) ending at `column`.
 
-    channels: numbers in a row. Rows may be wrapped. Another number of rows than claimed is noted; fewer than half of
-    it is a truncated file. Raises FormatError with the line.
+    channels: values per row. Rows may be wrapped. A row count other than the header's is noted; fewer than half of it
+    is a truncated file. Raises FormatError with the line.
     """
     claimed, seconds, body = _head(lines, start, column)
     numbers = _numbers(lines, body)
@@ -54,7 +54,7 @@ def read_frames(lines: list[str], start: int, column: int, channels: int) -> Bvh
 
 
 def _head(lines: list[str], start: int, column: int) -> tuple[int, float, int]:
-    """Claimed frames, seconds per frame, and the first line (from 0) of rows, of which the rest is cut off before."""
+    """Stated frame count, seconds per frame, and the first line (from 0) of rows, cut at its start."""
     lines[start] = lines[start][column:]
     line, found = _find(lines, start, r"\s*Frames\s*:?\s*(\d+)(?!\.?\d)", "Frames: and a whole number")
     claimed = int(found)
@@ -82,7 +82,7 @@ def _numbers(lines: list[str], body: int) -> Floats:
     words = " ".join(lines[body:])
     try:
         numbers: Floats = np.array([*map(float, words.split())], np.float64)
-        if GROUPED not in words and (not len(numbers) or np.abs(numbers).max() <= LIMIT):  # NaN is not
+        if GROUPED not in words and (not len(numbers) or np.abs(numbers).max() <= LIMIT):  # also rejects NaN
             return numbers
     except ValueError:
         pass
@@ -94,7 +94,7 @@ def _numbers(lines: list[str], body: int) -> Floats:
 
 
 def _check_columns(lines: list[str], body: int, count: int, channels: int, claimed: int) -> None:
-    """Refuse rows that are not as long as all channels together; wrapped ones may break anywhere."""
+    """Raise FormatError for rows that do not match the channel count; wrapped ones may break anywhere."""
     per_line = [(number, len(line.split())) for number, line in enumerate(lines[body:], body + 1) if line.strip()]
     lengths = {length for _, length in per_line}
     one_per_line = len(per_line) == claimed and len(lengths) == 1
@@ -110,6 +110,6 @@ def _check_columns(lines: list[str], body: int, count: int, channels: int, claim
 
 
 def _snap_rate(seconds: float) -> float:
-    """Frames per second: a usual rate where the frame time is one to within its digits."""
+    """Frames per second: a standard rate if the frame time equals one within its digits."""
     rate = min(RATES, key=lambda rate: abs(rate * seconds - 1))
     return rate if abs(rate * seconds - 1) < SNAP else 1 / seconds

@@ -1,4 +1,4 @@
-"""The HIERARCHY of a BVH: words → joints, every fault with its line."""
+"""HIERARCHY section of a BVH: words → joints; errors state the line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_DEPTH = 10_000
 
 
 class Word(NamedTuple):
-    """A word, or a brace, and the line it stands in (from 1)."""
+    """A word, or a brace, and its line (from 1)."""
 
     text: str
     line: int
@@ -24,7 +24,7 @@ class Word(NamedTuple):
 
 @dataclass(slots=True)
 class BvhJoint:
-    """A joint, or an End Site, as the file has it: offset in file units, channels ("X", "rotation") in their order."""
+    """A joint, or an End Site: offset in file units, channels ("X", "rotation") in file order."""
 
     name: str
     parent: int
@@ -34,9 +34,9 @@ class BvhJoint:
 
 
 def read_hierarchy(lines: list[str]) -> tuple[list[BvhJoint], int, int]:
-    """Return the joints, parents first, and where MOTION stands: its line (from 0) and the place behind the word.
+    """Return the joints, parents first, and the line (from 0) and the end column of the word MOTION.
 
-    Any number of ROOTs, joints with any channels in any order or none, names with spaces, statements on one line or
+    Accepts several ROOTs, joints with any channels in any order or none, names with spaces, statements on one line or
     many. Raises FormatError with the line for anything else.
     """
     for number, line in enumerate(lines):
@@ -44,7 +44,7 @@ def read_hierarchy(lines: list[str]) -> tuple[list[BvhJoint], int, int]:
         if match:
             joints = _Parser(lines[:number]).joints()
             return joints, number, match.end()
-    _Parser(lines).joints()  # for a fault that comes first
+    _Parser(lines).joints()  # an earlier fault is reported first
     raise FormatError("the file ends before MOTION (truncated?)", where=f"line {max(len(lines), 1)}")
 
 

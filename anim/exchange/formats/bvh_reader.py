@@ -1,4 +1,4 @@
-"""BVH ↔ EulerMotion. Angles are degrees, intrinsic, in the order in which each joint lists its channels."""
+"""BVH ↔ EulerMotion. Angles are degrees, intrinsic, in the channel order of each joint."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from anim.maths.euler import AxesConvention
 
 
 class BvhPosition(StrEnum):
-    """What position channels do with the OFFSET of their joint."""
+    """Meaning of position channels relative to the OFFSET of their joint."""
 
     REPLACE = "replace"
     ADD = "add"
@@ -28,8 +28,8 @@ class BvhPosition(StrEnum):
 def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMotion:
     """Return the motion in a BVH file, lengths in the file's own unit, times at whole frames.
 
-    position: whether position channels replace the OFFSET, as in Blender, or are added to it, as in three.js.
-    Names that appear twice get a number: "Hand", "Hand.2". Line ends of any system, UTF-8, UTF-16 or Latin-1.
+    position: position channels replace the OFFSET, as in Blender, or are added to it, as in three.js.
+    Repeated names get a number: "Hand", "Hand.2". Line ends of any system, UTF-8, UTF-16 or Latin-1.
     Raises FormatError with the line.
     """
     lines = decode_text(data).split("\n")
@@ -50,7 +50,7 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
-    """Return the motion as a BVH, see `bvh_write`. Raises UnsupportedError for extrinsic angles: BVH has none."""
+    """Return the motion as a BVH. Raises UnsupportedError for extrinsic angles: BVH has none."""
     if convention.frame != AxesConvention.INTRINSIC:
         raise UnsupportedError("a BVH's angles are intrinsic", help="give --frame intrinsic; the order reads backwards")
     return bvh_writer.write(motion)

@@ -9,14 +9,14 @@ from anim.errors import UnsupportedError
 from anim.exchange.euler.curve import evaluate
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 
-DIGITS = 6  # behind the point, of degrees and of the file's unit of length
+DIGITS = 6  # decimals of degrees and of the file's unit of length
 
 
 def write(motion: EulerMotion) -> bytes:
-    """Return a BVH of the motion: degrees, positions that replace the OFFSET, lengths as they are.
+    """Return a BVH of the motion: degrees, positions that replace the OFFSET, unscaled lengths.
 
-    Nodes that move have six channels, others three; order is each node's own. Frames stand at the even grid of the
-    first curve's times. Raises UnsupportedError where there is none, or a node's angles are extrinsic or pivoted.
+    Moving nodes have six channels, others three; each node has its own order. Frames are the even grid of the first
+    curve's times. Raises UnsupportedError without a grid, or for a node with extrinsic or pivoted angles.
     """
     times = _frame_times(motion)
     lines = ["HIERARCHY"]
@@ -25,7 +25,7 @@ def write(motion: EulerMotion) -> bytes:
         children.setdefault(node.parent, []).append(number)
     columns: list[Floats] = []
     waiting: list[tuple[int, int] | str] = [(root, 0) for root in reversed(children.get(-1, []))]
-    while waiting:  # a rope may have more joints in a row than Python lets functions call each other
+    while waiting:  # iterative: a rope may have more joints in sequence than Python's recursion limit
         item = waiting.pop()
         if isinstance(item, str):
             lines.append(item)
@@ -42,7 +42,7 @@ def write(motion: EulerMotion) -> bytes:
     rows = np.round(np.stack(columns, axis=-1), DIGITS) + 0.0
     pattern = " ".join([f"%.{DIGITS}f"] * rows.shape[1])
     lines += [pattern % tuple(row) for row in rows.tolist()]
-    return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # half a surrogate pair, which JSON can name
+    return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
 
 
 def _frame_times(motion: EulerMotion) -> Floats:
@@ -57,7 +57,7 @@ def _frame_times(motion: EulerMotion) -> Floats:
 
 
 def _open_joint(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
-    """The lines of a node up to where its children stand; an End Site, also that of a joint without children, whole."""
+    """The lines of a node before its children; complete for an End Site and for a joint without children."""
     tab = "\t" * depth
     offset = f"OFFSET {_numbers(node.translation)}"
     if node.end:

@@ -1,4 +1,4 @@
-"""CSV curves with a row per key: the rows of one channel → a curve. See `csv` for the columns."""
+"""CSV curves with a row per key: rows of one channel → a curve. Columns: see `csv_reader`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KeyRow = tuple[int, dict[str, str]]  # line, cells by column
 
 
 def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
-    """Return the curve of the rows of one channel, moved by `later` seconds. Raises FormatError with the line."""
+    """Return the curve of one channel's rows, shifted by `later` seconds."""
     lines = [line for line, _ in rows]
     times = np.array([parse_cell(row["time"], line, "time") for line, row in rows])
     check_times(times, lines)
@@ -33,7 +33,7 @@ def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
 
 
 def _check_tangents(rows: list[KeyRow], modes: list[int]) -> None:
-    """A cubic piece needs the tangent that leaves its first key and the one that arrives at its second."""
+    """Check the tangents at both ends of each cubic segment."""
     for mode, *ends in zip(modes, rows, rows[1:], strict=False):
         for (line, row), key in zip(ends, ("out_tangent", "in_tangent"), strict=True):
             if mode == Mode.CUBIC and not row.get(key):

@@ -1,4 +1,4 @@
-"""CSV curves ↔ EulerMotion, in two forms that the header tells apart.
+"""CSV curves ↔ EulerMotion, in two forms distinguished by the header.
 
 Frames: a row per time, a column per channel; an empty cell is no key of that channel.
 
@@ -15,11 +15,11 @@ Keys: a row per key.
     hips,rx,0,0,linear,,,,
     hips,rx,1,720,cubic,0,90,,0.5
 
-Channels are tx ty tz (metres, or the file's unit by `# meters_per_unit=0.01`), rx ry rz, sx sy sz; where an axis comes
-twice in the order (ZXZ) angles are r1 r2 r3. Times are seconds; where the first is before 0, all are moved by as much.
-Tangents are per second, at both ends of every cubic piece; weights are the handles' lengths as shares of the time to
-the next key, a third if empty. Lines that begin with # state the convention, or the hierarchy and the rest, if they are
-known: `#node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]`. Without interpolation curves are linear; in the
+Channels are tx ty tz (metres, or the file's unit by `# meters_per_unit=0.01`), rx ry rz, sx sy sz; with a repeated
+axis in the order (ZXZ) angles are r1 r2 r3. Times are seconds; if the first is negative, all are shifted to begin at 0.
+Tangents are per second, at both ends of every cubic segment; weights are the handle lengths as fractions of the time to
+the next key, a third if empty. Lines that begin with # state the convention, or, if known, the hierarchy and the rest
+pose: `#node,NAME,PARENT,tx,ty,tz[,angle,angle,angle[,sx,sy,sz]]`. Without interpolation curves are linear; in the
 frames form `# interpolation=step` makes all of them steps.
 """
 
@@ -49,7 +49,7 @@ __all__ = ["read", "write"]
 
 @dataclass(slots=True)
 class _File:
-    """What a CSV says before its numbers: words of the comments and their lines, nodes, the header; and its rows."""
+    """Content of a CSV before its values: comments with their lines, nodes, the header; and the rows."""
 
     words: dict[str, str] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
@@ -59,13 +59,13 @@ class _File:
     rows: list[tuple[int, list[str]]] = field(default_factory=list)
 
     def hear(self, line: int, comment: str) -> None:
-        """Take the words "key=value" out of a comment."""
+        """Parse the words "key=value" of a comment."""
         found = {key.casefold(): value for key, value in re.findall(r"(\w+)\s*=\s*(\S+)", comment)}
         self.words |= found
         self.lines |= dict.fromkeys(found, line)
 
     def meters_per_unit(self) -> float:
-        """Return what the comments say of the unit of length; 1 if nothing. Raises FormatError with the line."""
+        """Return the unit of length in the comments, default 1. Raises FormatError with the line."""
         if "meters_per_unit" not in self.words:
             return 1.0
         line = self.lines["meters_per_unit"]
@@ -78,7 +78,7 @@ class _File:
 def read(data: bytes, options: PartialConvention) -> EulerMotion:
     """Return the motion in CSV curves, see above; lengths in metres, angles in radians.
 
-    options: what the command line says about the convention. Raises FormatError with the line.
+    options: the convention of the command line. Raises FormatError with the line.
     """
     file = _parse(data)
     convention = require_complete(merge_strict(parse_convention(file.words, "the # lines"), options))
@@ -100,7 +100,7 @@ def read(data: bytes, options: PartialConvention) -> EulerMotion:
 
 
 class _NodeBuilders:
-    """Nodes by name, made where they first appear."""
+    """Nodes by name, created on first use."""
 
     def __init__(self, convention: Convention) -> None:
         self.by_name: dict[str, NodeBuilder] = {}
@@ -165,7 +165,7 @@ def _parse(data: bytes) -> _File:
 
 
 def _times(file: _File) -> Iterator[float]:
-    """All key times that are numbers."""
+    """All numeric key times."""
     if "time" in file.header:
         column = file.header.index("time")
         found = (parse_number(cells[column]) for _, cells in file.rows)

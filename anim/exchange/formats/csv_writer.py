@@ -1,4 +1,4 @@
-"""EulerMotion → CSV: frames where every curve is straight, keys where one is not. See `csv` for both forms."""
+"""EulerMotion → CSV: frames if every curve is linear, else keys. Both forms: see `csv_reader`."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
 
 KEY_COLUMNS = ("node", "channel", "time", "value")
 EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
-DIGITS = 9  # behind the point
+DIGITS = 9  # decimals
 
 Column = tuple[str, str, Curve]  # node, channel, its curve in the unit to write
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
-    """Return the motion as CSV; the convention is that of its nodes, with the unit to use.
+    """Return the motion as CSV; the convention is that of its nodes, with the output unit.
 
-    Raises UnsupportedError where a node's order is another: a CSV has one.
+    Raises UnsupportedError for a node with another order: a CSV has one.
     """
     if any(node.order != convention.order for node in motion.nodes):
         raise UnsupportedError("a CSV has one order for all nodes", help="write .json or .bvh")
@@ -38,7 +38,7 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     columns = [column for node in motion.nodes for column in _columns(node, convention)]
     straight = all((curve.modes == Mode.LINEAR).all() for _, _, curve in columns)
     (_write_frames if straight else _write_keys)(rows, columns)
-    return out.getvalue().encode(errors="backslashreplace")  # half a surrogate pair, which JSON can name
+    return out.getvalue().encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
 
 
 def _columns(node: EulerNode, convention: Convention) -> list[Column]:

@@ -1,9 +1,9 @@
-"""JSON curves ↔ EulerMotion: every axis of every node with keys of its own, as FBX and Maya keep them.
+"""JSON curves ↔ EulerMotion: every axis of every node with its own keys, as in FBX and Maya.
 
     {
       "schema": "euler-curves/1",
-      "order": "XYZ", "frame": "extrinsic", "unit": "deg",     how angles combine; a node may say otherwise
-      "meters_per_unit": 0.01,                                 of translations, offsets and pivots; 1 if left out
+      "order": "XYZ", "frame": "extrinsic", "unit": "deg",     convention of angles; a node may override it
+      "meters_per_unit": 0.01,                                 of translations, offsets and pivots; default 1
       "nodes": [
         {
           "name": "arm",
@@ -24,10 +24,10 @@
       ]
     }
 
-Times are seconds; where the first is before 0, all are moved by as much. Interpolation is step, linear (if left out) or
-cubic, for the curve or after each key; tangents are per second in the value's own unit. in_weights and out_weights say
-how far handles reach, as shares of the time to the next key (Maya's and FBX's weighted tangents, Blender's handles); a
-third if left out. Where an axis comes twice in the order (ZXZ), angles are rotation.1, .2, .3. Other keys are refused.
+Times are seconds; if the first is negative, all are shifted to begin at 0. Interpolation is step, linear (default) or
+cubic, for the curve or after each key; tangents are per second in the value's own unit. in_weights and out_weights are
+handle lengths as fractions of the time to the next key (Maya's and FBX's weighted tangents, Blender's handles), default
+a third. With a repeated axis in the order (ZXZ), angles are rotation.1, .2, .3. Other keys are errors.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ CURVE_KEYS = ("times", "values", "interpolation", *HANDLES)
 def read(data: bytes, options: PartialConvention) -> EulerMotion:
     """Return the motion in a JSON of curves, see above; lengths in metres, angles in radians.
 
-    options: what the command line says about the convention. Raises FormatError with the place.
+    options: the convention of the command line. Raises FormatError with the position.
     """
     content = json_text.parse(data)
     if "asset" in content and "schema" not in content:
@@ -109,7 +109,7 @@ def read(data: bytes, options: PartialConvention) -> EulerMotion:
 
 
 def _times(nodes: list[Any]) -> Iterator[float]:
-    """All key times that are numbers; what else stands there is told later."""
+    """All numeric key times; other values are reported later."""
     for node in nodes:
         curves = node.get("curves") if isinstance(node, dict) else None
         for about in curves.values() if isinstance(curves, dict) else ():
@@ -189,7 +189,7 @@ def _curve(about: Any, later: float, where: str) -> Curve:
 
 
 def _check_keys(about: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    """Refuse a key that is none: what is misspelled would be left out in silence."""
+    """Raise FormatError for an unknown key: a misspelled one would be ignored silently."""
     for key in about:
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1)

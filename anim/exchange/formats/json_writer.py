@@ -1,4 +1,4 @@
-"""EulerMotion → JSON curves. See `json` for the schema."""
+"""EulerMotion → JSON curves. Schema: see `json_reader`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
 from anim.gltf.io import json_text
 
 SCHEMA = "euler-curves/1"
-MULTILINE_LIST = re.compile(rb"\[\n\s*([^][{}]*?)\s*\]")  # of numbers or words
+MULTILINE_LIST = re.compile(rb"\[\n\s*([^][{}]*?)\s*\]")  # of numbers or strings
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
-    """Return the motion as a JSON of curves, see `json`; the convention has the unit to use, and most nodes' order."""
+    """Return the motion as a JSON of curves, in the unit and the default order of the convention."""
     nodes = [_node_json(node, motion, convention) for node in motion.nodes]
     content = {
         "schema": SCHEMA,
@@ -64,6 +64,6 @@ def _curve_json(curve: Curve) -> dict[str, Any]:
 
 
 def _short(values: Floats) -> list[float]:
-    """Numbers with ten digits behind the point: far below float32, without the noise of binary fractions."""
+    """Numbers with ten decimals: far below float32, without the noise of binary fractions."""
     rounded: list[float] = (np.round(values, 10) + 0.0).tolist()
     return rounded

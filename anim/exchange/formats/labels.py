@@ -1,4 +1,4 @@
-"""What nodes and tracks are called where each name may stand once only, and for people."""
+"""Unique labels of nodes and tracks, for formats with unique names and for messages."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from anim.model import Skeleton, Track
 
-LISTED = 3  # of what is left out
+LISTED = 3  # names in a note
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """Return the names, those that came before with a number that makes a name of its own: "Hand", "Hand.2".
+    """Return the names, repeated ones with a number that makes them unique: "Hand", "Hand.2".
 
     unique(["a", "a", "a.2"]) → "a", "a.3", "a.2"
     """
@@ -28,16 +28,16 @@ def unique(names: Sequence[str]) -> list[str]:
 
 
 def labels(skeleton: Skeleton) -> list[str]:
-    """Return a name on one line for every node, no two alike: "hip", "hip.2", "node 7" where it has none."""
+    """Return a unique one-line name for every node: "hip", "hip.2", "node 7" for an unnamed one."""
     return unique([" ".join(name.split()) or f"node {number}" for number, name in enumerate(skeleton.names)])
 
 
 def label_of(track: Track, names: Sequence[str]) -> str:
-    """Return what a track moves, in words: "weights of 'head'"."""
+    """Return a track's label: "weights of 'head'"."""
     return f"{track.path} of '{names[track.node]}'" if track.node is not None else f"{track.pointer}"
 
 
 def skipped_note(what: Sequence[str]) -> tuple[str, ...]:
-    """Return one note: "left out: weights of 'head', scale of 'arm' and 3 more"; none where nothing is."""
+    """Return one note: "left out: weights of 'head', scale of 'arm' and 3 more"; none if empty."""
     more = f" and {len(what) - LISTED} more" if len(what) > LISTED else ""
     return (f"left out: {', '.join(what[:LISTED])}{more}",) if what else ()

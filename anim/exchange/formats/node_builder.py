@@ -1,4 +1,4 @@
-"""Channels of nodes as CSV and JSON name them, gathered one by one, then made into EulerNodes."""
+"""Build EulerNodes from the channels of CSV and JSON files."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from anim.exchange.euler.convention import axis_index
 from anim.exchange.euler.curve import Curve
 from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerNode, Pivots
 
-MAX_UNIT = 1e9  # m; of a file's unit of length
+MAX_UNIT = 1e9  # m; limit of a file's unit of length
 KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
 
 
 @dataclass(slots=True)
 class NodeBuilder:
-    """A node that is being read. Angles and rotation curves are in the file's unit, lengths in the file's."""
+    """A node under construction. Angles, rotation curves and lengths are in the file's units."""
 
     name: str
     convention: Convention
@@ -31,7 +31,7 @@ class NodeBuilder:
     curves: dict[tuple[str, int], Curve] = field(default_factory=dict)
 
     def place(self, kind: str, axis: str) -> tuple[str, int]:
-        """Return the slot of a channel such as ("rotation", "x"). Raises FormatError where it names none."""
+        """Return the slot of a channel such as ("rotation", "x"). Raises FormatError for others."""
         if kind == "rotation" and axis in tuple("xyz123"):
             number = axis_index(axis, self.convention.order)
             if number is None:
@@ -44,16 +44,16 @@ class NodeBuilder:
         raise FormatError(f"unknown channel '{kind}.{axis}' (expected translation, rotation or scale, and x, y or z)")
 
     def add(self, slot: tuple[str, int], curve: Curve) -> None:
-        """Put a curve into its slot, rotations in radians. Raises FormatError where there is one already."""
+        """Store a curve in its slot, rotations in radians. Raises FormatError for a used slot."""
         if slot in self.curves:
             raise FormatError(f"a second curve for {slot[0]} {slot[1] + 1} of node '{self.name}'")
         self.curves[slot] = curve.scaled(self.convention.unit.radians) if slot[0] == "rotation" else curve
 
 
 def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tuple[EulerNode, ...], bool]:
-    """Return the nodes, parents first, lengths in metres, and whether any has a parent.
+    """Return the nodes, parents first, lengths in metres, and True if any has a parent.
 
-    Raises FormatError for a parent that is missing, or a circle of parents.
+    Raises FormatError for a missing parent, or a cycle of parents.
     """
     by_name = {draft.name: draft for draft in drafts}
     ordered: list[NodeBuilder] = []
@@ -76,7 +76,7 @@ def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tupl
 
 
 def check_nodes(draft: NodeBuilder, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
-    """Put the curve that `build()` makes into a node's slot. Raises FormatError for what is wrong with it."""
+    """Store the curve of `build()` in a node's slot. Raises FormatError with the position of a fault."""
     try:
         draft.add(slot, build())
     except FormatError:

@@ -1,4 +1,4 @@
-"""The formats of Euler tracks: by name, by file ending, and by their first bytes."""
+"""Table of Euler track formats: by name, by file extension and by magic bytes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anim.exchange.formats.bvh_reader import BvhPosition
 
 @dataclass(frozen=True, slots=True)
 class TrackReadOptions:
-    """What a reader may need to be told: the convention, and what BVH's position channels mean."""
+    """Reader options: the convention, and the meaning of BVH's position channels."""
 
     stated: PartialConvention = UNSPECIFIED
     bvh_position: BvhPosition = BvhPosition.REPLACE
@@ -24,8 +24,8 @@ class TrackReadOptions:
 class TrackFormat:
     """One format: bytes → motion and motion → bytes.
 
-    suffix: of its files. begins: whether these first bytes are of it, asked in the table's order.
-    has_units: whether lengths come out in metres; otherwise in the file's own, unknown unit.
+    suffix: of its files. begins: True for the magic bytes of the format, tested in the table's order.
+    has_units: True if lengths are in metres; otherwise in the file's own, unknown unit.
     """
 
     suffix: str
@@ -60,12 +60,12 @@ TRACK_FORMATS = {
 
 
 def of_path(path: str) -> TrackFormat | None:
-    """Return the format that a file's ending names, None where it names none."""
+    """Return the format of a file extension, None for an unknown one."""
     return next((each for each in TRACK_FORMATS.values() if path.lower().endswith(each.suffix)), None)
 
 
 def of_content(data: bytes) -> TrackFormat:
-    """Return the format of a file by its first bytes. Raises FormatError where it is none of them."""
+    """Return the format of a file by its magic bytes. Raises FormatError for unknown ones."""
     if data[:4] == b"glTF":
         raise FormatError(f"is a glTF already (expected {', '.join(TRACK_FORMATS)})")
     head = data[:4096].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")

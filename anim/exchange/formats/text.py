@@ -1,4 +1,4 @@
-"""Text formats: their text whoever wrote it, the numbers that they may hold, and faults with their line."""
+"""Text formats: decoding of any encoding, parsing of numbers, errors with their line."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import FormatError
 
-GROUPED = "_"  # Python reads 1_000 as a number; no file means that
-LIMIT = 1e15  # greatest number that is taken: float32 and products of lengths stay far from overflow
+GROUPED = "_"  # valid in Python (1_000), but not in these formats
+LIMIT = 1e15  # greatest number accepted: products of lengths in float32 do not overflow
 
 
 def error_at(line: int, problem: str) -> FormatError:
@@ -19,9 +19,10 @@ def error_at(line: int, problem: str) -> FormatError:
 
 
 def decode_text(data: bytes) -> str:
-    """Return the text of a file in UTF-8, UTF-16 with its mark, or else Latin-1, with one kind of line end.
+    """Return the text of a file in UTF-8, UTF-16 with a byte order mark, or else Latin-1.
 
-    text_of(b"a\\r\\nb\\rc") → "a\\nb\\nc"
+    All line ends become \\n.
+    decode_text(b"a\\r\\nb\\rc") → "a\\nb\\nc"
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
@@ -34,9 +35,9 @@ def decode_text(data: bytes) -> str:
 
 
 def parse_number(text: str) -> float | None:
-    """Return the number that a word means, None where it means none, or none that is finite and below 1e15.
+    """Return the number of a word, None for other words, infinite numbers or those above 1e15.
 
-    number("1e3") → 1000.0
+    parse_number("1e3") → 1000.0
     """
     try:
         value = float(text)
@@ -48,7 +49,7 @@ def parse_number(text: str) -> float | None:
 
 
 def parse_cell(text: str, line: int, what: str) -> float:
-    """Return the number that a cell holds. Raises FormatError with the line."""
+    """Return the number in a cell. Raises FormatError with the line."""
     value = parse_number(text)
     if value is None:
         raise error_at(line, f"{what} is '{text[:40]}' (expected a finite number)")
@@ -56,7 +57,7 @@ def parse_cell(text: str, line: int, what: str) -> float:
 
 
 def check_times(times: Floats, lines: list[int]) -> None:
-    """Raise the FormatError of the line whose time is not behind the one before."""
+    """Raise FormatError with the line for the first time that is not after the previous one."""
     steps = np.diff(times)
     if (steps <= 0).any():
         k = int(np.argmax(steps <= 0)) + 1

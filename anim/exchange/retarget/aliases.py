@@ -1,4 +1,4 @@
-"""Alias files: which joint of a motion is which node of a character, where names don't say it."""
+"""Alias files: target names by source joint, for names that do not match automatically."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from anim.gltf.io import json_text
 def read(data: bytes) -> dict[str, str]:
     """Return target names by source name, from a JSON object or from CSV lines "source,target".
 
-    An empty target leaves the joint out; in CSV, lines that begin with # are words. Raises FormatError with the line.
+    An empty target omits the joint; in CSV, lines that begin with # are comments. Raises FormatError with the line.
     b"LeftArm,upperarm.l\\nLFingers,\\n" → {"LeftArm": "upperarm.l", "LFingers": ""}
     """
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{":

@@ -1,4 +1,4 @@
-"""The joint that each matched joint is placed from, and the order in which joints can be placed."""
+"""Anchor of each matched joint, and the evaluation order of all target nodes."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ NONE: Pair = (-1, -1)
 
 
 def find_anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -> dict[int, Pair]:
-    """Return the matched pair that each matched target node is placed from; (−1, −1) for those that carry the path.
+    """Return each matched target node's anchor pair; (−1, −1) for nodes that carry the root path.
 
-    It is the nearest matched joint above, in the skeleton that has the nearer one: a foot of an IK rig, which descends
-    from the root, is placed from the lower leg where the other skeleton has it there.
+    The anchor is the nearest matched ancestor, in the skeleton with the nearer one: a foot of an IK rig, which descends
+    from the root, is positioned relative to the lower leg if that is its parent in the other skeleton.
     """
     back = {b: a for a, b in pairs.items()}
     found: dict[int, Pair] = {}
@@ -29,9 +29,9 @@ def find_anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -
 
 
 def placing_order(target: Skeleton, chosen: dict[int, Pair], pairs: Mapping[int, int]) -> list[int]:
-    """Return all target nodes, each behind its parent and its anchor.
+    """Return all target nodes, each after its parent and its anchor.
 
-    Where anchors wait for each other, one is replaced in `chosen` by the nearest matched joint above.
+    In a cycle of anchors, one is replaced in `chosen` by the nearest matched ancestor.
     """
     back = {b: a for a, b in pairs.items()}
     waiting = [node for level in target.levels() for node in level.tolist()]
@@ -54,7 +54,7 @@ def matched_ancestor(skeleton: Skeleton, node: int) -> list[int]:
 
 
 def _is_ready(target: Skeleton, node: int, chosen: Mapping[int, Pair], done: dict[int, None]) -> bool:
-    """Whether a node can be placed now; it then is done."""
+    """True if a node's parent and anchor are done; the node is then added to `done`."""
     ready = int(target.parents[node]) in done and chosen.get(node, NONE)[1] in done
     if ready:
         done[node] = None

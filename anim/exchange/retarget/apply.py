@@ -1,4 +1,4 @@
-"""A converted motion on a character: match joints by name, then retarget, or bind curves that are the nodes' own."""
+"""Apply an imported motion to a character: match joints by name, then retarget or bind directly."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from anim.model import Clip, Scene
 
 @dataclass(frozen=True, slots=True)
 class CharacterClip:
-    """The clip for the character, and what became of the motion's joints.
+    """The clip for the character, and results of the retargeting.
 
-    scale: of the path, character by motion. lowered: least and most that hips went down, metres.
-    measure: what the scale is taken from; None for curves that are the nodes' own. without: what of a person the path
-    and the floor need and is not matched, "hips", "legs" or "feet".
-    num_bound: joints whose rest was taken from the skins, because the nodes rest elsewhere.
-    up_axes: along which the figures of the motion and of the character stand at rest, see `up_axis`; "" if not known.
+    scale: of the path, character / motion. lowered: minimum and maximum lowering of the hips, metres.
+    measure: source of the scale; None for curves of the nodes themselves. without: unmatched body parts that the path
+    and the floor need, "hips", "legs" or "feet".
+    num_bound: joints with a rest pose from the skins, because the nodes' rest pose differs.
+    up_axes: of the motion's and the character's rest pose, see `up_axis`; "" if unknown.
     """
 
     clip: Clip
@@ -51,12 +51,12 @@ def apply_to_character(
 ) -> CharacterClip:
     """Return the motion as a clip of the character.
 
-    Joints are those of the character's skins, then nodes without mesh in their tree; all its nodes where it has none,
-    or where the motion is of its own tree.
-    See `same_tree`, `match` and `retarget`.
-    stated: the character's nodes by role, where its file states them (`humanoid.stated_roles`).
-    nested: whether the motion has a hierarchy; if not, its curves are the nodes' own and go to them as they are.
-    Raises NotFoundError where no joint is matched, or there is none.
+    Joints are those of the character's skins, then nodes without mesh in their tree; all its nodes if it has no skins,
+    or if the motion has the character's own hierarchy.
+    See `is_same_hierarchy`, `match_joints` and `retarget`.
+    stated: the character's nodes by role, if its file states them (`vrm_humanoid.read_vrm_roles`).
+    nested: False for a motion without hierarchy: its curves are bound directly to the nodes.
+    Raises NotFoundError without any matched joint, or without joints.
     """
     joints = _skin_joints(target)
     moving, moved = to_match(source, target, nested=nested)
@@ -104,9 +104,9 @@ def apply_to_character(
 
 
 def to_match(source: ImportedMotion, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
-    """Return the nodes of the motion, parents first, and those of the character that are matched with each other.
+    """Return the matchable nodes of the motion, parents first, and those of the character.
 
-    nested: as for `onto`.
+    nested: as for `apply_to_character`.
     """
     joints = _skin_joints(target)
     moved = sorted(joints) if joints and nested else list(range(len(target.skeleton)))
@@ -129,7 +129,7 @@ def _parents_first(source: ImportedMotion) -> list[int]:
 
 
 def _others(target: Scene, joints: Set[int]) -> list[int]:
-    """Nodes without mesh below the parents of topmost joints: limbs that the skin of a head, or of armor, lacks."""
+    """Nodes without mesh below the parents of topmost joints: limbs missing in a skin of head or armor."""
     parents = target.skeleton.parents
     holders = {each.node for each in target.instances}
     inside = set(joints) | {int(parents[node]) for node in joints}

@@ -1,4 +1,4 @@
-"""The rest pose that skins were bound in, where the nodes of a file rest in another: a pose of some dance."""
+"""Bind pose of skins, for files with nodes resting in another pose."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, Skin, Track
 from anim.sampling import rest_pose, world_matrices
 
-MIN_DISTANCE = 1e-3  # of the joints' size, by which a joint must be off its place when bound
+MIN_DISTANCE = 1e-3  # minimum offset of a joint from its bind position, as a fraction of the joints' size
 MIN_ANGLE = np.radians(1)
-SAME_SCALE = 0.01  # fraction by which two scales may differ; a joint of another one has no matrix that means anything
+SAME_SCALE = 0.01  # fraction by which two scales may differ; matrices of joints with another scale are ignored
 
 
 @dataclass(frozen=True, slots=True)
 class BindPose:
-    """A skeleton that rests as its skins were bound. num_joints: how many rest elsewhere in the file."""
+    """A skeleton resting in its bind pose. num_joints: count of joints that rest elsewhere in the file."""
 
     skeleton: Skeleton
     num_joints: int
 
 
 def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose:
-    """Return the skeleton at rest as the inverse bind matrices have it; unchanged where the nodes' pose agrees.
+    """Return the skeleton in the pose of the inverse bind matrices; unchanged if it rests there already.
 
-    The matrices give the joints to each other, not where the whole is: it is put where the mesh's node, a node above
-    the joints, or the world has it, whichever leaves the joints nearest to the nodes' pose, and keeps its size. Nodes
-    that are no joints, and joints whose matrix has another scale than the others', keep their place in their parent.
-    skins: by the node of the mesh, see `read.skins`.
+    The matrices define the joints relative to each other, not the position of the whole: that is taken from the mesh's
+    node, a node above the joints, or the world, whichever gives joints nearest to the nodes' pose, and the size is
+    kept. Other nodes, and joints with a matrix of another scale than the others', keep their local transform.
+    skins: by the node of the mesh, see `reader.skins`.
     """
     world = world_matrices(skeleton, rest_pose(skeleton))[0]
     bound: dict[int, Floats] = {}
@@ -44,9 +44,9 @@ def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose
 
 
 def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
-    """Return the clip with a key for whatever rests otherwise in `skeleton` than in `other` and is not animated.
+    """Return the clip with a key for each unanimated property that differs between two rest poses.
 
-    So the clip plays alike on both: what it left at the rest of `skeleton` it now says.
+    skeleton, other: the rest poses. The clip then plays identically on both: keys replace the rest pose of `skeleton`.
     """
     animated = {(track.node, track.path) for track in clip.tracks}
     times, tracks = np.array([clip.start]), list(clip.tracks)
@@ -59,7 +59,7 @@ def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
 
 
 def _bound(skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]) -> dict[int, Floats]:
-    """World matrices (3, 4) by joint of a skin, as it was bound."""
+    """World bind matrices (3, 4) by joint of a skin."""
     joints, inverse = held[1].joints, held[1].inverse_bind
     in_mesh = matrix.inverse(inverse)
     moves = matrix.multiply(world[joints], inverse)
@@ -79,9 +79,9 @@ def _bound(skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dic
 def _place_joints(
     skeleton: Skeleton, world: Floats, holder: int, joints: Ints, in_mesh: Floats, volume: float
 ) -> Floats:
-    """world_from_mesh (3, 4) when the skin was bound, of the scale that gives `volume`.
+    """world_from_mesh (3, 4) when the skin was bound, with the scale that gives `volume`.
 
-    The scale is the joints' own: vertices may be in centimeters where nodes are in meters.
+    The scale is that of the joints: vertices may be in centimeters and nodes in meters.
     """
     nodes = {holder, *(int(node) for node in skeleton.parents[joints] if node >= 0)} - set(joints.tolist())
     choices = np.stack([np.eye(4)[:3], *(world[node] for node in sorted(nodes))])
@@ -103,7 +103,7 @@ def _size(world: Floats, joints: dict[int, Floats]) -> float:
 
 
 def _resting(skeleton: Skeleton, world: Floats, bound: dict[int, Floats]) -> BindPose:
-    """The skeleton with its joints where they were bound, and how many of them that moves."""
+    """The skeleton with joints in the bind pose, and the count of moved joints."""
     parts = {path: getattr(skeleton, path).copy() for path in ("translation", "rotation", "scale")}
     found, size = world.copy(), _size(world, bound)
     for level in skeleton.levels():

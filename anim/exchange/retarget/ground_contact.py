@@ -1,4 +1,4 @@
-"""Where a character's soles are, and how far a motion must be moved for them to stand on the floor."""
+"""Ground contact: a character's soles, and the vertical offset that keeps them on the floor."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ from anim.maths import matrix
 from anim.model import MeshInstance, Scene, Skeleton
 from anim.sampling import rest_pose, world_matrices
 
-SOLE_FRACTION = 5.0  # percentile of a foot's lowest height that is taken for the ground under it
-DOWN = 0.03  # share of the height that the lowest foot may be above its ground while it is down
-STANDS, LEAVES = 0.015, 0.04  # shares of the height: up to the first clearance is noise, from the second on none of it
-UNEVEN = 0.04  # share of the height that a foot's ground may be above that of all: markers and floors are never level
+SOLE_FRACTION = 5.0  # percentile of a foot's lowest height, taken as its ground
+DOWN = 0.03  # fraction of the height; maximum height of the lowest foot above its ground during contact
+STANDS, LEAVES = 0.015, 0.04  # fractions of the height: clearance up to the first is noise, from the second on none
+UNEVEN = 0.04  # fraction of the height; maximum height of a foot's ground above the lowest ground: floors are uneven
 WINDOW, STEP = 0.1, 1 / 120  # s
-FEET = ("foot", "toe")  # endings of roles
+FEET = ("foot", "toe")  # suffixes of roles
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
 @dataclass(frozen=True, slots=True)
 class SolePoints:
-    """Points fixed to foot joints: nodes (P,), points (P, 3) in the node's space. floor: world height at rest."""
+    """Points fixed to foot joints: nodes (P,), points (P, 3) in the node's space.
+
+    floor: world height at rest.
+    """
 
     nodes: Ints
     points: Floats
@@ -37,12 +40,12 @@ class SolePoints:
 
 
 def has_feet(roles: Iterable[str]) -> bool:
-    """Return whether a foot or toe is among roles such as "left_foot"."""
+    """Return True for a foot or toe among roles such as "left_foot"."""
     return any(role.endswith(FEET) for role in roles)
 
 
 def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]) -> SolePoints:
-    """Return the outermost points of the skin on feet and toes, and where the floor is: the lowest of all at rest.
+    """Return the outermost points of the skin on feet and toes, and the floor height: the lowest at rest.
 
     positions: (N, 3) of all nodes at rest. roles: (role, node), with a foot or toe among them (`has_feet`). Without
     skin there, the joints themselves.
@@ -70,7 +73,7 @@ def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]
 
 
 def at_or_below(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
-    """Return the numbers of `nodes` and of all that hang on them, in order."""
+    """Return the indices of `nodes` and of all their descendants, in order."""
     found: list[int] = []
     for node in range(len(skeleton)):
         at = node
@@ -84,13 +87,13 @@ def at_or_below(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
 def ground_offset(
     times: Floats, source: Floats, feet: Sequence[Ints], target: Floats, floor: float, scale: float
 ) -> Floats:
-    """Return by how much the target stands too high (F,), in metres, smooth in time.
+    """Return the excess height (F,) of the target, in metres, smooth in time.
 
-    While a foot of the source is down, the target's lowest sole belongs on its floor, or as far above as the source is
-    above its ground, times scale, where that is more than recordings are unsure of; in between, while it jumps, what
-    is too high at take-off goes over into what is too high at landing.
-    times: (F,) s. source: heights (F, N) of the source's nodes. feet: numbers of the nodes of each of its feet.
-    target: heights (F, P) of the target's soles; floor: of its rest.
+    During contact of a source foot, the target's lowest sole must be on its floor, or as high above as the source's
+    above its ground, times scale, if that exceeds the noise of recordings; during a jump, the offset is interpolated
+    from take-off to landing.
+    times: (F,) s. source: heights (F, N) of the source's nodes. feet: indices of the nodes of each of its feet.
+    target: heights (F, P) of the target's soles; floor: of its rest pose.
     """
     height = float(np.median(np.ptp(source, axis=1))) or 1.0
     clearance = _clearance(source, feet, UNEVEN * height)
@@ -101,7 +104,7 @@ def ground_offset(
 
 
 def _clearance(source: Floats, feet: Sequence[Ints], uneven: float) -> Floats:
-    """How high (F,) the source is: its lowest node above the ground, or a foot above the ground under this one."""
+    """Clearance (F,) of the source: its lowest node above the ground, or a foot above its own ground."""
     lowest = source.min(axis=1)
     ground = float(np.percentile(lowest, SOLE_FRACTION))
     clearance = lowest - ground
@@ -114,7 +117,7 @@ def _clearance(source: Floats, feet: Sequence[Ints], uneven: float) -> Floats:
 
 
 def _smooth(times: Floats, values: Floats) -> Floats:
-    """Values (F,) under a Hann window of WINDOW seconds, ends held."""
+    """Values (F,) smoothed by a Hann window of WINDOW seconds, ends repeated."""
     count = int(np.ceil((times[-1] - times[0]) / STEP)) + 1
     if count < 3:
         return values
@@ -126,7 +129,7 @@ def _smooth(times: Floats, values: Floats) -> Floats:
 
 
 def _offset_path(instance: MeshInstance, world: Floats) -> tuple[Floats, Ints]:
-    """Vertices (V, 3) of a skinned mesh at rest, and the node (V,) that holds each most."""
+    """Vertices (V, 3) of a skinned mesh at rest, and the node (V,) with each one's greatest weight."""
     assert instance.skin is not None
     mesh, skin = instance.mesh, instance.skin
     moves = matrix.multiply(world[skin.joints], skin.inverse_bind)

@@ -1,4 +1,4 @@
-"""Which joint of a character is which joint of a motion's skeleton."""
+"""Match the joints of a character with those of a motion's skeleton."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from anim.errors import NotFoundError
 from anim.exchange.retarget.joint_names import normalize_names
 from anim.exchange.retarget.joint_roles import joint_roles
 
-MatchReason: TypeAlias = Callable[[int], int | None]  # from a source node to the target node, where there is one
+MatchReason: TypeAlias = Callable[[int], int | None]  # from a source node to its target node, None without one
 
 
 @dataclass(frozen=True, slots=True)
 class JointMatch:
-    """Pairs of nodes, source → target, in the source's order; source nodes left over; and what persons' joints are.
+    """Pairs of nodes, source → target, in the source's order; unmatched source nodes; and body roles.
 
     source_roles, target_roles: nodes by role ("left_foot"), for alignment; a role is in both or in none.
     """
@@ -39,13 +39,14 @@ def match_joints(
     same: Mapping[int, int] = MappingProxyType({}),
     stated: Mapping[str, int] = MappingProxyType({}),
 ) -> JointMatch:
-    """Return the pairs of nodes whose names mean the same, each node in one pair at most.
+    """Return pairs of nodes with equivalent names, each node in one pair at most.
 
-    In this order: aliases (source name → target name; "" for none), `same` (source → target node, see `same_tree`), the
-    joint that the target's file states (`stated`, target node by role), the same name, the same name without namespace,
-    prefix, ending, case, separators and spelling of sides, then the same joint of a person (`roles`).
-    of_source, of_target: nodes that take part, the surest first. others: nodes of the target for what finds no partner
-    among those. Raises NotFoundError for an alias of a missing name.
+    In this order: aliases (source name → target name; "" for none), `same` (source → target node, see
+    `is_same_hierarchy`), the joint that the target's file states (`stated`, target node by role), the same name, the
+    same name without namespace, prefix, suffix, case, separators and spelling of sides, then the same body role
+    (`joint_roles`).
+    of_source, of_target: candidate nodes, the most certain first. others: nodes of the target for source nodes without
+    a partner among those. Raises NotFoundError for an alias of a missing name.
     """
     left = {source[node]: node for node in reversed(of_source)}
     everywhere = {target[node]: node for node in (*range(len(target))[::-1], *reversed(of_target))}
@@ -55,9 +56,9 @@ def match_joints(
     by_role = {node: role for role, node in source_roles.items()}
 
     def by_names(nodes: Sequence[int]) -> tuple[MatchReason, ...]:
-        """Partners among these nodes: of the same name, of the same one taken apart, of the same role.
+        """Partners among these nodes: by equal name, by normalized name, by role.
 
-        Numbers mean other joints in other rigs ("spine1"): roles win over names that were taken apart.
+        Numbers differ in meaning between skeletons ("spine1"): roles precede normalized names.
         """
         right = {target[node]: node for node in reversed(nodes)}
         by_own_role = joint_roles(plain_target, [node for node in nodes if node not in stated.values()])
@@ -97,7 +98,7 @@ def match_joints(
 def _match_by_name(
     aliases: Mapping[str, str], left: Mapping[str, int], right: Mapping[str, int]
 ) -> tuple[dict[int, int], set[int]]:
-    """The pairs that aliases name, and the source nodes that they leave out."""
+    """The pairs given by aliases, and the source nodes that aliases exclude."""
     pairs: dict[int, int] = {}
     excluded: set[int] = set()
     for name, other in aliases.items():

@@ -1,4 +1,4 @@
-"""Names of joints taken apart: namespace, prefix, side and the rest, so that two files' names can be compared."""
+"""Normalize joint names: namespace, prefix and side removed, for comparison between files."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-TOOL = re.compile(r"^(?:DEF-|mixamorig\d*_?)(?=\w)")  # what Rigify's joints begin with, and Mixamo's without colon
-ROUNDS = 3  # of what is taken off at both ends
+TOOL = re.compile(r"^(?:DEF-|mixamorig\d*_?)(?=\w)")  # prefixes of Rigify's joints, and of Mixamo's without colon
+ROUNDS = 3  # rounds of removing affixes at both ends
 CENTER = "c"  # VRoid's joints in the middle: "J_Bip_C_Hips"
-DISTINCT = 0.9  # share of names that must stay different
-SHARED = 0.6  # share of names that must begin or end alike for that to tell nothing
+DISTINCT = 0.9  # fraction of names that must remain distinct
+SHARED = 0.6  # fraction of names with a common affix for it to be removed
 
 
 class JointName(NamedTuple):
-    """A name without what differs between tools: "mixamorig:LeftUpLeg" → ("left", "upleg")."""
+    """A name without the differences between tools: "mixamorig:LeftUpLeg" → ("left", "upleg")."""
 
     side: str
     stem: str
 
 
 def normalize_names(names: Sequence[str]) -> list[JointName]:
-    """Return the names of one skeleton taken apart, without namespaces and what most of them begin or end with.
+    """Return the normalized names of one skeleton, without namespaces and common affixes.
 
-    That is a prefix ("Bip01 "), an ending ("_Armature"), or a number that counts them ("_023").
-    plain(["Bip01 L Thigh", "Bip01 Head"]) → ("left", "thigh"), ("", "head")
+    An affix is a prefix ("Bip01 "), a suffix ("_Armature"), or a serial number ("_023").
+    normalize_names(["Bip01 L Thigh", "Bip01 Head"]) → ("left", "thigh"), ("", "head")
     """
     bare = [TOOL.sub("", re.split(r"[:|]", name)[-1]) for name in names]
     for _ in range(ROUNDS):
@@ -46,7 +46,7 @@ def _drop_suffix(names: list[str]) -> list[str]:
 
 
 def _drop_numbers(names: list[str]) -> list[str]:
-    """Names without the numbers that an exporter gave to all of them, which tell nothing."""
+    """Names without the serial numbers that an exporter gave to all of them."""
     numbers = [match[0] for name in names if (match := re.search(r"_\d+$", name))]
     shorter = [re.sub(r"_\d+$", "", name) for name in names]
     counted = len(numbers) > 1 and len(numbers) >= SHARED * len(names) and len(set(numbers)) == len(numbers)
@@ -58,7 +58,7 @@ def _differ(names: list[str]) -> bool:
 
 
 def _shared(parts: list[str]) -> str:
-    """The part that most names have; none where it is a side."""
+    """The affix of most names; "" if it is a side."""
     counts = Counter(part for part in parts if part)
     part, count = counts.most_common(1)[0] if counts else ("", 0)
     is_side = part.strip(" _.-").casefold() in SIDES
@@ -66,13 +66,13 @@ def _shared(parts: list[str]) -> str:
 
 
 def _ends(name: str) -> str:
-    """The last word of a name with the separator, where a word comes before: "_Armature" of "hips_Armature"."""
+    """The last word of a name with its separator, after another word: "_Armature" of "hips_Armature"."""
     match = re.search(r"(?<=\w)[\s_.-]+[^\W\d_]{2,}$", name)
     return match[0] if match else ""
 
 
 def _begins(name: str) -> str:
-    """The first word of a name with the separator, where a word follows: "Bip01 " of "Bip01 Head", "" of "tail.1"."""
+    """The first word of a name with its separator: "Bip01 " of "Bip01 Head", "" of "tail.1"."""
     match = re.match(r"([^\s_.-]+[\s_.-]+).*[^\W\d_]{2}", name)
     return match[1] if match else ""
 

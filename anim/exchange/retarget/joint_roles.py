@@ -1,4 +1,4 @@
-"""Which joint of a person a name means, in the words of the tools that people's skeletons come from."""
+"""Body roles of joint names, by the vocabulary of tools for human skeletons."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from anim.exchange.retarget.joint_names import JointName
 
-# Stems by role, the surest first: CMU, Mixamo, Biped (3ds Max), Rigify, Unreal, VRM, Poser, KayKit, Quaternius,
-# Daz; last what Rigify calls them, whose spine begins with the hips, as in rigs that only number theirs.
+# Stems by role, the most certain first: CMU, Mixamo, Biped (3ds Max), Rigify, Unreal, VRM, Poser, KayKit, Quaternius,
+# Daz; last Rigify's own names, with a spine that begins at the hips, as in skeletons with numbered spines.
 MIDDLE = {
     "hips": ("hips", "pelvis", "hip", "spine", "spine1"),
     "spine": ("spine", "spine1", "abdomen", "abdomenlower", "lowerback", "waist", "torso"),
@@ -29,9 +29,9 @@ PERSON = ("hips", "left_upper_leg", "right_upper_leg", "left_foot", "right_foot"
 
 
 def joint_roles(names: Sequence[JointName], chosen: Sequence[int]) -> dict[str, int]:
-    """Return the nodes by role ("left_upper_arm"), for those of `chosen` whose names say it; each node at most once.
+    """Return the nodes by role ("left_upper_arm") of `chosen`; each node at most once.
 
-    roles of CMU's names → {"hips": 0, "left_upper_leg": 2, …}
+    CMU's names → {"hips": 0, "left_upper_leg": 2, …}
     """
     found: dict[str, int] = {}
     taken: set[int] = set()

@@ -1,4 +1,4 @@
-"""What another skeleton does at any time while a motion plays: rotations, offsets and scales, seen from both rests."""
+"""Pose transfer from a source to a target skeleton, relative to both rest poses, at any time."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from anim.sampling import rest_pose, world_matrices
 from anim.sampling import sample_pose as posed
 from anim.sampling.pose import local_by_node, world_by_node
 
-FLAT = 1e-9  # of a unit cube's volume, below which a scale leaves nothing of an axis
-NUM_HEIGHT_SAMPLES = 64  # times at which the height of the motion is looked at
+FLAT = 1e-9  # of a unit cube's volume; a smaller scale flattens an axis
+NUM_HEIGHT_SAMPLES = 64  # times at which the height of the motion is sampled
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +41,12 @@ class TargetMotion:
 
 @dataclass(frozen=True, slots=True)
 class PoseTransfer:
-    """How a target follows a source.
+    """Parameters of a target that follows a source.
 
-    aligned: the target's rest pose as a whole, from the source's. fixes: by target node, the world rotation (4,) that
-    puts its rest pose into the source's. anchors: the pair that each matched target node is placed from. order: the
-    target's nodes as they can be placed. top: the target's topmost joint of a person, or of all. lifted: nodes that go
-    up and down with it, whatever they are placed from. origin: (N, 3) of the source, where paths are measured from.
+    aligned: alignment of the whole rest poses. fixes: by target node, the world rotation (4,) from its rest pose to the
+    source's. anchors: the anchor pair of each matched target node. order: the target's nodes in evaluation order. top:
+    the target's topmost joint of a person, or of all. lifted: nodes that move vertically with it, independent of their
+    anchors. origin: (N, 3) of the source, reference of paths.
     """
 
     source: Skeleton
@@ -64,7 +64,7 @@ class PoseTransfer:
     origin: Floats
 
     def at(self, times: Floats, lowered: Floats | None = None) -> TargetMotion:
-        """Return what the target does at times (F,) in seconds, as far down (F,) as `lowered` says, in metres."""
+        """Return the target's motion at times (F,) in seconds, lowered by `lowered` (F,) metres."""
         motion = posed(self.source, self.clip, times)
         of_source = world_by_node(self.source, motion)
         rotations = self._rotations(world_rotations(self.source, motion.rotation))
@@ -75,7 +75,7 @@ class PoseTransfer:
         return TargetMotion(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, of_source, world)
 
     def _rotations(self, of_source: dict[int, Floats]) -> dict[int, Floats]:
-        """Local rotations (F, 4): in the world as the source's away from rest, between rest poses that agree."""
+        """Local rotations (F, 4): world rotations relative to rest as the source's, after rest correction."""
         turn, wanted = self.aligned.rotation, dict[int, Floats]()
         for a, b in self.pairs.items():
             moved = quaternion.multiply(of_source[a], quaternion.conjugate(self.of_source.rotations[a]))
@@ -84,7 +84,7 @@ class PoseTransfer:
         return _local_rotations(self.target, wanted)
 
     def _scale(self, a: int, b: int, scale: Floats) -> Floats:
-        """Local scale (F, 3): the source's by its rest, along the axes of the target's joint that lie nearest."""
+        """Local scale (F, 3): the source's relative to rest, along the nearest axes of the target's joint."""
         own = quaternion.multiply(self.fixes[b], self.at_rest.rotations[b])
         other = quaternion.multiply(self.aligned.rotation, self.of_source.rotations[a])
         axes = quaternion.to_matrix(quaternion.multiply(quaternion.conjugate(own), other))
@@ -93,7 +93,7 @@ class PoseTransfer:
         return np.asarray(self.target.scale[b] * (factor @ (axes * axes).T))
 
     def _place(self, local: Floats, of_source: Floats, motion: Pose, lowered: Floats | None) -> Floats:
-        """World matrices (N, F, 3, 4) of the target; translations of matched nodes are filled into `local`."""
+        """World matrices (N, F, 3, 4) of the target; translations of matched nodes are stored in `local`."""
         back = {b: a for a, b in self.pairs.items()}
         world = np.empty_like(local)
         for node in self.order:
@@ -110,8 +110,8 @@ class PoseTransfer:
     def _path(self, a: int, b: int, of_source: Floats, motion: Pose, world: Floats) -> Floats:
         """World positions (F, 3) of a target node.
 
-        From its anchor: the source's offset, scaled and turned, and what both rest poses differ by there, which turns
-        with the anchor. Where they agree, nothing is left of that, and the offset is the source's.
+        From its anchor: the source's offset, scaled and rotated, plus the difference of both rest poses there, which
+        rotates with the anchor. For equal rest poses the difference is 0, and the offset is the source's.
         """
         turn, scale = self.aligned.rotation, self.aligned.scale
         from_a, from_b = self.anchors[b]
@@ -128,9 +128,9 @@ class PoseTransfer:
         return np.asarray(world[from_b, :, :, 3] + offset + quaternion.rotate(turn, moved))
 
     def _offset(self, a: int, anchor: int, of_source: Floats, motion: Pose) -> Floats:
-        """Offset (F, 3) of a source node from its anchor, in the world.
+        """Offset (F, 3) of a source node from its anchor, in world space.
 
-        What nodes without a partner turn between the two does not count: the target has no joint there that bends.
+        Rotations of unmatched nodes between the two are ignored: the target has no joint there.
         """
         between = matched_ancestor(self.source, a)
         if anchor not in between:
@@ -144,15 +144,15 @@ class PoseTransfer:
 def build_transfer(
     source: Skeleton, clip: Clip, target: Skeleton, matching: JointMatch, *, rest_at: float | None
 ) -> PoseTransfer:
-    """Return how the target's matched joints follow the source's.
+    """Return the transfer from the source's to the target's matched joints.
 
-    World rotations are taken over as turns away from the rest pose, between rest poses that are made to agree
-    (`rest_pose.corrections`); unmatched nodes of the target keep their own. Each joint keeps its offset from the joint
-    that it is placed from (see `anchors`), and moves in it as the source's does, scaled; the topmost follow the
-    source's path from where they rest. Scales are taken over as factors of the rest's. So where the rest poses agree,
-    moved, turned and scaled as a whole, the target does exactly what the source does.
-    rest_at: s, when the source stands in its rest pose; None for the pose in which every angle is zero. Raises
-    RangeError where the clip is not running then.
+    World rotations are transferred relative to the rest pose, between corrected rest poses
+    (`rest_pose.rest_corrections`); unmatched nodes of the target keep their own. Each joint keeps its offset from its
+    anchor (see `anchors`), and moves relative to it as the source's does, scaled; the topmost follow the source's path
+    from their rest positions. Scales are transferred as factors of the rest's. So for equal rest poses, up to a
+    similarity transform of the whole, the target's motion equals the source's.
+    rest_at: s, time of the source's rest pose; None for the pose with all angles zero. Raises RangeError for a time
+    outside the clip.
     """
     if rest_at is not None and not clip.start <= rest_at <= clip.end:
         raise RangeError(f"rest at {rest_at:g} s (the motion runs from {clip.start:g} to {clip.end:.4g} s)")
@@ -194,7 +194,7 @@ def _rest_pose(skeleton: Skeleton, still: Pose) -> RestPose:
 
 
 def _descends(parent: Floats, place: Floats, still: Floats) -> Floats:
-    """World positions (F, 3) in a parent's space; as they rest (F, 3) along what the parent's scale flattens."""
+    """World positions (F, 3) in a parent's space; rest values (F, 3) along axes flattened by its scale."""
     linear, beyond = parent[:, :, :3], place - matrix.apply(parent, still[:, None])[:, 0]
     largest = np.sqrt((linear * linear).sum(axis=-2)).max(axis=-1)
     flat = np.abs(np.linalg.det(linear)) <= FLAT * largest**3
@@ -214,7 +214,7 @@ def _with_joint(still: Pose, frames: int, rotations: Mapping[int, Floats], scale
 
 
 def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int, Floats]:
-    """Local rotations (F, 4) of the nodes whose world rotations are wanted; the others stay at rest."""
+    """Local rotations (F, 4) of the nodes with given world rotations; the others remain at rest."""
     world: dict[int, Floats] = {}
     found: dict[int, Floats] = {}
     for level in skeleton.levels():
@@ -235,7 +235,7 @@ def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int,
 
 
 def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
-    """Positions (N, 3) of the source's nodes at rest, standing on the floor."""
+    """Positions (N, 3) of the source's nodes at rest, with feet on the floor."""
     at_rest = world_matrices(source, rest_pose(source))[0, :, :, 3]
     looks = np.linspace(clip.start, clip.end, NUM_HEIGHT_SAMPLES)
     heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
@@ -243,7 +243,7 @@ def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
 
 
 def _lift_root(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
-    """The topmost joint, and what is placed from joints above it: all that the floor lifts but those themselves."""
+    """The topmost joint and nodes with an anchor above it: moved by the floor, unlike the anchors."""
     chain, node = [-1], top
     while (node := chosen.get(node, NONE)[1]) >= 0:
         chain.append(node)

@@ -1,4 +1,4 @@
-"""Alignment of two rest poses as wholes: heading, size, and the level of the floor."""
+"""Alignment of two whole rest poses: heading, size, and floor level."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.rest_pose import RestPose, facing_rotation
 from anim.exchange.retarget.similarity import fit_similarity
 
-ALIKE = 1e-3  # of the radius; joints that differ less between two rest poses are those of one build
-MAX_SCALE_RATIO = 0.5  # share of the source's joints that must be matched for them to tell the figure's size
-HANGING = 0.1  # of the size, that the lowest joint must be below 0 for a rest pose to hang from its origin
+ALIKE = 1e-3  # fraction of the radius; joints that differ less between two rest poses have the same build
+MAX_SCALE_RATIO = 0.5  # minimum fraction of the source's joints that must be matched to measure the size
+HANGING = 0.1  # of the size; minimum depth of the lowest joint below 0 for a rest pose that hangs from its origin
 
 
 class Measure(StrEnum):
-    """What the scale of lengths is taken from."""
+    """Source of the scale of lengths."""
 
     BUILD = "build"
     LEGS = "legs"
@@ -37,18 +37,18 @@ class RestAlignment:
 
     @property
     def alike(self) -> bool:
-        """Whether that takes all matched joints to their places: the build is the same, and nothing else differs."""
+        """True for equal builds: the alignment maps all matched joints to their positions."""
         return self.measure is Measure.BUILD
 
 
 def align_rests(source: RestPose, target: RestPose, matching: JointMatch, *, of_one_tree: bool) -> RestAlignment:
-    """Return how the target's rest pose lies to the source's.
+    """Return the alignment of the source's rest pose to the target's.
 
-    Of one build (moved, turned, scaled as a whole): exactly so. Otherwise a turn about the vertical, see `facing`, and
-    the length of the legs. Where these are not matched, how far the matched joints lie around their middle; where
-    they are few, the largest extents of both figures.
-    of_one_tree: whether nodes are matched because names and parents agree, see `same_tree`. Joints on a line, or a
-    single one, are of one build with any other such: there it decides.
+    For equal builds (up to a similarity transform) it is exact. Otherwise a rotation about the vertical, see
+    `facing_rotation`, and the ratio of leg lengths. Without matched legs, the spread of the matched joints around their
+    mean; with few matches, the largest extents of both skeletons.
+    of_one_tree: True if nodes are matched by equal names and parents, see `is_same_hierarchy`. Collinear joints, or a
+    single one, always fit: there it decides.
     """
     pairs = np.array([*matching.pairs.items()], np.int64)
     found = fit_similarity(source.positions[pairs[:, 0]], target.positions[pairs[:, 1]])
@@ -67,10 +67,10 @@ def align_rests(source: RestPose, target: RestPose, matching: JointMatch, *, of_
 
 
 def with_offset(source: Floats, target: Floats, heights: Floats, node: int) -> float:
-    """Return by how much the source's rest pose must go up to stand on the floor, in metres: 0 where it stands.
+    """Return the upward offset of the source's rest pose to the floor, in metres: 0 if it is there.
 
-    A BVH's root mostly rests at the origin, its feet below; only the motion lifts it. That is so where the source
-    hangs, the target does not, and the motion is nearer to standing.
+    A BVH's root mostly rests at the origin with its feet below; only the motion lifts it. That is detected if the
+    source hangs, the target does not, and the motion is nearer to standing.
     source, target: positions (N, 3) at rest. heights: (F,) of the source's `node`, which carries the path.
     """
     hanging = _hangs(source)
@@ -81,13 +81,13 @@ def with_offset(source: Floats, target: Floats, heights: Floats, node: int) -> f
 
 
 def _hangs(positions: Floats) -> float:
-    """How far the lowest node is below 0; 0 where that is little."""
+    """Depth of the lowest node below 0; 0 if small."""
     lowest = -float(positions[:, 1].min())
     return lowest if lowest > HANGING * float(np.ptp(positions, axis=0).max()) else 0.0
 
 
 def _legs(pose: RestPose, roles: Mapping[str, int]) -> float:
-    """Mean length of the legs whose joints are all known, 0 where none is."""
+    """Mean length of the completely matched legs, 0 without any."""
     legs = []
     for side in ("left", "right"):
         joints = [roles.get(f"{side}_{role}") for role in ("upper_leg", "lower_leg", "foot")]
@@ -98,12 +98,12 @@ def _legs(pose: RestPose, roles: Mapping[str, int]) -> float:
 
 
 def _spread(places: Floats) -> float:
-    """How far places (P, 3) lie around their middle."""
+    """Spread of positions (P, 3) around their mean."""
     return float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
 def _extent(pose: RestPose, nodes: Ints) -> float:
-    """The longest side of the box around the trees of nodes (P,): a person's height, also where arms are spread."""
+    """Longest side of the bounding box of the trees of nodes (P,): a person's height, also in T-pose."""
     roots = {_root(pose, node) for node in nodes.tolist()}
     figure = [node for node in range(len(pose.positions)) if _root(pose, node) in roots]
     return float(np.ptp(pose.positions[figure], axis=0).max())

@@ -1,4 +1,4 @@
-"""What lies between two rest poses: which way each skeleton faces, and how its limbs are held."""
+"""Differences of two rest poses: heading of each skeleton, and directions of its limbs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anim.exchange.retarget.joint_roles import PERSON
 from anim.maths import quaternion
 
 UP = np.array((0.0, 1.0, 0.0))
-SNAP = np.radians(30)  # nearer to a quarter turn than this is one: rest poses are made along axes
+SNAP = np.radians(30)  # angles nearer to a multiple of 90° are snapped: rest poses are made along axes
 LIMBS = {"upper_arm": "lower_arm", "lower_arm": "hand", "upper_leg": "lower_leg", "lower_leg": "foot"}
 
 
@@ -35,9 +35,9 @@ class RestPose:
 
 
 def facing_rotation(source: RestPose, target: RestPose, matching: JointMatch) -> Floats:
-    """Return the turn (4,) about the vertical from where the source faces to where the target does.
+    """Return the rotation (4,) about the vertical from the source's heading to the target's.
 
-    A skeleton faces where its right-to-left crosses up; without pairs of sides the two face the same way.
+    The heading is right-to-left × up; skeletons without paired sides have equal headings.
     """
     headings = []
     for pose, roles in ((source, matching.source_roles), (target, matching.target_roles)):
@@ -57,11 +57,12 @@ def facing_rotation(source: RestPose, target: RestPose, matching: JointMatch) ->
 
 
 def rest_corrections(source: RestPose, target: RestPose, matching: JointMatch, turn: Floats) -> dict[int, Floats]:
-    """Return for each matched target node the world rotation (4,) that puts its rest pose into the source's.
+    """Return for each matched target node the world rotation (4,) from its rest pose to the source's.
 
-    turn: the source's heading to the target's. Of persons, arms and legs are turned by the shortest way to point as
-    the source's do; hands and fingers go with the arm. Trunk, head, shoulders, feet and toes stay: those differ in
-    build, not in pose, and feet that are flat at rest stay flat. Other chains point as the source's do.
+    turn: rotation from the source's heading to the target's. For human roles, arms and legs get the smallest rotation
+    to the source's directions; hands and fingers rotate with the arm. Trunk, head, shoulders, feet and toes are
+    unchanged: those differ in build, not in pose, and feet flat at rest remain flat. Other chains get the source's
+    directions.
     """
     person = all(role in matching.source_roles for role in PERSON)
     ends = _limb_ends(matching) if person else _chain_ends(source, target, matching)
@@ -80,7 +81,7 @@ def rest_corrections(source: RestPose, target: RestPose, matching: JointMatch, t
 
 
 def rotation_between(a: Floats, b: Floats) -> Floats:
-    """Return the smallest turn (4,) that points direction a (3,) along b (3,); none where one has no length."""
+    """Return the smallest rotation (4,) from direction a (3,) to b (3,); identity for a zero vector."""
     lengths = np.linalg.norm(a) * np.linalg.norm(b)
     if lengths < 1e-12:
         return IDENTITY
@@ -111,7 +112,7 @@ def _up_rotation(matching: JointMatch) -> set[int]:
 
 
 def _chain_ends(source: RestPose, target: RestPose, matching: JointMatch) -> LimbEnds:
-    """Joints with one matched joint next below in both skeletons."""
+    """Joints with exactly one matched joint next below in both skeletons."""
     below_source = _next_below(source, set(matching.pairs))
     below_target = _next_below(target, set(matching.pairs.values()))
     ends: LimbEnds = {}

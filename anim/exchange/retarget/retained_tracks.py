@@ -1,4 +1,4 @@
-"""What of a clip stays when a motion takes its place: tracks of nodes that the motion says nothing of."""
+"""Tracks retained when a motion replaces a clip: those of nodes that the motion does not animate."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from anim.sampling.times import key_times
 
 
 def retained_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], int]:
-    """Return the tracks of a clip that gives way which stay, and how many go though the motion has no node for them.
+    """Return the retained tracks of a replaced clip, and the count of removed ones without a motion node.
 
-    Those are of nodes that no joint of the motion is matched to, of morph weights and of pointers. They stay where the
-    motion is the figure's own (of its build), for there they belong to it; beside another figure's motion they go.
+    These are tracks of unmatched nodes, of morph weights and of pointers. They are retained if the motion has the
+    character's own build; with another one's motion they are removed.
     """
     known = set(done.matching.pairs.values())
     found = tuple(t for t in old.tracks if t.node is None or t.path == "weights" or t.node not in known)
@@ -29,7 +29,10 @@ def retained_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], 
 
 
 def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
-    """Return the motion's clip with tracks that stay. Joints keep their way in the world below nodes that move now."""
+    """Return the motion's clip with the retained tracks.
+
+    Joints keep their world-space motion below nodes that the retained tracks move.
+    """
     moving = {track.node for track in stay if track.path != "weights"}
     known = set(done.matching.pairs.values())
     below = [node for node in known if moving & set(_between(skeleton, node, known))]
@@ -43,7 +46,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
         parent = int(skeleton.parents[node])
         top = next((up for up in matched_ancestor(skeleton, node) if up in known), -1)
         carried = world[parent]
-        if top >= 0:  # where the parent is once its matched joint is back in its place
+        if top >= 0:  # world matrix of the parent after its matched joint is restored
             carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
         local = matrix.multiply(matrix.inverse(carried), wanted[node])
         tracks |= {(node, track.path): track for track in _tracks(node, times, local)}

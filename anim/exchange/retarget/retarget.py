@@ -1,4 +1,4 @@
-"""A motion put on another skeleton: joints turn in world space as the source's do, seen from both rest poses."""
+"""Retarget a motion to another skeleton: world-space rotations relative to both rest poses."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import rest_pose, world_matrices
 
-MAX_STEP_S = 86_400.0  # s; of a motion that is looked through for contacts, 30 times a second and more
-CONSTANT_TOLERANCE = 1e-7  # rad, factor, and share of the target's size: what rounding leaves of no motion
-CONTACT_STEP = 1 / 30  # s between times at which soles are looked at, where keys stand farther apart
+MAX_STEP_S = 86_400.0  # limit of a motion sampled for contacts, 30 times a second and more
+CONSTANT_TOLERANCE = 1e-7  # rad, factor, and fraction of the target's size: rounding of a constant
+CONTACT_STEP = 1 / 30  # s, maximum step between times at which soles are sampled
 
 
 class GroundMode(StrEnum):
-    """What heights the hips get."""
+    """Treatment of the hips' height."""
 
     CONTACT = "contact"
     KEEP = "keep"
@@ -35,9 +35,9 @@ class GroundMode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Retargeted:
-    """The clip for the target, the target's size by the source's, and the least and most that hips went down, in m.
+    """The clip for the target, the size ratio target / source, and results of the ground contact.
 
-    measure: what the scale is taken from.
+    lowered: minimum and maximum lowering of the hips, in metres. measure: source of the scale.
     """
 
     clip: Clip
@@ -48,10 +48,10 @@ class Retargeted:
 
 @dataclass(frozen=True, slots=True)
 class _RequiredKeys:
-    """What the target does at times (K,), and which keys its tracks get.
+    """The target's motion at times (K,), and the choice of keys.
 
-    before: those of the times that stand before steps. inside: what it does at `within(knots)`; None without steps.
-    thin: whether keys may be left out where nothing changes; recordings keep their grid.
+    before: the times that precede steps. inside: the motion at `inside_interval(knots)`; None without steps.
+    thin: True to omit keys where nothing changes; recordings keep their grid.
     """
 
     times: Floats
@@ -62,7 +62,7 @@ class _RequiredKeys:
     thin: bool
 
     def track(self, node: int, path: str, tolerance: float) -> Track:
-        """STEP where the value holds between all knots of the source, LINEAR otherwise."""
+        """Return a STEP track if the value is constant between all knots of the source, else LINEAR."""
         values = _of(self.found, node, path)
         if self.inside is not None and is_step(_of(self.inside, node, path), tolerance=tolerance):
             at = np.isin(self.times, self.knots)
@@ -84,14 +84,14 @@ def retarget(
     floor: GroundMode = GroundMode.CONTACT,
     rest_at: float | None = None,
 ) -> Retargeted:
-    """Return a clip that moves the target's matched joints as the source's move; see `transfer` for how.
+    """Return a clip that moves the target's matched joints like the source's; see `build_transfer`.
 
-    Keys stand at all times of the source, and between them where what a player makes there would leave the motion by
-    more than the source's tolerance, of the target's size for its path; recordings keep their grid.
-    floor: CONTACT moves the hips up or down so that the soles stand where they stand at rest while a foot of the
-    source is down; KEEP scales heights only, and so does CONTACT where no foot is matched.
-    rest_at: s, the time at which the source stands in its rest pose; None for the pose in which every angle is zero.
-    Raises NotFoundError where no joint is matched, RangeError for CONTACT in a motion of over a day.
+    Keys are at all times of the source, and between them where interpolation would exceed the source's tolerance, times
+    the target's size for its path; recordings keep their grid.
+    floor: CONTACT moves the hips vertically so that the soles keep their rest height while a foot of the source is
+    down; KEEP only scales heights, and so does CONTACT without a matched foot.
+    rest_at: s, time of the source's rest pose; None for the pose with all angles zero.
+    Raises NotFoundError without a matched joint, RangeError for CONTACT in a motion of over a day.
     """
     if not matching.pairs:
         raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
@@ -122,20 +122,20 @@ def retarget(
 
 
 def _times(clip: Clip) -> tuple[Floats, Floats]:
-    """All key times (T,), and float32 times just before those at which a step may jump."""
+    """All key times (T,), and the float32 times before those with a possible step."""
     arrays = {id(track.times): track.times for track in clip.tracks}
     steps = {id(t.times): just_before(t.times[1:]) for t in clip.tracks if t.interpolation is Interpolation.STEP}
     return unique_sorted(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
 
 
 def _limit_distance(times: Floats, step: float) -> Floats:
-    """Times with others between them so that none is farther from the next than `step`."""
+    """Times with added ones between them so that no interval exceeds `step`."""
     grid = np.arange(times[0], times[-1], step)
     return unique_sorted(np.concatenate((times, grid)))
 
 
 def _is_above_ground(follow: PoseTransfer, target: Scene, matching: JointMatch, times: Floats) -> Floats:
-    """How far (F,) above the floor the target would be with heights scaled only, in metres."""
+    """Height (F,) of the target above the floor with heights scaled only, in metres."""
     found = follow.at(times)
     feet = find_soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
     roles = matching.source_roles
@@ -145,7 +145,7 @@ def _is_above_ground(follow: PoseTransfer, target: Scene, matching: JointMatch, 
 
 
 def _lengths(follow: PoseTransfer) -> dict[int, float]:
-    """Meters per unit of the space that each matched node of the target moves in, at rest."""
+    """Metres per unit of the parent space of each matched target node, at rest."""
     skeleton = follow.target
     world = world_matrices(skeleton, rest_pose(skeleton))[0]
     lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
@@ -155,13 +155,13 @@ def _lengths(follow: PoseTransfer) -> dict[int, float]:
 def _rotations_and_paths(
     found: TargetMotion, lengths: Mapping[int, float], size: float
 ) -> tuple[dict[int, Floats], Floats]:
-    """What must be followed between keys: rotations, and as metres (F, P, 3) translations and scales."""
+    """Motion to follow between keys: rotations, and translations and scales as metres (F, P, 3)."""
     places = [found.translations[node] * length for node, length in lengths.items()]
     return found.rotations, np.stack([*places, *(scale * size for scale in found.scales.values())], axis=1)
 
 
 def _tracks(follow: PoseTransfer, wanted: _RequiredKeys, size: float) -> list[Track]:
-    """Tracks of the matched nodes; none for what stays at rest and has no track in the source either."""
+    """Tracks of the matched nodes; none for constant rest values without a track in the source."""
     moved = {(track.node, track.path) for track in follow.clip.tracks}
     lengths, still, found = _lengths(follow), follow.target, wanted.found
     tracks = []

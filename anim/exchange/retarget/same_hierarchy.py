@@ -1,4 +1,4 @@
-"""Whether a motion's nodes are a part of a character's own tree: then each node is the one of its name."""
+"""Detect motions with a character's own hierarchy: nodes then match by name."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from anim.model import Skeleton
 
 
 def is_same_hierarchy(source: Skeleton, target: Skeleton, chosen: Sequence[int]) -> dict[int, int]:
-    """Return the target node of each chosen source node, by name; none at all where the trees differ.
+    """Return the target node of each chosen source node, by name; empty for different hierarchies.
 
-    They agree where every chosen node, and its parent where it has one, has the label (see `labels`) of a target node
-    and its parent: as in what was written from this very file. Nodes that are no joints, and those whose names come
-    twice, then have their partners too.
+    They agree if every chosen node, and its parent, if any, has the label (see `labels`) of a target node and its
+    parent: as in a file exported from this character. Nodes that are no joints, and those with repeated names, then
+    have their partners too.
     """
     found: dict[int, int] = {}
     by_label = {label: node for node, label in enumerate(labels(target))}

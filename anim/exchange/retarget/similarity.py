@@ -11,14 +11,15 @@ from anim.exchange.euler.motion import IDENTITY
 from anim.exchange.retarget.rest_pose import rotation_between
 from anim.maths import quaternion
 
-MIN_RANK_FRACTION = 1e-6  # second singular value by the first; below it, points are within a thousandth of a line
+MIN_RANK_FRACTION = 1e-6  # ratio of second to first singular value; below it, points are within a thousandth of a line
 
 
 @dataclass(frozen=True, slots=True)
 class Similarity:
-    """target ≈ scale · rotation · source + offset. rotation: unit quaternion (4,). error: largest distance left over,
-    by the radius of the target's points. unique: False where points lie on a line or in one place, which other
-    rotations take to the same places.
+    """target ≈ scale · rotation · source + offset. rotation: unit quaternion (4,).
+
+    error: largest residual distance, divided by the radius of the target's points. unique: False for collinear or
+    coincident points, for which other rotations give the same result.
     """
 
     rotation: Floats
@@ -28,11 +29,11 @@ class Similarity:
 
 
 def fit_similarity(source: Floats, target: Floats) -> Similarity:
-    """Return the transform that takes points (P, 3) to others (P, 3) best; of several, the one that turns least.
+    """Return the best transform of points (P, 3) to others (P, 3); of several, the smallest rotation.
 
-    Points on a line leave the turn about it open, points in one place every turn, and the scale: 1 then. The error is
-    infinite where one set is in one place and the other is not. Mirroring is no similarity: its error is large.
-    (a figure, the same twice as large and turned by 90° about y) → rotation (0, 0.707, 0, 0.707), scale 2, error 0
+    For collinear points the rotation about the line is 0, for coincident points every rotation, and the scale is 1. The
+    error is infinite if only one set is coincident. A reflection is no similarity: its error is large.
+    (points, the same twice as large and rotated by 90° about y) → rotation (0, 0.707, 0, 0.707), scale 2, error 0
     Source: S. Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991.
     """
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)

@@ -1,4 +1,4 @@
-"""The axis along which a figure stands at rest: files that a tool wrote with another axis up lie on their back."""
+"""Up axis of a rest pose: detects files with another axis up than Y."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from anim.model import Skeleton
 from anim.sampling import rest_pose, world_matrices
 
-CLEAR = 0.8  # share of the length that lies along the axis; 37°
+CLEAR = 0.8  # fraction of the length along the axis; 37°
 BELOW = ("left_foot", "right_foot")
 
 
 def up_axis(skeleton: Skeleton, roles: Mapping[str, int]) -> str:
-    """Return "X", "Y" or "Z", along which the way from the feet to the hips leads at rest in world space.
+    """Return "X", "Y" or "Z", the axis from the feet to the hips at rest in world space.
 
-    Without feet, from the hips to the head. "" where these are not known, or the way leads along no axis clearly: an
-    animal's back leads forward, its legs still point down.
+    Without feet, from the hips to the head. "" if these are unknown, or the direction is along no axis clearly: an
+    animal's back points forward, its legs still point down.
     """
     places = world_matrices(skeleton, rest_pose(skeleton))[0, :, :3, 3]
     feet = [places[roles[role]] for role in BELOW if role in roles]

@@ -1,4 +1,4 @@
-"""The joints of a person that a VRM file states: VRM 0.x, VRM 1.0 and VRM animations."""
+"""Human joint roles stated by VRM files: VRM 0.x, VRM 1.0 and VRM animations."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 from anim.gltf.document import Json, json_array
 
 EXTENSIONS = ("VRMC_vrm", "VRMC_vrm_animation", "VRM")
-ROLES = {"left_toes": "left_toe", "right_toes": "right_toe"}  # where VRM has another word
+ROLES = {"left_toes": "left_toe", "right_toes": "right_toe"}  # different names in VRM
 
 
 def read_vrm_roles(json: Json) -> dict[str, int]:
-    """Return the nodes by role ("left_upper_arm", see `roles`), as a file's extensions state them; none for others.
+    """Return the nodes by role ("left_upper_arm", see `joint_roles`) of a file's extensions.
 
-    Of VRM 1.0 and animations humanBones is an object of {"node": 3} by bone; of VRM 0.x a list of {"bone", "node"}.
-    An upper chest is the chest where no chest is stated. What is not as the specifications say is left out.
+    Of VRM 1.0 and animations humanBones is an object of {"node": 3} by bone; of VRM 0.x a list of {"bone", "node"}. An
+    upper chest is the chest if no chest is stated. Invalid entries are ignored.
     {"leftToes": {"node": 7}} → {"left_toe": 7}
     """
     count = len(json_array(json, "nodes"))

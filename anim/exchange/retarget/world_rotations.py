@@ -1,4 +1,4 @@
-"""World rotations down a hierarchy, without scale."""
+"""World rotations of a hierarchy, without scale."""
 
 from __future__ import annotations
 
