@@ -61,9 +61,7 @@ class Float32Times:
         found = self._found.get(id(curve.times))
         if found is None:
             stored = curve.times.astype(np.float32).astype(np.float64)
-            last: Ints = np.flatnonzero(
-                np.append(np.diff(stored) > 0, True)
-            )  # the last of keys with equal float32 times
+            last: Ints = np.flatnonzero(np.append(np.diff(stored) > 0, True))  # of keys equal in float32
             found = self._found[id(curve.times)] = (curve.times, stored[last], last)
         _, times, kept = found
         if len(kept) == len(curve.times):
