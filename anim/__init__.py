@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from anim.model import VertexCache as VertexCache
     from anim.skinning.methods.registry import SKINNING_METHODS as SKINNING_METHODS
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _MODULES = {  # where a name comes from, imported when it is first used
     "anim.api": ("BakedCache", "OptimizeResult", "bake", "diff", "optimize", "sample", "sample_poses"),
