@@ -9,7 +9,7 @@ from anim.maths import quaternion
 
 
 def from_rigid(rotation: Floats, translation: Floats) -> Floats:
-    """Return the dual quaternions (..., 8) that turn by unit quaternions (..., 4), then move by translations (..., 3).
+    """Return the dual quaternions (..., 8) of rotations (..., 4), unit, followed by translations (..., 3).
 
     from_rigid([0, 0, 0, 1], [2, 0, 0]) → [0, 0, 0, 1, 1, 0, 0, 0]
     Source: Kavan et al. 2008, "Geometric Skinning with Approximate Dual Quaternion Blending", equation 4.
@@ -19,7 +19,7 @@ def from_rigid(rotation: Floats, translation: Floats) -> Floats:
 
 
 def apply(dual: Floats, points: Floats) -> Floats:
-    """Return points (..., 3) moved by dual quaternions (..., 8) of any length but 0: they are normalized first.
+    """Return points (..., 3) transformed by dual quaternions (..., 8), which are normalized first; none may be 0.
 
     apply([0, 0, 0, 1, 1, 0, 0, 0], [5, 5, 5]) → [7, 5, 5]
     """

@@ -1,11 +1,11 @@
 """Euler angles ↔ quaternions (x, y, z, w) in radians, for all 12 orders, intrinsic and extrinsic.
 
-An order lists axes as they are written: intrinsic ZXY is R = Z(a)·X(b)·Y(c), about the axes of the turning thing;
-extrinsic ZXY is R = Y(c)·X(b)·Z(a), about fixed axes, Z first. Angles (..., 3) stand in the order's own sequence.
+An order lists axes as they are written: intrinsic ZXY is R = Z(a)·X(b)·Y(c), about the axes of the rotating body;
+extrinsic ZXY is R = Y(c)·X(b)·Z(a), about fixed axes, Z first. Angles (..., 3) are in the order's own sequence.
 FBX and Maya call extrinsic XYZ "XYZ"; three.js and BVH list intrinsic axes.
 
-Inside, every order is taken apart as the proper one nearest to it: turns first, middle (0 … π), third about axes where
-lock lies at middle = 0 and π. There only third + first, or third − first, is seen.
+Internally every order is decomposed as the proper order nearest to it: angles first, middle (0 … π), third, with gimbal
+lock at middle = 0 and π. There only third + first, or third − first, is determined.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from anim.errors import RangeError
 from anim.maths import quaternion
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ")
-GIMBAL_TOLERANCE_RAD = 5e-8  # rad from lock, below which float64 no longer tells first and third angle apart
+GIMBAL_TOLERANCE_RAD = 5e-8  # rad from lock, below which float64 can't separate first and third angle
 TAU = 2 * np.pi
 
 
 class AxesConvention(StrEnum):
-    """Whose axes the turns are about."""
+    """Axes of the elementary rotations: of the body (intrinsic) or fixed (extrinsic)."""
 
     INTRINSIC = "intrinsic"
     EXTRINSIC = "extrinsic"
@@ -33,7 +33,7 @@ class AxesConvention(StrEnum):
 def to_quaternion(angles: Floats, *, order: str, frame: AxesConvention = AxesConvention.INTRINSIC) -> Floats:
     """Return unit quaternions (..., 4) of angles (..., A) in radians about the A axes of `order`.
 
-    order: any sequence of X, Y, Z, as long as the last axis of `angles`; "" gives no turn.
+    order: any sequence of X, Y, Z, as long as the last axis of `angles`; "" gives the identity.
     to_quaternion([0, 0, π/2], order="XYZ") → [0, 0, √½, √½]
     """
     result: Floats = np.zeros((*angles.shape[:-1], 4))
@@ -50,10 +50,10 @@ def to_quaternion(angles: Floats, *, order: str, frame: AxesConvention = AxesCon
 
 
 def from_quaternion(q: Floats, *, order: str, frame: AxesConvention = AxesConvention.INTRINSIC) -> Floats:
-    """Return angles (..., 3) in radians of unit quaternions (..., 4), each on its own.
+    """Return angles (..., 3) in radians of unit quaternions (..., 4), each independently.
 
-    The middle angle lies in −π/2 … π/2, of proper orders (first axis = third) in 0 … π; the others in −π … π.
-    At lock the seen sum or difference is shared evenly by first and third angle.
+    The middle angle is in −π/2 … π/2, of proper orders (first axis = third) in 0 … π; the others in −π … π.
+    At lock the sum or difference is split evenly between first and third angle.
     from_quaternion([0, 0, √½, √½], order="XYZ") → [0, 0, π/2]
     Raises RangeError for an unknown order. Source: Bernardes & Viollet 2022.
     """
@@ -70,13 +70,13 @@ def from_quaternion(q: Floats, *, order: str, frame: AxesConvention = AxesConven
 def unwrap(
     q: Floats, *, order: str, frame: AxesConvention = AxesConvention.INTRINSIC, lock: float = GIMBAL_TOLERANCE_RAD
 ) -> Floats:
-    """Return angles (K, ..., 3) in radians that run on without jumps over unit quaternions (K, ..., 4).
+    """Return continuous angles (K, ..., 3) in radians of unit quaternions (K, ..., 4).
 
-    Each key gets the equivalent triple (both families, any whole turns) nearest to that of the key before; the first
-    gets that of `from_quaternion`. Keys at lock take what is seen there exactly, and what is not seen (the difference
-    or sum of first and third angle) from their neighbors on both sides, evenly.
-    lock: rad from lock below which the unseen is not trusted; the rotation is kept within it. Give the precision of
-    the data: 5e-8 for float64, 1e-6 for what a file held as float32.
+    Each key gets the equivalent triple (both families, any multiples of 2π) nearest to that of the key before; the
+    first gets that of `from_quaternion`. Keys at lock keep the determined sum or difference of first and third angle
+    exactly; the undetermined one is interpolated between the neighbors on both sides.
+    lock: rad from lock below which the undetermined angle is ignored; rotations keep this accuracy. Give the precision
+    of the data: 5e-8 for float64, 1e-6 for float32 of a file.
     Raises RangeError for an unknown order.
     """
     if len(q) == 0:
@@ -96,8 +96,8 @@ def unwrap(
 def gimbal_distance(q: Floats, *, order: str) -> Floats:
     """Return the angle (...) in radians, 0 … π/2, of unit quaternions (..., 4) from the lock of an intrinsic order.
 
-    The extrinsic order with the axes reversed has the same.
-    distance_to_lock([0, 0, 0, 1], order="XYZ") → π/2
+    The extrinsic order with the axes reversed has the same distance.
+    gimbal_distance([0, 0, 0, 1], order="XYZ") → π/2
     """
     a, b, c, d = _parts(q, order, AxesConvention.INTRINSIC)
     first, second = np.hypot(a, b), np.hypot(c, d)
@@ -105,7 +105,7 @@ def gimbal_distance(q: Floats, *, order: str) -> Floats:
 
 
 def is_proper(order: str) -> bool:
-    """Return whether the first axis is the third again, as in ZXZ."""
+    """Return whether the first axis equals the third, as in ZXZ."""
     return order[0] == order[2]
 
 
@@ -117,12 +117,12 @@ def check_order(order: str) -> str:
 
 
 def wrap_angles(angles: Floats) -> Floats:
-    """Return angles moved by whole turns into −π … π; those inside stay as they are."""
+    """Return angles shifted by multiples of 2π into −π … π; those inside are unchanged."""
     return np.asarray(angles - TAU * np.rint(angles / TAU))
 
 
 def _axes(order: str, frame: AxesConvention) -> tuple[int, int, int, float]:
-    """First, second and another axis of the extrinsic sequence, and whether they are right-handed (1) or not (−1)."""
+    """First, second and remaining axis of the extrinsic sequence, and 1 if right-handed, −1 if left-handed."""
     listed = check_order(order) if frame == AxesConvention.EXTRINSIC else check_order(order)[::-1]
     i, j, k = ("XYZ".index(axis) for axis in listed)
     if i == k:
@@ -131,7 +131,7 @@ def _axes(order: str, frame: AxesConvention) -> tuple[int, int, int, float]:
 
 
 def _parts(q: Floats, order: str, frame: AxesConvention) -> tuple[Floats, Floats, Floats, Floats]:
-    """a + ib and c + id, whose lengths give the middle angle and whose directions half sum and half difference."""
+    """Complex a + ib and c + id: lengths give the middle angle, directions the half sum and half difference."""
     i, j, k, sign = _axes(order, frame)
     x, y, z, w = q[..., i], q[..., j], q[..., k] * sign, q[..., 3]
     if is_proper(order):
@@ -148,7 +148,7 @@ def _extract_angles(
 
 
 def _complete_triple(raw: Floats, order: str, frame: AxesConvention) -> Floats:
-    """Angles of the order itself, in its own sequence, from the proper ones."""
+    """Angles of the order itself, in its own sequence, from those of the proper order."""
     sign = _axes(order, frame)[3]
     angles = raw.copy()
     if not is_proper(order):
@@ -160,8 +160,8 @@ def _complete_triple(raw: Floats, order: str, frame: AxesConvention) -> Floats:
 def _unwind(raw: Floats) -> Floats:
     """Triples (K, ..., 3), each the equivalent one nearest to its predecessor.
 
-    The other family, (first + π, −middle, third + π), is as far from itself as the one is from itself, so whether a
-    key changes sides does not depend on the side: the sides are a running sum of changes.
+    The other family is (first + π, −middle, third + π). Distances between two keys are equal in both families, so a
+    change of family doesn't depend on the current family, and families are a running sum of changes.
     """
     other = raw * [1, -1, 1] + [np.pi, 0, np.pi]
     same = (wrap_angles(raw[1:] - raw[:-1]) ** 2).sum(axis=-1)
@@ -173,7 +173,7 @@ def _unwind(raw: Floats) -> Floats:
 
 
 def _interpolate_in_lock(raw: Floats, half_sum: Floats, half_difference: Floats, near: Bools, far: Bools) -> Floats:
-    """Triples (K, 3) of one curve with keys at lock, filled in between those that are not."""
+    """Triples (K, 3) of one curve; keys at lock are interpolated between the others."""
     keys = np.arange(len(raw))
     free = keys[~(near | far)]
     if len(free):
@@ -193,5 +193,5 @@ def _interpolate_in_lock(raw: Floats, half_sum: Floats, half_difference: Floats,
 
 
 def _nearest(angle: Floats, goal: Floats, has_goal: bool) -> Floats:
-    """`angle` (K,) moved by whole turns next to `goal`, or next to itself where there is none."""
+    """`angle` (K,) shifted by multiples of 2π nearest to `goal`, or to its predecessor without a goal."""
     return angle + TAU * np.rint((goal - angle) / TAU) if has_goal else np.asarray(np.unwrap(wrap_angles(angle)))

@@ -1,6 +1,6 @@
-"""The cubic between two values with given slopes, and its derivatives.
+"""Cubic Hermite segments between two values with given slopes, and their derivatives.
 
-u runs from 0 to 1 along the piece. Slopes m0 and m1 are per u: a slope per second times the piece's duration h. The
+u runs from 0 to 1 over the segment. Slopes m0 and m1 are per u: a slope per second times the segment's duration h. The
 arguments broadcast against each other, so for values (..., C) give u as (..., 1).
 """
 

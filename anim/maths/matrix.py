@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 
-SHORT = 0.01  # of the longest axis; in float32, directions of shorter ones may be mostly rounding
+SHORT = 0.01  # of the longest axis; in float32, directions of shorter axes are dominated by rounding
 STRAIGHT = 1e-9  # cosine between axes that counts as 0
 
 
@@ -41,7 +41,7 @@ def multiply(a: Floats, b: Floats) -> Floats:
 
 
 def apply(matrix: Floats, points: Floats) -> Floats:
-    """Return points (..., P, 3) moved by matrices (..., 3, 4)."""
+    """Return points (..., P, 3) transformed by matrices (..., 3, 4)."""
     moved: Floats = points @ np.swapaxes(matrix[..., :3], -1, -2) + matrix[..., None, :, 3]
     return moved
 
@@ -49,7 +49,7 @@ def apply(matrix: Floats, points: Floats) -> Floats:
 def inverse(matrix: Floats) -> Floats:
     """Return the inverses (..., 3, 4) of affine matrices (..., 3, 4).
 
-    Of one that flattens space, as a scale of 0 does, the pseudo-inverse: what it flattened stays flat.
+    Of a singular matrix, such as a scale of 0, the pseudo-inverse: flattened directions stay flat.
     """
     try:
         back = np.linalg.inv(matrix[..., :3])
@@ -61,10 +61,10 @@ def inverse(matrix: Floats) -> Floats:
 def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return translation (..., 3), unit quaternion (..., 4), scale (..., 3) and shear (...) of matrices (..., 3, 4).
 
-    shear: how far an axis of the matrix is from what the parts give, as a share of its length; the parts give the
-    matrix back where it is 0, and are the nearest rotation with the axes' lengths elsewhere. Of axes shorter than
-    SHORT of the longest, directions count less: in float32 they are mostly rounding. A mirroring matrix gets a
-    negative x scale. An axis of length 0 gets scale 0 and a direction that completes the others.
+    shear: largest error of an axis of the recomposed matrix, as a fraction of the axis length. Where it is 0 the parts
+    recompose the matrix; elsewhere they are the nearest rotation with the axes' lengths. Directions of axes shorter
+    than SHORT of the longest have less weight: in float32 they are dominated by rounding. A mirroring matrix gets a
+    negative x scale. An axis of length 0 gets scale 0 and a direction orthogonal to the others.
     """
     axes = np.swapaxes(matrix[..., :3], -1, -2)  # rows are the axes
     scale: Floats = np.sqrt((axes * axes).sum(axis=-1))
@@ -89,7 +89,7 @@ def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 def accumulate_world(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
     """Return world matrices (N, F, 3, 4) from local ones: one batched product per level of the hierarchy.
 
-    parents: (N,), −1 for roots. levels: node numbers by depth, roots first.
+    parents: (N,), −1 for roots. levels: node indices by depth, roots first.
     """
     world = np.empty_like(local)
     for depth, nodes in enumerate(levels):
@@ -109,7 +109,7 @@ def _complete_axes(directions: Floats, scale: Floats) -> Floats:
 
 
 def _orthogonalize(rows: Floats, missing: int) -> Floats:
-    """A unit vector at a right angle to the rows that are there."""
+    """Unit vector orthogonal to the other rows."""
     there = [row for i, row in enumerate(rows) if i != missing and row.any()]
     if not there:
         return np.asarray(np.eye(3)[missing])
@@ -119,7 +119,7 @@ def _orthogonalize(rows: Floats, missing: int) -> Floats:
 
 
 def _nearest_rotation(matrix: Floats) -> Floats:
-    """The rotations nearest to matrices (..., 3, 3), also of those that flatten space."""
+    """Rotations nearest to matrices (..., 3, 3), singular ones included."""
     u, _, v = np.linalg.svd(matrix)
     u[..., 2] *= np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[..., None]
     nearest: Floats = u @ v

@@ -1,7 +1,7 @@
 """Rotations as quaternions (..., 4) in the order x, y, z, w, float64.
 
-Every function works on the last axis and broadcasts over the others. Unit length is the caller's promise unless the
-docstring says otherwise; q and −q are the same rotation. A product `multiply(a, b)` turns by b first, then by a.
+Every function works on the last axis and broadcasts over the others. Quaternions must be unit unless the docstring
+states otherwise; q and −q are the same rotation. A product `multiply(a, b)` rotates by b first, then by a.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ TINY = 1e-8  # below this |xyz| the angle equals its sine in float64
 
 
 def multiply(a: Floats, b: Floats) -> Floats:
-    """Return the Hamilton product a ⊗ b (..., 4): the rotation b followed by a, both seen from outside.
+    """Return the Hamilton product a ⊗ b (..., 4): the rotation b followed by a, both about fixed axes.
 
     multiply([0, 0, 1, 0], [0, 0, 1, 0]) → [0, 0, 0, −1]
     """
@@ -55,10 +55,10 @@ def normalize(q: Floats) -> Floats:
 
 
 def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
-    """Return the rotation (..., 4) a share u of the way from a to b, at constant speed along the shorter arc.
+    """Return the spherical linear interpolation (..., 4) from a to b along the shorter arc at constant speed.
 
-    u: (...), 0 gives a and 1 gives b or −b, exactly; beyond 0 and 1 the turn goes on along the same arc.
-    The sign of b changes where dot(a, b) < 0, so results lie in a's hemisphere. A half turn keeps b's sign.
+    u: (...), 0 gives a and 1 gives b or −b, exactly; outside 0 … 1 the rotation continues along the same arc.
+    The sign of b changes where dot(a, b) < 0, so results are in a's hemisphere. At dot(a, b) = 0 b keeps its sign.
     slerp([0, 0, 0, 1], [0, 0, 1, 0], 0.5) → [0, 0, √½, √½]
     Source: Shoemake 1985; sin(uθ)/sin θ = u·sinc(uθ)/sinc θ is stable at θ = 0, and θ ≤ 90° keeps sin θ away from 0.
     """
@@ -72,9 +72,9 @@ def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
 
 
 def nlerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
-    """Return the normalized chord (..., 4) between a and b on the shorter side: slerp's arc, but not at constant speed.
+    """Return the normalized linear interpolation (..., 4) from a to b: slerp's arc, but not at constant speed.
 
-    u: (...) in 0 … 1. Off slerp by 0.033°, 0.27°, 0.92° for 30°, 60°, 90° between a and b.
+    u: (...) in 0 … 1. It deviates from slerp by 0.033°, 0.27°, 0.92° for 30°, 60°, 90° between a and b.
     """
     u = np.asarray(u, dtype=np.float64)[..., None]
     return normalize((1 - u) * a + u * _near(a, b))
@@ -83,7 +83,7 @@ def nlerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
 def rotation_vector(q: Floats) -> Floats:
     """Return axis · angle (..., 3) in radians, the angle in 0 … π: the logarithm of a rotation (twice that of q).
 
-    The length of q does not matter, its sign neither, but for a half turn, where it picks the axis.
+    Independent of the length of q, and of its sign except at 180°, where the sign selects the axis.
     rotation_vector([0, 0, √½, √½]) → [0, 0, π/2]
     """
     xyz, w = q[..., :3], q[..., 3]
@@ -95,7 +95,7 @@ def rotation_vector(q: Floats) -> Floats:
 
 
 def from_rotation_vector(vector: Floats) -> Floats:
-    """Return unit quaternions (..., 4) that turn by |vector| radians about `vector` (..., 3): the exponential.
+    """Return unit quaternions (..., 4) of rotations by |vector| radians about `vector` (..., 3): the exponential.
 
     from_rotation_vector([0, 0, π]) → [0, 0, 1, 0]
     """
@@ -104,7 +104,7 @@ def from_rotation_vector(vector: Floats) -> Floats:
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
-    """Return the angle (...) in radians, 0 … π, of the turn from a to b. Exact near 0, where acos(dot) is not.
+    """Return the angle (...) in radians, 0 … π, between rotations a and b; unlike acos(dot), accurate near 0.
 
     angle_between([0, 0, 0, 1], [0, 0, 0, −1]) → 0
     """
@@ -113,9 +113,9 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 
 
 def align_signs(q: Floats) -> Floats:
-    """Return q (K, ..., 4) with signs flipped along the first axis so that no neighbors point apart (dot < 0).
+    """Return q (K, ..., 4) with signs flipped along the first axis so that neighbors have dot ≥ 0.
 
-    The first key keeps its sign, and so does every one that stands at a right angle to its neighbor.
+    The first key keeps its sign, and so does a key orthogonal to its neighbor.
     align_signs([[0, 0, 0, 1], [0, 0, 0, −1]]) → [[0, 0, 0, 1], [0, 0, 0, 1]]
     """
     signs = np.ones(q.shape[:-1])
@@ -124,7 +124,7 @@ def align_signs(q: Floats) -> Floats:
 
 
 def rotate(q: Floats, vectors: Floats) -> Floats:
-    """Return vectors (..., 3) turned by unit quaternions (..., 4).
+    """Return vectors (..., 3) rotated by unit quaternions (..., 4).
 
     rotate([0, 0, √½, √½], [1, 0, 0]) → [0, 1, 0]
     """
@@ -147,8 +147,8 @@ def to_matrix(q: Floats) -> Floats:
 def from_matrix(matrix: Floats) -> Floats:
     """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3); the largest component is positive.
 
-    The matrices must be rotations: no scale, no mirror. Small faults (1e-6) are averaged out.
-    Source: Shepperd 1978; the table below is 4 q qᵀ, and its row with the largest diagonal is the safe one.
+    The matrices must be rotations: no scale, no reflection. Small errors (1e-6) are averaged out.
+    Source: Shepperd 1978; the table below is 4 q qᵀ; its row with the largest diagonal is well-conditioned.
     """
     m = np.moveaxis(matrix, (-2, -1), (0, 1))
     xy, xz, yz = m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] + m[1, 2]
@@ -171,7 +171,7 @@ def from_matrix(matrix: Floats) -> Floats:
 def derivative(q: Floats, omega: Floats) -> Floats:
     """Return the rate of change (..., 4) of q (..., 4) per second: ½ q ⊗ (omega, 0).
 
-    omega: angular velocity (..., 3) in rad/s along the turning thing's own axes. It stands at a right angle to q.
+    omega: angular velocity (..., 3) in rad/s about the body's own axes. The result is orthogonal to q.
     derivative([0, 0, 0, 1], [0, 0, 2]) → [0, 0, 1, 0]
     """
     still = np.zeros((*omega.shape[:-1], 1))
@@ -179,7 +179,7 @@ def derivative(q: Floats, omega: Floats) -> Floats:
 
 
 def _near(a: Floats, b: Floats) -> Floats:
-    """Return b (..., 4) with the sign that puts it on a's side."""
+    """Return b (..., 4) with the sign of the same hemisphere as a."""
     return np.asarray(b * np.where(dot(a, b) < 0, -1.0, 1.0)[..., None])
 
 
@@ -188,7 +188,7 @@ def _length(vectors: Floats) -> Floats:
 
 
 def _sum(products: Floats) -> Floats:
-    """Return the sums (...) over the last axis: numpy's own takes three times as long where that one is short."""
+    """Return the sums (...) over the last axis, three times as fast as numpy's sum over a short axis."""
     total = products[..., 0] + products[..., 1]
     for i in range(2, products.shape[-1]):
         total = total + products[..., i]

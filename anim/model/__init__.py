@@ -1,4 +1,4 @@
-"""Immutable values with their invariants, and no algorithms."""
+"""Immutable data classes with their invariants, without algorithms."""
 
 from anim.model.clip import Clip
 from anim.model.pose import Pose

@@ -1,4 +1,4 @@
-"""Clip: a glTF animation in memory: tracks that play together."""
+"""Clip: a glTF animation in memory."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from anim.model.track import Track
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """Tracks under one name, at most one per property of a node.
+    """Named set of tracks, at most one per property of a node.
 
-    name: as in the file; empty where it has none.
+    name: as in the file; empty if it has none.
     """
 
     name: str
@@ -34,17 +34,17 @@ class Clip:
 
     @property
     def axes(self) -> tuple[Floats, ...]:
-        """The distinct arrays of key times, in the order of the tracks."""
+        """Distinct arrays of key times, in the order of the tracks."""
         return tuple({id(track.times): track.times for track in self.tracks}.values())
 
     @property
     def start(self) -> float:
-        """Time of the first key, in seconds; 0 where there is no track."""
+        """Time of the first key, in seconds; 0 without tracks."""
         return min((float(times[0]) for times in self.axes), default=0.0)
 
     @property
     def end(self) -> float:
-        """Time of the last key, in seconds: glTF's length of the animation, which always starts at 0."""
+        """Time of the last key, in seconds: the animation's duration in glTF, where it always starts at 0."""
         return max((float(times[-1]) for times in self.axes), default=0.0)
 
     def __repr__(self) -> str:

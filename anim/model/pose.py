@@ -1,4 +1,4 @@
-"""Pose: where every node is, in its parent's space, at some times."""
+"""Pose: local transforms of all nodes at some times."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from anim.arrays import Floats
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Local transforms of all nodes at F times.
+    """Local transforms of all nodes at F times, each in the parent's space.
 
     times: (F,) s. translation (F, N, 3) m, rotation (F, N, 4) unit xyzw, scale (F, N, 3).
-    weights: by node number, morph weights (F, M), for the nodes whose weights are animated.
+    weights: by node index, morph weights (F, M), for nodes with animated weights.
     """
 
     times: Floats

@@ -1,4 +1,4 @@
-"""Skin, Mesh and Scene: what a skeleton carries, and where vertices come from."""
+"""Skin, Mesh, MeshInstance and Scene: vertices and their binding to a skeleton."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from anim.arrays import Floats, Ints
 from anim.errors import FormatError, ShapeError
 from anim.model.skeleton import Skeleton
 
-SUM_TOLERANCE = 1e-3  # how far a vertex's skin weights may be from adding up to 1: more than rounding leaves
+SUM_TOLERANCE = 1e-3  # error of a vertex's sum of skin weights from 1, above rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
-    """Joints of a skin and the matrices that take mesh space to each joint's space at bind time.
+    """Joints of a skin, and the matrices from mesh space to each joint's space in bind pose.
 
-    joints: (J,) node numbers. inverse_bind: (J, 3, 4).
+    joints: (J,) node indices. inverse_bind: (J, 3, 4).
     """
 
     joints: Ints
@@ -34,7 +34,7 @@ class Skin:
 
 @dataclass(frozen=True, slots=True)
 class PrimitiveRange:
-    """How many vertices and faces of a mesh are one primitive's. material: its number in the file, −1 for none."""
+    """Numbers of vertices and faces of one primitive of a mesh. material: its index in the file, −1 for none."""
 
     vertices: int
     faces: int
@@ -45,14 +45,14 @@ class PrimitiveRange:
 class Mesh:
     """Vertices of all primitives of a glTF mesh, one after another.
 
-    positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0, of each vertex
-    adding up to 1.
-    targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3), or None where any
-    lacks or they were not read.
-    tangents: (V, 4) xyz and handedness ±1, like normals. normal_targets, tangent_targets: (M, V, 3) what morph targets
-    add to normals and tangents, or None where they add nothing.
-    primitives: in the order of the file; empty where unknown. weight_sums: (V,) what weights added up to in the file,
-    where that is another number than 1 for any vertex and not by rounding.
+    positions: (V, 3) m. faces: (T, 3). joints, weights: (V, I), I = 0 without a skin; weights ≥ 0 with sum 1 per
+    vertex.
+    targets: (M, V, 3) morph displacements. rest_weights: (M,) of the mesh. normals: (V, 3), or None if any
+    is missing or they were not read.
+    tangents: (V, 4) xyz and handedness ±1, like normals. normal_targets, tangent_targets: (M, V, 3) displacements
+    of normals and tangents by morph targets, or None.
+    primitives: in the order of the file; empty if unknown. weight_sums: (V,) sums of the weights in the file, if any
+    deviates from 1 by more than rounding.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshInstance:
-    """A mesh on a node; with a skin, the joints place the vertices and the node does not count.
+    """Mesh on a node; with a skin the vertices follow the joints only, and the node is ignored.
 
     weights: (M,) morph weights at rest: the node's own, or the mesh's.
     """
@@ -103,7 +103,7 @@ class MeshInstance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The skeleton and every mesh instance, in depth-first order of nodes."""
+    """Skeleton and mesh instances, in depth-first order of nodes."""
 
     skeleton: Skeleton
     instances: tuple[MeshInstance, ...]

@@ -1,4 +1,4 @@
-"""Skeleton: all nodes of a file as a forest in its rest pose."""
+"""Skeleton: node hierarchy of a file in its rest pose."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from anim.errors import FormatError, ShapeError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skeleton:
-    """Every node, by its number in the file; joints of skins are some of them.
+    """All nodes by index in the file; joints of skins are a subset.
 
-    names: (N,) as in the file, empty where a node has none.
-    parents: (N,) number of the parent, −1 for a root; acyclic.
+    names: (N,) as in the file, empty for a node without a name.
+    parents: (N,) index of the parent, −1 for a root; acyclic.
     translation (N, 3) m, rotation (N, 4) unit xyzw, scale (N, 3): the rest pose, in the parent's space.
-    sheared: (X,) numbers of the nodes whose `matrix` no translation, rotation and scale give; they can't be animated.
+    sheared: (X,) indices of nodes with a `matrix` that has no translation, rotation, scale; they can't be animated.
     sheared_local: (X, 3, 4) local matrices of those.
-    Equal is a skeleton only to itself.
+    Skeletons compare by identity.
     """
 
     names: tuple[str, ...]
@@ -59,11 +59,11 @@ class Skeleton:
         return len(self.names)
 
     def label(self, node: int) -> str:
-        """Return how messages call a node: "node 7 'hip'"."""
+        """Return the name of a node for messages: "node 7 'hip'"."""
         return f"node {node} '{self.names[node]}'" if self.names[node] else f"node {node}"
 
     def descendants(self, node: int) -> Bools:
-        """Return which nodes (N,) are `node` or hang on it."""
+        """Return a mask (N,) of `node` and its descendants."""
         found = np.zeros(len(self.parents), np.bool_)
         found[node] = True
         for level in self.levels()[1:]:
@@ -71,7 +71,7 @@ class Skeleton:
         return found
 
     def levels(self) -> list[Ints]:
-        """Return the nodes of each depth, roots first: children never come before their parents.
+        """Return the nodes by depth, roots first, so that parents precede their children.
 
         Raises FormatError for a cycle or a parent that does not exist.
         """

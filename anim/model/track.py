@@ -1,4 +1,4 @@
-"""Track: one animated property: its key times, its values, how to go from key to key, and how it is stored."""
+"""Track: an animated property with its key times, values, interpolation and storage format."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from anim.arrays import Floats
 from anim.errors import RangeError, ShapeError
 
 PATHS = ("translation", "rotation", "scale", "weights")
-WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}  # components per key; weights and pointers have their own
+WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}  # components per key; of weights and pointers they vary
 
 
 class Interpolation(StrEnum):
-    """What lies between two keys, by glTF's names."""
+    """Interpolation between keys, by glTF's names."""
 
     STEP = "STEP"
     LINEAR = "LINEAR"
@@ -26,7 +26,7 @@ class Interpolation(StrEnum):
 
 
 class ValueKind(StrEnum):
-    """What a value is, hence how it may be interpolated."""
+    """Type of values, which determines their interpolation."""
 
     VECTOR = "vector"  # component by component
     ROTATION = "rotation"  # unit quaternion (x, y, z, w)
@@ -35,9 +35,9 @@ class ValueKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AccessorFormat:
-    """How a file holds values: glTF's component type, whether integers mean fractions, and the element type.
+    """Storage format of values: glTF's component type, normalization of integers, and element type.
 
-    element: "SCALAR", "VEC3", …; None where the path says it all.
+    element: "SCALAR", "VEC3", …; None if the path determines it.
     """
 
     component_type: int = 5126
@@ -50,16 +50,16 @@ FLOAT32 = AccessorFormat()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Keys of one property of one node, or of anything that a JSON pointer names.
+    """Keys of one property of a node, or of the target of a JSON pointer.
 
-    path: "translation", "rotation", "scale" or "weights" of `node`; "pointer" where the target is no node property.
+    path: "translation", "rotation", "scale" or "weights" of `node`; "pointer" if the target is no node property.
     times: (K,) seconds, ≥ 0, strictly increasing.
     values: (K, C) metres, unit quaternion (x, y, z, w), factor, weight, or the pointer's own unit.
-    in_tangents, out_tangents: (K, C) per second, for CUBICSPLINE and only there.
-    pointer: the target by KHR_animation_pointer; `node` and `path` say the same where it names a node's property.
-    storage: how the file held the values; writers use it again where it holds the new ones exactly.
+    in_tangents, out_tangents: (K, C) per second, for CUBICSPLINE only.
+    pointer: the target by KHR_animation_pointer; `node` and `path` agree with it if it names a node's property.
+    storage: format of the values in the file; writers reuse it if it represents the new values exactly.
     Writable arrays are copied, read-only ones shared.
-    Raises ShapeError, or RangeError for a target or an interpolation that glTF does not know, or keys that can't be.
+    Raises ShapeError, or RangeError for a target or an interpolation unknown to glTF, or invalid keys.
     Track(0, "translation", "LINEAR", [0, 1], [[0, 0, 0], [0, 1, 0]]): node 0 rises by a metre in a second
     """
 
@@ -78,7 +78,7 @@ class Track:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        if type(self.node) is not int or self.node < 0 or self.path not in PATHS:  # else there is nothing to check
+        if type(self.node) is not int or self.node < 0 or self.path not in PATHS:  # otherwise the target is valid
             set_field(self, "node", _node(self.node, self.path))
         if type(self.interpolation) is not Interpolation:
             set_field(self, "interpolation", _interpolation(self.interpolation))
@@ -96,7 +96,7 @@ class Track:
             set_field(self, "out_tangents", _tangents(self.out_tangents, shape, "out tangents"))
 
     def __eq__(self, other: object) -> bool:
-        """Whether the other is a track of the same numbers, target and storage."""
+        """Whether the other track has the same keys, target and storage."""
         if not isinstance(other, Track):
             return NotImplemented
         if self is other:
@@ -116,12 +116,12 @@ class Track:
 
     @property
     def target(self) -> tuple[int | None, str]:
-        """What this track moves, comparable: (node, path), or (None, pointer)."""
+        """Comparable target of the track: (node, path), or (None, pointer)."""
         return (None, self.pointer or "") if self.path == "pointer" else (self.node, self.path)
 
     @property
     def kind(self) -> ValueKind:
-        """How values may be interpolated: see `kind_of`."""
+        """Type of the values, see `kind_of`."""
         return kind_of(self)
 
     def __repr__(self) -> str:
@@ -137,7 +137,7 @@ def _same(one: Floats | None, other: Floats | None) -> bool:
 
 
 def _node(node: int | None, path: str) -> int | None:
-    """The node as a plain integer, which JSON can hold; None for a pointer's target."""
+    """The node as a plain integer, which JSON can represent; None for a pointer's target."""
     if path not in PATHS and path != "pointer":
         raise RangeError(f"path is '{path}' (expected {', '.join(PATHS)} or pointer)")
     if (node is None) is not (path == "pointer"):
@@ -168,7 +168,7 @@ def _tangents(values: Floats, shape: tuple[int, int], name: str) -> Floats:
 
 
 def kind_of(track: Track) -> ValueKind:
-    """Return what the values of `track` are.
+    """Return the type of the values of `track`.
 
     A pointer that ends in "/rotation" and has four components is a quaternion; integers that are not normalized
     under STEP are bools or integers of the object model (KHR_animation_pointer allows nothing else for those).

@@ -1,4 +1,4 @@
-"""VertexCache: where every vertex is at every frame, handed out in chunks so that no length is too long."""
+"""VertexCache: vertex positions per frame, streamed in chunks so that memory does not limit the length."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from anim.errors import ShapeError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameChunk:
-    """Some frames in a row: `first` is the number of the first, positions (n, V, 3) m, normals and
-    tangents (n, V, 3), all float32."""
+    """Consecutive frames.
+
+    first: index of the first. positions: (n, V, 3) m. normals, tangents: (n, V, 3). All float32.
+    """
 
     first: int
     positions: AnyArray
@@ -24,7 +26,7 @@ class FrameChunk:
     tangents: AnyArray | None = None
 
     def changed(self, change: Callable[[AnyArray], AnyArray]) -> FrameChunk:
-        """Return the chunk with the same done to positions, normals and tangents."""
+        """Return the chunk with `change` applied to positions, normals and tangents."""
         turned = (None if each is None else change(each) for each in (self.normals, self.tangents))
         return FrameChunk(self.first, change(self.positions), *turned)
 
@@ -35,9 +37,9 @@ class FrameChunk:
 
 @dataclass(frozen=True, slots=True)
 class MeshPart:
-    """The vertices and faces of one primitive within a cache: half-open ranges, and what it was called.
+    """Vertices and faces of one primitive within a cache as half-open ranges, with its name.
 
-    vertices: (first, beyond the last) of V; faces: the same of T. material: its number in the file, −1 for none.
+    vertices: (first, last + 1) of V; faces: likewise of T. material: its index in the file, −1 for none.
     """
 
     name: str
@@ -52,13 +54,13 @@ Chunks: TypeAlias = Callable[[], Iterator[FrameChunk]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexCache:
-    """F frames of V vertices, always in the same order, with the triangles that join them.
+    """F frames of V vertices in constant order, with triangles.
 
     times: (F,) s, increasing. faces: (T, 3). chunks: called for a new pass over all frames, in order, each frame once.
-    rest: (V, 3) m, the mesh at rest in the same order, or None. has_normals: whether every chunk carries them.
-    parts: the primitives, in order, covering all vertices; empty where unknown. up: "y" or "z". handedness: (V,) ±1
-    where every chunk carries tangents too, else None. chosen: of which clip the frames are, in words, where
-    the file has others.
+    rest: (V, 3) m, the rest mesh in the same order, or None. has_normals: whether every chunk has them.
+    parts: the primitives, in order, covering all vertices; empty if unknown. up: "y" or "z". handedness: (V,) ±1
+    if every chunk has tangents too, else None. chosen: description of the clip of the frames, if the file has
+    others.
     """
 
     times: Floats
@@ -85,7 +87,7 @@ class VertexCache:
 
     @property
     def has_tangents(self) -> bool:
-        """Whether every chunk carries tangents."""
+        """Whether every chunk has tangents."""
         return self.handedness is not None
 
     def load_all(self) -> FrameChunk:
@@ -105,9 +107,9 @@ class VertexCache:
 def from_arrays(
     times: Floats, positions: AnyArray, faces: Ints, *, normals: AnyArray | None = None, rest: Floats | None = None
 ) -> VertexCache:
-    """Return a cache of frames that are in memory: positions and normals (F, V, 3), times (F,) s.
+    """Return a cache of frames in memory: positions and normals (F, V, 3), times (F,) s.
 
-    Raises ShapeError where these don't fit together, RangeError for times that don't increase.
+    Raises ShapeError for inconsistent shapes, RangeError for times that don't increase.
     from_arrays([0, 1], positions of shape (2, 4, 3), [[0, 1, 2]]) → a cache of 2 frames of 4 vertices
     """
     times = arrays.as_key_times(times)
@@ -123,7 +125,7 @@ def from_arrays(
 
 
 def _joined(parts: Iterable[AnyArray | None]) -> AnyArray | None:
-    """All parts in one array, None where one is missing."""
+    """All parts in one array, None if one is missing."""
     listed = list(parts)
     there = [each for each in listed if each is not None]
     return np.concatenate(there) if there and len(there) == len(listed) else None

@@ -1,4 +1,4 @@
-"""Time to value: frames, tracks, poses, world matrices."""
+"""Sampling: frame times, tracks, poses, world matrices."""
 
 from anim.sampling.pose import rest_pose, sample_pose, world_matrices
 from anim.sampling.times import frame_times

@@ -1,4 +1,4 @@
-"""Tracks that one rule plays, so that their keys can be put into one array."""
+"""Groups of tracks with the same path, interpolation and type, which can be sampled as one array."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ Tangents: TypeAlias = tuple[Floats, Floats]
 
 @dataclass(frozen=True, slots=True)
 class TrackGroup:
-    """Tracks of one rule, see `rule`."""
+    """Tracks of one rule: see `rule`."""
 
     tracks: tuple[Track, ...]
 
     @property
     def path(self) -> str:
-        """The one path of all tracks."""
+        """Path of all tracks."""
         return self.tracks[0].path
 
     @property
     def interpolation(self) -> Interpolation:
-        """The one interpolation of all tracks."""
+        """Interpolation of all tracks."""
         return self.tracks[0].interpolation
 
     @property
     def kind(self) -> ValueKind:
-        """The one kind of all tracks."""
+        """Value type of all tracks."""
         return self.tracks[0].kind
 
 
 def rule(track: Track) -> Rule:
-    """Return what tracks must have in common: path, interpolation, kind, and number of components."""
+    """Return the grouping key of a track: path, interpolation, value type, number of components."""
     return track.path, track.interpolation, track.kind, track.values.shape[1]
 
 
 def stack_values(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:
-    """Return the values of tracks of one rule, and their in and out tangents, None where they have none.
+    """Return the values of tracks of one rule, and their in and out tangents, None without CUBICSPLINE.
 
     join: makes one array of each track's (K, C).
     """

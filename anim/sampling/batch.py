@@ -1,4 +1,4 @@
-"""Tracks that share a time axis, stacked so that numpy's cost per call is paid once for all of them."""
+"""Tracks of one time axis stacked into one array, so that the cost per numpy call occurs once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from anim.sampling.track import KeyInterval, find_interval, interpolate
 
 @dataclass(frozen=True, slots=True)
 class Batch(TrackGroup):
-    """G tracks of one rule and with the same times.
+    """G tracks of one rule with the same times.
 
     times: (K,) s. values: (K, G, C). tangents: in and out, both (K, G, C) per second, for CUBICSPLINE.
     """
@@ -26,16 +26,16 @@ class Batch(TrackGroup):
     tangents: Tangents | None
 
     def sample(self, at: Floats, place: KeyInterval | None = None) -> Floats:
-        """Return the values (F, G, C) at times `at` (F,); `place` saves the look-up where it is known."""
+        """Return the values (F, G, C) at times `at` (F,); a known `place` saves its search."""
         place = place or find_interval(self.times, at)
         return interpolate(place, self.values, self.tangents, self.interpolation, self.kind)
 
 
 class LazyBatch:
-    """Tracks of one rule and with the same times, whose keys are stacked when they are needed.
+    """Tracks of one rule with the same times, with keys stacked on demand.
 
-    That is all keys at once where half of them are, or where parts have been asked for that are twice as many together;
-    else only those: a long clip that is played from start to end isn't in memory twice, and begins sooner.
+    All keys are stacked once half of them are requested in one call, or twice as many in all calls together. Before,
+    only the requested ones are: a long clip sampled from start to end is not in memory twice, and starts sooner.
     """
 
     def __init__(self, tracks: tuple[Track, ...]) -> None:
@@ -52,7 +52,7 @@ class LazyBatch:
         return self._whole
 
     def at(self, place: KeyInterval) -> tuple[Batch, KeyInterval]:
-        """Return a batch of keys among which are those of `place`, and where in it they are."""
+        """Return a batch with the keys of `place`, and `place` relative to that batch."""
         low, high = (int(place.left.min()), int(place.right.max()) + 1) if len(place.left) else (0, 0)
         self._stacked += high - low
         keys = len(self.times)
@@ -64,9 +64,9 @@ class LazyBatch:
 
 
 def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:
-    """Return `tracks` by time axis and `alike.rule`, in the order of their first members.
+    """Return `tracks` grouped by time axis and `alike.rule`, in the order of their first members.
 
-    Time axes are the same where they are one array: tracks read from one input accessor share it.
+    Time axes are compared by identity: tracks read from one input accessor share one array.
     """
     groups: dict[tuple[int, Rule], list[Track]] = {}
     for track in tracks:
@@ -75,5 +75,5 @@ def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:
 
 
 def batches(tracks: Iterable[Track]) -> list[Batch]:
-    """Return `tracks` stacked as `stacks` sorts them."""
+    """Return `tracks` stacked by the groups of `lazy_batches`."""
     return [each.whole for each in lazy_batches(tracks)]

@@ -1,4 +1,4 @@
-"""Tracks of any clips laid end to end, so that numpy's cost per call is paid once for all of them."""
+"""Tracks of any clips concatenated into one array, so that the cost per numpy call occurs once."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from anim.model import Track
 from anim.sampling.alike import Rule, Tangents, TrackGroup, rule, stack_values
 from anim.sampling.track import KeyInterval, interpolate
 
-KEYS_AT_ONCE = 4096  # in one group: what is computed from them stays in the processor's cache
+KEYS_AT_ONCE = 4096  # of one group: temporary arrays fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
 class ConcatenatedTracks(TrackGroup):
-    """T tracks of one rule, one after the other: S keys in all.
+    """T tracks of one rule, concatenated: S keys in all.
 
-    numbers: (T,) which of the given tracks they are. counts: (T,) keys of each. starts: (T,) where each one begins.
+    numbers: (T,) indices of the given tracks. counts: (T,) keys of each. starts: (T,) offset of each one's first key.
     times: (S,) s. values: (S, C). tangents: in and out, both (S, C) per second, for CUBICSPLINE.
     """
 
@@ -35,7 +35,7 @@ class ConcatenatedTracks(TrackGroup):
         return interpolate(self._located(at), self.values, self.tangents, self.interpolation, self.kind)
 
     def _located(self, at: Floats) -> KeyInterval:
-        """Where the times lie, as `sampling.track.locate` says: keys at or before each of them are counted."""
+        """Key intervals of the times, as by `sampling.track.find_interval`, by counting keys at or before each time."""
         before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
         last = self.counts[:, None] - 1
         in_track = np.clip(np.add.reduceat(before, self.starts, axis=0, dtype=np.int64) - 1, 0, last)
@@ -48,7 +48,7 @@ class ConcatenatedTracks(TrackGroup):
 
 
 def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
-    """Return the tracks by `alike.rule`, each group laid end to end in their order.
+    """Return the tracks grouped by `alike.rule`, each group concatenated in their order.
 
     A group of over KEYS_AT_ONCE keys is split between its tracks.
     """

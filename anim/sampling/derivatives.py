@@ -1,4 +1,4 @@
-"""Rates of change of tracks, by analysis, just before and just after a time."""
+"""Analytic one-sided derivatives of tracks."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from anim.sampling import segment as piece
 
 
 def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return in and out tangents (F, C) per second for keys at `times` (F,) with these values (F, C) of the track.
+    """Return in and out tangents (F, C) per second for keys at `times` (F,) with sampled values (F, C) of the track.
 
-    values: as sampled; rotations with any signs, which their tangents follow.
+    values: rotations can have any signs; their tangents get the same.
     """
     before, after = rates(track, times, before=True), rates(track, times, before=False)
     if track.kind is ValueKind.ROTATION:
@@ -22,10 +22,10 @@ def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Float
 
 
 def rates(track: Track, times: Floats, *, before: bool) -> Floats:
-    """Return the rate of change just before, or just after, each time: (F, C) per second.
+    """Return the derivative just before, or just after, each time: (F, C) per second.
 
-    Of rotations the angular velocity (F, 3) in rad/s along the turning node's own axes. STEP has rate 0, and outside
-    its keys every track stands still.
+    Of rotations the angular velocity (F, 3) in rad/s about the node's own axes. STEP has rate 0, and so has every track
+    outside its keys.
     """
     result = np.zeros((len(times), 3 if track.kind is ValueKind.ROTATION else track.values.shape[1]))
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:

@@ -1,8 +1,8 @@
-"""How players differ in what they make of LINEAR rotations: stored quaternions are rarely of unit length.
+"""Interpolation of LINEAR rotations by different players.
 
-The format says slerp. Integers and rounded floats are a little too long or too short, though, and what a player does
-about that, and whether it turns at constant speed at all, is its own. A bound on the error holds in a player only if
-it was measured as that player plays.
+glTF specifies slerp. Quaternions stored as integers or rounded floats are rarely of unit length, though; players differ
+in their treatment of that, and some do not rotate at constant speed. An error bound holds in a player only if it was
+measured with that player's interpolation.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from anim.sampling.pose import PoseSampler, Sampler
 from anim.sampling.track import KeyInterval
 
 SHORT_OF_THREE = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
-SHORT_OF_RAW = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this dot product on the chord as it is
+SHORT_OF_RAW = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this dot product on the chord, not normalized
 
 
 @dataclass(frozen=True, slots=True)
 class PlayerModel:
-    """A way to play rotations.
+    """Interpolation of rotations by a player.
 
-    about: who does so. between: (a, b, u) with keys (..., 4) and shares (..., 1) → (..., 4), None for glTF's own rule.
-    normalizes: whether keys that are held or stepped come out at unit length.
+    about: players that use it. between: (a, b, u) with keys (..., 4) and u (..., 1) → (..., 4), None for glTF's slerp.
+    normalizes: whether values at keys, of STEP and outside the keys are normalized.
     """
 
     about: str
@@ -38,7 +38,7 @@ class PlayerModel:
 
 
 def sampler_for(skeleton: Skeleton, clip: Clip, *, player: str = "spec") -> PoseSampler:
-    """Return the clip on the skeleton as a player shows it, to be asked for poses at any times.
+    """Return the sampler of a clip on a skeleton with the interpolation of a player.
 
     player: a name in PLAYERS. With one that does not normalize, rotations of the poses are not of unit length, and
     world matrices from them scale, as they do in that player.
@@ -47,7 +47,7 @@ def sampler_for(skeleton: Skeleton, clip: Clip, *, player: str = "spec") -> Pose
 
 
 def parse_pair(player: str) -> tuple[str, str]:
-    """Return who plays the clip before and who the one after: "nlerp" plays both, "spec,nlerp" one each.
+    """Return the players of the clips before and after: "nlerp" for both, "spec,nlerp" for one each.
 
     Raises RangeError for a name that is not in PLAYERS.
     """
@@ -58,7 +58,7 @@ def parse_pair(player: str) -> tuple[str, str]:
 
 
 def sampler(player: str) -> Sampler:
-    """Return how a player, a name in PLAYERS, gets the values of tracks."""
+    """Return the function that samples tracks like a player, a name in PLAYERS."""
     chosen = PLAYERS[player]
     if chosen.between is None:
         return Batch.sample
@@ -66,7 +66,7 @@ def sampler(player: str) -> Sampler:
 
 
 def _sampled(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) -> Floats:
-    """Values (F, G, C) of tracks on one axis; all but linear and stepped rotations are played the same everywhere."""
+    """Values (F, G, C) of tracks on one time axis; players differ in LINEAR and STEP rotations only."""
     if player.between is None or batch.kind is not ValueKind.ROTATION:
         return batch.sample(at, place)
     if batch.interpolation is Interpolation.CUBICSPLINE:
@@ -83,12 +83,12 @@ def _sampled(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) 
 
 
 def _chord(a: Floats, b: Floats, u: Floats) -> Floats:
-    """The normalized chord on the shorter side, of keys as they are stored."""
+    """Normalized chord on the shorter side, of keys as stored."""
     return quaternion.normalize(a + u * (_near(a, b) - a))
 
 
 def _as_three(a: Floats, b: Floats, u: Floats) -> Floats:
-    """What three.js makes of two keys: slerp of them as they are, near each other the normalized chord."""
+    """Interpolation by three.js: slerp of keys as stored, for near keys the normalized chord."""
     return _slerped(a, b, u, SHORT_OF_THREE, quaternion.normalize)
 
 

@@ -20,7 +20,7 @@ Sampler: TypeAlias = Callable[[Batch, Floats, KeyInterval], Floats]
 
 
 def sample_pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
-    """Return the local transforms of all nodes at times `at` (F,) in seconds; what no track moves stays at rest.
+    """Return the local transforms of all nodes at times `at` (F,) in seconds; untracked properties equal the rest pose.
 
     Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.
     """
@@ -28,9 +28,9 @@ def sample_pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
 
 
 class PoseSampler:
-    """A clip on a skeleton, to be asked for many stretches of time: its keys are stacked where they are needed.
+    """Sampler of a clip on a skeleton for repeated use, with keys stacked on demand.
 
-    sample: gives the values of tracks at times, by default as glTF says.
+    sample: gives the values of tracks at times, by default as specified by glTF.
     """
 
     def __init__(self, skeleton: Skeleton, clip: Clip, sample: Sampler = Batch.sample) -> None:
@@ -47,7 +47,7 @@ class PoseSampler:
         self._stacks = lazy_batches(moving)
 
     def sampled(self, sample: Sampler) -> PoseSampler:
-        """Return the same clip on the same skeleton, with the values of its tracks given by another sampler."""
+        """Return the sampler of the same clip and skeleton with another sampling function for tracks."""
         other = copy(self)
         other._sample = sample
         return other
@@ -82,7 +82,7 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
 
 def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return world_from_node (N, F, 3, 4): the order in which it is fast to compute."""
+    """Return world_from_node (N, F, 3, 4), in the memory order of the computation."""
     return matrix.accumulate_world(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
 
 

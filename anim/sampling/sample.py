@@ -1,4 +1,4 @@
-"""Poses as numbers for scripts and plots."""
+"""Tables of poses for scripts and plots."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ SPACES = ("local", "world")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseTable:
-    """All nodes at F times, in their parents' space or in the world's.
+    """Transforms of all nodes at F times, in their parents' space or in world space.
 
     times: (F,) s. translation (F, N, 3) m, rotation (F, N, 4) unit xyzw, scale (F, N, 3); in world space those of
-    `world`, which also holds the shear that a turned node under an uneven scale gets.
+    `world`, which also contains the shear of a rotated node under a non-uniform scale.
     world: world_from_node (F, N, 3, 4), None in local space.
     weights: by node, (F, M). pointers: by JSON pointer, (F, C).
     """
@@ -39,7 +39,7 @@ class PoseTable:
 
 
 def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") -> PoseTable:
-    """Return where every node of the skeleton is at times `at` (F,) in seconds; before and after the clip it holds.
+    """Return the transforms of all nodes at times `at` (F,) in seconds; outside the clip those of its nearest end.
 
     space: "local", in the parent's space, or "world". Raises RangeError for another.
     Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.

@@ -1,4 +1,4 @@
-"""One piece of a track, from key k to key k + 1, as a curve of its own that goes on beyond both ends."""
+"""Segments of a track, from key k to key k + 1, extrapolated beyond both ends."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from anim.model import Interpolation, Track, ValueKind
 
 
 def evaluate(track: Track, left: Ints, share: Floats) -> Floats:
-    """Return the values (F, C) at a share (F,) of the way through pieces `left` (F,); rotations are unit.
+    """Return the values (F, C) at fractions `share` (F,) of the segments `left` (F,); rotations are unit.
 
-    A share below 0 or above 1 is where the piece's own line, arc or cubic leads: nothing is clamped.
+    Below 0 and above 1 the segment's own line, arc or cubic is extrapolated, not clamped.
     """
     start, end = track.values[left], track.values[left + 1]
     if track.interpolation is Interpolation.STEP:
@@ -27,7 +27,7 @@ def evaluate(track: Track, left: Ints, share: Floats) -> Floats:
 
 
 def derivative(track: Track, left: Ints, share: Floats) -> Floats:
-    """Return the change per share of a piece (F, C); of rotations the turn (F, 3) in rad about the node's own axes."""
+    """Return the derivative per u (F, C); of rotations the angular velocity (F, 3) in rad about the node's own axes."""
     rotation = track.kind is ValueKind.ROTATION
     if track.interpolation is Interpolation.STEP:
         return np.zeros((len(left), 3 if rotation else track.values.shape[1]))
@@ -36,7 +36,7 @@ def derivative(track: Track, left: Ints, share: Floats) -> Floats:
         if not rotation:
             return slope
         raw = hermite.evaluate(share[:, None], *_cubic(track, left))
-        # q / |q| turns with ω = 2 vec(q* q′) / |q|²: the part of q′ along q only changes the length
+        # q / |q| rotates with ω = 2 vec(q* q′) / |q|²: the component of q′ along q only changes the length
         turned = quaternion.multiply(quaternion.conjugate(raw), slope)[:, :3]
         return np.asarray(2 * turned / quaternion.dot(raw, raw)[:, None])
     start, end = track.values[left], track.values[left + 1]
@@ -46,14 +46,14 @@ def derivative(track: Track, left: Ints, share: Floats) -> Floats:
 
 
 def max_rate(track: Track, pieces: Ints) -> float:
-    """Return the greatest change per share of a piece anywhere in `pieces`: length of the vector, or angle in rad."""
+    """Return the greatest derivative per u in the segments `pieces`: vector length, or angular speed in rad."""
     left = np.repeat(pieces, len(_FRACTIONS))
     found = derivative(track, left, np.tile(_FRACTIONS, len(pieces)))
     return float(np.sqrt((found * found).sum(axis=1)).max(initial=0.0))
 
 
 def max_rate_per_second(track: Track) -> float:
-    """Return the greatest rate of change of the track per second: length of the vector, or angular speed in rad/s."""
+    """Return the greatest derivative of the track per second: vector length, or angular speed in rad/s."""
     left = np.repeat(np.arange(len(track.times) - 1), len(_FRACTIONS))
     found = derivative(track, left, np.tile(_FRACTIONS, len(track.times) - 1))
     duration = track.times[left + 1] - track.times[left]

@@ -1,7 +1,7 @@
-"""Frames against seconds: the only place where a frame rate becomes times.
+"""Frame times in seconds: the only module that converts frame rates to times.
 
-A frame number belongs to a display; a time, in seconds, belongs to the clip. Frame k lies at start + k / fps, computed
-in float64 from the whole number k, so that no error adds up; the last frame is the clip's exact end.
+A frame index belongs to a display; a time, in seconds, belongs to the clip. Frame k is at start + k / fps, computed in
+float64 from the integer k, so that errors do not add up; the last frame is the clip's exact end.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 
-SLIVER = 1e-3  # frames; a last step shorter than this, or than float32 tells apart at the end, is rounding
+SLIVER = 1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
 MAX_FRAMES = 10_000_000
 
 
@@ -22,8 +22,8 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
 
     fps: frames per second, > 0. Raises RangeError otherwise, or for a grid of over ten million frames.
-    grid(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
-    grid(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
+    frame_times(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
+    frame_times(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
     """
     if not (math.isfinite(fps) and fps > 0):
         raise RangeError(f"fps is {fps:g} (expected a number above 0)")
@@ -37,14 +37,14 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
 
 
 def key_times(seconds: Floats) -> Floats:
-    """Return times as a file can hold them: rounded to float32, and what that made equal only once."""
+    """Return times as stored in a file: rounded to float32, without duplicates."""
     return arrays.freeze(arrays.unique_sorted(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
 
 
 def distinct_float32(seconds: Floats) -> Ints:
-    """Return the numbers of the times (K,), not decreasing, to keep so that they increase as float32.
+    """Return the indices of a subset of non-decreasing times (K,) that strictly increases as float32.
 
-    The first and the last stay; of times that fall together the first does, at the end the last.
+    The first and the last are kept; of equal times the first, at the end the last.
     """
     stored = seconds.astype(np.float32)
     if len(stored) < 2 or (np.diff(stored) > 0).all():

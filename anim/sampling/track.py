@@ -1,4 +1,4 @@
-"""Values of tracks at any time, exactly as glTF 2.0 says in appendix C."""
+"""Sampling of tracks by the glTF 2.0 specification, appendix C."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ VANISHING = 1e-9  # a quaternion whose largest component is below this has no di
 
 @dataclass(frozen=True, slots=True)
 class KeyInterval:
-    """Times placed between keys: looked up once per time axis, used by every track on it.
+    """Key intervals of times, found once per time axis for all of its tracks.
 
-    left: (F,) key at or before each time (the first key before the first). right: (F,) the next key, or the last.
-    u: (F,) share of the way from left to right, 0 exactly at keys and outside. duration: (F,) s from left to right.
+    left: (F,) key at or before each time (before the first key the first). right: (F,) the next key, or the last.
+    u: (F,) interpolation parameter from left to right, 0 exactly at keys and outside. duration: (F,) s from left to
+    right.
     """
 
     left: Ints
@@ -29,7 +30,7 @@ class KeyInterval:
 
 
 def find_interval(times: Floats, at: Floats) -> KeyInterval:
-    """Return where times `at` (F,) lie between the keys `times` (K,); outside they are held at the nearest end."""
+    """Return the key intervals of times `at` (F,) among the keys `times` (K,); outside they are clamped to the ends."""
     last = len(times) - 1
     left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, last)
     right = np.minimum(left + 1, last)
@@ -43,7 +44,7 @@ def sample(track: Track, at: Floats) -> Floats:
     """Return the values (F, C) of a track at times `at` (F,) in seconds.
 
     At a key the key's own value; outside the keys the first or the last one; rotations are unit quaternions.
-    Raises ShapeError or RangeError for times that are none.
+    Raises ShapeError or RangeError for invalid times.
     (0 s: 1, 2 s: 3, LINEAR) at 0.5, 9 → 1.5, 3
     """
     tangents = None
@@ -60,12 +61,12 @@ def interpolate(
     interpolation: Interpolation,
     kind: ValueKind,
 ) -> Floats:
-    """Return the values (..., C) at places (...) between keys `values` (K, C): of G tracks on one axis (..., G, C).
+    """Return the values (..., C) in key intervals (...) of keys `values` (K, C); of G tracks on one axis (..., G, C).
 
-    tangents: in and out, shaped as the values, per second, for CUBICSPLINE. Rotations come out normalized.
+    tangents: in and out, shaped as the values, per second, for CUBICSPLINE. Rotations are normalized.
     """
     start = values[place.left]
-    if interpolation is Interpolation.STEP or not place.u.any():  # all at keys, where the curve's own value is theirs
+    if interpolation is Interpolation.STEP or not place.u.any():  # all at keys, whose values are exact
         return quaternion.normalize(start) if kind is ValueKind.ROTATION else start
     shape = place.u.shape + (1,) * (values.ndim - 1)
     u, end = place.u.reshape(shape), values[place.right]
@@ -80,6 +81,6 @@ def interpolate(
 
 
 def _unit(rotations: Floats, instead: Floats) -> Floats:
-    """The rotations at unit length; where a spline runs through zero there is none, and the left key's stands."""
+    """The rotations at unit length; where a spline passes through zero, the left key's instead."""
     lost = (np.abs(rotations).max(axis=-1) < VANISHING)[..., None]
     return quaternion.normalize(np.where(lost, instead, rotations))

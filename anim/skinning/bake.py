@@ -44,7 +44,7 @@ def bake(
     """Return where the vertices of a scene are at `times` (F,) in seconds while a clip plays.
 
     Parameters as for `baker`, which is the thing to use for many clips; progress: called with the frames done.
-    bake(scene, clip, times=grid(0, 1, fps=30), method="dqs") → VertexCache of 31 frames
+    bake(scene, clip, times=frame_times(0, 1, fps=30), method="dqs") → VertexCache of 31 frames
     """
     made = prepare_bake(
         scene,
