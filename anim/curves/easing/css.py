@@ -1,4 +1,4 @@
-"""The eases of CSS: cubic Béziers in the time-value plane, and steps.
+"""CSS easings: cubic Béziers in the time-value plane, and steps.
 
 Source: W3C CSS Easing Functions Level 2, sections 2.2 and 2.3.
 """
@@ -12,18 +12,18 @@ from anim.curves.easing.function import CubicSegment, Easing, format_call
 from anim.errors import RangeError
 
 JUMPS = ("jump-start", "jump-end", "jump-both", "jump-none")
-MAX_STEPS = 10_000  # more than any display has frames for one ease
-THIRD = 1e-12  # how near to 1/3 and 2/3 the handles lie where the Bézier is a cubic of time
-SOLVED = 4e-16  # a step, or a relative error, this small is rounding
-SOLVER_ROUNDS = 60  # halving alone takes 46; Newton's method about 3
-TABLE = 128  # places that the solver starts from
+MAX_STEPS = 10_000  # above the frame count of one easing on any display
+THIRD = 1e-12  # distance of handles from 1/3 and 2/3 below which the Bézier is a cubic of time
+SOLVED = 4e-16  # a step, or a relative error, below this is rounding
+SOLVER_ROUNDS = 60  # bisection alone takes 46; Newton's method about 3
+TABLE = 128  # start values of the solver
 
 
 def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") -> Easing:
-    """Return the ease along the Bézier (0, 0), (x1, y1), (x2, y2), (1, 1), x as time and y as the share of the way.
+    """Return the easing along the Bézier (0, 0), (x1, y1), (x2, y2), (1, 1), with x as time and y as progress.
 
-    x1 and x2 lie in 0 … 1, y1 and y2 are any finite numbers; RangeError otherwise. Handles at thirds of the time make
-    an exact cubic, handles on the diagonal a line. The slope is ±inf where a handle is upright.
+    x1 and x2 are in 0 … 1, y1 and y2 are any finite numbers; RangeError otherwise. Handles at thirds of the time give
+    an exact cubic, handles on the diagonal a line. The slope is ±inf at a vertical handle.
     cubic_bezier(0.25, 0.1, 0.25, 1) → CSS `ease`
     """
     if not (0 <= x1 <= 1 and 0 <= x2 <= 1):
@@ -47,9 +47,9 @@ def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") 
 
 
 def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
-    """Return the ease that holds on `count` levels of equal length and jumps between them; its exact form holds too.
+    """Return the easing of `count` constant levels of equal duration with jumps between them; its exact form is STEP.
 
-    jump: where the first and last jump lie: "jump-start" jumps at u = 0, "jump-end" at u = 1, "jump-both" at both,
+    jump: position of the first and last jump: "jump-start" jumps at u = 0, "jump-end" at u = 1, "jump-both" at both,
     "jump-none" at neither (count ≥ 2). At a jump the value is the one after it: value(0) > 0 for the first and third.
     Raises RangeError for a count outside 1 … 10 000 or another word.
     steps(2) → 0 on 0 … ½, ½ on ½ … 1, 1 at 1
@@ -76,7 +76,7 @@ def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
 
 
 def _parameter(u: Floats, x1: float, x2: float) -> Floats:
-    """Return s (any shape) with x(s) = u: Newton's method, kept between halving bounds (x never falls)."""
+    """Return s (any shape) with x(s) = u: Newton's method with bisection as a safeguard (x never decreases)."""
     goal = np.asarray(u, dtype=np.float64).ravel()
     grid = np.linspace(0, 1, TABLE + 1)
     table = _bernstein(grid, x1, x2)
@@ -98,11 +98,11 @@ def _parameter(u: Floats, x1: float, x2: float) -> Floats:
 
 
 def _slope(s: Floats, first: tuple[float, float], second: tuple[float, float]) -> Floats:
-    """Return dy/dx at s; at the ends that of the first handle with a length."""
+    """Return dy/dx at s; at the ends that of the first handle of non-zero length."""
     run = _bernstein_slope(s, first[0], second[0])
     rise = _bernstein_slope(s, first[1], second[1])
     upright = np.where(rise == 0, 0.0, np.copysign(np.inf, rise))
-    with np.errstate(over="ignore"):  # a handle that leans by a denormal number is upright too
+    with np.errstate(over="ignore"):  # a denormal x difference counts as vertical
         slope = np.where(run > 0, rise / np.where(run > 0, run, 1.0), upright)
     start = _handle_slope(first, second)
     end = _handle_slope((1 - second[0], 1 - second[1]), (1 - first[0], 1 - first[1]))
@@ -110,7 +110,7 @@ def _slope(s: Floats, first: tuple[float, float], second: tuple[float, float]) -
 
 
 def _handle_slope(near: tuple[float, float], far: tuple[float, float]) -> float:
-    """Return the slope towards the nearest control point that is not the end itself."""
+    """Return the slope towards the nearest control point distinct from the end point."""
     x, y = next(handle for handle in (near, far, (1.0, 1.0)) if handle != (0, 0))
     return y / x if x else float(np.copysign(np.inf, y))
 

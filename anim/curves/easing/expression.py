@@ -1,4 +1,4 @@
-"""Names with arguments, "spring(100, 10)": how eases and tangent rules are asked for in text."""
+"""Names with arguments, "spring(100, 10)": text form of easings and tangent rules."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SUGGESTIONS = 3
 
 @dataclass(frozen=True, slots=True)
 class Factory(Generic[T]):
-    """One name that takes arguments: how to write it, and what makes the thing of the argument texts."""
+    """A name with arguments: its usage, and the factory function of the argument texts."""
 
     usage: str
     make: Callable[[tuple[str, ...]], T]
@@ -28,9 +28,9 @@ class Factory(Generic[T]):
 def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str) -> T:
     """Return what `text` names: an entry of `ready`, or one made by `makers` with the arguments in parentheses.
 
-    kind: what the table holds, "ease", for the messages. Case and spaces around names and arguments do not matter.
+    kind: type of the entries for messages, such as "ease". Case and spaces around names and arguments are ignored.
     Raises RangeError for an unknown name, with the nearest ones, and for wrong arguments, with the usage.
-    resolve("back-out(3)", ...) → makers["back-out"].make(("3",))
+    parse_call("back-out(3)", ...) → makers["back-out"].make(("3",))
     """
     call = CALL.fullmatch(text)
     if call is None:
@@ -52,14 +52,14 @@ def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T
 
 
 def numbers(arguments: tuple[str, ...], count: int) -> tuple[float, ...]:
-    """Return the arguments as `count` floats; fractions such as 1/3 are numbers. Raises RangeError if they aren't."""
+    """Return the arguments as `count` floats; fractions such as 1/3 are valid. Raises RangeError otherwise."""
     if len(arguments) != count:
         raise RangeError(f"number of arguments is {len(arguments)} (expected {count})")
     return tuple(number(argument) for argument in arguments)
 
 
 def number(text: str) -> float:
-    """Return the float that a text spells, "0.25", "-1e-3" or "1/3". Raises RangeError if it spells none."""
+    """Return the float of a text: "0.25", "-1e-3" or "1/3". Raises RangeError otherwise."""
     above, slash, below = text.partition("/")
     try:
         return float(above) / float(below) if slash else float(above)

@@ -1,4 +1,4 @@
-"""The type of an ease: how far a motion has come at a share u of its time, and the exact cubics if it has some."""
+"""Easing: progress of a motion as a function of the time fraction u, and its exact cubics if there are any."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from anim.maths import hermite
 
 Function: TypeAlias = Callable[[Floats], Floats]
 
-EXTENT_SAMPLES = 4097  # finds an extremum of curvature c to within c · 8e-9
-ROUNDING = 1e-9  # overshoots smaller than this are rounding
+EXTENT_SAMPLES = 4097  # finds an extremum of curvature c with an error below c · 8e-9
+ROUNDING = 1e-9  # smaller overshoots are rounding
 
 
 @dataclass(frozen=True, slots=True)
 class CubicSegment:
-    """One cubic of an ease, from u = `start` to `end`: its end values and its end slopes per u of the whole ease.
+    """Cubic segment of an easing, from u = `start` to `end`: end values, and end slopes per u of the whole easing.
 
     On a segment of duration t_d from v0 to v1 the key values are v0 + value · (v1 − v0) and the CUBICSPLINE tangents
-    slope · (v1 − v0) / t_d. Where one piece's value1 is not the next one's value0, the ease jumps.
+    slope · (v1 − v0) / t_d. If value1 of a segment is not value0 of the next one, the easing jumps.
     """
 
     start: float
@@ -35,12 +35,12 @@ class CubicSegment:
 
 @dataclass(frozen=True, slots=True)
 class Easing:
-    """One ease: functions of u (any shape, each in 0 … 1) with value(0) = 0 and value(1) = 1.
+    """An easing: functions of u (any shape, each in 0 … 1) with value(0) = 0 and value(1) = 1.
 
-    value: the share of the way. Steps, which jump, give the value after the jump; jump-start ones begin above 0.
-    derivative: slope per u; ±inf where the curve is vertical; of either side at a breakpoint.
-    breakpoints: interior u, increasing, where it is not smooth, or where its exact form needs a key.
-    exact: the cubics that it consists of, covering 0 … 1 in order, or None if it is not piecewise cubic.
+    value: progress. Steps give the value after a jump; jump-start ones begin above 0.
+    derivative: slope per u; ±inf at vertical tangents; of either side at a breakpoint.
+    breakpoints: interior u, increasing, of non-smooth points and of keys of the exact form.
+    exact: its cubic segments, covering 0 … 1 in order, or None if it is not piecewise cubic.
     """
 
     name: str
@@ -51,31 +51,31 @@ class Easing:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """The least and the greatest value on the way, sampled: (0, 1) unless it overshoots."""
+        """Least and greatest value, sampled: (0, 1) unless it overshoots."""
         values = self.value(np.linspace(0, 1, EXTENT_SAMPLES))
         low, high = float(values.min()), float(values.max())
         return (low if low < -ROUNDING else 0.0), (high if high > 1 + ROUNDING else 1.0)
 
     @property
     def overshoots(self) -> bool:
-        """Whether it leaves 0 … 1 on the way."""
+        """Whether values leave 0 … 1."""
         return self.extent != (0.0, 1.0)
 
     @property
     def stepped(self) -> bool:
-        """Whether it only holds and jumps, so that a STEP sampler is its exact form."""
+        """Whether it is piecewise constant, so that a STEP sampler is its exact form."""
         return self.exact is not None and all(p.value0 == p.value1 and p.slope0 == p.slope1 == 0 for p in self.exact)
 
 
 def format_call(name: str, *arguments: float) -> str:
-    """Return the name with its arguments, as it is asked for: spelled("spring", 100, 10) → spring(100, 10)."""
+    """Return the text form of a name with arguments: format_call("spring", 100, 10) → spring(100, 10)."""
     return f"{name}({', '.join(f'{argument:.15g}' for argument in arguments)})"
 
 
 def evaluate(pieces: tuple[CubicSegment, ...], u: Floats) -> Floats:
-    """Return the values at u (any shape, in 0 … 1) of cubics that cover 0 … 1; after the jump where there is one.
+    """Return the values at u (any shape, in 0 … 1) of cubics that cover 0 … 1; at a jump the value after it.
 
-    evaluate((Piece(0, 1, 0, 1, 0, 0),), 0.5) → 0.5
+    evaluate((CubicSegment(0, 1, 0, 1, 0, 0),), 0.5) → 0.5
     """
     columns = [(p.start, p.end - p.start, p.value0, p.value1, p.slope0, p.slope1) for p in pieces]
     start, length, value0, value1, slope0, slope1 = np.array(columns).T
@@ -85,7 +85,7 @@ def evaluate(pieces: tuple[CubicSegment, ...], u: Floats) -> Floats:
 
 
 def ease_out_from(ease: Easing, name: str) -> Easing:
-    """Return the ease run backwards from its end, 1 − f(1 − u): the out form of an in form, and the other way."""
+    """Return the time-reversed easing 1 − f(1 − u): the out form of an in form, and the reverse."""
     exact = None if ease.exact is None else tuple(_mirror(piece) for piece in reversed(ease.exact))
     return Easing(
         name,
@@ -97,7 +97,7 @@ def ease_out_from(ease: Easing, name: str) -> Easing:
 
 
 def ease_in_out_from(ease: Easing, name: str) -> Easing:
-    """Return the in-out form of an in form: half of it up to u = ½, then the same mirrored. A breakpoint lies at ½."""
+    """Return the in-out form of an in form: scaled by ½ up to u = ½, then point-mirrored. ½ is a breakpoint."""
 
     def value(u: Floats) -> Floats:
         half = ease.value(np.where(u < 0.5, 2 * u, 2 - 2 * u)) / 2

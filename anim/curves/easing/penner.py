@@ -1,7 +1,7 @@
-"""Penner's eases: eleven curves, each as in (slow start), out (slow end) and in-out.
+"""Penner's easings: eleven curves, each as in (slow start), out (slow end) and in-out.
 
 Source: Penner, "Programming Macromedia Flash MX" 2002, ch. 7; constants as on easings.net. Two differences, both
-below 0.001: expo and elastic are scaled so that they reach 0 and 1, where the originals jump over the last 2⁻¹⁰.
+below 0.001: expo and elastic are scaled to reach 0 and 1 exactly, where the originals jump by 2⁻¹⁰.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from anim.arrays import Floats
 from anim.curves.easing.function import CubicSegment, Easing, ease_in_out_from, ease_out_from, format_call
 from anim.errors import RangeError
 
-OVERSHOOT = 1.70158  # back: leaves the range by 10 %
-IN_OUT_OVERSHOOT = 1.525  # × the overshoot: by 10 % of the whole again, though each half has half the height
-PERIOD = 0.3  # elastic: one swing, in u
+OVERSHOOT = 1.70158  # back: overshoots the range by 10 %
+IN_OUT_OVERSHOOT = 1.525  # × OVERSHOOT: 10 % of the range again, though each half has half the height
+PERIOD = 0.3  # elastic: one oscillation, in u
 IN_OUT_PERIOD = 0.45  # elastic in-out: in u of each half
 EXPO_RISE = 1023.0  # 2¹⁰ − 1
 
 
 def penner() -> list[Easing]:
-    """Return the whole family: quad-in, quad-out, quad-in-out, cubic-in and so on."""
+    """Return all easings of the family: quad-in, quad-out, quad-in-out, cubic-in and so on."""
     table = [form for name, n in _POWERS for form in _forms(_power(name, n))]
     table += [_sine(), ease_out_from(_sine(), "sine-out"), _sine_in_out()]
     table += [*_forms(_expo()), *_forms(_circ())]
@@ -33,7 +33,7 @@ def penner() -> list[Easing]:
 
 
 def back_in(overshoot: float, *, name: str = "") -> Easing:
-    """Return the ease that first swings back: (s+1)u³ − su² for s = `overshoot` ≥ 0; 1.70158 leaves by 10 %.
+    """Return the easing with an initial undershoot: (s+1)u³ − su² for s = `overshoot` ≥ 0; 10 % for 1.70158.
 
     Raises RangeError for an overshoot that is negative or not finite.
     """
@@ -49,12 +49,12 @@ def back_in(overshoot: float, *, name: str = "") -> Easing:
 
 
 def back_out(overshoot: float, *, name: str = "") -> Easing:
-    """Return the ease that goes past its end and comes back: back_in mirrored."""
+    """Return the easing with a final overshoot: back_in time-reversed."""
     return ease_out_from(back_in(overshoot), name or format_call("back-out", overshoot))
 
 
 def back_in_out(overshoot: float, *, name: str = "") -> Easing:
-    """Return the ease that swings back first and goes past its end: halves of back_in with 1.525 · `overshoot`."""
+    """Return the easing with undershoot and overshoot: halves of back_in with 1.525 · `overshoot`."""
     return ease_in_out_from(back_in(overshoot * IN_OUT_OVERSHOOT), name or format_call("back-in-out", overshoot))
 
 
@@ -62,7 +62,7 @@ _POWERS = (("quad", 2), ("cubic", 3), ("quart", 4), ("quint", 5))
 
 
 def _forms(ease: Easing) -> tuple[Easing, Easing, Easing]:
-    """Return an in form with the out and in-out forms made of it."""
+    """Return an in form with its out and in-out forms."""
     family = ease.name.removesuffix("-in")
     return ease, ease_out_from(ease, f"{family}-out"), ease_in_out_from(ease, f"{family}-in-out")
 
@@ -78,7 +78,7 @@ def _sine() -> Easing:
 
 
 def _sine_in_out() -> Easing:
-    """Return ½ − ½ cos πu: smooth throughout, so without the break that two halves would have."""
+    """Return ½ − ½ cos πu: smooth, without the breakpoint of two halves."""
 
     def slope(u: Floats) -> Floats:
         return np.asarray(np.sin(np.pi * np.minimum(u, 1 - u)) * np.pi / 2)
@@ -99,7 +99,7 @@ def _circ() -> Easing:
 
 
 def _elastic(period: float) -> Easing:
-    """Return the swing that grows as expo-in does and ends at its peak, `period` (in u) per swing."""
+    """Return the oscillation of `period` (in u) with the envelope expo-in, which ends at its peak."""
     rate = 2 * np.pi / period
 
     def phase(u: Floats) -> Floats:
@@ -113,7 +113,7 @@ def _elastic(period: float) -> Easing:
 
 
 def _bounce_out() -> Easing:
-    """Return the fall and three rebounds: parabolas (11/4)² (u − c)² + floor that meet 1 at 4/11, 8/11, 10/11 and 1."""
+    """Return a fall and three rebounds: parabolas (11/4)² (u − c)² + floor with value 1 at 4/11, 8/11, 10/11 and 1."""
     breaks = np.array([4, 8, 10]) / 11
     centers = np.array([0, 6, 9, 10.5]) / 11
     floors = np.array([0, 0.75, 0.9375, 0.984375])
@@ -134,7 +134,7 @@ def _bounce_out() -> Easing:
 
 
 def _rise(u: Floats) -> Floats:
-    """Return (2^(10u) − 1) / (2^10 − 1), which is exactly 0 at 0 and 1 at 1."""
+    """Return (2^(10u) − 1) / (2^10 − 1): exactly 0 at 0 and 1 at 1."""
     return np.asarray((np.exp2(10 * u) - 1) / EXPO_RISE)
 
 

@@ -1,4 +1,4 @@
-"""Eases that are one polynomial: linear, smoothstep, smootherstep, and the cubic with chosen end slopes."""
+"""Polynomial easings: linear, smoothstep, smootherstep, and the cubic with given end slopes."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ ZERO, ONE = np.zeros(()), np.ones(())
 
 
 def hermite(slope0: float, slope1: float, *, name: str = "") -> Easing:
-    """Return the cubic ease that leaves with `slope0` and arrives with `slope1`, both relative to constant speed.
+    """Return the cubic easing with start slope `slope0` and end slope `slope1`, relative to constant speed.
 
-    Any finite slopes: negative ones pull back, large ones overshoot. Raises RangeError for others.
+    Any finite slopes: negative ones undershoot, large ones overshoot. Raises RangeError for others.
     hermite(0, 0) → smoothstep, hermite(1, 1) → linear, hermite(0, 3) → cubic-in
     """
     if not np.isfinite((slope0, slope1)).all():
@@ -35,7 +35,7 @@ def linear() -> Easing:
 
 
 def smoothstep() -> Easing:
-    """Return 3u² − 2u³: at rest at both ends, the cubic with the least acceleration squared."""
+    """Return 3u² − 2u³: zero speed at both ends, the minimum of integrated squared acceleration."""
 
     def value(u: Floats) -> Floats:
         return u * u * (3 - 2 * u)
@@ -44,7 +44,7 @@ def smoothstep() -> Easing:
 
 
 def smootherstep() -> Easing:
-    """Return 10u³ − 15u⁴ + 6u⁵: at rest and unaccelerated at both ends, the path with the least jerk squared.
+    """Return 10u³ − 15u⁴ + 6u⁵: zero speed and acceleration at both ends, the minimum of integrated squared jerk.
 
     Source: Flash & Hogan 1985 (minimum jerk); Perlin 2002 (the same polynomial, for noise).
     """

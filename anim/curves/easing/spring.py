@@ -1,4 +1,4 @@
-"""The ease of a damped spring let go at 0 and pulled to 1."""
+"""Easing of a damped spring, released at 0 with equilibrium at 1."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from anim.arrays import Floats
 from anim.curves.easing.function import Easing, format_call
 from anim.errors import RangeError
 
-SETTLED = 1e-3  # the spring has settled when it stays this near to 1
-MIN_DAMPING_RATIO = 0.005  # 200 swings until it settles: as many as anyone can want to key
+SETTLED = 1e-3  # distance from 1 below which the spring has settled
+MIN_DAMPING_RATIO = 0.005  # 200 oscillations until it settles, the limit for keys
 CRITICAL_SETTLING = 9.233413476451586  # the root of (1 + x) e^−x = SETTLED
 
 
 def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
-    """Return the motion of a mass of 1 kg on a spring until it has settled, as an ease: starts at rest, ends at 1.
+    """Return the motion of a mass of 1 kg on a spring until it has settled, as an easing: starts at rest, ends at 1.
 
-    stiffness: k in N/m, > 0. damping: c in N·s/m, > 0. Only the ratio ζ = c / (2 √k) shapes the ease, since u = 1 is
-    the time of settling whatever it is: ζ < 1 swings, ζ ≥ 1 creeps. Ends exactly at 1 by a factor within 0.1 % of 1.
-    Raises RangeError if one of them is not positive, or if ζ < 0.005 (more than 200 swings).
-    spring(100, 10) → one swing past the end by 16 %, u = 1 at settle_time(100, 10) = 1.41 s
+    stiffness: k in N/m, > 0. damping: c in N·s/m, > 0. Only the ratio ζ = c / (2 √k) determines the shape, since u = 1
+    is the settling time: ζ < 1 oscillates, ζ ≥ 1 does not. A factor within 0.1 % of 1 makes the end exactly 1.
+    Raises RangeError if one of them is not positive, or if ζ < 0.005 (more than 200 oscillations).
+    spring(100, 10) → one overshoot by 16 %, u = 1 at settle_time(100, 10) = 1.41 s
     """
     end = settle_time(stiffness, damping)
     last = float(_position(np.array(end), stiffness, damping))
@@ -31,9 +31,9 @@ def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
 
 
 def settle_time(stiffness: float, damping: float) -> float:
-    """Return the time in seconds after which the spring stays within 0.1 % of its end. Raises RangeError as spring.
+    """Return the settling time in seconds, after which the error stays below 0.1 %. Raises RangeError as spring.
 
-    The bound is on the envelope of the swing, so the time does not jump when the damping changes a little.
+    It is defined on the envelope of the oscillation, so that it is a continuous function of the damping.
     """
     if not (stiffness > 0 and damping > 0 and np.isfinite((stiffness, damping)).all()):
         raise RangeError(f"stiffness and damping are {stiffness:g} and {damping:g} (expected finite and above 0)")
@@ -51,7 +51,7 @@ def settle_time(stiffness: float, damping: float) -> float:
 
 
 def _settle_creeping(stiffness: float, damping: float) -> float:
-    """Return the settling time of an over-damped spring, by halving: its distance only falls."""
+    """Return the settling time of an over-damped spring by bisection: its distance decreases monotonically."""
     low, high = 0.0, 2 * CRITICAL_SETTLING * damping / stiffness
     for _ in range(60):
         middle = (low + high) / 2

@@ -1,4 +1,4 @@
-"""The table of eases, how they are named in text, and what they look like in one line of it."""
+"""Table of easings, their parser, and sparklines."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _easings() -> dict[str, Easing]:
 
 
 def _steps(arguments: tuple[str, ...]) -> Easing:
-    """Return steps(n) or steps(n, jump); the jump may be written without "jump-"."""
+    """Return steps(n) or steps(n, jump); the prefix "jump-" is optional."""
     if not 1 <= len(arguments) <= 2:
         raise RangeError(f"number of arguments is {len(arguments)} (expected 1 or 2)")
     count = number(arguments[0])
@@ -51,16 +51,16 @@ EASING_FACTORIES: dict[str, Factory[Easing]] = {
 
 
 def parse(text: str) -> Easing:
-    """Return the ease that a text names: one of EASINGS, or one of EASING_MAKERS with its arguments.
+    """Return the easing named by a text: one of EASINGS, or one of EASING_FACTORIES with its arguments.
 
-    Raises RangeError for an unknown name, with the nearest ones in its help, and for arguments that do not fit.
+    Raises RangeError for an unknown name, with the nearest ones in its help, and for invalid arguments.
     parse("cubic-bezier(.2, 0, 0, 1)").value(0.5) → 0.87
     """
     return parse_call(text, EASINGS, EASING_FACTORIES, kind="ease")
 
 
 def sparkline(easing: Easing, width: int = 24) -> str:
-    """Return the curve as one line of `width` bars, lowest value to highest; an overshoot lifts the rest off the edges.
+    """Return the curve as one line of `width` bars, scaled to its lowest and highest value, overshoots included.
 
     Raises RangeError for a width below 2.
     sparkline(EASINGS["linear"], 8) → ▁▂▃▄▅▆▇█

@@ -1,4 +1,4 @@
-"""A motion that is given by a function, as keys: pieces are halved until what lies between keys is near enough."""
+"""Adaptive keys of a motion given by functions: segments are halved until their error is within the tolerance."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track
 from anim.sampling.times import distinct_float32
 
-SAMPLES = np.array([0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97])  # of a piece; errors hide at ½
-MAX_ANGLE_RAD = np.radians(120)  # of one piece: beyond, players and splines of quaternions go wrong
-SHORTEST = 1e-5  # s; two float32 times below a minute are still apart by more than this
-LEVELS = 24  # halvings of a piece at most
+SAMPLES = np.array(
+    [0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97]
+)  # of a segment; errors can vanish at ½ alone
+MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, slerp and quaternion splines are inaccurate
+SHORTEST = 1e-5  # s; float32 times below a minute have a finer resolution
+LEVELS = 24  # greatest number of halvings of a segment
 
 
 @dataclass(frozen=True, slots=True)
 class TrackFunction:
-    """A motion over time as functions.
+    """Motion as functions of time.
 
-    values: times (F,) s → values (F, C), unit quaternions where `rotation`.
+    values: times (F,) s → values (F, C), unit quaternions if `rotation`.
     rates: times (F,), before → change per second just before or just after: (F, C), angular velocity (F, 3) in rad/s
     along the body's own axes for rotations.
     """
@@ -43,7 +45,7 @@ class KeySet:
 
 
 def float32_tolerance(track: Track, tolerance: float) -> float:
-    """Return a tolerance for vector values that float32 can reach: no tighter than four steps of its largest value."""
+    """Return the tolerance for vector values, at least four float32 steps of the track's largest value."""
     return max(tolerance, 4 * float(np.spacing(np.float32(np.abs(track.values).max(initial=0.0)))))
 
 
@@ -60,9 +62,9 @@ def to_cubicspline(track: Track, keys: KeySet) -> Track:
 
 
 def cubic_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
-    """Return CUBICSPLINE keys that follow `motion` within `tolerance`: value units, or radians for rotations.
+    """Return CUBICSPLINE keys that approximate `motion` within `tolerance`: value units, or radians for rotations.
 
-    corners: (K,) s, increasing: where keys must lie, both ends among them; between two the motion must be smooth.
+    corners: (K,) s, increasing: required key times, including both ends; the motion must be smooth between two.
     """
     times = _bisect(motion, corners, tolerance, _cubic_segment)
     values = _values(motion, times)
@@ -74,7 +76,7 @@ def cubic_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> K
 
 
 def linear_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
-    """Return LINEAR keys that follow `motion` within `tolerance`; tangents are 0 and unused."""
+    """Return LINEAR keys that approximate `motion` within `tolerance`; tangents are 0 and unused."""
     times = _bisect(motion, corners, tolerance, _linear_segment)
     values = _values(motion, times)
     return KeySet(times, values, np.zeros_like(values), np.zeros_like(values))
@@ -100,7 +102,7 @@ def _bisect(motion: TrackFunction, corners: Floats, tolerance: float, between: B
 
 
 def _deviation(motion: TrackFunction, start: Floats, end: Floats, between: Between) -> Floats:
-    """How far each piece is off at worst (P,); infinite where it turns too far."""
+    """Greatest error of each segment (P,); infinite if its angle is too large."""
     at = start[:, None] + (end - start)[:, None] * SAMPLES
     true = motion.values(at.reshape(-1)).reshape(*at.shape, -1)
     given = between(motion, start, end)

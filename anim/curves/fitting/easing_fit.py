@@ -1,4 +1,4 @@
-"""Eases that are not cubic, as the fewest cubic or straight pieces within a tolerance."""
+"""Approximation of easings by the fewest cubic or linear segments within a tolerance."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from anim.curves.fitting.subdivision import subdivide
 
 @lru_cache(maxsize=256)
 def fit_segments(easing: Easing, *, tolerance: float) -> tuple[CubicSegment, ...]:
-    """Return an ease as cubics: its exact ones if it has them, else the fewest within `tolerance` (share of the way).
+    """Return an easing as cubics: the exact ones if there are any, else the fewest within `tolerance` (of the range).
 
-    cubic_pieces(EASINGS["bounce-out"], tolerance=1e-3) → its four parabolas
+    fit_segments(EASINGS["bounce-out"], tolerance=1e-3) → its four parabolas
     Raises RangeError as fit_cubic does.
     """
     if easing.exact is not None:
@@ -25,13 +25,13 @@ def fit_segments(easing: Easing, *, tolerance: float) -> tuple[CubicSegment, ...
 
 
 def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], tolerance: float) -> tuple[CubicSegment, ...]:
-    """Return the fewest cubics that follow f over 0 … 1 with values and slopes of its own at their ends.
+    """Return the fewest cubics that approximate f over 0 … 1, with its values and slopes at their ends.
 
-    f, df: a continuous function of u (any shape) and its slope, which may be ±inf: there the best finite slope is used.
-    breakpoints: interior u where the slope jumps or the function is not smooth; each gets an end of pieces.
-    tolerance: the greatest |error|, 1e-7 or more; RangeError otherwise. Where slopes are finite the result is C1.
-    fit_cubic(smootherstep, 30u²(1−u)², (), 1e-3) → 4 pieces
-    Source: notes/algorithms.md C2; Hermite error h⁴/384 · max|f⁗| sets the lengths, but here it is measured.
+    f, df: a continuous function of u (any shape) and its slope; ±inf is replaced by the best finite slope.
+    breakpoints: interior u where the slope jumps or the function is not smooth; each becomes an end of segments.
+    tolerance: the greatest |error|, 1e-7 or more; RangeError otherwise. With finite slopes the result is C1.
+    fit_cubic(smootherstep, 30u²(1−u)², (), 1e-3) → 4 segments
+    Source: notes/algorithms.md C2; the Hermite error is about h⁴/384 · max|f⁗|, but measured here.
     """
     path = FitTarget(lambda u: f(u)[..., None], lambda u: np.ones((*u.shape, 1)), df, _difference, breakpoints)
     ends = np.array(subdivide(lambda a, b: fit_errors(path, a, b), (0.0, *breakpoints, 1.0), tolerance))
@@ -42,9 +42,9 @@ def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], toleran
 
 
 def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) -> Floats:
-    """Return the fewest u (K,), 0 and 1 among them, between whose values f is straight within `tolerance`.
+    """Return the fewest knots u (K,), 0 and 1 included, of linear segments that approximate f within `tolerance`.
 
-    f must be continuous. Breakpoints are among the result. Raises RangeError for a tolerance below 1e-7.
+    f must be continuous. The result contains all breakpoints. Raises RangeError for a tolerance below 1e-7.
     For an eased slerp by θ give tolerance / θ: its angle is f · θ.
     fit_linear(u², (), 1e-3) → 17 u, evenly spaced
     """
@@ -58,7 +58,7 @@ def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) ->
 
 
 def fit_error(f: Function, pieces: tuple[CubicSegment, ...]) -> float:
-    """Return the greatest |error| of cubics that cover 0 … 1 against f: what a fit promises, measured."""
+    """Return the greatest sampled |error| of cubics that cover 0 … 1 against f."""
     u = np.concatenate([p.start + (p.end - p.start) * SAMPLES for p in pieces])
     return float(np.abs(evaluate(pieces, u) - f(u)).max() * SAFETY)
 

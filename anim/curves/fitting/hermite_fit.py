@@ -1,4 +1,4 @@
-"""How well single Hermite pieces follow a path: their end slopes, and the error that is left."""
+"""Fit of single Hermite segments to a path: end slopes and errors."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from anim.maths import hermite
 
 SAMPLES = (
     1 - np.cos(np.pi * np.arange(1, 40) / 40)
-) / 2  # in each piece, closer towards its ends, where roots are steep
-SAFETY = 1.01  # the greatest error lies between samples: less than 1 % above the greatest sample
-NUDGE = 1e-12  # the slope at a breakpoint is taken this far inside the piece
-VERTICAL = 1e4  # slopes above are not followed but chosen: least squares
+) / 2  # of each segment, denser towards its ends, where roots are steep
+SAFETY = 1.01  # the greatest error is less than 1 % above the greatest sample
+NUDGE = 1e-12  # the slope at a breakpoint is evaluated at this distance inside the segment
+VERTICAL = 1e4  # steeper slopes are replaced by a least squares fit
 
 
 @dataclass(frozen=True, slots=True)
 class FitTarget:
-    """A path (..., D) that turns u (...) into points, moving along `direction` (..., D) at `rate` (...) per u.
+    """Path from u (...) to points (..., D), with unit tangent `direction` (..., D) and speed `rate` (...) per u.
 
     distance: the error (...) of a point (..., D) against the true one (..., D).
-    breakpoints: where the rate may differ on both sides.
+    breakpoints: u with different rates on both sides.
     """
 
     point: Function
@@ -35,10 +35,10 @@ class FitTarget:
 
 
 def fit_end_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return the rates (B,) at which pieces from u = a (B,) to b (B,) leave and arrive.
+    """Return the start and end rates (B,) of segments from u = a (B,) to b (B,).
 
-    They are the path's own, from inside the piece. If one is vertical, both are those of the least squared error:
-    to keep the other one would make the piece thirty times shorter, for a kink where nobody can see one.
+    They are the path's own, from inside the segment. If one is vertical, both are those of the least squared error:
+    keeping the other one would make the segment thirty times shorter, to avoid an invisible kink.
     """
     rate0, rate1 = path.rate(_nudged(a, path, NUDGE)), path.rate(_nudged(b, path, -NUDGE))
     free = np.maximum(np.abs(rate0), np.abs(rate1)) > VERTICAL
@@ -49,9 +49,9 @@ def fit_end_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Float
 
 
 def fit_errors(path: FitTarget, a: Floats, b: Floats, rates: tuple[Floats, Floats] | None = None) -> Floats:
-    """Return the greatest distances (B,) of Hermite pieces from a (B,) to b (B,) from the path.
+    """Return the greatest errors (B,) of Hermite segments from a (B,) to b (B,) against the path.
 
-    rates: those (B,) at both ends, if not the ones that `slopes` finds.
+    rates: those (B,) at both ends, by default those of `fit_end_slopes`.
     """
     u = a[:, None] + (b - a)[:, None] * SAMPLES
     fitted = _segments(path, a, b, *(rates or fit_end_slopes(path, a, b)))
@@ -59,14 +59,14 @@ def fit_errors(path: FitTarget, a: Floats, b: Floats, rates: tuple[Floats, Float
 
 
 def _segments(path: FitTarget, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
-    """Return the points (B, S, D) of the pieces at SAMPLES."""
+    """Return the points (B, S, D) of the segments at SAMPLES."""
     m0 = ((b - a) * rate0)[:, None] * path.direction(a)
     m1 = ((b - a) * rate1)[:, None] * path.direction(b)
     return hermite.evaluate(SAMPLES[:, None], path.point(a)[:, None], m0[:, None], path.point(b)[:, None], m1[:, None])
 
 
 def _free_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return the rates (B,) at both ends that together leave the least squared error at SAMPLES."""
+    """Return the rates (B,) at both ends with the least squared error at SAMPLES."""
     none = np.zeros_like(a)
     left = path.point(a[:, None] + (b - a)[:, None] * SAMPLES) - _segments(path, a, b, none, none)
     length, s = (b - a)[:, None, None], SAMPLES[:, None]

@@ -1,4 +1,4 @@
-"""An eased turn as the fewest quaternion cubics within a tolerance."""
+"""Approximation of an eased rotation by the fewest quaternion cubics within a tolerance."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from anim.curves.fitting.subdivision import subdivide
 from anim.errors import RangeError
 from anim.maths import quaternion as quat
 
-MAX_ANGLE_RAD = np.radians(120)  # turn of one piece; above, the chord of unit quaternions gets short
-ANGLE_STEP = np.pi / 32  # fits are shared by turns up to the next multiple
+MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, the chord of unit quaternions gets short
+ANGLE_STEP = np.pi / 32  # fits are shared by angles up to the next multiple
 
 
 @dataclass(frozen=True, slots=True)
 class RotationKeys:
-    """Keys of a turn: u (K,) from 0 to 1, unit quaternions (K, 4) in one hemisphere, tangents (K, 4) per u.
+    """Keys of a rotation: u (K,) from 0 to 1, unit quaternions (K, 4) in one hemisphere, tangents (K, 4) per u.
 
-    The tangents before the first and after the last key are 0. error: the greatest angle in radians off the true turn.
+    The tangents before the first and after the last key are 0. error: greatest angle in rad from the exact one.
     """
 
     u: Floats
@@ -33,12 +33,12 @@ class RotationKeys:
 
 
 def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> RotationKeys:
-    """Return the fewest CUBICSPLINE keys that turn q0 to q1 (4,) along the shorter arc with the tempo of an ease.
+    """Return the fewest CUBICSPLINE keys that rotate q0 to q1 (4,) along the shorter arc with an easing.
 
-    tolerance: the greatest angle off the eased slerp, radians, 1e-7 or more; the result's `error` says what it is.
-    No piece turns by more than 120°. The result's signs follow q0's, so its last key may be −q1. Tangents are
+    tolerance: the greatest angle from the eased slerp, radians, 1e-7 or more; the result's `error` is the actual one.
+    No segment rotates by more than 120°. The result's signs follow q0's, so its last key may be −q1. Tangents are
     ½ q ⊗ ω, ω = axis · θ · e′(u); divide them by the segment's duration.
-    Raises RangeError for a tolerance out of range, or for steps: they jump, and are a STEP sampler's.
+    Raises RangeError for a tolerance out of range, or for steps, which need a STEP sampler.
     90° with smoothstep at 0.1° → 4 keys
     """
     if easing.stepped:
@@ -61,9 +61,9 @@ def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> Ro
 
 @dataclass(frozen=True, slots=True)
 class RotationFit:
-    """Cubics for turns of up to one angle: key u (P + 1,), rates e′ (P,) at which pieces leave and arrive, and error.
+    """Cubics for rotations of up to one angle: key u (P + 1,), start and end rates e′ (P,) of segments, and error.
 
-    Tangents per u are ½ q ⊗ (rate · turn). error: the greatest angle in radians off the eased turn.
+    Tangents per u are ½ q ⊗ (rate · rotation vector). error: greatest angle in radians from the eased rotation.
     """
 
     u: Floats
@@ -73,14 +73,14 @@ class RotationFit:
 
 
 def rotation_segments_for(easing: Easing, angle: float, tolerance: float) -> RotationFit:
-    """Return the fewest cubics for a turn by `angle` radians; turns up to the next multiple of π/32 share one fit."""
+    """Return the fewest cubics for a rotation by `angle` radians; angles are rounded up to multiples of π/32."""
     rounded = float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP
     return RotationFit(*fit_rotation_segments(easing, rounded, tolerance))
 
 
 @lru_cache(maxsize=1024)
 def fit_rotation_segments(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
-    """Return key u (K,), the rates e′ (K − 1,) at which pieces leave and arrive, and the angle that they are off."""
+    """Return key u (K,), start and end rates e′ (K − 1,) of the segments, and the greatest error as an angle."""
     edges = (0.0, *easing.breakpoints, 1.0)
     if angle == 0:
         none = np.zeros(len(edges) - 1)
@@ -101,7 +101,7 @@ def _error(easing: Easing, angle: float, ends: Floats, rate0: Floats, rate1: Flo
 
 
 def _circle(easing: Easing, angle: float) -> FitTarget:
-    """Return the turn's path in the plane of its two quaternions: a circle, run through at half the angle."""
+    """Return the rotation's path in the plane of its two quaternions: a circular arc of half the angle."""
 
     def point(u: Floats) -> Floats:
         half = easing.value(u) * angle / 2
@@ -115,6 +115,6 @@ def _circle(easing: Easing, angle: float) -> FitTarget:
 
 
 def _angle(fitted: Floats, true: Floats) -> Floats:
-    """Return the rotation angle (...) between points (..., 2) of the plane, whatever their length."""
+    """Return the rotation angle (...) between points (..., 2) of the plane, of any length."""
     across = fitted[..., 0] * true[..., 1] - fitted[..., 1] * true[..., 0]
     return np.asarray(2 * np.abs(np.arctan2(across, (fitted * true).sum(axis=-1))))

@@ -1,4 +1,4 @@
-"""The fewest pieces that keep an error below a tolerance: as long as possible from left to right, then evened out."""
+"""Subdivision into the fewest segments within a tolerance: greedy from left to right, then errors are equalized."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 
-Errors: TypeAlias = Callable[[Floats, Floats], Floats]  # of the pieces from a (B,) to b (B,): their errors (B,)
+Errors: TypeAlias = Callable[[Floats, Floats], Floats]  # errors (B,) of the segments from a (B,) to b (B,)
 
-MIN_TOLERANCE = 1e-7  # of the range: what float32 values resolve
-SHORTEST = 1e-6  # of the whole; shorter pieces would fall together in float32 key times
-CANDIDATES = 16  # ends tried at once
-REFINEMENTS = 4  # rounds of CANDIDATES: an end is found to 16⁻⁴ of the rest
-EVEN_ROUNDS = 6  # halvings of the tolerance while the number of pieces stays
-EVEN_LIMIT = 64  # with more pieces the last one is no longer odd enough to matter
+MIN_TOLERANCE = 1e-7  # of the range: resolution of float32 values
+SHORTEST = 1e-6  # of the range; shorter segments would have equal float32 key times
+CANDIDATES = 16  # ends evaluated at once
+REFINEMENTS = 4  # rounds of CANDIDATES: an end is found to 16⁻⁴ of the remainder
+EVEN_ROUNDS = 6  # halvings of the tolerance at a constant number of segments
+EVEN_LIMIT = 64  # with more segments a short last one doesn't matter
 
 
 def subdivide(errors: Errors, edges: tuple[float, ...], tolerance: float) -> tuple[float, ...]:
-    """Return the ends of the fewest pieces whose errors stay within `tolerance`: `edges` and what must lie between.
+    """Return the ends of the fewest segments with errors within `tolerance`: `edges` and ends between them.
 
-    errors: the error of each piece from a to b (B,). edges: increasing, each one an end of pieces.
-    As many pieces as needed and no more, if a part of a good piece is a good piece; then their errors are evened out.
-    No piece is shorter than 1e-6: next to a vertical slope one of those may miss the tolerance.
+    errors: the error of each segment from a to b (B,). edges: increasing, each one an end of segments.
+    The number is minimal if errors don't grow when a segment is shortened; then the errors are equalized.
+    No segment is shorter than 1e-6: next to a vertical slope such a segment may exceed the tolerance.
     Raises RangeError for a tolerance below 1e-7 or not finite.
     """
     if not (MIN_TOLERANCE <= tolerance < np.inf):
@@ -38,7 +38,7 @@ def subdivide(errors: Errors, edges: tuple[float, ...], tolerance: float) -> tup
 
 
 def _evened(errors: Errors, start: float, end: float, tolerance: float) -> list[float]:
-    """Return the ends of the fewest pieces from start to end, for nearly the least tolerance that needs no more."""
+    """Return the ends of the fewest segments from start to end, at nearly the least tolerance for their number."""
     best = _greedy(errors, start, end, tolerance, limit=None)
     assert best is not None
     count = len(best)
@@ -56,7 +56,7 @@ def _evened(errors: Errors, start: float, end: float, tolerance: float) -> list[
 
 
 def _greedy(errors: Errors, start: float, end: float, tolerance: float, *, limit: int | None) -> list[float] | None:
-    """Return the ends of pieces that are as long as the tolerance lets them, or None if there are more than `limit`."""
+    """Return the ends of segments of maximal length within the tolerance, or None for more than `limit`."""
     ends: list[float] = []
     while start < end:
         if limit is not None and len(ends) == limit:
@@ -67,7 +67,7 @@ def _greedy(errors: Errors, start: float, end: float, tolerance: float, *, limit
 
 
 def _longest(errors: Errors, start: float, end: float, tolerance: float) -> float:
-    """Return the last end before which every candidate is within the tolerance."""
+    """Return the last candidate end up to which all candidates are within the tolerance."""
     low, high, rounds = start, end, 0
     while rounds < REFINEMENTS or low == start:
         ends = np.linspace(low, high, CANDIDATES + 1)[1:]

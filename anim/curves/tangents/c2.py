@@ -1,4 +1,4 @@
-"""Tangents of curves with continuous acceleration (C2): scipy solves for all keys at once.
+"""Tangents of C2 curves (continuous acceleration), solved by scipy for all keys at once.
 
 A piecewise cubic is exact as CUBICSPLINE keys of its values and slopes.
 """
@@ -12,19 +12,19 @@ from anim.curves.tangents.rule import SplineKeys, extended
 
 
 def natural(times: Floats, values: Floats) -> SplineKeys:
-    """Return the C2 curve through the keys with no acceleration at its ends: the one that bends least."""
+    """Return the C2 curve through the keys with zero end acceleration: the least integrated squared acceleration."""
     return _cubic(times, values, ends="natural")
 
 
 def clamped(times: Floats, values: Floats) -> SplineKeys:
-    """Return the C2 curve through the keys that starts and ends at rest."""
+    """Return the C2 curve through the keys with zero end speed."""
     return _cubic(times, values, ends="clamped")
 
 
 def periodic(times: Floats, values: Floats) -> SplineKeys:
-    """Return the C2 curve through the keys whose speed and acceleration at the end are those at the start.
+    """Return the C2 curve through the keys with equal speed and acceleration at start and end.
 
-    If the last value is not the first, the difference is the way made in a lap: the loop goes on from there.
+    If the last value is not the first, the difference is the displacement per cycle, which continues in the next cycle.
     """
     duration, way = times[-1] - times[0], values[-1] - values[0]
     still = values - (times - times[0])[:, None] / duration * way
@@ -35,10 +35,10 @@ def periodic(times: Floats, values: Floats) -> SplineKeys:
 
 
 def bspline(times: Floats, values: Floats) -> SplineKeys:
-    """Return the C2 curve that the keys pull at: it meets the first and last, and passes the others by.
+    """Return the C2 curve that approximates the keys and interpolates the first and last.
 
-    With even spacing the keys are the control points of the uniform cubic B-spline, value (v₋ + 4v + v₊) / 6. With any,
-    the control points lie on the straight lines between keys at means of three times, so straight runs stay straight.
+    With even spacing the keys are the control points of the uniform cubic B-spline, value (v₋ + 4v + v₊) / 6. With any
+    spacing the control points are on the lines between keys at means of three times, so straight runs stay straight.
     Source: Schoenberg 1967 (variation diminishing spline); scipy's BSpline.
     """
     knots = np.concatenate((times[:1].repeat(3), times, times[-1:].repeat(3)))
@@ -46,7 +46,7 @@ def bspline(times: Floats, values: Floats) -> SplineKeys:
 
 
 def cyclic_bspline(times: Floats, values: Floats) -> SplineKeys:
-    """Return the same for a loop: its ends are passed by too, and meet each other."""
+    """Return the periodic form of `bspline`: both ends are approximated too, and meet each other."""
     more_times, more_values = extended(times, values, 3)
     keys = _approximated(more_times, more_times, more_values, times, values)
     keys.values[-1] = keys.values[0] + (values[-1] - values[0])
@@ -65,7 +65,7 @@ def _cubic(times: Floats, values: Floats, *, ends: str) -> SplineKeys:
 
 
 def _approximated(knots: Floats, lines_t: Floats, lines_v: Floats, times: Floats, values: Floats) -> SplineKeys:
-    """Return the B-spline on `knots`, its control points on the lines through lines_t, lines_v, seen at `times`."""
+    """Return the B-spline on `knots`, with control points on the lines through lines_t, lines_v, sampled at `times`."""
     from scipy.interpolate import BSpline
 
     centers = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3

@@ -1,6 +1,6 @@
 """Tangents from a key's neighbors: h_k and d_k are the duration and the mean speed from key k to k + 1.
 
-Source: notes/algorithms.md C4. scipy's splines do monotone and Akima.
+Source: notes/algorithms.md C4. Monotone and Akima come from scipy.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from anim.arrays import Floats
 from anim.curves.tangents.rule import TangentRule, local_rule
 from anim.errors import RangeError
 
-SHORTEST_KNOT = 1e-9  # of the longest: keeps repeated points apart in the centripetal parameter
+SHORTEST_KNOT = 1e-9  # of the longest interval: separates repeated points in the centripetal parameter
 
 
 def bessel(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return the slopes of the parabolas through three keys; those at the ends go through the first and last three.
+    """Return the slopes of the parabolas through three keys; the end slopes are of the first and last three keys.
 
     (h_k d_{k−1} + h_{k−1} d_k) / (h_{k−1} + h_k). Exact for parabolas, whatever the spacing.
     """
@@ -31,16 +31,16 @@ def catmull_rom(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def flat(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return 0: a stop at every key."""
+    """Return slopes 0: zero speed at every key."""
     none = np.zeros_like(values)
     return none, none
 
 
 def centripetal(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return the slopes of time_aware in the parameter √distance, so that the path has no cusps and no loops.
+    """Return the slopes of time_aware in the parameter √distance, for a path without cusps and loops.
 
-    Smooth in that parameter; in time the direction is, but the speed jumps at a key unless the spacing follows it.
-    A repeated point is a rest. Source: Yuksel et al. 2011; Barry & Goldman 1988.
+    The path is C1 in that parameter and G1 in time: speed jumps at keys unless key times are spaced accordingly.
+    A repeated point has zero speed. Source: Yuksel et al. 2011; Barry & Goldman 1988.
     """
     steps = np.diff(values, axis=0)
     knots = np.sqrt(np.sqrt((steps * steps).sum(axis=1)))
@@ -53,19 +53,19 @@ def centripetal(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def monotone(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return slopes that never leave the range between two keys: weights stay in 0 … 1, feet on the floor.
+    """Return slopes of a curve that stays in the range of neighboring keys: weights in 0 … 1, no feet below the floor.
 
     Source: Fritsch & Butland 1984, by scipy's PchipInterpolator.
     """
     from scipy.interpolate import PchipInterpolator
 
-    with np.errstate(over="ignore"):  # 1 / a denormal slope, whose inverse is 0 as it should be
+    with np.errstate(over="ignore"):  # 1 / denormal slope is inf, and its inverse 0, as intended
         slopes = np.asarray(PchipInterpolator(times, values, axis=0).derivative()(times))
     return slopes, slopes
 
 
 def akima(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return slopes that lean to the steadier side, so that one odd key disturbs little (Akima 1970, scipy)."""
+    """Return slopes weighted towards the side with less change, robust to outlier keys (Akima 1970, scipy)."""
     from scipy.interpolate import Akima1DInterpolator
 
     if len(times) == 2:
@@ -75,7 +75,7 @@ def akima(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def cardinal(tension: float) -> TangentRule:
-    """Return the rule of Catmull-Rom slopes times 1 − tension: 0 is catmull-rom, 1 is flat, below 0 is livelier.
+    """Return the rule of Catmull-Rom slopes times 1 − tension: 0 is catmull-rom, 1 is flat, below 0 steeper.
 
     Raises RangeError for a tension outside −1 … 1.
     """
@@ -89,9 +89,9 @@ def cardinal(tension: float) -> TangentRule:
 
 
 def tcb(tension: float, continuity: float, bias: float) -> TangentRule:
-    """Return the rule with tension (1 tight), continuity (other than 0: a corner) and bias (1 overshoots, −1 is early).
+    """Return the rule with tension (1: slope 0), continuity (0: C1) and bias (1 overshoots, −1 undershoots).
 
-    Each in −1 … 1, RangeError otherwise; (0, 0, 0) is catmull-rom. The ends take its slopes, times 1 − tension.
+    Each in −1 … 1, RangeError otherwise; (0, 0, 0) is catmull-rom. The end slopes are catmull-rom's times 1 − tension.
     Source: Kochanek & Bartels 1984, with their correction for uneven spacing.
     """
     _check(tension=tension, continuity=continuity, bias=bias)
@@ -110,7 +110,7 @@ def tcb(tension: float, continuity: float, bias: float) -> TangentRule:
 
 
 def _parabola_slopes(times: Floats, values: Floats) -> Floats:
-    """Return the slopes (K, C) at the keys of parabolas through three; of the chord if there are only two."""
+    """Return the slopes (K, C) at the keys of parabolas through three keys; of the chord for two keys."""
     h = np.diff(times)[:, None]
     d = np.diff(values, axis=0) / h
     if len(times) == 2:

@@ -1,4 +1,4 @@
-"""The types of tangent rules: what they return, what they are, and how a loop goes on beyond its ends."""
+"""Types of tangent rules, and periodic extension of keys."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from anim.arrays import Floats
 class SplineKeys:
     """Keys of a CUBICSPLINE track: values (K, C), tangents (K, C) per second.
 
-    departure: the greatest distance of a value from the key it was made of (radians for rotations); 0 unless the rule
+    departure: greatest distance of a value from its original key (radians for rotations); 0 unless the rule
     approximates.
     """
 
@@ -31,12 +31,12 @@ Slopes: TypeAlias = Callable[[Floats, Floats], tuple[Floats, Floats]]  # the sam
 
 @dataclass(frozen=True, slots=True)
 class TangentRule:
-    """One way to find the tangents of keys that have none, for a track with ends and for a loop.
+    """Rule for the tangents of keys, for open tracks and for loops.
 
-    cyclic: the same function as `open` if the rule makes no difference.
-    smooth: whether the result is C2: such rules treat rotations by component, since a quaternion whose components are
-    C2 stays so when the player normalizes it. The others treat rotations by their rates.
-    loop: whether it takes every track for a loop.
+    cyclic: the same function as `open` if the rule doesn't distinguish them.
+    smooth: whether the result is C2. Such rules treat rotations by component, since C2 components stay C2 when the
+    player normalizes the quaternion. The others treat rotations by angular velocity.
+    loop: whether it treats every track as a loop.
     """
 
     name: str
@@ -47,7 +47,7 @@ class TangentRule:
 
 
 def local_rule(name: str, slopes: Slopes) -> TangentRule:
-    """Return a rule that sees at most two neighbors on each side; a loop lends it those from its other end."""
+    """Return a rule of at most two neighbors on each side; in a loop the ends' neighbors are those of the other end."""
 
     def open_keys(times: Floats, values: Floats) -> SplineKeys:
         return SplineKeys(values, *slopes(times, values))
@@ -62,7 +62,7 @@ def local_rule(name: str, slopes: Slopes) -> TangentRule:
 def extended(times: Floats, values: Floats, count: int) -> tuple[Floats, Floats]:
     """Return times (K + 2·count,) and values (K + 2·count, C) with `count` more keys of the loop before and after.
 
-    The last key is the first one of the next lap; what its value differs by is the way made in a lap, and goes on.
+    The last key is the first one of the next cycle; the difference of their values is the displacement per cycle.
     extended([0, 1, 3], [[0], [5], [0]], 1) → [−2, 0, 1, 3, 4], [[5], [0], [5], [0], [5]]
     """
     laps, at = np.divmod(np.arange(-count, len(times) + count), len(times) - 1)

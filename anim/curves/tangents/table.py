@@ -1,4 +1,4 @@
-"""The table of tangent rules, and what they make of raw keys."""
+"""Table of tangent rules, and their application to keys."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anim.curves.tangents.rule import SplineKeys, TangentRule, local_rule
 from anim.errors import RangeError, ShapeError
 from anim.maths import quaternion as quat
 
-CLOSED = 1e-3  # radians: how near the ends of a loop of rotations must be
+CLOSED = 1e-3  # rad between first and last key of a closed loop
 
 TANGENTS: dict[str, TangentRule] = {
     rule.name: rule
@@ -41,9 +41,9 @@ DEFAULT = "time-aware"
 
 
 def parse(text: str) -> TangentRule:
-    """Return the rule that a text names: one of TANGENTS, or one of TANGENT_MAKERS with its arguments.
+    """Return the rule named by a text: one of TANGENTS, or one of TANGENT_FACTORIES with its arguments.
 
-    Raises RangeError for an unknown name, with the nearest ones in its help, and for arguments that do not fit.
+    Raises RangeError for an unknown name, with the nearest ones in its help, and for invalid arguments.
     parse("tcb(0, 0, 0.5)"), parse("akima")
     """
     return parse_call(text, TANGENTS, TANGENT_FACTORIES, kind="tangent rule")
@@ -52,10 +52,10 @@ def parse(text: str) -> TangentRule:
 def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
     """Return CUBICSPLINE keys for times (K,) s and values (K, C): the values and the rule's tangents per second.
 
-    cyclic: the last key is the first one of the next lap, so speed has no seam there (nor acceleration, for C2 rules:
-    natural becomes periodic). A last value that differs from the first is the way made in a lap.
+    cyclic: the last key is the first one of the next cycle, so speed is continuous there (for C2 rules acceleration
+    too: natural becomes periodic). The difference of last and first value is the displacement per cycle.
     The unused tangents, before the first and after the last key, are 0; so are all of a single key.
-    Raises RangeError or ShapeError for arrays that are no keys.
+    Raises RangeError or ShapeError for arrays that are not valid keys.
     keys 0, 1, 2 s with 0, 1, 0 by time-aware → out-tangents 2, 0, (0), in-tangents (0), 0, −2
     """
     t, v = _checked(times, arrays.as_floats(values, "K C", name="values"))
@@ -67,11 +67,11 @@ def apply_rotation_tangents(
 ) -> SplineKeys:
     """Return CUBICSPLINE keys for times (K,) s and quaternions (K, 4): signs aligned, the rule's tangents per second.
 
-    Local rules work on the turns from key to key, rolled out into a curve of rotation vectors in the body's own axes:
+    Local rules work on the rotations from key to key, unrolled into a curve of rotation vectors in body axes:
     its slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when
     the player normalizes them; bspline's values are normalized here, which leaves it nearly C2. Best below 120° between
-    keys. cyclic: as in spline_keys; for C2 rules the last key must be the first one, or its negative.
-    Raises RangeError for a loop that is open, for C2 rules, or a quaternion of length 0.
+    keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
+    Raises RangeError for an open loop under a C2 rule, or a quaternion of length 0.
     Source: notes/algorithms.md C4, rotations (b).
     """
     t, checked = _checked(times, arrays.as_floats(rotations, "K 4", name="rotations"))
@@ -87,7 +87,7 @@ def apply_rotation_tangents(
 
 
 def check_closed(rotations: Floats) -> None:
-    """Raise RangeError where unit quaternions (K, 4) of a loop end in another rotation than they start with."""
+    """Raise RangeError if unit quaternions (K, 4) of a loop start and end in different rotations."""
     turn = float(quat.angle_between(rotations[0], rotations[-1]))
     if turn > CLOSED:
         raise RangeError(
@@ -109,7 +109,7 @@ def _keys(times: Floats, values: Floats, rule: TangentRule, cyclic: bool) -> Spl
 
 
 def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
-    """Return the rule's keys of quaternion components, at unit length. A loop that ends at −q runs twice to close."""
+    """Return the rule's keys of quaternion components, normalized. A loop that ends at −q is closed by two cycles."""
     if cyclic:
         check_closed(q)
     count = len(q)
@@ -125,7 +125,7 @@ def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -
 
 
 def _bounded(keys: SplineKeys) -> SplineKeys:
-    """Return the keys with no tangents where no piece is, as the format wishes."""
+    """Return the keys with the unused tangents, before the first and after the last key, set to 0."""
     before, after = keys.in_tangents.copy(), keys.out_tangents.copy()
     before[0], after[-1] = 0.0, 0.0
     return SplineKeys(keys.values, before, after, keys.departure)
