@@ -1,4 +1,4 @@
-"""Cubic pieces one after another → the keys of a CUBICSPLINE track, jumps and float32 times included."""
+"""Cubic segments, and their conversion to keys of CUBICSPLINE tracks with jumps and float32 times."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from anim.maths import quaternion
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling.times import distinct_float32
 
-JUMP = 1e-6  # s; a jump takes at least this long, so that it does not become a denormal number near 0 s
-SAME = 1e-9  # of the largest value; where pieces meet nearer than this they meet
+JUMP = 1e-6  # shortest duration of a jump, to avoid denormal times near 0 s
+SAME = 1e-9  # of the largest value; smaller differences between segments are no jumps
 
 
 @dataclass(frozen=True, slots=True)
 class CubicSegments:
-    """P cubics: from start to end (P,) s, from value0 to value1 (P, C), slopes (P, C) per second at both ends."""
+    """P cubics from start to end (P,) s, from value0 to value1 (P, C), with end slopes (P, C) per second."""
 
     start: Floats
     end: Floats
@@ -29,17 +29,17 @@ class CubicSegments:
 
 
 def join_segments(parts: Sequence[CubicSegments]) -> CubicSegments:
-    """Return the pieces of all parts in order."""
+    """Return the segments of all parts in order."""
     return CubicSegments(
         *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(CubicSegments))
     )
 
 
 def to_cubicspline(track: Track, pieces: CubicSegments) -> Track:
-    """Return `track` with the pieces as CUBICSPLINE keys.
+    """Return `track` with the segments as CUBICSPLINE keys.
 
-    Where one piece's end is not the next one's start the value jumps between two keys as near as float32 allows.
-    Pieces too short for float32 times go; tangents before the first and after the last key are 0.
+    If a segment's end value is not the next one's start value, the value jumps between two keys of the least interval
+    in float32. Segments too short for float32 times are removed; unused tangents at both ends are 0.
     """
     if track.kind is ValueKind.ROTATION:
         pieces = _aligned(pieces)
@@ -63,7 +63,7 @@ def to_cubicspline(track: Track, pieces: CubicSegments) -> Track:
 
 
 def to_step(track: Track, pieces: CubicSegments) -> Track:
-    """Return `track` with the start of each piece as a STEP key, and the last end."""
+    """Return `track` with the start of each segment, and the last end, as STEP keys."""
     values = np.concatenate((pieces.value0, pieces.value1[-1:]))
     if track.kind is ValueKind.ROTATION:
         values = quaternion.align_signs(values)
@@ -72,7 +72,7 @@ def to_step(track: Track, pieces: CubicSegments) -> Track:
 
 
 def with_keys(track: Track, times: Floats, values: Floats, interpolation: Interpolation) -> Track:
-    """Return `track` with these keys and no tangents; keys too near for float32 go."""
+    """Return `track` with these keys and no tangents; keys with equal float32 times are removed."""
     kept = distinct_float32(times)
     return replace(
         track,
@@ -85,7 +85,7 @@ def with_keys(track: Track, times: Floats, values: Floats, interpolation: Interp
 
 
 def _aligned(pieces: CubicSegments) -> CubicSegments:
-    """Pieces of quaternions with signs such that each starts on the side on which the last one ended."""
+    """Quaternion segments with aligned signs: each starts in the hemisphere of the previous end."""
     inside = np.where(quaternion.dot(pieces.value0, pieces.value1) < 0, -1.0, 1.0)
     between = np.where(quaternion.dot(pieces.value1[:-1], pieces.value0[1:]) < 0, -1.0, 1.0)
     start = np.cumprod(np.concatenate(([1.0], between * inside[:-1])))[:, None]
@@ -101,7 +101,7 @@ def _aligned(pieces: CubicSegments) -> CubicSegments:
 
 
 def _jumps(pieces: CubicSegments) -> list[int]:
-    """Numbers of the pieces that don't start where the one before ended."""
+    """Indices of the segments with a start value other than the previous end value."""
     size = max(float(np.abs(pieces.value0).max()), float(np.abs(pieces.value1).max()), 1e-30)
     off = np.abs(pieces.value1[:-1] - pieces.value0[1:]).max(axis=1)
     return [int(i) + 1 for i in np.flatnonzero(off > SAME * size)]
@@ -110,7 +110,7 @@ def _jumps(pieces: CubicSegments) -> list[int]:
 def _with_jumps(
     jumps: list[int], pieces: CubicSegments, times: Floats, values: Floats, before: Floats, after: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Keys with one more just before each jump, which ends the piece that came before."""
+    """Keys with one more just before each jump, as the end of the previous segment."""
     at = np.array(jumps)
     early = times[at].astype(np.float32)
     early = np.minimum(np.nextafter(early, np.float32(-np.inf)).astype(np.float64), times[at] - JUMP)

@@ -1,4 +1,4 @@
-"""The same keys with another tempo between them."""
+"""Easing of the segments between keys."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from anim.operations.cubic_segments import to_cubicspline, to_step, with_keys
 from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
 from anim.sampling import segment
 
-TOLERANCE = 1e-3  # of a piece's range
+TOLERANCE = 1e-3  # of a segment's range
 ANGLE_TOLERANCE = math.radians(0.05)
 OUTPUTS = ("cubicspline", "linear")
-MIN_TOLERANCE = 2e-7  # of an ease; float64 fits get no nearer
-EDGE = 1e-6  # s; a piece that starts this little before --from still counts as inside
+MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
+EDGE = 1e-6  # s; a segment that starts less than this before `start` counts as inside
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerances:
-    """How near keys must follow an ease that no cubic is: share of a piece's range, and radians for rotations."""
+    """Tolerances for non-cubic easings: fraction of a segment's range, and radians for rotations."""
 
     fraction: float = TOLERANCE
     angle: float = ANGLE_TOLERANCE
@@ -43,17 +43,17 @@ def ease(
     interpolation: str = "cubicspline",
     tracks: frozenset[int] | None = None,
 ) -> Clip:
-    """Return the clip with every key-to-key piece eased: same keys, same path between them, new tempo.
+    """Return the clip with every segment between keys eased: same keys, same path, new speed.
 
-    A piece from v0 to v1 becomes v0 + e(u)(v1 − v0); rotations turn along the slerp arc by e(u) of its angle, and a
-    CUBICSPLINE piece is run through at e(u). Eases that overshoot go on beyond the keys. STEP tracks and tracks with
-    one key have no tempo and stay as they are. What is not eased in an eased track keeps its shape.
+    A segment from v0 to v1 becomes v0 + e(u)(v1 − v0); rotations follow the slerp arc to the fraction e(u) of its
+    angle, and a CUBICSPLINE segment is evaluated at e(u). Easings that overshoot extrapolate beyond the keys. STEP
+    tracks and tracks with one key are unchanged, and so is the shape of segments outside the range.
 
-    easing: one of EASINGS, or a text that names it: "smoothstep", "cubic-bezier(.2, 0, 0, 1)".
-    start, end: seconds; only pieces between are eased.
-    interpolation: "cubicspline", exact where the ease is cubic, or "linear". Steps become STEP, or jumps within one
-    float32 time where only a part is eased.
-    tracks: numbers of the tracks to ease, None for all. Raises RangeError for another interpolation.
+    easing: one of EASINGS, or its name as text: "smoothstep", "cubic-bezier(.2, 0, 0, 1)".
+    start, end: seconds; only segments between are eased.
+    interpolation: "cubicspline", exact for cubic easings, or "linear". Steps become STEP, or jumps within one float32
+    interval if only a part is eased.
+    tracks: indices of the tracks to ease, None for all. Raises RangeError for another interpolation.
     (keys 0, 1 s: 0, 1; quad-in) → keys 0, 1 s with in tangent 2 at 1 s
     """
     if interpolation not in OUTPUTS:
@@ -111,10 +111,10 @@ class _Job:
         return with_keys(track, keys.times, keys.values, Interpolation.LINEAR)
 
     def _motion(self, track: Track, inside: Bools) -> tuple[adaptive_keys.TrackFunction, Floats, float]:
-        """The eased track as functions of time, with the times where it is not smooth, and how near to follow it."""
+        """The eased track as functions of time, its non-smooth times, and the tolerance of its approximation."""
         allowed, speed = self._allowed(track, inside)
         near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
-        near = 2.0 ** math.floor(math.log2(near))  # few different fits for many tracks
+        near = 2.0 ** math.floor(math.log2(near))  # rounded, so that many tracks share few fits
         cubics = fit_segments(self.easing, tolerance=max(near, MIN_TOLERANCE))
         breaks = np.array([p.start for p in cubics[1:]])
         starts, durations = track.times[:-1][inside], np.diff(track.times)[inside]
@@ -127,7 +127,7 @@ class _Job:
         )
 
     def _allowed(self, track: Track, inside: Bools) -> tuple[float, float]:
-        """How far keys may be off, and how fast the track changes per share of a piece: an ease's error times that."""
+        """Tolerance of the keys, and greatest derivative per u, which multiplies an easing's error."""
         speed = segment.max_rate(track, np.flatnonzero(inside))
         if track.kind is ValueKind.ROTATION:
             return self.tolerances.angle, speed

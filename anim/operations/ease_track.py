@@ -1,4 +1,4 @@
-"""What an ease makes of a track: as cubic pieces where there is a closed form, as functions of time where not."""
+"""Eased tracks: cubic segments if there is a closed form, otherwise functions of time."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from anim.model import Interpolation, Track, ValueKind
 from anim.operations.cubic_segments import JUMP, CubicSegments, join_segments
 from anim.sampling import segment
 
-JOINT = 1e-12  # of an ease; nearer than this to where two of its cubics meet is there
+JOINT = 1e-12  # of an easing; u this near to a knot between two cubics is at the knot
 LINE = (CubicSegment(0, 1, 0, 1, 1, 1),)
 
 
 def ease_segments(
     track: Track, inside: Bools, easing: Easing, tolerance: float, angle_tolerance: float
 ) -> CubicSegments:
-    """Return the cubics of a LINEAR track with the pieces `inside` (K − 1,) eased, the others as they are.
+    """Return the cubics of a LINEAR track with the segments `inside` (K − 1,) eased, the others unchanged.
 
-    tolerance: share of a piece's range, where the ease is not cubic. angle_tolerance: radians, for rotations.
+    tolerance: fraction of a segment's range, for non-cubic easings. angle_tolerance: radians, for rotations.
     """
     parts = []
     for which, each in ((np.flatnonzero(inside), easing), (np.flatnonzero(~inside), EASINGS["linear"])):
@@ -40,9 +40,9 @@ def ease_segments(
 
 
 def ease_steps(track: Track, inside: Bools, easing: Easing, *, angle_tolerance: float) -> CubicSegments:
-    """Return the pieces of a track that holds and jumps by a stepped ease where `inside`, and stays itself elsewhere.
+    """Return the segments of a track with stepped easing `inside`, and unchanged elsewhere.
 
-    Where the last one is inside, a piece of one jump's length ends at the last key's value.
+    If the last one is inside, an additional segment with the duration of a jump ends at the last key's value.
     """
     assert easing.exact is not None
     levels = np.array([(p.start, p.end, p.value0) for p in easing.exact])
@@ -62,7 +62,7 @@ def ease_steps(track: Track, inside: Bools, easing: Easing, *, angle_tolerance: 
 
 
 class EasedTrack:
-    """An eased track as functions of time: values and, just before or after, rates."""
+    """Eased track as functions of time: values and one-sided derivatives."""
 
     def __init__(self, track: Track, inside: Bools, cubics: Sequence[CubicSegment]) -> None:
         self._track, self._inside, self._cubics = track, inside, tuple(cubics)
@@ -73,7 +73,7 @@ class EasedTrack:
         return segment.evaluate(self._track, left, np.where(self._inside[left], evaluate(self._cubics, u), u))
 
     def rates(self, times: Floats, before: bool) -> Floats:
-        """Return the change per second (F, C), of rotations the angular velocity (F, 3), on one side of times (F,)."""
+        """Return the one-sided derivative per second (F, C), of rotations the angular velocity (F, 3), at times (F,)."""
         left, u = self._place(times, before=before)
         inside = self._inside[left]
         share = np.where(inside, evaluate(self._cubics, u), u)
@@ -89,7 +89,7 @@ class EasedTrack:
 
 
 def slope(cubics: tuple[CubicSegment, ...], u: Floats, *, before: bool) -> Floats:
-    """Return the slope of an ease given as cubics, just before or just after u (F,)."""
+    """Return the slope of an easing given as cubics, just before or just after u (F,)."""
     start, end, value0, value1, slope0, slope1 = _columns(cubics).T
     shifted = u - JOINT if before else u + JOINT
     at = np.clip(np.searchsorted(start, shifted, side="right") - 1, 0, len(cubics) - 1)
@@ -104,7 +104,7 @@ def _columns(cubics: Sequence[CubicSegment]) -> Floats:
 
 
 def _moves(track: Track, left: Ints, cubics: Sequence[CubicSegment]) -> CubicSegments:
-    """The pieces left → left + 1 (S,) of a vector track, each as these cubics."""
+    """The segments left → left + 1 (S,) of a vector track, each composed of these cubics."""
     duration = (track.times[left + 1] - track.times[left])[:, None]
     start, way = track.values[left][:, None], (track.values[left + 1] - track.values[left])[:, None]
     rows = _columns(cubics)
@@ -117,7 +117,7 @@ def _moves(track: Track, left: Ints, cubics: Sequence[CubicSegment]) -> CubicSeg
 
 
 def _rotation_segments(track: Track, left: Ints, easing: Easing, tolerance: float) -> list[CubicSegments]:
-    """The pieces left → left + 1 (S,) of a rotation track, each turned along its own arc; like angles share a fit."""
+    """The segments left → left + 1 (S,) of a rotation track, each eased along its own arc; fits are shared by angle."""
     q = quaternion.normalize(track.values)
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(q[left]), q[left + 1]))
     angle = np.sqrt((turn * turn).sum(axis=1))
@@ -167,7 +167,7 @@ def _constant_segments(start: Floats, end: Floats, value0: Floats, value1: Float
 
 
 def _without_last_start(pieces: CubicSegments) -> CubicSegments:
-    """For STEP: the last piece, which only carries the last key's value, has no key of its own at its start."""
+    """Segments for STEP: the last one, which only contains the last key's value, gets no key at its start."""
     ended = np.concatenate((pieces.value1[:-2], pieces.value1[-1:]))
     parts = (pieces.start[:-1], pieces.end[:-1], pieces.value0[:-1], ended, pieces.slope0[:-1], pieces.slope1[:-1])
     return CubicSegments(*parts)

@@ -1,4 +1,4 @@
-"""A clip whose end meets its start, in value and in speed."""
+"""Closing of loops in value and speed."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
-SPARSE = 6  # keys that a blend needs at least; sparser tracks get more
-FPS = 30.0  # of those
+SPARSE = 6  # fewest keys in a blend; sparser tracks get more
+FPS = 30.0  # of the added keys
 SHORTEST = 1e-5  # s, between two keys
 
 
 def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
-    """Return the clip one frame longer, its last key the first one again: for a loop that lacks its last frame."""
+    """Return the clip with its first pose appended as a frame: for a loop that lacks its last frame."""
     end = clip.end + 1 / fps
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(clip.name, tuple(_extended(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
 def open_tracks(clip: Clip) -> frozenset[int]:
-    """Return the numbers of the tracks that end in another value than they start with; q and −q are the same.
+    """Return the indices of the tracks with different first and last value; q and −q are equal.
 
     (one track from 0 to 1 and back to 0, one from 0 to 1) → {1}
     """
@@ -39,11 +39,11 @@ def _is_closed(track: Track) -> bool:
 
 
 def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> Clip:
-    """Return the clip with its last `blend` seconds bent so that it ends as it starts, in value and speed.
+    """Return the clip with its last `blend` seconds corrected so that it ends as it starts, in value and speed.
 
-    To the motion a correction is added that grows from nothing: a cubic with the gap in value and in speed at its end;
-    for rotations a turn. The last piece of a LINEAR track gets the speed of the first one. STEP tracks end on their
-    first value. Tracks not in `tracks` keep their end: a root that travels.
+    The correction is added to the motion: a cubic from 0 to the loop gap in value and speed; for rotations a rotation
+    vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks end with their first value.
+    Tracks not in `tracks` keep their end, for example of a traveling root.
     Raises RangeError unless 0 < blend ≤ the clip's duration.
     """
     if not 0 < blend <= clip.end - clip.start:
@@ -92,7 +92,7 @@ def _closed(track: Track, clip: Clip, blend: float) -> Track:
 
 
 def _without_last_jump(track: Track) -> Track:
-    """Return a track whose last two keys stand for a jump without it: the bend replaces that."""
+    """Return a track without a jump between its last two keys, which the correction replaces."""
     before, after = track.in_tangents, track.out_tangents
     return replace(
         track,
@@ -110,15 +110,16 @@ def _closing_offset(track: Track, first: Floats, last: Floats) -> Floats:
 
 
 def _stepped_back(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
-    """Return what a track was some seconds before a value that it reaches at a steady speed."""
+    """Return the value some seconds before `value` at constant speed."""
     if track.kind is ValueKind.ROTATION:
         return quaternion.multiply(value, quaternion.from_rotation_vector(-seconds * speed))
     return value - seconds * speed
 
 
 def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -> Floats:
-    """Return the slope at its end of the cubic that is 0 and at rest at first, `gap` after `duration` seconds, and
-    `before_last` the `last` seconds earlier.
+    """Return the end slope of the correction cubic.
+
+    The cubic is 0 with slope 0 at first, `gap` after `duration` seconds, and `before_last` at `last` seconds earlier.
     """
     share = 1 - last / duration
     # c(s) = (3 g − m) s² + (m − 2 g) s³ with m the slope per duration, so that c(1) = g and c'(1) = m
@@ -126,7 +127,7 @@ def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -
 
 
 class _Correction:
-    """What is added from `start` to `end`: nothing and at rest at first, `gap` with `speed` (per second) at last."""
+    """Correction from `start` to `end`: 0 with speed 0 at first, `gap` with `speed` (per second) at last."""
 
     def __init__(self, start: float, end: float, gap: Floats, speed: Floats) -> None:
         self.start, self.end = start, end
@@ -153,7 +154,7 @@ def _bent_lines(track: Track, times: Floats, correction: _Correction) -> Track:
 
 
 def _times(track: Track, start: float, end: float) -> Floats:
-    """Return the track's keys, with the ends of the blend and, where keys are sparse in it, some between."""
+    """Return the track's key times with the ends of the blend and, for sparse keys, some between."""
     keys = track.times
     inside = keys[(keys > start) & (keys < end)]
     more = np.array([start, end])

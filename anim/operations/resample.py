@@ -1,4 +1,4 @@
-"""The same motion on a regular grid of keys."""
+"""Resampling of clips on a uniform grid of keys."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from anim.sampling.batch import Batch, batches
 from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"
-UNIT = 1e-6  # of a squared length; what rounding to float32 leaves
+UNIT = 1e-6  # of a squared length: error by rounding to float32
 INTERPOLATIONS = (KEEP, "step", "linear", "cubicspline")
 
 
@@ -24,15 +24,15 @@ def resample(
 ) -> Clip:
     """Return the clip with its tracks keyed at `fps` frames per second.
 
-    Keys lie at start + k / fps of the clip; the last key is the clip's end even when the duration is no multiple of
-    1 / fps. A track that never changes, or has one key, is kept as it is: more keys would say nothing.
-    Rotations stay unit and sign-continuous; a rotation spline between far keys is followed closely but not exactly,
-    since players normalize it and its new keys are unit. Morph weights and pointers are sampled like any other track.
+    Keys are at start + k / fps of the clip; the last key is the clip's end even if the duration is no multiple of
+    1 / fps. A constant track, or one with a single key, is unchanged: more keys would be redundant.
+    Rotations stay unit and sign-continuous; a rotation spline between distant keys is approximated closely but not
+    exactly, since players normalize it and its new keys are unit. Morph weights and pointers are sampled likewise.
 
     fps: frames per second, > 0. Raises RangeError otherwise.
     interpolation: "keep", or "step", "linear", "cubicspline" for all tracks; bools and integers stay STEP.
-    snap: STEP tracks get their jumps on the grid too; without it their keys stay exactly where they are.
-    tracks: numbers of the tracks to resample, None for all.
+    snap: move jumps of STEP tracks to the grid too; otherwise their key times are unchanged.
+    tracks: indices of the tracks to resample, None for all.
     (keys 0, 1 s; fps 4) → keys 0, 0.25, 0.5, 0.75, 1 s
     """
     if interpolation not in INTERPOLATIONS:
@@ -55,7 +55,7 @@ def _goal(track: Track, interpolation: str) -> Interpolation:
 
 
 def _kept(track: Track, goal: Interpolation) -> Track:
-    """A track whose keys stay, with the interpolation that was asked for where it says the same without tangents."""
+    """A track with its keys unchanged, in the requested interpolation if that needs no tangents."""
     if goal is track.interpolation or goal is Interpolation.CUBICSPLINE or _is_sampled(track):
         return track
     return replace(track, interpolation=goal, in_tangents=None, out_tangents=None)
@@ -77,7 +77,7 @@ def _is_constant(track: Track) -> bool:
 
 
 def _sampled(tracks: list[Track], times: Floats) -> list[Floats]:
-    """The values (F, C) of each track at `times`, rotations sign-continuous; tracks on one time axis at once."""
+    """Values (F, C) of each track at `times`, rotations sign-continuous; tracks of one time axis form a batch."""
     found: dict[int, Floats] = {}
     for batch in batches(tracks):
         values = batch.sample(times)
@@ -88,7 +88,7 @@ def _sampled(tracks: list[Track], times: Floats) -> list[Floats]:
 
 
 def _with_keys(batch: Batch, times: Floats, values: Floats) -> Floats:
-    """Sampled rotations, at keys the key's own numbers where they are unit already: normalizing changes last bits."""
+    """Sampled rotations with unit keys restored bit for bit, since normalization changes the last bits."""
     at = np.minimum(np.searchsorted(batch.times, times), len(batch.times) - 1)
     own = batch.values[at]
     unit = np.abs(quaternion.dot(own, own) - 1) < UNIT
@@ -106,7 +106,7 @@ def _keyed(track: Track, goal: Interpolation, times: Floats, values: Floats) -> 
 
 
 def _tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Tangents of the new keys; a piece that was there from key to key keeps its own, to the bit."""
+    """Tangents of the new keys; an unchanged segment keeps its own, bit for bit."""
     before, after = derivatives.tangents(track, times, values)
     if track.in_tangents is None or track.out_tangents is None:
         return before, after

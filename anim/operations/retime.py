@@ -1,4 +1,4 @@
-"""Seconds of a clip moved, stretched, turned round: keys keep their values, tangents follow by the chain rule."""
+"""Retiming of clips: scale, shift, reverse, ping-pong; values stay and tangents follow by the chain rule."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.model import Clip, Interpolation, Track
 
-NEAR_ZERO_S = 5e-4  # an offset that leads this near to 0 means 0: the times that it was read from are printed rounded
-JUMP = 1e-6  # s; how long a reversed STEP track shows the value that it ended on for an instant
+NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
+JUMP = 1e-6  # s; duration of the final value of a reversed STEP track
 
 
 def retime(
@@ -26,14 +26,14 @@ def retime(
     offset: float = 0.0,
     tracks: frozenset[int] | None = None,
 ) -> Clip:
-    """Return the clip played faster or slower, backwards, there and back, later: in that order.
+    """Return the clip with its time scaled, reversed, ping-ponged and shifted, in that order.
 
-    These are seconds of the clip; how many frames a display shows of them is not touched. Exact for every
-    interpolation: values stay, tangents are divided by what stretches time.
+    Times are seconds of the clip, independent of a display's frame rate. Exact for every interpolation: values stay,
+    tangents are divided by the time scale.
 
     speed: > 0; 0.25 takes four times as long. duration: seconds from first to last key, > 0. Not both.
-    The clip's start stays where it is, but for `offset` seconds, which must not lead below 0; one that leads back to
-    within half a millisecond of 0 leads to 0 itself.
+    offset: seconds added to the clip's start, which otherwise is unchanged; the new start must not be below 0. A new
+    start within half a millisecond of 0 becomes 0.
     Raises RangeError for values out of range.
     (keys 0, 1 s; speed 0.25) → keys 0, 4 s
     """
@@ -56,7 +56,7 @@ def retime(
 
 
 def scale_time(track: Track, start: float, factor: float) -> Track:
-    """Return the track with every time `factor` times as far from `start`."""
+    """Return the track with its times scaled by `factor` about `start`."""
     times = start + (track.times - start) * factor
     if track.in_tangents is None or track.out_tangents is None:
         return replace(track, times=times)
@@ -64,15 +64,15 @@ def scale_time(track: Track, start: float, factor: float) -> Track:
 
 
 def shift_time(track: Track, offset: float) -> Track:
-    """Return the track `offset` seconds later."""
+    """Return the track shifted by `offset` seconds."""
     return replace(track, times=np.maximum(track.times + offset, 0.0))
 
 
 def reverse_track(track: Track, start: float, end: float) -> Track:
-    """Return the track as it runs from `end` back to `start` (s, of the clip); twice reversed it is itself again.
+    """Return the track reversed between `start` and `end` (s, of the clip); reversing twice restores it.
 
-    What STEP holds from a key to the next it holds between the same two moments; the value that it ends on shows first,
-    for a microsecond where it ended at `end`.
+    STEP keeps its value in each mirrored interval; its last value comes first, for a microsecond if the last key is at
+    `end`.
     """
     times = start + end - track.times[::-1]
     if track.interpolation is Interpolation.STEP:
@@ -118,7 +118,7 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
 
 
 def _checked_offset(offset: float, start: float) -> float:
-    """The offset, or the one that leads to 0 s exactly where that is what it means."""
+    """The offset, adjusted for a start at 0 s if the new start is within NEAR_ZERO_S of it."""
     if offset < 0 and abs(start + offset) < NEAR_ZERO_S:
         return -start
     if not start + offset >= 0:
@@ -139,7 +139,7 @@ def _reversed_step(track: Track, times: Floats, start: float) -> Track:
 
 
 def _joined(track: Track, back: Track, *, drop_first: bool) -> Track:
-    """One track after the other; at the turn the tangents of both sides meet in one key where times do."""
+    """Two tracks concatenated; equal end and start times become one key with the tangents of both sides."""
     skip = 1 if drop_first else 0
     times = np.concatenate((track.times, back.times[skip:]))
     values = np.concatenate((track.values, back.values[skip:]))

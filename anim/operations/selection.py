@@ -1,4 +1,4 @@
-"""Which clips and tracks a command is about: the same globs everywhere."""
+"""Selection of clips, nodes and tracks by globs."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from anim.model import Clip, Skeleton
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Globs for the names of clips and nodes, and the paths of tracks; empty means all."""
+    """Globs for names of clips and nodes, and paths of tracks; empty selects all."""
 
     clips: Sequence[str] = ()
     nodes: Sequence[str] = ()
     paths: Sequence[str] = ()
 
     def chosen_clips(self, names: Sequence[str]) -> list[int]:
-        """Return the numbers of the clips that are meant; a clip without a name is called by its number, "3".
+        """Return the indices of the selected clips; the name of an unnamed clip is its index, "3".
 
-        Raises NotFoundError for a glob that matches no clip, and says which name is near.
+        Raises NotFoundError, with similar names, for a glob that matches no clip.
         """
         return match_names(self.clips, [name or f"#{i}" for i, name in enumerate(names)], "clip")
 
     def chosen_nodes(self, skeleton: Skeleton) -> list[int]:
-        """Return the numbers of the nodes that are meant; a node without a name is called by its number."""
+        """Return the indices of the selected nodes; the name of an unnamed node is its index."""
         names = [name or str(i) for i, name in enumerate(skeleton.names)]
         return match_names(self.nodes, names, "node")
 
     def chosen_tracks(self, clip: Clip, skeleton: Skeleton) -> frozenset[int]:
-        """Return the numbers of the tracks of `clip` that are meant; pointers only where neither node nor path is."""
+        """Return the indices of the selected tracks of `clip`; pointers only without a selection of nodes and paths."""
         nodes = set(self.chosen_nodes(skeleton)) if self.nodes else None
         return frozenset(
             i
@@ -42,10 +42,10 @@ class Selection:
 
 
 def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
-    """Return the numbers of the names that match any of the globs; of all without a glob. what: "clip", for messages.
+    """Return the indices of the names that match any of the globs; all without globs. what: "clip", for messages.
 
-    "#3" is number 3, whatever it is called.
-    Raises NotFoundError for a glob that matches none, and says which name is near.
+    "#3" is index 3, with any name.
+    Raises NotFoundError, with similar names, for a glob that matches none.
     """
     if not globs:
         return list(range(len(names)))

@@ -1,4 +1,4 @@
-"""Raw keys as a smooth curve: tangents by a rule from the table TANGENTS."""
+"""Smooth curves through keys: tangents by a rule from the table TANGENTS."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from anim.errors import AnimError, RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 
-SMALLEST = 1e-3  # ends of a vector's track are compared with its largest value, and with this at least
-NEAR = 1e-6  # of the clip's end: times in float32 that mean the same
+SMALLEST = 1e-3  # lower limit of a vector track's largest value, for the comparison of its ends
+NEAR = 1e-6  # of the clip's end: differences of float32 times by rounding
 
 
 def spline(
@@ -26,17 +26,16 @@ def spline(
     tracks: frozenset[int] | None = None,
     label: Callable[[int], str] = "node {}".format,
 ) -> Clip:
-    """Return the clip with its keys joined by cubics whose tangents follow a rule; tangents that were there go.
+    """Return the clip as CUBICSPLINE with tangents by a rule, which replace existing tangents.
 
-    Rotations get theirs from angular velocities, so that they are those of a turning thing. STEP tracks hold on purpose
-    and stay; so do tracks with one key. Values stay too, but under a rule that approximates (bspline).
-    tangents: one of TANGENTS, or a text that names it: "natural", "tcb(0, 0, 0.5)".
-    cyclic: a loop: the first and the last key are neighbors, so value and speed have no seam. A track that starts late
-    or ends early stands still at the seam: its keys are not neighbors.
-    root: the node whose translation goes on from lap to lap, −1 for none.
-    label: gives what errors call a node (`Skeleton.label`).
-    Raises RangeError where the rule can't be used, and for a loop with a track that ends in another value than it
-    starts with.
+    Tangents of rotations come from angular velocities. STEP tracks are intentionally constant between keys and
+    unchanged; so are tracks with one key. Values are unchanged except under a rule that approximates (bspline).
+    tangents: one of TANGENTS, or its name as text: "natural", "tcb(0, 0, 0.5)".
+    cyclic: a loop: the first and the last key are neighbors, so value and speed are continuous at the seam. A track
+    that starts late or ends early has zero speed at the seam: its keys are not neighbors.
+    root: the node with a translation that continues from cycle to cycle, −1 for none.
+    label: gives the name of a node for errors (`Skeleton.label`).
+    Raises RangeError if the rule can't be used, and for a loop with a track of different first and last value.
     (keys 0, 1, 2 s: 0, 1, 0; time-aware) → tangents 2, 0, −2
     """
     rule = parse(tangents) if isinstance(tangents, str) else tangents
@@ -56,7 +55,7 @@ def spline(
 
 
 def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
-    """Return how far keys were moved at most: largest change of a vector value, and largest turn in radians.
+    """Return the largest change of keys: of a vector value, and of a rotation in radians.
 
     Both clips have the same tracks with the same keys.
     """
@@ -73,13 +72,13 @@ def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
 
 
 def _spans(track: Track, clip: Clip) -> bool:
-    """Whether a track has keys at both ends of its clip, as near as float32 times can tell."""
+    """Whether a track has keys at both ends of its clip, within the resolution of float32 times."""
     near = NEAR * max(clip.end, 1.0)
     return bool(track.times[0] <= clip.start + near and track.times[-1] >= clip.end - near)
 
 
 def _check_closed(track: Track) -> None:
-    """Raise RangeError where a track of a loop ends in another value than it starts with."""
+    """Raise RangeError if a track of a loop has different first and last value."""
     if track.kind is ValueKind.ROTATION:
         check_closed(quaternion.normalize(track.values[[0, -1]]))
         return

@@ -1,4 +1,4 @@
-"""A clip run through at another tempo: new time → old time by a map that may slow down, race, stop or turn back."""
+"""Time warp of clips: new time → old time by a map of any speed, zero and negative included."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from anim.sampling.derivatives import rates
 from anim.sampling.times import distinct_float32
 from anim.sampling.track import sample
 
-TOLERANCE = 1e-3  # of a track's range, where no cubic is exact
+TOLERANCE = 1e-3  # of a track's range, if no cubic is exact
 ANGLE_TOLERANCE = math.radians(0.05)
-HALVINGS = 60  # of the search for the moment at which the map reaches a key
-SNAP = 1e-10  # s; the search for a key's moment ends nearer than this
-MIN_TOLERANCE = 2e-7  # of an ease; float64 fits get no nearer
+HALVINGS = 60  # of the search for the time at which the map reaches a key
+SNAP = 1e-10  # s; error of the search for a key's time
+MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
 
 
 def warp(
@@ -41,15 +41,15 @@ def warp(
     interpolation: str = "cubicspline",
     tracks: frozenset[int] | None = None,
 ) -> Clip:
-    """Return the clip with one ease over a whole range: at start + u·d it shows what it showed at start + e(u)·d.
+    """Return the clip with its time eased over a range: the pose at start + u·d is the old one at start + e(u)·d.
 
-    easing: one of EASINGS, or a text that names it: "sine-in-out".
-    start, end: seconds, by default the clip's own; before and after nothing changes. An ease that overshoots runs into
-    the motion beyond the range and back; beyond the clip's ends it holds.
-    STEP keys move to where the map reaches them, exactly. Others become CUBICSPLINE: exact for LINEAR vectors under a
-    cubic ease, within `tolerance` (share of a track's range) or `angle_tolerance` (rad) elsewhere; with interpolation
-    "linear" LINEAR, within the same.
-    Raises RangeError for an empty range, or an ease that jumps.
+    easing: one of EASINGS, or its name as text: "sine-in-out".
+    start, end: seconds, by default the clip's own; outside nothing changes. An easing that overshoots reaches the
+    motion outside the range, clamped to the clip's ends.
+    STEP keys move exactly to the times at which the map reaches them. Others become CUBICSPLINE: exact for LINEAR
+    vectors under a cubic easing, otherwise within `tolerance` (fraction of a track's range) or `angle_tolerance` (rad);
+    with interpolation "linear" LINEAR, within the same.
+    Raises RangeError for an empty range, or an easing that jumps.
     """
     easing = table.parse(easing) if isinstance(easing, str) else easing
     first = clip.start if start is None else start
@@ -62,7 +62,7 @@ def warp(
     new = []
     corners: dict[
         tuple[int, tuple[CubicSegment, ...]], Floats
-    ] = {}  # tracks on one time axis under one map share the search for keys
+    ] = {}  # tracks of one time axis and one map share the search for keys
     for i, track in enumerate(clip.tracks):
         if i not in chosen or len(track.times) == 1 or not _moves(track):
             new.append(track)
@@ -83,9 +83,9 @@ def warp(
 
 @dataclass(frozen=True, slots=True)
 class TimeMap:
-    """New time → old time: an ease between start and end, in seconds, and the same time elsewhere.
+    """Map from new to old time: an easing between start and end, in seconds, and the identity elsewhere.
 
-    cubics: the ease, or what follows it closely. value: what counts: that of the cubics, or the ease's own.
+    cubics: the easing, or its approximation. value: function of the map: of the cubics, or of the easing itself.
     """
 
     cubics: tuple[CubicSegment, ...]
@@ -94,20 +94,20 @@ class TimeMap:
     end: float
 
     def old(self, times: Floats) -> Floats:
-        """Return the old times (F,) that new times (F,) show."""
+        """Return the old times (F,) of new times (F,)."""
         u = (times - self.start) / (self.end - self.start)
         inside = (u >= 0) & (u <= 1)
         eased = self.start + (self.end - self.start) * self.value(np.clip(u, 0, 1))
         return np.where(inside, eased, times)
 
     def speed(self, times: Floats, *, before: bool) -> Floats:
-        """Return old seconds per new second (F,), just before or just after each time; negative while it runs back."""
+        """Return old seconds per new second (F,), just before or just after each time; negative in reverse."""
         u = (times - self.start) / (self.end - self.start)
         inside = (u > 0) & (u <= 1) if before else (u >= 0) & (u < 1)
         return np.where(inside, slope(self.cubics, np.clip(u, 0, 1), before=before), 1.0)
 
     def reaching(self, keys: Floats) -> Floats:
-        """Return the new times at which the map reaches one of the old times `keys` (K,), and its pieces' ends."""
+        """Return the new times of the old times `keys` (K,), and the ends of the map's segments."""
         found = [keys[(keys <= self.start) | (keys >= self.end)], np.array([self.start, self.end])]
         duration = self.end - self.start
         for low, high in _monotone(self.cubics):
@@ -121,11 +121,11 @@ class TimeMap:
 
 
 def _map(track: Track, easing: Easing, start: float, end: float, allowed: float) -> TimeMap:
-    """The map for one track: an ease that is no cubic is followed so closely that its error stays half of `allowed`."""
+    """The map for one track: a non-cubic easing is approximated so that its error is at most half of `allowed`."""
     if track.interpolation is Interpolation.STEP:
         return TimeMap(fit_segments(easing, tolerance=TOLERANCE), easing.value, start, end)
     near = allowed / 2 / max(segment.max_rate_per_second(track) * (end - start), allowed)
-    near = 2.0 ** math.floor(math.log2(max(near, MIN_TOLERANCE)))  # few different fits for many tracks
+    near = 2.0 ** math.floor(math.log2(max(near, MIN_TOLERANCE)))  # rounded, so that many tracks share few fits
     cubics = fit_segments(easing, tolerance=max(near, MIN_TOLERANCE))
     return TimeMap(cubics, lambda u: evaluate(cubics, u), start, end)
 
@@ -156,7 +156,7 @@ def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
     def changes(at: Floats, before: bool) -> Floats:
         tempo = times.speed(at, before=before)
         old = _snapped(times.old(at), track.times)
-        # running forward, just before in new time is just before in old time; running back it is just after
+        # forward, just before in new time is just before in old time; in reverse it is just after
         forward, back = rates(track, old, before=before), rates(track, old, before=not before)
         return np.asarray(np.where((tempo >= 0)[:, None], forward, back) * tempo[:, None])
 
@@ -164,13 +164,13 @@ def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
 
 
 def _snapped(times: Floats, keys: Floats) -> Floats:
-    """Times, those that only rounding keeps from a key put on it: there, before and after differ."""
+    """Times, those within rounding of a key moved to the key, where one-sided derivatives differ."""
     near = keys[np.clip(np.searchsorted(keys, times - SNAP), 0, len(keys) - 1)]
     return np.where(np.abs(near - times) <= SNAP, near, times)
 
 
 def _without_repeats(track: Track) -> Track:
-    """STEP keys that change nothing go, but for the first and the last."""
+    """The STEP track without redundant keys, except for the first and the last."""
     changed = np.concatenate(([True], (np.diff(track.values, axis=0) != 0).any(axis=1)))
     changed[-1] = True
     return replace(track, times=track.times[changed], values=track.values[changed])
@@ -182,13 +182,13 @@ def _extent(track: Track) -> float:
 
 
 def _monotone(cubics: Sequence[CubicSegment]) -> list[tuple[float, float]]:
-    """The parts of u between which the ease only rises or only falls, in order."""
+    """Monotonic intervals of u of the easing, in order."""
     parts: list[tuple[float, float]] = []
     for p in cubics:
         length = p.end - p.start
         a, b = length * p.slope0, length * p.slope1
         rise = p.value1 - p.value0
-        # slope of the cubic over its own share w: a + (6·rise − 4a − 2b) w + 3 (a + b − 2·rise) w²
+        # slope of the cubic over its own parameter w: a + (6·rise − 4a − 2b) w + 3 (a + b − 2·rise) w²
         roots = np.roots([3 * (a + b - 2 * rise), 6 * rise - 4 * a - 2 * b, a])
         turns = sorted(float(w.real) for w in roots if abs(w.imag) < 1e-12 and 0 < w.real < 1)
         edges = [p.start, *(p.start + w * length for w in turns), p.end]
@@ -197,7 +197,7 @@ def _monotone(cubics: Sequence[CubicSegment]) -> list[tuple[float, float]]:
 
 
 def _inverse(value: Callable[[Floats], Floats], low: float, high: float, shares: Floats, *, rising: bool) -> Floats:
-    """The u between low and high, where the ease only rises or only falls, at which it has the values `shares`."""
+    """The u at which the easing, monotonic between low and high, has the values `shares`."""
     a, b = np.full(len(shares), low), np.full(len(shares), high)
     for _ in range(HALVINGS):
         middle = (a + b) / 2

@@ -1,4 +1,4 @@
-"""A part of a clip, with exact new ends."""
+"""Trimming of clips, with exact new ends."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def trim(
     rebase: bool = False,
     tracks: frozenset[int] | None = None,
 ) -> Clip:
-    """Return what the clip shows from `start` to `end` seconds; keys between stay, those at the ends are exact.
+    """Return the clip from `start` to `end` seconds; keys between are unchanged, keys at the ends are exact.
 
-    New end keys have the value, and under CUBICSPLINE the tangent, that the track has there; a cut piece of a rotation
-    spline gets keys more where renormalized cubics need them. A track with no key in between becomes one key.
-    start, end: by default the clip's own; times beyond it are brought back to it, others rounded to float32, as keys
-    are. Where both are left out, or the clip is one moment, nothing is cut.
-    rebase: move all so that the part starts at 0 s. Raises RangeError for an empty part.
+    New end keys have the track's value and, under CUBICSPLINE, its tangent; a cut segment of a rotation spline gets
+    more keys if its normalization needs them. A constant track without a key in between becomes one key.
+    start, end: by default the clip's own; times outside are clamped to it, others rounded to float32 like keys.
+    Without both, or if the clip has one time only, nothing is cut.
+    rebase: shift the part to start at 0 s. Raises RangeError for an empty part.
     (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
     """
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
@@ -77,7 +77,7 @@ def _trimmed(track: Track, start: float, end: float) -> Track:
 
 
 def _changes(track: Track, start: float, end: float) -> bool:
-    """Whether a track without a key in between differs between its ends or moves there."""
+    """Whether a track without a key in between has different end values or a non-zero speed there."""
     ends = sample(track, np.array([start, end]))
     moving = track.interpolation is not Interpolation.STEP and bool(rates(track, np.array([start]), before=False).any())
     return moving or bool((ends[0] != ends[1]).any())
@@ -107,7 +107,7 @@ def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[
 
 
 def _with_cuts(track: Track, times: Floats) -> Floats:
-    """The times with more of them in the cut pieces at both ends, where a rotation's cubic is normalized anew."""
+    """The times with more in the cut segments at both ends, in which a rotation's cubic is normalized anew."""
     motion = adaptive_keys.TrackFunction(
         lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
     )
@@ -126,7 +126,7 @@ def _restore(
     before: Floats,
     after: Floats,
 ) -> None:
-    """Keys that were there keep what they had, to the bit but for signs; on the side of a cut the tangent is new."""
+    """Restore original keys bit for bit except for signs; on the side of a cut the tangent is new."""
     assert track.in_tangents is not None
     assert track.out_tangents is not None
     at = np.searchsorted(track.times, times[exact])
