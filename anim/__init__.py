@@ -16,25 +16,25 @@
 
 Facade
     load, save              files and bytes ↔ Asset
-    optimize, bake          fewer bytes under a bound; skinning as a vertex cache
-    diff                    how far two assets move apart
+    optimize, bake          fewer bytes within an error bound; skinning as a vertex cache
+    diff                    distances between the motion of two assets
     sample, sample_poses    positions of joints; rotations, scales and matrices too
-    Asset, Clip, Track, Skeleton, Scene, VertexCache    what they give and take
-    AnimError               what is refused, and why: FormatError, UnsupportedError, NotFoundError,
+    Asset, Clip, Track, Skeleton, Scene, VertexCache    their arguments and results
+    AnimError               base of all errors: FormatError, UnsupportedError, NotFoundError,
                             RangeError, ShapeError, OutputError
-    CACHE_FORMATS, SKINNING_METHODS, EASINGS, TANGENTS  tables of what can be named
+    CACHE_FORMATS, SKINNING_METHODS, EASINGS, TANGENTS  tables of names for options
     ops                     Clip → Clip: resample, ease, warp, retime, trim, loop, spline
 
-Rooms, from the bottom up, each imported as anim.<room>.<module>
+Packages, from the bottom up, each imported as anim.<package>.<module>
     maths                   quaternions, matrices, Euler angles, Hermite cubics on arrays
     model                   Clip, Track, Skeleton, Scene, Pose, VertexCache: frozen, checked once
     files, gltf             paths; the JSON and buffers of glTF: reading, validation, writing
     sampling, curves        tracks and poses at times; easings, tangents, keys that follow curves
-    measure                 inspect, error, diff, continuity, loops: numbers about things
-    operations              what `ops` offers
+    measure                 inspect, error, diff, continuity, loops
+    operations              implementation of `ops`
     exchange                BVH, CSV and JSON curves; retargeting
     skinning, caches        methods and bakes; .npz, .usdc, .pc2, .glb and other vertex caches
-    optimization            keys and bits under a bound, verified
+    optimization            fewest keys and bits within an error bound, verified
     show                    plots and filmstrips
 
 Metres, seconds and radians; right-handed, Y up; quaternions (x, y, z, w). Arrays are read-only, so that values can be
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-_MODULES = {  # where a name comes from, imported when it is first used
+_MODULES = {  # modules of the names, imported on first use
     "anim.api": ("BakedCache", "OptimizeResult", "bake", "diff", "optimize", "sample", "sample_poses"),
     "anim.asset": ("Asset", "load", "save"),
     "anim.caches.registry": ("CACHE_FORMATS",),

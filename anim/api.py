@@ -1,6 +1,6 @@
-"""What most scripts need, on assets and names of clips; `anim` offers it as its own.
+"""Functions of the facade `anim`, on assets and names of clips.
 
-Here lengths may have units, as on the command line: "0.5mm", "2cm", "0.1%" of the diagonal of the model's bounding box;
+Lengths may have units, as on the command line: "0.5mm", "2cm", "0.1%" of the diagonal of the model's bounding box;
 numbers are metres.
 """
 
@@ -41,16 +41,16 @@ from anim.skinning import bake as skinning
 AssetLike: TypeAlias = Asset | Document | PathName
 ClipKey: TypeAlias = Clip | str | int
 Length: TypeAlias = str | float
-SHELL = "1%"  # of the diagonal: how far around nodes without vertices errors count
-MAX_POINTER_ERROR = 1e-4  # of the range of a track that moves no node
+SHELL = "1%"  # of the diagonal: radius of the sample points around nodes without vertices
+MAX_POINTER_ERROR = 1e-4  # of the range of a pointer track
 
 
 @dataclass(frozen=True, slots=True)
 class OptimizeResult:
-    """An asset in fewer bytes.
+    """Optimized asset with its errors.
 
-    asset: what to save. max_error: m, farthest that any vertex is from where it was, as measured on what is saved, in
-    any clip. errors: the same by the name of each clip that was optimized, in the order of the file.
+    asset: the asset to save. max_error: m, largest displacement of any vertex in any clip, measured on the saved bytes.
+    errors: the same by name of each optimized clip, in the order of the file.
     """
 
     asset: Asset
@@ -63,7 +63,7 @@ class OptimizeResult:
 
 
 class BakedCache(VertexCache):
-    """A vertex cache that can be saved. Its frames are baked while they are asked for: `load_all()` gives them all."""
+    """Vertex cache with a `save` method. Frames are baked on demand: `load_all()` returns all of them."""
 
     __slots__ = ()
 
@@ -80,10 +80,10 @@ class BakedCache(VertexCache):
         depth: str = "float",
         rest: str = ".ply",
     ) -> None:
-        """Write the cache in the format of the path's ending: .npz, .usdc, .glb, .pc2, … (`anim.CACHE_FORMATS`).
+        """Write the cache in the format of the file extension: .npz, .usdc, .glb, .pc2, … (`anim.CACHE_FORMATS`).
 
-        Options as of `gltf-anim bake`. Raises UnsupportedError for another ending or a package that is missing,
-        RangeError for an option that the format doesn't take, OutputError where nothing can be written.
+        Options as of `gltf-anim bake`. Raises UnsupportedError for another extension or a missing package, RangeError
+        for an option that the format doesn't support, OutputError if the file can't be written.
         """
         cache = up_axis.to_up_axis(vertex_order.reorder(self, order), up)
         limit = None if max_error is None else _meters(max_error, "max_error", lambda: bounds.diagonal(cache))
@@ -105,14 +105,14 @@ def optimize(
     workers: int = 1,
     progress: Callable[[float], None] = lambda _: None,
 ) -> OptimizeResult:
-    """Return the asset with its animations in fewer bytes, no vertex farther off than `max_error` at any time.
+    """Return the asset with its animations in fewer bytes and no vertex displaced by more than `max_error` at any time.
 
-    max_error: "0.5mm", "0.01%", or metres; 0 loses nothing. clips: globs, all by default.
-    max_angle: of any node's own rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
-    keep_nodes: globs for nodes whose motion stays exact. drop: "rest", "unused" or "never", channels at rest that go.
-    meshopt: "ext" or "khr" to compress the numbers. effort: "fast", "balanced" or "max".
-    workers: processes; a script that asks for more than one needs `if __name__ == "__main__":`.
-    The asset itself comes back where nothing gets smaller.
+    max_error: "0.5mm", "0.01%", or metres; 0 is lossless. clips: globs, all by default.
+    max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
+    keep_nodes: globs for nodes with exact motion. drop: "rest", "unused" or "never", removed channels at the rest pose.
+    meshopt: "ext" or "khr" for compression by that extension. effort: "fast", "balanced" or "max".
+    workers: processes; a script with more than one needs `if __name__ == "__main__":`.
+    The result is the asset itself if nothing gets smaller.
     optimize("walk.glb", max_error="0.5mm").save("small.glb")
     """
     asset = as_asset(asset)
@@ -167,11 +167,11 @@ def bake(
     rigid: bool = False,
     meshes: Sequence[str] = (),
 ) -> BakedCache:
-    """Return where every vertex is at every frame while a clip plays, skinned by a method of choice.
+    """Return a clip as a vertex cache: every vertex at every frame, skinned by `method`.
 
     method: "lbs", "dqs", "cor", …, a name in `anim.SKINNING_METHODS`. fps: frames per second; or times, in seconds;
     without both a frame per key. space: "world" or "mesh". normals, tangents: bake those too.
-    rigid: meshes that only nodes move, too. meshes: globs for names of meshes; all by default.
+    rigid: include meshes without a skin. meshes: globs for names of meshes; all by default.
     bake("walk.glb", "walk", method="dqs", fps=24).save("walk.usdc")
     """
     asset = as_asset(asset)
@@ -203,10 +203,10 @@ def diff(
     player: str = "spec",
     fps: float = FPS,
 ) -> Diff:
-    """Return how far the motion of two assets is apart, in metres on the surface; worst clip first.
+    """Return the distances between the motion of two assets, in metres on the surface; worst clip first.
 
-    `max_error` of it is the largest distance of all, infinite where `new` lacks a clip. clips: globs for names in
-    `old`. player: who plays both, or two, "spec,nlerp". fps: of the grid looked at besides all keys.
+    Its `max_error` is the largest distance of all, infinite if a clip is missing in `new`. clips: globs for names in
+    `old`. player: of both, or two, "spec,nlerp". fps: of the sampled grid, in addition to all keys.
     """
     old, new = as_asset(old), as_asset(new)
     globs = [clips] if isinstance(clips, str) else list(clips or ())
@@ -216,7 +216,7 @@ def diff(
 
 
 def sample(asset: AssetLike, clip: ClipKey = 0, *, fps: float | None = None, times: ArrayLike | None = None) -> Floats:
-    """Return the positions of all joints in the world while a clip plays: (F, N, 3) m.
+    """Return the world positions of all nodes over a clip: (F, N, 3) m.
 
     Columns are the nodes of `asset.skeleton`, in its order. fps: frames per second, from the clip's start to its exact
     end; or times, in seconds; without both at the clip's own keys. `sample_poses` gives rotations and times too.
@@ -233,7 +233,7 @@ def sample_poses(
     times: ArrayLike | None = None,
     space: str = "world",
 ) -> PoseTable:
-    """Return the transform of every node while a clip plays: times, translation, rotation (x, y, z, w), scale.
+    """Return the transforms of all nodes over a clip: times, translation, rotation (x, y, z, w), scale.
 
     space: "world", then also the matrices as `world`, or "local", in the parent's space. Else as `sample`.
     """
@@ -257,7 +257,7 @@ def _optimized(asset: Asset, found: search.Optimized, limits: Bounds) -> Optimiz
 
 
 def _size(asset: Asset) -> int:
-    """Bytes as a GLB."""
+    """Size in bytes as a GLB."""
     return sum(len(piece) for piece in container.glb(asset.document))
 
 

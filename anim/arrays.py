@@ -1,4 +1,4 @@
-"""The one gate for arrays: type, named shape, finiteness, read-only."""
+"""Validation of arrays: type, named shape, finiteness, read-only."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     """Return `values` as a read-only float64 array of the named shape, every number finite.
 
     shape: one word per axis, a number for a fixed length and a letter for any: "K 3", "F N 4", "K C".
-    An array that anybody can write to is copied, also a read-only view of one; what nobody can write to is shared.
+    Writable arrays, and read-only views of them, are copied; immutable ones are shared.
     Raises ShapeError for a wrong shape or type, RangeError for NaN or infinity.
-    floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
+    as_floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -48,7 +48,7 @@ def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
     """Return key times (K,) in seconds as a read-only float64 array: K ≥ 1, finite, ≥ 0, strictly increasing.
 
     The same array object is checked once only, since many tracks share one time axis.
-    Raises ShapeError, or RangeError that names the first bad key.
+    Raises ShapeError, or RangeError with the index of the first invalid key.
     """
     if isinstance(values, np.ndarray) and _CHECKED_AXES.get(id(values)) is values:
         return values
@@ -83,18 +83,18 @@ def unique_sorted(values: Floats) -> Floats:
 
 
 def _is_finite(array: AnyArray) -> bool:
-    """Whether every number is finite; the sum of squares is a quick yes for all but huge numbers."""
+    """Whether every number is finite; a finite sum of squares is a fast proof."""
     flat = array.reshape(-1)
     return math.isfinite(flat.dot(flat)) or bool(np.isfinite(array).all())
 
 
 def own(array: NDArray[Any]) -> NDArray[Any]:
-    """Return `array` itself if it is read-only, else a read-only copy, which later writes by its owner don't reach."""
+    """Return `array` itself if it is read-only, else a read-only copy, independent of later writes."""
     return array if _is_frozen(array) else freeze(array.copy(order="K"))
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return `array` itself if nobody can write to it through this object, else a read-only view of it."""
+    """Return `array` itself if this object is read-only, else a read-only view of it."""
     if array.flags.writeable:
         array = array.view()
         array.flags.writeable = False
@@ -102,7 +102,7 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def freeze(array: NDArray[Any]) -> NDArray[Any]:
-    """Make an array that nobody else holds read-only, with what it is a view of, and return it."""
+    """Make an array without other references read-only, together with its base, and return it."""
     owner: object = array
     while isinstance(owner, np.ndarray):
         owner.flags.writeable = False
@@ -111,13 +111,13 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def restore_fields(instance: Any, state: list[Any]) -> None:
-    """Set the fields of a frozen dataclass that was pickled or copied, its arrays read-only as they were."""
+    """Restore the fields of a pickled or copied frozen dataclass, with read-only arrays."""
     for field, value in zip(fields(instance), state, strict=True):
         object.__setattr__(instance, field.name, freeze(value) if isinstance(value, np.ndarray) else value)
 
 
 def _is_frozen(array: AnyArray) -> bool:
-    """Whether nobody can write to the memory of `array`, neither through it nor through what it is a view of."""
+    """Whether the memory of `array` is read-only through itself and through all of its bases."""
     owner: object = array
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:

@@ -1,4 +1,4 @@
-"""Asset: a glTF file in memory, with views of what is in it. It never changes: `map_clips` returns another one."""
+"""Asset: an immutable glTF file in memory, with views of its contents; `map_clips` returns a changed copy."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ RAW_BYTES = (bytes, bytearray, memoryview, np.ndarray)
 
 @dataclass(frozen=True, eq=False)
 class Asset:
-    """A glTF file: its document as it is written, and views of what is in it, read when they are first asked for.
+    """A glTF file: its document, and views of its contents, read on first use.
 
-    document: JSON and buffers. source: the input that it comes from; None where it was made from nothing.
+    document: JSON and buffers. source: the input it was read from, or None.
     """
 
     document: Document
@@ -42,29 +42,29 @@ class Asset:
 
     @cached_property
     def clips(self) -> Clips:
-        """The animations, by name or index. Raises FormatError with the place of the first fault."""
+        """The animations, by name or index. Raises FormatError with the position of the first error."""
         return Clips(reader.clips(self.document))
 
     @cached_property
     def skeleton(self) -> Skeleton:
-        """All nodes in their rest pose; a node's index is its place in the file."""
+        """All nodes in their rest pose, with the indices of the file."""
         return reader.skeleton(self.document)
 
     @cached_property
     def scene(self) -> Scene:
-        """The skeleton with every mesh on it. Raises UnsupportedError where vertices can't be had."""
+        """The skeleton with all meshes. Raises UnsupportedError if vertices can't be read."""
         return reader.scene(self.document)
 
     @property
     def name(self) -> str:
-        """What messages call it: the path it was loaded from."""
+        """Name for messages: the path it was loaded from."""
         return self.source.name if self.source is not None else "asset"
 
     def map_clips(self, change: Callable[[Clip], Clip], *, clips: str | Sequence[str] | None = None) -> Asset:
-        """Return the asset with clips replaced by what `change` makes of them; all else stays as it is.
+        """Return the asset with `change` applied to clips; everything else is unchanged.
 
         change: Clip → Clip, such as `lambda clip: anim.ops.resample(clip, fps=30)`. A new name is written too.
-        clips: globs for names, "run*" or several; all by default. Raises NotFoundError where one matches none.
+        clips: globs for names, "run*" or several; all by default. Raises NotFoundError for a glob without match.
         """
         globs = [clips] if isinstance(clips, str) else list(clips or ())
         new = {}
@@ -98,9 +98,9 @@ class Asset:
 def load(file: PathName | RawBytes | BinaryIO) -> Asset:
     """Return the glTF asset in a .glb or .gltf file.
 
-    file: a path, the bytes of a file, or a binary file that is open for reading. Buffers beside a .gltf are read where
-    they lie in or below its folder, and only for a path: bytes have no folder.
-    Raises FormatError for what can't be read or is no valid glTF, UnsupportedError for an extension that it requires.
+    file: a path, the bytes of a file, or a binary file open for reading. External buffers of a .gltf are read only from
+    its folder and below, and only for a path, since bytes have no folder.
+    Raises FormatError for unreadable or invalid glTF, UnsupportedError for an unsupported required extension.
     load("walk.glb").clips["walk"] → Clip('walk', …)
     """
     if isinstance(file, Document | Asset):
@@ -114,12 +114,12 @@ def load(file: PathName | RawBytes | BinaryIO) -> Asset:
 
 
 def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
-    """Write an asset: a GLB or, where the path ends in .gltf, text with its .bin beside it.
+    """Write an asset as GLB or, for a path with the extension .gltf, as text with a companion .bin.
 
-    path: a name that ends in .glb, .gltf, .vrm or .vrma, or a binary file that is open for writing and gets a GLB.
-    Files take their place whole or not at all; the input may be its own output. An asset that did not change keeps its
-    bytes. In another folder external images are copied beside the output.
-    Raises OutputError where nothing can be written, RangeError for another ending.
+    path: a name with the extension .glb, .gltf, .vrm or .vrma, or a binary file open for writing, for a GLB.
+    Files are replaced atomically; the input may be the output. An unchanged asset keeps its bytes. In another folder
+    external images are copied next to the output.
+    Raises OutputError if a file can't be written, RangeError for another extension.
     """
     asset = Asset(asset) if isinstance(asset, Document) else asset
     if not isinstance(asset, Asset):
@@ -135,7 +135,7 @@ def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
 
 
 def as_asset(value: Asset | Document | PathName) -> Asset:
-    """Return an asset as it is, and one for a document or a path."""
+    """Return an asset unchanged, or the asset of a document or a path."""
     if isinstance(value, Asset):
         return value
     return Asset(value) if isinstance(value, Document) else load(value)

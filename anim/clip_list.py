@@ -24,7 +24,7 @@ class Clips:
         return tuple(reader.clip_name(clip.name, i) for i, clip in enumerate(self._clips))
 
     def index_of(self, key: int | str) -> int:
-        """Return the index of the clip that is meant. Raises NotFoundError, with the name that is near."""
+        """Return the index of a clip by name or index. Raises NotFoundError, with similar names."""
         if not isinstance(key, str):
             return self._checked(key)
         found = [i for i, name in enumerate(self.names) if name == key]
@@ -33,7 +33,7 @@ class Clips:
         if len(found) > 1:
             raise NotFoundError(f"{len(found)} clips are called '{key}'", help=f"take one by its index: {found}")
         if not found:
-            match_names([_without_wildcards(key)], self.names, "clip")  # raises, with what is near
+            match_names([_without_wildcards(key)], self.names, "clip")  # raises, with similar names
         return found[0]
 
     @overload
@@ -67,5 +67,5 @@ class Clips:
 
 
 def _without_wildcards(name: str) -> str:
-    """A glob that matches this name only."""
+    """Glob that matches this name only."""
     return "".join(f"[{each}]" if each in "*?[" else each for each in name)

@@ -1,11 +1,11 @@
-"""Everything the library refuses, and why.
+"""Errors of the library.
 
 AnimError
 ├─ FormatError       the input is not valid glTF (or BVH, PC2 ...), or can't be read
-├─ UnsupportedError  valid, but not handled: a required extension, a missing extra
+├─ UnsupportedError  the input is valid but unsupported: a required extension, a missing extra
 ├─ NotFoundError     no such clip, node, skin or mesh
-├─ RangeError        a parameter outside the values it can take
-├─ ShapeError        an array of the wrong shape or type: the caller's mistake
+├─ RangeError        a parameter outside its valid range
+├─ ShapeError        an array of the wrong shape or type: an error of the caller
 └─ OutputError       the output can't be written: a full or read-only disk, no permission
 """
 
@@ -21,11 +21,11 @@ _NO_MEMORY = (
 
 
 class AnimError(Exception):
-    """One refusal: what is wrong, where, and, if we know, what to do about it.
+    """Base of all errors: problem, position and help.
 
-    problem: what is wrong, with what was got and what was expected. One line.
-    where: the place from the outside in, "clip 'walk', track 3"; empty if the message says all.
-    help: one line that says what to do, or empty; tracebacks show it too.
+    problem: one line with the actual and the expected value.
+    where: the position from the outside in, "clip 'walk', track 3"; empty if the problem contains it.
+    help: one line of advice, or empty; tracebacks show it too.
     """
 
     def __init__(self, problem: str, *, where: str = "", help: str = "") -> None:
@@ -39,32 +39,32 @@ class AnimError(Exception):
         return f"{self.where}: {self.problem}" if self.where else self.problem
 
     def advise(self, help: str) -> Self:
-        """Return this error with `help`, unless it has some already; tracebacks show it as a note."""
+        """Return this error with `help` unless it has one already; tracebacks show it as a note."""
         if help and not self.help:
             self.help = help
             self.add_note(f"help: {help}")
         return self
 
     def at(self, where: str, separator: str = ", ") -> Self:
-        """Return this error with `where` put in front of its place: the caller knows more of the way."""
+        """Return this error with its position prefixed by `where`, known to the caller."""
         self.where = f"{where}{separator}{self.where}" if self.where else where
         return self
 
 
 class FormatError(AnimError):
-    """The input is not what its format says it must be, or can't be read."""
+    """The input violates its format, or can't be read."""
 
 
 class UnsupportedError(AnimError):
-    """The input is valid, but needs something that is not handled or not installed."""
+    """The input is valid, but needs something unsupported or not installed."""
 
 
 class NotFoundError(AnimError):
-    """Nothing in the input has this name or number."""
+    """Nothing in the input has this name or index."""
 
 
 class RangeError(AnimError):
-    """A parameter lies outside the values it can take."""
+    """A parameter is outside its valid range."""
 
 
 class ShapeError(AnimError):
@@ -72,13 +72,13 @@ class ShapeError(AnimError):
 
 
 class OutputError(AnimError):
-    """What was asked for is right, but can't be written: a full or read-only disk, no permission."""
+    """The output can't be written: a full or read-only disk, no permission."""
 
 
 def not_written(name: object, error: OSError) -> OutputError:
-    """Return the error for an output, `name`, that the system does not let us write.
+    """Return the error for an output, `name`, that the system can't write.
 
-    Raises MemoryError where no memory was left: a library that was loaded meanwhile says so as OSError, too.
+    Raises MemoryError if memory ran out: loading a library then raises OSError, too.
     """
     if is_out_of_memory(error):
         raise MemoryError
@@ -86,14 +86,14 @@ def not_written(name: object, error: OSError) -> OutputError:
 
 
 def check_type(value: object, expected: type, name: str, *, help: str = "") -> None:
-    """Raise ShapeError where `value`, called `name`, is no `expected`."""
+    """Raise ShapeError unless `value`, named `name`, is an instance of `expected`."""
     if not isinstance(value, expected):
         got = "None" if value is None else type(value).__name__
         raise ShapeError(f"{name} is {got} (expected {expected.__name__})", help=help)
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:
-    """Return whether an error, or what it came from, is that of a system without memory left."""
+    """Return whether an error, or one of its causes, means that memory ran out."""
     while error is not None:
         words = str(error).lower()
         if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):

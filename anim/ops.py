@@ -1,4 +1,4 @@
-"""Operations: Clip → Clip, one verb each. What a clip has beside the change stays, and the clip given is not touched.
+"""Operations: Clip → Clip, one verb each. Everything else of a clip is kept; the given clip is not changed.
 
     from anim import ops
     asset.map_clips(lambda clip: ops.resample(clip, fps=30))
@@ -7,11 +7,11 @@
 All take `tracks`, the indices of the tracks to change; all by default. `select_tracks` gives those of some nodes.
 
     resample            keys at a frame rate
-    ease, warp          another tempo between keys, or over a range; easings by name: anim.EASINGS, "cubic-bezier(…)"
+    ease, warp          easing between keys, or over a time range; easings by name: anim.EASINGS, "cubic-bezier(…)"
     retime              speed, duration, reverse, ping-pong, offset
     trim                a part, with exact ends
-    loop                bend the end so that it meets the start
-    append_first_frame  a loop that lacks its last frame
+    loop                correct the end so that it meets the start
+    append_first_frame  complete a loop that lacks its last frame
     spline              smooth curves through the keys; rules by name: anim.TANGENTS, "tcb(0, 0, 0.5)"
 """
 

@@ -1,4 +1,4 @@
-"""Numbers with units, as options and the functions of `anim` take them: lengths, angles, shares."""
+"""Parsing of numbers with units: lengths, angles, fractions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
 
 def parse_fraction(text: str, name: str) -> float:
-    """Return a share of something: "0.1%" or a bare number, above 0. Raises RangeError otherwise.
+    """Return a fraction above 0: "0.1%" or a number without unit. Raises RangeError otherwise.
 
-    parse_share("0.1%", "--tolerance") → 0.001
+    parse_fraction("0.1%", "--tolerance") → 0.001
     """
     value, unit = _split(text, name)
     if unit not in ("", "%") or value <= 0:
@@ -25,7 +25,7 @@ def parse_fraction(text: str, name: str) -> float:
 
 
 def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
-    """Return a length above 0 in metres: "0.5mm", "2cm", bare metres, or "0.1%" of what `diagonal` gives.
+    """Return a length above 0 in metres: "0.5mm", "2cm", metres without unit, or "0.1%" of `diagonal()`.
 
     Raises RangeError otherwise.
     """
