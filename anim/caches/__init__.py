@@ -1,1 +1,1 @@
-"""VertexCache ↔ bytes: one file and one row of `formats.CACHE_FORMATS` for every format."""
+"""VertexCache ↔ bytes: one file and one row of `registry.CACHE_FORMATS` for every format."""

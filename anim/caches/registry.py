@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 from anim.caches.formats import gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
+from anim.caches.signatures import Signature, is_mdd, is_obj, is_stl, starts_with
 from anim.caches.storage import Inputs, Outputs
 from anim.caches.vat import reader, writer
 from anim.errors import UnsupportedError
@@ -29,14 +30,16 @@ class Files(Enum):
 
 @dataclass(frozen=True, slots=True)
 class CacheFormat:
-    """One format. about: for --help. takes: the fields of Reading and Writing that mean something to it.
+    """One format. about: for --help. begins: signature of its files, for input without a name.
 
-    holds: "normals" and "tangents", where there is a place for them beside positions. files: which ones a cache is.
+    takes: names of the fields of ReadOptions ("read_fps") and WriteOptions that it supports. holds: "normals",
+    "tangents", if it stores them beside positions. files: the files of one cache.
     """
 
     about: str
     read: Read
     write: Write
+    begins: Signature
     takes: frozenset[str] = frozenset()
     holds: frozenset[str] = frozenset()
     files: Files = Files.ONE
@@ -47,38 +50,46 @@ BOTH = frozenset(("normals", "tangents"))
 RATE = frozenset(("read_fps",))
 
 
-def _frames(ending: str, about: str, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
+def _frames(ending: str, about: str, begins: Signature, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
     read, write = partial(mesh_sequence.read, ending=ending), partial(mesh_sequence.write, ending=ending)
-    return CacheFormat(about, read, write, RATE, holds, Files.FRAMES)
+    return CacheFormat(about, read, write, begins, RATE, holds, Files.FRAMES)
 
 
-def _usd(ending: str, about: str) -> CacheFormat:
-    return CacheFormat(about, usd_reader.read, partial(usd_writer.write, ending=ending), RATE, BOTH)
+def _usd(ending: str, about: str, magic: bytes) -> CacheFormat:
+    write = partial(usd_writer.write, ending=ending)
+    return CacheFormat(about, usd_reader.read, write, starts_with(magic), RATE, BOTH)
 
 
-def _texture(ending: str, about: str, *takes: str) -> CacheFormat:
+def _texture(ending: str, about: str, magic: bytes, *takes: str) -> CacheFormat:
     write = partial(writer.write, ending=ending)
-    return CacheFormat(about, reader.read, write, frozenset(takes), NORMALS, Files.SEVERAL)
+    return CacheFormat(about, reader.read, write, starts_with(magic), frozenset(takes), NORMALS, Files.SEVERAL)
 
 
 CACHE_FORMATS: dict[str, CacheFormat] = {
-    ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write, holds=BOTH),
-    ".pc2": CacheFormat("point cache of 3ds Max and Blender", pc2.read, pc2.write, frozenset(("read_fps", "rest"))),
-    ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, frozenset(("rest",))),
-    ".usdc": _usd(".usdc", "USD, binary (extra usd)"),
-    ".usda": _usd(".usda", "USD, text (extra usd)"),
+    ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write, starts_with(b"PK"), holds=BOTH),
+    ".pc2": CacheFormat(
+        "point cache of 3ds Max and Blender",
+        pc2.read,
+        pc2.write,
+        starts_with(b"POINTCACHE2"),
+        frozenset(("read_fps", "rest")),
+    ),
+    ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, is_mdd, frozenset(("rest",))),
+    ".usdc": _usd(".usdc", "USD, binary (extra usd)", b"PXR-USDC"),
+    ".usda": _usd(".usda", "USD, text (extra usd)", b"#usda"),
     ".glb": CacheFormat(
         "glTF: morph targets or a flip-book",
         gltf.read,
         gltf.write,
+        starts_with(b"glTF"),
         frozenset(("read_fps", "max_error", "quantize", "layout")),
         BOTH,
     ),
-    ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", "preset", "depth"),
-    ".png": _texture(".png", "vertex animation texture, 16 bit", "preset"),
-    ".ply": _frames(".ply", "a mesh a frame"),
-    ".obj": _frames(".obj", "a mesh a frame, as text"),
-    ".stl": _frames(".stl", "a mesh a frame, without order", holds=frozenset()),
+    ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", b"\x76\x2f\x31\x01", "preset", "depth"),
+    ".png": _texture(".png", "vertex animation texture, 16 bit", b"\x89PNG\r\n\x1a\n", "preset"),
+    ".ply": _frames(".ply", "a mesh a frame", starts_with(b"ply")),
+    ".obj": _frames(".obj", "a mesh a frame, as text", is_obj),
+    ".stl": _frames(".stl", "a mesh a frame, without order", is_stl, holds=frozenset()),
 }
 
 
