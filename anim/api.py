@@ -78,7 +78,7 @@ class BakedCache(VertexCache):
         layout: str = "morph",
         preset: str = "plain",
         depth: str = "float",
-        rest: str = ".ply",
+        rest_mesh: str = ".ply",
     ) -> None:
         """Write the cache in the format of the file extension: .npz, .usdc, .glb, .pc2, … (`anim.CACHE_FORMATS`).
 
@@ -87,7 +87,7 @@ class BakedCache(VertexCache):
         """
         cache = up_axis.to_up_axis(vertex_order.reorder(self, order), up)
         limit = None if max_error is None else _meters(max_error, "max_error", lambda: bounds.diagonal(cache))
-        cache_file.save(cache, os.fspath(path), WriteOptions(limit, quantize, layout, preset, depth, rest))
+        cache_file.save(cache, os.fspath(path), WriteOptions(limit, quantize, layout, preset, depth, rest_mesh))
 
 
 def optimize(

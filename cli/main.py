@@ -58,15 +58,15 @@ COMMANDS = {
         (
             "gltf-anim from-euler walk.bvh walk.glb --mesh sticks",
             "gltf-anim from-euler walk.bvh hero-walk.glb --onto hero.glb --fail-unmatched 12",
-            "gltf-anim from-euler curves.csv door.glb --order XYZ --frame extrinsic --unit deg",
+            "gltf-anim from-euler curves.csv door.glb --order XYZ --axes extrinsic --unit deg",
         ),
     ),
     "to-euler": CommandInfo(
         "Write a clip as Euler curves: BVH, CSV or JSON.",
         (
             "gltf-anim to-euler hero.glb walk.bvh --clip walk --fps 30",
-            "gltf-anim to-euler door.glb door.csv --order XYZ --frame extrinsic",
-            "gltf-anim to-euler door.glb door.json --tolerance 0.1deg",
+            "gltf-anim to-euler door.glb door.csv --order XYZ --axes extrinsic",
+            "gltf-anim to-euler door.glb door.json --angle-tolerance 0.1deg",
         ),
     ),
     "ease": CommandInfo(
@@ -133,7 +133,7 @@ COMMANDS = {
     "convert-cache": CommandInfo(
         "Change a vertex cache into another format, frame by frame.",
         (
-            "gltf-anim convert-cache walk.npz walk.pc2 --up z --order blender",
+            "gltf-anim convert-cache walk.npz walk.pc2 --up z --vertex-order blender",
             "gltf-anim convert-cache walk.npz walk.glb --max-error 0.5mm --quantize",
             "gltf-anim convert-cache walk.mdd walk.exr --preset godot --depth half",
         ),

@@ -26,7 +26,7 @@ class WriteOptions:
     layout: how a .glb keeps frames, one of LAYOUTS of anim.caches.formats.gltf.
     preset: whose axes and rows a texture has, one of PRESETS of anim.caches.vat.presets.
     depth: of a texture's numbers: "half" or "float" in EXR.
-    rest: ending of the rest mesh beside a PC2 or MDD: ".ply", ".obj", or "" for none.
+    rest_mesh: ending of the rest mesh beside a PC2 or MDD: ".ply", ".obj", or "" for none.
     """
 
     max_error: float | None = None
@@ -34,7 +34,7 @@ class WriteOptions:
     layout: str = "morph"
     preset: str = "plain"
     depth: str = "float"
-    rest: str = ".ply"
+    rest_mesh: str = ".ply"
 
 
 @dataclass(frozen=True, slots=True)

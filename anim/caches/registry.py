@@ -32,7 +32,7 @@ class Files(Enum):
 class CacheFormat:
     """One format. about: for --help. begins: signature of its files, for input without a name.
 
-    takes: names of the fields of ReadOptions ("read_fps") and WriteOptions that it supports. holds: "normals",
+    takes: names of the fields of ReadOptions ("input_fps") and WriteOptions that it supports. holds: "normals",
     "tangents", if it stores them beside positions. files: the files of one cache.
     """
 
@@ -47,7 +47,7 @@ class CacheFormat:
 
 NORMALS = frozenset(("normals",))
 BOTH = frozenset(("normals", "tangents"))
-RATE = frozenset(("read_fps",))
+RATE = frozenset(("input_fps",))
 
 
 def _frames(ending: str, about: str, begins: Signature, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
@@ -72,9 +72,9 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         pc2.read,
         pc2.write,
         starts_with(b"POINTCACHE2"),
-        frozenset(("read_fps", "rest")),
+        frozenset(("input_fps", "rest_mesh")),
     ),
-    ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, is_mdd, frozenset(("rest",))),
+    ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, is_mdd, frozenset(("rest_mesh",))),
     ".usdc": _usd(".usdc", "USD, binary (extra usd)", b"PXR-USDC"),
     ".usda": _usd(".usda", "USD, text (extra usd)", b"#usda"),
     ".glb": CacheFormat(
@@ -82,7 +82,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         gltf.read,
         gltf.write,
         starts_with(b"glTF"),
-        frozenset(("read_fps", "max_error", "quantize", "layout")),
+        frozenset(("input_fps", "max_error", "quantize", "layout")),
         BOTH,
     ),
     ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", b"\x76\x2f\x31\x01", "preset", "depth"),

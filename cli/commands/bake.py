@@ -71,13 +71,13 @@ def command(
     rigid: Annotated[bool, typer.Option("--rigid", help="Bake meshes that only nodes move, too.")] = False,
     format: caches.FormatOption = None,
     up: caches.UpOption = None,
-    order: caches.OrderOption = None,
+    vertex_order: caches.VertexOrderOption = None,
     max_error: caches.MaxError = None,
     quantize: caches.Quantize = False,
     layout: caches.LayoutOption = None,
     preset: caches.PresetOption = None,
     depth: caches.DepthOption = None,
-    rest: caches.RestOption = None,
+    rest_mesh: caches.RestMeshOption = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
@@ -96,10 +96,9 @@ def command(
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     ending = cache_files.check(output, None if format is None else f".{format}", PLACEHOLDERS)
-    given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    caches.write_options(
-        ending, given | {"max_error": max_error}
-    )  # raises before any work for options that the format doesn't support
+    given = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest_mesh": rest_mesh}
+    # Raises before any work for options that the format doesn't support.
+    caches.write_options(ending, given | {"max_error": max_error})
     caches.check_supported(ending, normals=normals, tangents=tangents)
     done: list[_Done] = []
     with documents.source(input, voice) as source:
@@ -149,7 +148,7 @@ def command(
             if fps is None:
                 missed.append((label, inbetween_error(made[job.group], each, times)))
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
-            cache = _turned(made[job.group].bake(each, times=times, progress=progress), up, order)
+            cache = _turned(made[job.group].bake(each, times=times, progress=progress), up, vertex_order)
             try:
                 writing = caches.write_options(ending, given | {"max_error": _meters(max_error, cache)})
                 saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)

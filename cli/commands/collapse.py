@@ -38,7 +38,7 @@ def command(
     bulge_clamp: Annotated[
         bool, typer.Option("--bulge-clamp", help="Look at methods other than lbs as bake --bulge-clamp makes them.")
     ] = False,
-    fps: Annotated[float, typer.Option("--fps", metavar="N", help="Frames per second to look at.")] = 30,
+    fps: Annotated[float, typer.Option("--samples-per-second", metavar="N", help="Samples per second of a clip.")] = 30,
     clip: common.Clips = None,
     mesh: mesh_selection.Meshes = None,
     format: common.Report = Format.TEXT,
@@ -91,7 +91,7 @@ def command(
 
 def _check(fps: float, plot: str | None) -> None:
     if fps <= 0:
-        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+        raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
     if plot is not None:
         documents.check_file(plot)
         if PurePath(plot).suffix.lower() not in (".png", ".svg"):

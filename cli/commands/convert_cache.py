@@ -36,18 +36,18 @@ def command(
     fps: Annotated[
         float | None, typer.Option("--fps", metavar="N", help="New frames, on straight lines between the old.")
     ] = None,
-    read_fps: Annotated[
+    input_fps: Annotated[
         float | None,
-        typer.Option("--read-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24)."),
+        typer.Option("--input-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24)."),
     ] = None,
     up: caches.UpOption = None,
-    order: caches.OrderOption = None,
+    vertex_order: caches.VertexOrderOption = None,
     max_error: caches.MaxError = None,
     quantize: caches.Quantize = False,
     layout: caches.LayoutOption = None,
     preset: caches.PresetOption = None,
     depth: caches.DepthOption = None,
-    rest: caches.RestOption = None,
+    rest_mesh: caches.RestMeshOption = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> None:
@@ -56,28 +56,33 @@ def command(
     Any length goes in little memory, but for .glb morph targets (1 GB of positions) and textures (4096 × 8192 pixels).
 
     Formats go by the name's ending, else IN's by its first bytes and OUT's by --format. PC2 and MDD get a rest mesh
-    beside them (walk.pc2-rest.ply) with the same order of vertices; for Blender's Mesh Cache modifier use --up z
-    --order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply. Textures (.exr, .png) get a JSON
-    and a mesh beside them. A pipe takes one file: textures don't go through it, of sequences a single frame does.
+    beside them (walk.pc2-rest.ply) in the same vertex order; for Blender's Mesh Cache modifier use --up z
+    --vertex-order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply. Textures (.exr, .png) get
+    a JSON file and a mesh beside them. A pipe carries one file: no textures, and only one frame of a sequence.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()
-    for name, rate in (("--fps", fps), ("--read-fps", read_fps)):
+    for name, rate in (("--fps", fps), ("--input-fps", input_fps)):
         if rate is not None and rate <= 0:
             raise UsageError(f"{name} is {rate:g} (expected a number above 0)")
     if at is not None and fps is not None:
         raise UsageError("--at and --fps exclude each other")
     ending = cache_files.check(output, None if format is None else f".{format}")
-    given: dict[str, Any] = {"quantize": quantize, "layout": layout, "preset": preset, "depth": depth, "rest": rest}
-    caches.write_options(
-        ending, given | {"max_error": max_error}
-    )  # raises before any work for options that the format doesn't support
-    with cache_files.load(input, ReadOptions(read_fps)) as loaded:
-        if read_fps and "read_fps" not in CACHE_FORMATS[loaded.ending].takes:
-            raise UsageError(f"--read-fps means nothing to {loaded.ending}, which says when its frames are")
+    given: dict[str, Any] = {
+        "quantize": quantize,
+        "layout": layout,
+        "preset": preset,
+        "depth": depth,
+        "rest_mesh": rest_mesh,
+    }
+    # Raises before any work for options that the format doesn't support.
+    caches.write_options(ending, given | {"max_error": max_error})
+    with cache_files.load(input, ReadOptions(input_fps)) as loaded:
+        if input_fps and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
+            raise UsageError(f"--input-fps means nothing to {loaded.ending}, which says when its frames are")
         if loaded.ending == ".glb":
             announce_compiling(voice)
-        cache = _changed(loaded.cache, at, fps, up, order)
+        cache = _changed(loaded.cache, at, fps, up, vertex_order)
         if max_error is not None:
             given["max_error"] = units.parse_length(max_error, "--max-error", lambda: bounds.diagonal(cache))
         writing = caches.write_options(ending, given)

@@ -64,7 +64,9 @@ def command(
         str | None,
         typer.Option("--players", metavar="P,Q", help="A as two players show it, spec,nlerp: one file, no B."),
     ] = None,
-    fps: Annotated[float, typer.Option("--fps", metavar="N", help="Look so often per second, besides at keys.")] = FPS,
+    fps: Annotated[
+        float, typer.Option("--samples-per-second", metavar="N", help="Samples per second, in addition to all keys.")
+    ] = FPS,
     shell: Annotated[
         str, typer.Option("--shell", metavar="LENGTH", help="How far around nodes without vertices; 0: leave them out.")
     ] = "1%",
@@ -89,7 +91,7 @@ def command(
     if old == new == documents.PIPE:
         raise UsageError("A and B can't both be stdin")
     if fps <= 0:
-        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+        raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
     kind = "" if plot is None else _kind(plot)
     one = _opened(old, voice)
     other = one if new is None else _opened(new, voice)

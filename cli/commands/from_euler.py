@@ -62,15 +62,15 @@ def command(
         str | None,
         typer.Option("--order", metavar="ORDER", help="Of the axes as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
     ] = None,
-    frame: Annotated[
-        AxesConvention | None, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+    axes: Annotated[
+        AxesConvention | None, typer.Option("--axes", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = None,
     unit: Annotated[Unit | None, typer.Option("--unit", help="Unit of the angles (CSV, JSON).")] = None,
     keys: Annotated[
         KeyPlacement, typer.Option("--keys", help="Where keys stand; auto keeps recordings' grid.")
     ] = KeyPlacement.AUTO,
-    tolerance: Annotated[
-        str, typer.Option("--tolerance", metavar="ANGLE", help="The most that slerp may leave the Euler motion.")
+    angle_tolerance: Annotated[
+        str, typer.Option("--angle-tolerance", metavar="ANGLE", help="The most that slerp may leave the Euler motion.")
     ] = "0.05deg",
     scale: Annotated[
         float | None,
@@ -93,8 +93,8 @@ def command(
     floor: Annotated[
         GroundMode, typer.Option("--floor", help="--onto: soles on the floor, or heights scaled and no more.")
     ] = GroundMode.CONTACT,
-    rest_at: Annotated[
-        float | None, typer.Option("--rest-at", metavar="S", help="--onto: when the source stands in its rest pose.")
+    bind_time: Annotated[
+        float | None, typer.Option("--bind-time", metavar="S", help="--onto: when the source stands in its rest pose.")
     ] = None,
     name: Annotated[str | None, typer.Option("--name", help="Name of the clip; else the file's.")] = None,
     replace: Annotated[
@@ -108,7 +108,7 @@ def command(
 ) -> None:
     """Turn Euler tracks into glTF: BVH, or CSV or JSON curves.
 
-    Every axis is evaluated on its own keys, the axes are combined as --order and --frame say, and keys are placed so
+    Every axis is evaluated on its own keys, the axes are combined as --order and --axes say, and keys are placed so
     that slerp follows the motion between them too. A BVH says its order itself, and keeps its frames. Without --onto a
     skeleton is made; with it, joints are matched by name and the motion is put on the character, with regard to both
     rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints, or all
@@ -116,12 +116,12 @@ def command(
     """
     began = time.perf_counter()
     voice = text.Reporter(quiet, verbose)
-    limit = units.parse_angle(tolerance, "--tolerance")
+    limit = units.parse_angle(angle_tolerance, "--angle-tolerance")
     _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
-    if onto is None and (alias, fail_unmatched, rest_at, replace, floor) != (*[None] * 4, GroundMode.CONTACT):
-        words = "--alias, --fail-unmatched, --floor, --replace and --rest-at"
+    if onto is None and (alias, fail_unmatched, bind_time, replace, floor) != (*[None] * 4, GroundMode.CONTACT):
+        words = "--alias, --fail-unmatched, --floor, --replace and --bind-time"
         raise UsageError(f"{words} are about a character (--onto names it)")
-    stated = PartialConvention(_order(order), frame, unit)
+    stated = PartialConvention(_order(order), axes, unit)
     with documents.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = registry.of_path(source) or registry.of_content(data.tobytes())
         motion = kind.read(data.tobytes(), TrackReadOptions(stated, bvh_position))
@@ -144,7 +144,7 @@ def command(
             taken = index_of(replace, character.document)
             check_name(name, taken, character.document)
             made = named(made, character.document, name=name, replaced=taken)
-            casting = CharacterOptions(names, floor, rest_at, fail_unmatched, taken)
+            casting = CharacterOptions(names, floor, bind_time, fail_unmatched, taken)
             made, document = put_on_character(made, character, casting, voice)
             before, size = character.size, documents.write(document, output, character, dry_run=dry_run, voice=voice)
     for each in from_euler_report.warnings(made):

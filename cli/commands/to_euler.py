@@ -46,16 +46,20 @@ def command(
             help="Of the axes as written: XYZ …, auto (each joint's farthest from lock), or 'hips=ZXY,*arm=YZX,auto'.",
         ),
     ] = USUAL,
-    frame: Annotated[
-        AxesConvention, typer.Option("--frame", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+    axes: Annotated[
+        AxesConvention, typer.Option("--axes", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = AxesConvention.INTRINSIC,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of the angles; BVH has degrees.")] = Unit.DEG,
     fps: Annotated[
         float | None, typer.Option("--fps", metavar="N", help="Frames per second; else the source's keys.")
     ] = None,
-    tolerance: Annotated[
+    angle_tolerance: Annotated[
         str | None,
-        typer.Option("--tolerance", metavar="ANGLE", help="CSV, JSON: add keys where curves leave the motion by more."),
+        typer.Option(
+            "--angle-tolerance",
+            metavar="ANGLE",
+            help="CSV, JSON: error above which keys are added: 0.1deg. Default: none.",
+        ),
     ] = None,
     scale: Annotated[
         float | None,
@@ -77,16 +81,16 @@ def command(
     began = time.perf_counter()
     voice = text.Reporter(quiet)
     kind = _kind(output, format)
-    limit = None if tolerance is None else units.parse_angle(tolerance, "--tolerance")
+    limit = None if angle_tolerance is None else units.parse_angle(angle_tolerance, "--angle-tolerance")
     orders = _orders(order, kind)
-    _check(kind, unit, frame, scale, limit)
+    _check(kind, unit, axes, scale, limit)
     if output != documents.PIPE and not dry_run:
         documents.check_file(output)
-    convention = Convention(USUAL if orders.otherwise == BEST else orders.otherwise, frame, unit)
+    convention = Convention(USUAL if orders.otherwise == BEST else orders.otherwise, axes, unit)
     with documents.source(input, voice) as source:
         chosen = _only(reader.clips(source.document), clip)
         motion, words, num_bound = _motion(
-            source.document, chosen, kind, orders, frame, fps, limit, scale or CENTIMETERS
+            source.document, chosen, kind, orders, axes, fps, limit, scale or CENTIMETERS
         )
         data = kind.write(motion, convention)
         if kind is TRACK_FORMATS["bvh"]:  # which can't store its unit
@@ -138,7 +142,7 @@ def _check(kind: TrackFormat, unit: Unit, frame: AxesConvention, scale: float | 
             "a BVH's angles are intrinsic, in degrees", help="an extrinsic order is an intrinsic one reversed"
         )
     if limit is not None:
-        raise UsageError("--tolerance adds keys, but a BVH's frames stand on a grid", help="give --fps")
+        raise UsageError("--angle-tolerance adds keys, but a BVH's frames stand on a grid", help="give --fps")
 
 
 def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
@@ -186,5 +190,5 @@ def _motion(
         else ""
     )
     if limit is None and found.deviation > NOTABLE:
-        words = f"{words[:-2]} (--tolerance adds keys), "
+        words = f"{words[:-2]} (--angle-tolerance adds keys), "
     return found.motion, words, bound.num_joints

@@ -44,10 +44,12 @@ Product = Annotated[str, typer.Argument(metavar="OUT", help=f"A cache: {FORMATS}
 UpOption = Annotated[
     Up | None, typer.Option("--up", help="Axis that points up; z is what Blender has.", show_default=False)
 ]
-OrderOption = Annotated[
+VertexOrderOption = Annotated[
     Order | None,
     typer.Option(
-        "--order", help="blender: without unused vertices, as its glTF importer leaves them out.", show_default=False
+        "--vertex-order",
+        help="Vertex order: of the file, or of Blender's glTF importer, which drops unused vertices.",
+        show_default=False,
     ),
 ]
 FormatOption = Annotated[
@@ -77,9 +79,9 @@ PresetOption = Annotated[
 DepthOption = Annotated[
     Depth | None, typer.Option("--depth", help=".exr: float (default) or half.", show_default=False)
 ]
-RestOption = Annotated[
+RestMeshOption = Annotated[
     RestMesh | None,
-    typer.Option("--rest", help=".pc2, .mdd: the rest mesh beside, default ply.", show_default=False),
+    typer.Option("--rest-mesh", help=".pc2, .mdd: the rest mesh beside, default ply.", show_default=False),
 ]
 
 
@@ -95,8 +97,8 @@ def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
             raise UsageError(f"--{name.replace('_', '-')} means nothing to {ending}")
     if "max_error" in said and str(said.get("layout", "")).startswith("flip"):
         raise UsageError("--max-error means nothing to a flip-book, which has every frame as it is")
-    if "rest" in said:
-        said["rest"] = "" if said["rest"] == "none" else f".{said['rest']}"
+    if "rest_mesh" in said:
+        said["rest_mesh"] = "" if said["rest_mesh"] == "none" else f".{said['rest_mesh']}"
     plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}
     return WriteOptions(**plain)
 

@@ -35,7 +35,7 @@ class CharacterOptions:
 
     names: dict[str, str]
     floor: GroundMode
-    rest_at: float | None
+    bind_time: float | None
     fail_unmatched: int | None
     replaced: int | None = None
 
@@ -57,7 +57,7 @@ def put_on_character(
             nested=made.motion.nested,
             stated=read_vrm_roles(document.json),
             floor=casting.floor,
-            rest_at=casting.rest_at,
+            bind_time=casting.bind_time,
         )
     except NotFoundError:  # no joint is matched, or an alias names an unknown joint
         _list_joints(made, scene, voice)

@@ -113,7 +113,7 @@ def test_every_format_is_written(call: Call, fixture: Fixture, tmp_path: Path) -
 
 def test_up_and_order_are_blenders(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     source = fixture("arm")
-    for name, more in (("y", ()), ("z", ("--up", "z", "--order", "blender"))):
+    for name, more in (("y", ()), ("z", ("--up", "z", "--vertex-order", "blender"))):
         assert call("bake", source, tmp_path / f"{name}.npz", "--clip", "bend", *more).code == 0
     y, z = (np.load(tmp_path / f"{name}.npz")["positions"] for name in "yz")
     assert np.array_equal(z, y[..., [0, 2, 1]] * np.array([1, -1, 1], np.float32))
@@ -195,7 +195,7 @@ def test_a_method_that_loses_the_model_is_told_however_quiet(call: Call, tmp_pat
     assert run.code == 0
     assert run.err.startswith("warning: dqs can't be used: a vertex is 19.7 m from where linear blending")
     assert "model's size of 1.04 m, at 1 s of clip 'torn'\n" in run.err
-    report = call("collapse", tmp_path / "torn.glb", "--clip", "torn", "--fps", "8").text
+    report = call("collapse", tmp_path / "torn.glb", "--clip", "torn", "--samples-per-second", "8").text
     assert "dqs can't be used" in report
     assert "--method dqs" not in report
 

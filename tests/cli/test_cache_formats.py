@@ -143,7 +143,7 @@ def test_a_rest_mesh_of_another_cache_is_said(walk: Path, call: Call) -> None:
     out, back = walk.with_name("a.pc2"), walk.with_name("back.npz")
     call("convert-cache", walk, out).product()
     assert "note" not in call("convert-cache", out, back).err
-    call("convert-cache", walk, out, "--up", "z", "--rest", "none").product()
+    call("convert-cache", walk, out, "--up", "z", "--rest-mesh", "none").product()
     said = call("convert-cache", out, back).err
     assert "warning: 'a.pc2-rest.ply' is the rest mesh of another cache: left out\n" in said
 

@@ -33,7 +33,7 @@ def nameless(tmp_path: Path) -> Path:
         ("loop", "{}"),
         ("sample", "{}", "-", "--format", "csv", "--fps", "2", "--clip", "#0"),
         ("diff", "{}", "{}"),
-        ("collapse", "{}", "--fps", "4"),
+        ("collapse", "{}", "--samples-per-second", "4"),
         ("optimize", "{}", "{}-out.glb", "-v", "--effort", "fast"),
         ("resample", "{}", "{}-out.glb", "--fps", "30", "-v"),
         ("retime", "{}", "{}-out.glb", "--speed", "2"),

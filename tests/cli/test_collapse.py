@@ -160,12 +160,12 @@ def test_the_whole_is_100_percent() -> None:
 
 def test_every_mesh_on_request(call: Call, asset: object) -> None:
     path = asset("Knight.glb")  # type: ignore[operator]
-    short = call("collapse", path, "--clip", "Throw", "--fps", "10").text
-    long = call("collapse", path, "--clip", "Throw", "--fps", "10", "-v").text
+    short = call("collapse", path, "--clip", "Throw", "--samples-per-second", "10").text
+    long = call("collapse", path, "--clip", "Throw", "--samples-per-second", "10", "-v").text
     assert "the worst mesh of each clip (-v: all)" in short
     assert len(long.splitlines()) == len(short.splitlines()) + 5
     assert re.search(r"head\.001 +1\.00 .* s +head ", long), "one joint: no other, and no turn between them"
-    only = call("collapse", path, "--clip", "Throw", "--fps", "10", "--mesh", "Cube.126").text
+    only = call("collapse", path, "--clip", "Throw", "--samples-per-second", "10", "--mesh", "Cube.126").text
     assert ": 1 clip, 1 skinned mesh\n" in only
 
 
@@ -177,7 +177,9 @@ def test_pipes(fixture: Fixture, tmp_path: Path) -> None:
 
 def test_refusals(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     source = fixture("arm")
-    assert "--fps is 0 (expected a number above 0)" in refusal(call("collapse", source, "--fps", "0"), 2)
+    assert "--samples-per-second is 0 (expected a number above 0)" in refusal(
+        call("collapse", source, "--samples-per-second", "0"), 2
+    )
     assert "is no .png or .svg file" in refusal(call("collapse", source, "--plot", tmp_path / "a.gif"), 2)
     assert "no mesh matches 'x'" in refusal(call("collapse", source, "--mesh", "x"), 5)
     clamp = call("collapse", source, "--method", "lbs", "--bulge-clamp")

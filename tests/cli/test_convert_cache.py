@@ -57,7 +57,7 @@ def test_one_line_says_what_came_of_it(walk: Path, call: Call) -> None:
 
 def test_pipes(walk: Path, tmp_path: Path) -> None:
     run = shell(
-        "gltf-anim convert-cache - - --format pc2 < walk.npz | gltf-anim convert-cache - - --format mdd --read-fps 30 "
+        "gltf-anim convert-cache - - --format pc2 < walk.npz | gltf-anim convert-cache - - --format mdd --input-fps 30 "
         "| gltf-anim convert-cache - back.npz",
         tmp_path,
     )
@@ -70,7 +70,7 @@ def test_pipes(walk: Path, tmp_path: Path) -> None:
 
 def test_for_blender(walk: Path, call: Call) -> None:
     out = walk.with_name("a.pc2")
-    call("convert-cache", walk, out, "--up", "z", "--order", "blender").product()
+    call("convert-cache", walk, out, "--up", "z", "--vertex-order", "blender").product()
     data = out.read_bytes()
     assert np.frombuffer(data[16:20], "<i4") == 8
     x, y, z = np.moveaxis(positions(walk)[:, :8], -1, 0)
@@ -145,11 +145,11 @@ def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
         (["a.mdd", "--preset", "unity"], "--preset means nothing to .mdd"),
         (["a.glb", "--max-error", "1parsec"], "expected a length"),
         (["a.png", "--preset", "godot"], "cuts 16-bit PNG"),
-        (["a.mdd", "--read-fps", "9"], "--read-fps means nothing to .npz"),
+        (["a.mdd", "--input-fps", "9"], "--input-fps means nothing to .npz"),
         (["a.npz", "--at", "9"], "no frame at 9 s"),
         (["a.npz", "--at", "0", "--fps", "9"], "exclude each other"),
         (["a.npz", "--fps", "0"], "--fps is 0 (expected a number above 0)"),
-        (["a.npz", "--read-fps", "-1"], "--read-fps is -1 (expected a number above 0)"),
+        (["a.npz", "--input-fps", "-1"], "--input-fps is -1 (expected a number above 0)"),
         (["no/a.npz"], "there is no folder"),
     ],
 )
@@ -161,7 +161,7 @@ def test_what_can_t_be_done_is_exit_2(args: list[str], words: str, walk: Path, c
 
 
 def test_a_gltf_is_played(fixture: Fixture, call: Call, tmp_path: Path) -> None:
-    run = call("convert-cache", fixture("arm"), tmp_path / "arm.npz", "--read-fps", "10")
+    run = call("convert-cache", fixture("arm"), tmp_path / "arm.npz", "--input-fps", "10")
     assert run.err.startswith("warning: clip 'twist', one of 2; bake takes others by --clip\n")
     assert positions(tmp_path / "arm.npz").shape[0] == 11
     assert "warning: clip" not in call("convert-cache", tmp_path / "arm.npz", tmp_path / "arm.glb").err

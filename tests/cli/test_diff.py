@@ -166,7 +166,7 @@ def test_a_picture_counts_what_it_leaves_out(asset: Find, tmp_path: Path, call: 
         (("--fail-above", "3deg"), "--fail-above is '3deg' (expected a length above 0"),
         (("--fail-above", "0"), "--fail-above is '0' (expected a length above 0"),
         (("--shell", "-1mm"), "--shell is '-1mm' (expected a length above 0"),
-        (("--fps", "0"), "--fps is 0 (expected a number above 0)"),
+        (("--samples-per-second", "0"), "--samples-per-second is 0 (expected a number above 0)"),
         (("--player", "unity"), "'unity' is none of spec, three, raw, nlerp"),
     ],
 )

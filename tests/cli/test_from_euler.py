@@ -40,7 +40,7 @@ Frame Time: 0.033333
 1 90 0 0 0 90 0 90 0
 """
 CURVES = b"time,door.rx,door.ry,door.rz\n0,0,0,0\n1,90,90,0\n"
-XYZ = ("--order", "XYZ", "--frame", "intrinsic", "--unit", "deg")
+XYZ = ("--order", "XYZ", "--axes", "intrinsic", "--unit", "deg")
 
 
 def _valid(data: bytes) -> None:
@@ -96,7 +96,7 @@ def test_a_giant_is_told(call: Call) -> None:
 
 
 def test_csv_keys_follow_the_motion(call: Call) -> None:
-    run = call("from-euler", "-", "-", *XYZ, "--tolerance", "0.1deg", stdin=CURVES)
+    run = call("from-euler", "-", "-", *XYZ, "--angle-tolerance", "0.1deg", stdin=CURVES)
     _valid(run.out)
     assert 3 < len(reader.clips(opened(run.product()))[0].tracks[0].times) <= 17
 
@@ -295,11 +295,11 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         ((), CURVES, 2, "nobody says the order"),
         (XYZ, CURVES.replace(b"1,90", b"1,9O"), 3, "stdin: line 3: door.rx is '9O'"),
         (XYZ, CURVES.replace(b"door.rz", b"door.rq"), 3, "stdin: line 1: "),
-        (("--tolerance", "0"), SMALL, 2, "--tolerance is '0'"),
-        (("--tolerance", "1mm"), SMALL, 2, "--tolerance is '1mm'"),
+        (("--angle-tolerance", "0"), SMALL, 2, "--angle-tolerance is '0'"),
+        (("--angle-tolerance", "1mm"), SMALL, 2, "--angle-tolerance is '1mm'"),
         (("--scale", "0"), SMALL, 2, "--scale is 0"),
         (("--fail-unmatched", "0"), SMALL, 2, "are about a character (--onto names it)"),
-        (("--rest-at", "0"), SMALL, 2, "are about a character (--onto names it)"),
+        (("--bind-time", "0"), SMALL, 2, "are about a character (--onto names it)"),
         (("--replace", "walk"), SMALL, 2, "are about a character (--onto names it)"),
         (("--format", "json"), SMALL, 2, "both want stdout"),
         (("--onto", "-"), SMALL, 2, "SOURCE and --onto can't both be stdin"),
@@ -324,8 +324,8 @@ def test_a_folder_is_refused_with_a_way_out(call: Call, fixture: Fixture, tmp_pa
 
 
 def test_a_rest_pose_must_be_in_the_motion(call: Call, fixture: Fixture, asset: Find) -> None:
-    run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", fixture("biped"), "--rest-at", "9")
-    assert "rest at 9 s (the motion runs from 0 to 0.03333 s)" in refusal(run, 2)
+    run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", fixture("biped"), "--bind-time", "9")
+    assert "bind time 9 s is outside the motion (expected 0 to 0.03333 s)" in refusal(run, 2)
 
 
 def test_sticks_and_a_character_exclude_each_other(call: Call, fixture: Fixture) -> None:
@@ -357,7 +357,7 @@ def test_in_a_shell_pipe(tmp_path: Path) -> None:
 @khronos.needs_validator
 def test_a_joint_with_a_matrix_is_taken_apart_when_it_gets_keys(call: Call, asset: Find, tmp_path: Path) -> None:
     character, out = asset("RiggedSimple.gltf"), tmp_path / "out.glb"
-    call("to-euler", character, tmp_path / "m.json", "--order", "XYZ", "--frame", "intrinsic").product()
+    call("to-euler", character, tmp_path / "m.json", "--order", "XYZ", "--axes", "intrinsic").product()
     call("from-euler", tmp_path / "m.json", out, "--onto", character).product()
     assert khronos.errors(khronos.validate(out.read_bytes())) == []
     assert call("inspect", out).code == 0

@@ -22,7 +22,7 @@ EXAMPLES = [(command, example) for command, row in main.COMMANDS.items() for exa
 MAKING = (
     "convert scene/walk.glb scene/walk.gltf",
     "resample walk.glb walk30.glb --fps 30",
-    "from-euler curves.csv door.glb --order XYZ --frame extrinsic --unit deg",
+    "from-euler curves.csv door.glb --order XYZ --axes extrinsic --unit deg",
     "bake walk.glb walk.npz",
     "bake walk.glb walk.mdd --fps 24",
 )

@@ -67,7 +67,7 @@ def test_each_joint_can_have_its_order(call: Call, fixture: Fixture) -> None:
 def test_a_tolerance_adds_keys(call: Call, fixture: Fixture) -> None:
     plain, fine = (
         json.loads(call("to-euler", fixture("biped"), "--clip", "wave", "--format", "json", *more).product())
-        for more in ((), ("--tolerance", "0.01deg"))
+        for more in ((), ("--angle-tolerance", "0.01deg"))
     )
     count = [sum(len(c["times"]) for n in f["nodes"] for c in n.get("curves", {}).values()) for f in (plain, fine)]
     assert count[1] > count[0]
@@ -83,9 +83,9 @@ def test_the_clip_must_be_one(call: Call, fixture: Fixture) -> None:
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (("--frame", "extrinsic"), "a BVH's angles are intrinsic"),
+        (("--axes", "extrinsic"), "a BVH's angles are intrinsic"),
         (("--unit", "rad"), "a BVH's angles are intrinsic"),
-        (("--tolerance", "1deg"), "--tolerance adds keys"),
+        (("--angle-tolerance", "1deg"), "--angle-tolerance adds keys"),
         (("--scale", "-1"), "--scale is -1"),
         (("--scale", "1", "--format", "csv"), "--scale is the unit of a BVH"),
         (("--fps", "0"), "fps is 0"),

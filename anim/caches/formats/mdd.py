@@ -45,5 +45,5 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
         file.write(cache.times.astype(">f4").tobytes())
         mark = frame_blocks.write(cache, file, ">f4")
-    rest_mesh.write(cache, outputs, writing.rest, mark)
+    rest_mesh.write(cache, outputs, writing.rest_mesh, mark)
     return WriteResult()

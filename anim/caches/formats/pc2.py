@@ -58,7 +58,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(MAGIC, 1, cache.vertex_count, start, 1.0, cache.frame_count))
         mark = frame_blocks.write(cache, file, "<f4")
-    rest_mesh.write(cache, outputs, writing.rest, mark, fps=fps)
+    rest_mesh.write(cache, outputs, writing.rest_mesh, mark, fps=fps)
     return WriteResult(notes=notes)
 
 

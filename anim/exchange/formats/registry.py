@@ -37,7 +37,7 @@ class TrackFormat:
 
 def _read_bvh(data: bytes, reading: TrackReadOptions) -> EulerMotion:
     if reading.stated != UNSPECIFIED:
-        raise RangeError("a BVH says the order of every joint itself (no --order, --frame or --unit)")
+        raise RangeError("a BVH says the order of every joint itself (no --order, --axes or --unit)")
     return bvh_reader.read(data, position=reading.bvh_position)
 
 

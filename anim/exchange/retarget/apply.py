@@ -47,7 +47,7 @@ def apply_to_character(
     nested: bool,
     stated: Mapping[str, int] = MappingProxyType({}),
     floor: GroundMode = GroundMode.CONTACT,
-    rest_at: float | None = None,
+    bind_time: float | None = None,
 ) -> CharacterClip:
     """Return the motion as a clip of the character.
 
@@ -83,7 +83,7 @@ def apply_to_character(
         bound = bind_pose(
             target.skeleton, [(each.node, each.skin) for each in target.instances if each.skin is not None]
         )
-        done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, rest_at=rest_at)
+        done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, bind_time=bind_time)
         clip = fill_from_parents(done.clip, bound.skeleton, target.skeleton)
         return CharacterClip(
             clip,

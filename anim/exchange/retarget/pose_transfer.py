@@ -142,7 +142,7 @@ class PoseTransfer:
 
 
 def build_transfer(
-    source: Skeleton, clip: Clip, target: Skeleton, matching: JointMatch, *, rest_at: float | None
+    source: Skeleton, clip: Clip, target: Skeleton, matching: JointMatch, *, bind_time: float | None
 ) -> PoseTransfer:
     """Return the transfer from the source's to the target's matched joints.
 
@@ -151,12 +151,14 @@ def build_transfer(
     anchor (see `anchors`), and moves relative to it as the source's does, scaled; the topmost follow the source's path
     from their rest positions. Scales are transferred as factors of the rest's. So for equal rest poses, up to a
     similarity transform of the whole, the target's motion equals the source's.
-    rest_at: s, time of the source's rest pose; None for the pose with all angles zero. Raises RangeError for a time
+    bind_time: s, time of the source's rest pose; None for the pose with all angles zero. Raises RangeError for a time
     outside the clip.
     """
-    if rest_at is not None and not clip.start <= rest_at <= clip.end:
-        raise RangeError(f"rest at {rest_at:g} s (the motion runs from {clip.start:g} to {clip.end:.4g} s)")
-    still = rest_pose(source) if rest_at is None else posed(source, clip, np.array([rest_at]))
+    if bind_time is not None and not clip.start <= bind_time <= clip.end:
+        raise RangeError(
+            f"bind time {bind_time:g} s is outside the motion (expected {clip.start:g} to {clip.end:.4g} s)"
+        )
+    still = rest_pose(source) if bind_time is None else posed(source, clip, np.array([bind_time]))
     of_source, at_rest = _rest_pose(source, still), _rest_pose(target, rest_pose(target))
     of_one_tree = not matching.unmatched and bool(is_same_hierarchy(source, target, [*matching.pairs]))
     aligned = align_rests(of_source, at_rest, matching, of_one_tree=of_one_tree)

@@ -82,7 +82,7 @@ def retarget(
     matching: JointMatch,
     *,
     floor: GroundMode = GroundMode.CONTACT,
-    rest_at: float | None = None,
+    bind_time: float | None = None,
 ) -> Retargeted:
     """Return a clip that moves the target's matched joints like the source's; see `build_transfer`.
 
@@ -90,7 +90,7 @@ def retarget(
     the target's size for its path; recordings keep their grid.
     floor: CONTACT moves the hips vertically so that the soles keep their rest height while a foot of the source is
     down; KEEP only scales heights, and so does CONTACT without a matched foot.
-    rest_at: s, time of the source's rest pose; None for the pose with all angles zero.
+    bind_time: s, time of the source's rest pose; None for the pose with all angles zero.
     Raises NotFoundError without a matched joint, RangeError for CONTACT in a motion of over a day.
     """
     if not matching.pairs:
@@ -98,7 +98,7 @@ def retarget(
     if floor == GroundMode.CONTACT and source.clip.end - source.clip.start > MAX_STEP_S:
         seconds = source.clip.end - source.clip.start
         raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
-    follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, rest_at=rest_at)
+    follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, bind_time=bind_time)
     size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
     knots, before = _times(source.clip)
     times = unique_sorted(np.concatenate((knots, before)))

@@ -42,14 +42,14 @@ def test_caches_of_one_stem_keep_their_own() -> None:
 )
 def test_what_an_earlier_cache_left_is_not_taken(later: VertexCache, words: str) -> None:
     files = written(cache(), "a.pc2")[0]
-    files.files |= written(later, "a.pc2", WriteOptions(rest=""))[0].files
+    files.files |= written(later, "a.pc2", WriteOptions(rest_mesh=""))[0].files
     found, notes = read(files)
     assert (len(found.faces), found.rest, notes) == (0, None, [words])
 
 
 def test_a_newer_obj_goes_before_an_older_ply() -> None:
     files = written(cache(), "a.mdd")[0]
-    files.files |= written(to_up_axis(cache(), "z"), "a.mdd", WriteOptions(rest=".obj"))[0].files
+    files.files |= written(to_up_axis(cache(), "z"), "a.mdd", WriteOptions(rest_mesh=".obj"))[0].files
     found, notes = read(files, "a.mdd")
     assert (found.up, len(found.faces)) == ("z", 4)
     assert notes == ["'a.mdd-rest.ply' is the rest mesh of another cache: left out"]
@@ -57,7 +57,7 @@ def test_a_newer_obj_goes_before_an_older_ply() -> None:
 
 @pytest.mark.parametrize("name", ["a-rest.ply", "a-rest.obj", "a.ply", "a.obj"])
 def test_meshes_that_only_their_name_speaks_for_are_said(name: str) -> None:
-    files = written(to_up_axis(cache(), "z"), "a.pc2", WriteOptions(rest=name[-4:]))[0]
+    files = written(to_up_axis(cache(), "z"), "a.pc2", WriteOptions(rest_mesh=name[-4:]))[0]
     data = files.files.pop(f"a.pc2-rest{name[-4:]}")
     at = data.index(b" of=")
     files.files[name] = data[:at] + data[at + len(" of=01234567") :]  # as earlier versions wrote it

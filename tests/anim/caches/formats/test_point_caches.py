@@ -18,7 +18,7 @@ TWO = from_arrays(np.array([0.0, 0.5]), np.array([[[1, 2, 3]], [[-1, 0.5, 4]]], 
 
 
 def test_pc2_by_hand() -> None:
-    data = written(TWO, "a.pc2", WriteOptions(rest=""))[0].files["a.pc2"]
+    data = written(TWO, "a.pc2", WriteOptions(rest_mesh=""))[0].files["a.pc2"]
     assert data == (
         b"POINTCACHE2\0" + bytes.fromhex("01000000 01000000 00000000 0000803f 02000000")  # 1, 1 point, 0.0, 1.0, 2
         + bytes.fromhex("0000803f 00000040 00004040  000080bf 0000003f 00008040")
@@ -26,7 +26,7 @@ def test_pc2_by_hand() -> None:
 
 
 def test_mdd_by_hand() -> None:
-    data = written(TWO, "a.mdd", WriteOptions(rest=""))[0].files["a.mdd"]
+    data = written(TWO, "a.mdd", WriteOptions(rest_mesh=""))[0].files["a.mdd"]
     assert data == bytes.fromhex(
         "00000002 00000001 00000000 3f000000  3f800000 40000000 40400000  bf800000 3f000000 40800000"
     )
@@ -55,7 +55,7 @@ def test_mdd_by_numpy() -> None:
 @pytest.mark.parametrize("ending", [".ply", ".obj"])
 def test_the_rest_mesh_has_the_same_order(name: str, ending: str) -> None:
     source = cache()
-    files, _ = written(source, name, WriteOptions(rest=ending))
+    files, _ = written(source, name, WriteOptions(rest_mesh=ending))
     assert sorted(files.files) == sorted([name, f"{name}-rest{ending}"])
     mesh = by_trimesh(files.files[f"{name}-rest{ending}"], ending)
     assert mesh.vertices == pytest.approx(source.rest, abs=1e-6)

@@ -115,14 +115,14 @@ def test_a_frame_can_be_the_rest_pose(asset: Find) -> None:
     source, document = recorded("cmu_01_01.bvh", asset), character("biped", asset)
     scene = reader.scene(document)
     one, two = (
-        apply_to_character(source, scene, aliases={}, nested=True, floor=GroundMode.KEEP, rest_at=at).clip
+        apply_to_character(source, scene, aliases={}, nested=True, floor=GroundMode.KEEP, bind_time=at).clip
         for at in (None, 0.0)
     )
     for a, b in zip(one.tracks, two.tracks, strict=True):
         name = scene.skeleton.names[a.node or 0]
         if not name.endswith(("leg", "foot", "toe")):
             np.testing.assert_allclose(b.values, a.values, atol=1e-6, err_msg=name)
-    turned = apply_to_character(source, scene, aliases={}, nested=True, floor=GroundMode.KEEP, rest_at=5.0).clip
+    turned = apply_to_character(source, scene, aliases={}, nested=True, floor=GroundMode.KEEP, bind_time=5.0).clip
     bones = scene.skeleton
     hips = bones.names.index("hips")
     at_rest = sample_pose(bones, turned, np.array([5.0])).rotation[0, hips]
