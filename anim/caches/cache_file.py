@@ -1,4 +1,4 @@
-"""A vertex cache written to a path, in the format that its ending names."""
+"""Write a vertex cache to a path, in the format of its file extension."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ DEFAULTS = WriteOptions()
 
 
 def save(cache: VertexCache, path: str, options: WriteOptions = DEFAULTS) -> WriteResult:
-    """Write a cache, and what goes beside it, whole or not at all.
+    """Write a cache and its companion files atomically.
 
-    Raises UnsupportedError for an ending that no format has, RangeError for options that mean nothing to it,
-    OutputError where nothing can be written.
+    Raises UnsupportedError for an unknown file extension, RangeError for options that the format does not support,
+    OutputError if the files cannot be written.
     """
     ending = suffix(path)
     write = writer_for(ending)

@@ -1,4 +1,4 @@
-"""Frames of bare numbers behind a header, as PC2 and MDD keep them, a chunk at a time."""
+"""Raw frame data after a header, as in PC2 and MDD, a chunk at a time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anim.model import FrameChunk, VertexCache
 
 
 def check_size(file: BinaryIO, header: int, frames: int, vertices: int) -> None:
-    """Raise FormatError unless a file holds `frames` of `vertices` behind a header of so many bytes."""
+    """Raise FormatError unless a file's size matches its header, frame and vertex counts."""
     if frames < 1 or vertices < 1:
         raise FormatError(f"header says {frames} frames of {vertices} points (expected at least one)")
     expected, found = header + 12 * frames * vertices, size_of(file)
@@ -25,7 +25,7 @@ def check_size(file: BinaryIO, header: int, frames: int, vertices: int) -> None:
 
 
 def chunks(inputs: Inputs, header: int, frames: int, vertices: int, dtype: str) -> Iterator[FrameChunk]:
-    """Yield the frames of the main file, float32 of `dtype` ("<f4" or ">f4") behind the header."""
+    """Yield the frames of the main file, float32 of `dtype` ("<f4" or ">f4") after the header."""
     step = per_chunk(vertices)
     with inputs.open(inputs.main) as file:
         file.seek(header)
@@ -40,7 +40,7 @@ def chunks(inputs: Inputs, header: int, frames: int, vertices: int, dtype: str) 
 
 
 def write(cache: VertexCache, file: BinaryIO, dtype: str) -> str:
-    """Write all positions as float32 of `dtype`, and return the mark of the first frame."""
+    """Write all positions as float32 of `dtype`, and return the fingerprint of the first frame."""
     mark = ""
     for chunk in cache.chunks():
         rows = np.ascontiguousarray(chunk.positions, dtype)
@@ -50,7 +50,7 @@ def write(cache: VertexCache, file: BinaryIO, dtype: str) -> str:
 
 
 def fingerprint(inputs: Inputs, header: int, frames: int, vertices: int) -> str:
-    """Return the mark of the first of so many frames behind the header, by which a rest mesh knows its cache."""
+    """Return the fingerprint of the first frame, by which a rest mesh identifies its cache."""
     with inputs.open(inputs.main) as file:
         file.seek(header)
         return _mark(read_exactly(file, 12 * vertices, "frame 0"), frames)
@@ -61,5 +61,5 @@ def _mark(frame: bytes, frames: int) -> str:
 
 
 def per_chunk(vertices: int) -> int:
-    """Return how many frames make a chunk."""
+    """Return the frame count of a chunk."""
     return max(1, COPY_BYTES // max(12 * vertices, 1))

@@ -1,4 +1,4 @@
-"""What readers and writers of caches may need to be told; each takes what concerns it."""
+"""Options of cache readers and writers; each format uses those it supports."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """fps: frames per second where a format keeps none (PC2, frame sequences, USD without a rate).
+    """fps: frames per second for formats without a rate (PC2, frame sequences, USD without a rate).
 
-    note: called with what the user should know about what was read, a line each.
+    note: called with a line for each fact that the user should know about the input.
     """
 
     fps: float | None = None
@@ -19,14 +19,14 @@ class ReadOptions:
 
 @dataclass(frozen=True, slots=True)
 class WriteOptions:
-    """Settings of all formats.
+    """Options of all formats.
 
-    max_error: m, how far a vertex may lie from where it was, for morph targets and textures' own report.
-    quantize: whether glTF numbers become integers by KHR_mesh_quantization.
-    layout: how a .glb keeps frames, one of LAYOUTS of anim.caches.formats.gltf.
-    preset: whose axes and rows a texture has, one of PRESETS of anim.caches.vat.presets.
-    depth: of a texture's numbers: "half" or "float" in EXR.
-    rest_mesh: ending of the rest mesh beside a PC2 or MDD: ".ply", ".obj", or "" for none.
+    max_error: m, maximum error of a vertex, for morph targets and the report of textures.
+    quantize: store glTF values as integers by KHR_mesh_quantization.
+    layout: storage of frames in a .glb, one of LAYOUTS of anim.caches.formats.gltf.
+    preset: engine that defines a texture's axes and row order, one of PRESETS of anim.caches.vat.presets.
+    depth: number type of a texture: "half" or "float" in EXR.
+    rest_mesh: file extension of the rest mesh of a PC2 or MDD: ".ply", ".obj", or "" for none.
     """
 
     max_error: float | None = None
@@ -39,9 +39,9 @@ class WriteOptions:
 
 @dataclass(frozen=True, slots=True)
 class WriteResult:
-    """What came of writing. max_error: m, farthest that a vertex is from where it was; None where nothing is lost.
+    """Result of writing. max_error: m, maximum error of a vertex; None if lossless.
 
-    notes: what the user should know, a line each.
+    notes: lines for the user.
     """
 
     max_error: float | None = None

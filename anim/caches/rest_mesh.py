@@ -1,7 +1,8 @@
-"""The rest mesh beside a PC2 or MDD: what the cache is put onto, every vertex in exactly the cache's order.
+"""Rest mesh of a PC2 or MDD: the companion mesh to which the cache is applied, in its vertex order.
 
-`walk.pc2` has `walk.pc2-rest.ply`, which no other cache shares; its comment holds a mark of the cache's first frame, so
-that one which was left behind by an earlier cache of this name is told. Meshes of others are found by the cache's name.
+`walk.pc2` has `walk.pc2-rest.ply`, which no other cache shares; its comment stores a fingerprint of the cache's first
+frame, which detects a rest mesh of an earlier cache of this name. Meshes of other programs are found by the cache's
+name.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
 REST_EXTENSIONS = (".ply", ".obj", "")
-OURS = ("-rest.ply", "-rest.obj")  # behind the cache's whole name
-OTHERS = ("-rest.ply", "-rest.obj", ".ply", ".obj")  # behind its name without the ending, asked in this order
+OURS = ("-rest.ply", "-rest.obj")  # appended to the cache's whole name
+OTHERS = ("-rest.ply", "-rest.obj", ".ply", ".obj")  # appended to its name without the extension, tried in this order
 
 
 @dataclass(frozen=True, slots=True)
 class RestMesh:
-    """What lies beside a cache: faces (T, 3), none if nothing does; positions (V, 3); fps and up as it says."""
+    """Companion mesh: faces (T, 3), none without a file; positions (V, 3); fps and up axis if stored."""
 
     faces: Ints
     positions: Floats | None = None
@@ -36,9 +37,9 @@ class RestMesh:
 
 
 def write(cache: VertexCache, outputs: Outputs, ending: str, mark: str, *, fps: float | None = None) -> None:
-    """Write `NAME.pc2-rest.ply` (or .obj) beside the cache; "" writes none. Raises RangeError for another ending.
+    """Write `NAME.pc2-rest.ply` (or .obj); "" writes none. Raises RangeError for another extension.
 
-    mark: of the cache's first frame, as `raw.write` gives it.
+    mark: fingerprint of the cache's first frame, returned by `frame_blocks.write`.
     """
     if ending not in REST_EXTENSIONS:
         raise RangeError(f"rest is '{ending}' (expected .ply, .obj or nothing)")
@@ -51,10 +52,10 @@ def write(cache: VertexCache, outputs: Outputs, ending: str, mark: str, *, fps: 
 
 
 def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable[[str], None]) -> RestMesh:
-    """Return the first rest mesh beside the main file that belongs to it.
+    """Return the first companion mesh of the main file that belongs to it.
 
-    header: bytes before the cache's first frame. note: is told of meshes that are left out since they
-    have another number of vertices or are marked as another cache's, and of one that only its name speaks for.
+    header: bytes before the cache's first frame. note: called with a line about ignored meshes, which have another
+    vertex count or another cache's fingerprint, and about one identified only by its name.
     """
     there = set(inputs.names())
     mark = ""
@@ -76,7 +77,7 @@ def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable
 
 
 def positions(cache: VertexCache) -> Floats:
-    """Return the mesh at rest (V, 3), the first frame where the cache has none."""
+    """Return the rest mesh (V, 3), the first frame if the cache has none."""
     return cache.rest if cache.rest is not None else next(cache.chunks()).positions[0].astype(np.float64)
 
 

@@ -1,7 +1,7 @@
-"""Where the bytes of a cache come from and go to: one main file and what lies beside it, by name.
+"""Input and output files of caches: one main file and its companions, by name.
 
-The library opens no paths: it asks these for binary files. `Memory` keeps them in a dict; the command line has ones for
-folders and pipes.
+The library opens no paths here: it requests binary files from these protocols. `Memory` keeps them in a dict; the
+command line implements them for folders and pipes.
 """
 
 from __future__ import annotations
@@ -15,33 +15,33 @@ from typing import BinaryIO, Protocol
 
 from anim.errors import FormatError
 
-COPY_BYTES = 1 << 24  # bytes that streaming readers and writers handle at a time, about
+COPY_BYTES = 1 << 24  # approximate bytes that streaming readers and writers process at a time
 
 
 class Inputs(Protocol):
-    """Files to read. main: the name of the one that was asked for."""
+    """Files to read. main: name of the requested one."""
 
     main: str
 
     def open(self, name: str) -> BinaryIO:
-        """Return a file at its start, seekable. Raises FormatError where there is none of this name."""
+        """Return a file at its start, seekable. Raises FormatError for an unknown name."""
 
     def names(self) -> Sequence[str]:
-        """Return the names of all files beside the main one, itself among them, sorted."""
+        """Return the names of all files in the main one's folder, itself included, sorted."""
 
 
 class Outputs(Protocol):
-    """Files to write. main: the name that was asked for."""
+    """Files to write. main: the requested name."""
 
     main: str
 
     def create(self, name: str) -> BinaryIO:
-        """Return an empty file, seekable, that becomes `name` when it is closed."""
+        """Return an empty file, seekable, that becomes `name` on close."""
 
 
 @dataclass
 class Memory:
-    """Files in a dict: Inputs and Outputs at once, for Python users and tests."""
+    """Files in a dict: both Inputs and Outputs, for Python users and tests."""
 
     main: str
     files: dict[str, bytes] = field(default_factory=dict)
@@ -62,17 +62,17 @@ class Memory:
 
 
 def companion_name(name: str, ending: str) -> str:
-    """Return the name of a companion: beside("walk.pc2", "-rest.ply") → "walk.pc2-rest.ply"; no other cache has it."""
+    """Return a companion's unique name: companion_name("walk.pc2", "-rest.ply") → "walk.pc2-rest.ply"."""
     return PurePath(name).name + ending
 
 
 def suffix(name: str) -> str:
-    """Return the ending that names a format: suffix("A/Walk.PC2") → ".pc2"."""
+    """Return the file extension of a format: suffix("A/Walk.PC2") → ".pc2"."""
     return PurePath(name).suffix.lower()
 
 
 def read_exactly(file: BinaryIO, count: int, what: str) -> bytes:
-    """Return the next `count` bytes. Raises FormatError where the file ends before."""
+    """Return the next `count` bytes. Raises FormatError at the end of the file."""
     data = file.read(count)
     if len(data) < count:
         raise FormatError(f"is truncated: {what} has {len(data)} bytes of {count}")
@@ -80,7 +80,7 @@ def read_exactly(file: BinaryIO, count: int, what: str) -> bytes:
 
 
 def size_of(file: BinaryIO) -> int:
-    """Return the size of a seekable file in bytes; its place stays."""
+    """Return the size of a seekable file in bytes; its position is unchanged."""
     at = file.tell()
     size = file.seek(0, io.SEEK_END)
     file.seek(at)
@@ -89,13 +89,13 @@ def size_of(file: BinaryIO) -> int:
 
 @contextmanager
 def read_all(inputs: Inputs, name: str) -> Iterator[bytes]:
-    """Give all bytes of a file."""
+    """Yield all bytes of a file."""
     with inputs.open(name) as file:
         yield file.read()
 
 
 class _MemoryFile(io.BytesIO):
-    """A file in memory whose bytes are put into a dict when it is closed without an error."""
+    """A file in memory that stores its bytes in a dict when it is closed without an error."""
 
     def __init__(self, files: dict[str, bytes], name: str) -> None:
         super().__init__()

@@ -15,7 +15,7 @@ from anim.caches.storage import COPY_BYTES, Inputs, Outputs
 
 @contextmanager
 def temp_output(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
-    """Give a path of this ending to write to; what lies there at the end becomes the output `name`."""
+    """Yield a path of this extension to write to; its content becomes the output `name`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"output{ending}"
         yield str(path)
@@ -25,7 +25,7 @@ def temp_output(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
 
 @contextmanager
 def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
-    """Give a path at which the bytes of an input can be read."""
+    """Yield a path from which the bytes of an input can be read."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"input{ending}"
         with inputs.open(name) as source, path.open("wb") as target:
@@ -35,10 +35,10 @@ def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
 
 @contextmanager
 def silence_native() -> Iterator[None]:
-    """Keep a package written in C++ from printing: what it finds wrong is said by us, in one line."""
+    """Suppress printed messages of native packages; errors are reported in one line instead."""
     try:
         kept = os.dup(2)
-    except OSError:  # stderr is closed: nothing to keep
+    except OSError:  # stderr is closed
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)

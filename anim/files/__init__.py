@@ -1,1 +1,1 @@
-"""Files by path: mapped, confined to a folder, and replaced whole. Nothing else in the library opens a path."""
+"""Files by path: memory-mapped, confined to a folder, and written atomically."""

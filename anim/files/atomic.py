@@ -1,7 +1,8 @@
-"""Files that appear whole or not at all: written as temporary neighbors, renamed once they are complete.
+"""Atomic output: files are written as temporary siblings and renamed when complete.
 
-One file is replaced by one rename. Files that belong together by their names alone (a cache and its companions) can't
-be: their main file is moved away before any of them changes and comes last, so that whoever finds it finds one set.
+One file is replaced by one rename. Files related only by their names (a cache and its companions) cannot be: their main
+file is moved away before any of them changes and is renamed last, so that a reader that finds it finds a consistent
+set.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ from anim.arrays import Bytes
 from anim.errors import OutputError, not_written
 from anim.files import links, signals
 
-MAX_PREFIX_LENGTH = 40  # letters of a name that its temporary neighbor begins with: longer names have no room for more
-BLOCK_BYTES = 1 << 24  # that are copied or compared at a time
-MAX_LOCK_WAIT_S = 5.0  # `flock FOLDER gltf-anim …` in a script would make us wait for ever
+MAX_PREFIX_LENGTH = 40  # characters of the target name in a temporary name, so that long names remain valid
+BLOCK_BYTES = 1 << 24  # copied or compared at a time
+MAX_LOCK_WAIT_S = 5.0  # a lock held by a script (`flock FOLDER gltf-anim …`) would block forever
 LOCK_POLL_S = 0.005
 
 
 def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
-    """Write one file whole, in one rename; of a file that has these bytes already only the time is updated.
+    """Write one file atomically; for equal bytes only the modification time is updated.
 
-    Links are followed; what is no plain file (/dev/null, a named pipe) is written into. Raises OutputError.
+    Links are followed; special files (/dev/null, a named pipe) are written directly. Raises OutputError.
     """
     with commit_after(path, pieces):
         pass
@@ -38,10 +39,10 @@ def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
 
 @contextmanager
 def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
-    """Write one file like `write_file`, but rename it after the block only; where that fails, the file stays as it was.
+    """Write one file like `write_file`, but rename it after the block; an error keeps the old file.
 
-    So what may fail of this file (no permission, a full disk) fails before the block. What is no plain file is written
-    into before it.
+    So errors of this file (no permission, a full disk) are raised before the block. Other than regular files are
+    written before it.
     """
     target, temporary = links.resolve_links(path), None
     with temporary_files() as made:
@@ -62,9 +63,9 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
 
 @dataclass
 class AtomicOutputs:
-    """Files of one folder, `main` and its companions, that take their places together on `commit`.
+    """Files of one folder, `main` and its companions, that are renamed together on `commit`.
 
-    folder and main: without links. A companion that is a link goes: what it leads to belongs to others.
+    folder and main: with links resolved. A companion that is a link is replaced: its target belongs to others.
     """
 
     folder: Path
@@ -72,7 +73,7 @@ class AtomicOutputs:
     files: dict[str, Path] = field(default_factory=dict)
 
     def size(self, names: Sequence[str]) -> int:
-        """Return the bytes of these files together."""
+        """Return the total bytes of these files."""
         return sum(self.files[name].stat().st_size for name in names)
 
     @property
@@ -81,17 +82,17 @@ class AtomicOutputs:
         return tuple(sorted(self.files, key=lambda name: name == self.main))
 
     def create(self, name: str) -> BinaryIO:
-        """Return a new file of this name, open for writing and reading back."""
+        """Return a new file of this name, open for writing and reading."""
         path = self.folder / name
-        if path.exists() and not path.is_file():  # what lies beside /dev/null is not for everybody to write
+        if path.exists() and not path.is_file():  # companions of /dev/null would be in a shared folder
             path = Path(tempfile.gettempdir()) / name
         handle, self.files[name] = create_temporary(path)
         return os.fdopen(handle, "w+b")
 
     def commit(self) -> None:
-        """Give the files their names, where their bytes are new; else update the main file's time.
+        """Rename the files that have new bytes; otherwise update the main file's time.
 
-        Where the main file is none of them (a sequence of numbered frames) the first one counts as it.
+        Without the main file (a sequence of numbered frames) the first one replaces it.
         """
         main = self.main if self.main in self.files else min(self.files)
         with lock_folder(self.folder):
@@ -108,7 +109,7 @@ class AtomicOutputs:
             _replace_set(new, self.folder / main)
 
     def clear(self) -> None:
-        """Remove what is still temporary."""
+        """Remove remaining temporary files."""
         for temporary in self.files.values():
             with suppress(OSError):
                 temporary.unlink()
@@ -116,9 +117,9 @@ class AtomicOutputs:
 
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
-    """Keep other runs from changing sets of files in this folder meanwhile, where the system has locks for folders.
+    """Lock a folder against concurrent changes of file sets, if the system supports it.
 
-    The lock leaves no file behind and ends with the process. After 5 s it goes on without.
+    The lock leaves no file and ends with the process. After 5 s the block runs without it.
     """
     try:
         import fcntl
@@ -144,7 +145,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def name_errors(path: Path) -> Iterator[None]:
-    """Turn errors of the system into ours, which name the output."""
+    """Convert OSError to an error with the output's name."""
     try:
         yield
     except OSError as error:
@@ -153,21 +154,21 @@ def name_errors(path: Path) -> Iterator[None]:
 
 @contextmanager
 def temporary_files() -> Iterator[list[Path]]:
-    """Give a list of files of which those that are still there at the end are removed."""
+    """Yield a list of temporary files; those that remain at the end are removed."""
     made: list[Path] = []
     try:
         yield made
     finally:
-        with signals.hold_signals():  # what stops us may not stop this
+        with signals.hold_signals():  # the signal must not interrupt the removal
             for path in made:
                 with suppress(OSError):
                     path.unlink()
 
 
 def write_temporary(path: Path, pieces: Iterable[Bytes], made: list[Path]) -> Path:
-    """Write pieces to a neighbor of `path` that is to take its place, with its permissions; return where it is.
+    """Write chunks to a temporary sibling of `path` with its permissions; return the temporary path.
 
-    made: of `temporary_files`; gets it as soon as it is there.
+    made: of `temporary_files`; receives the path on creation.
     """
     handle, temporary = create_temporary(path)
     made.append(temporary)
@@ -178,18 +179,18 @@ def write_temporary(path: Path, pieces: Iterable[Bytes], made: list[Path]) -> Pa
 
 
 def create_temporary(path: Path, suffix: str = ".tmp") -> tuple[int, Path]:
-    """Make an empty file beside `path` that is to take its place; return what is open, and where it is."""
+    """Create an empty sibling of `path` that will replace it; return its descriptor and path."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name[:MAX_PREFIX_LENGTH]}.", suffix=suffix, dir=path.parent)
     return handle, Path(name)
 
 
 def move_to_free(temporary: Path, path: Path) -> None:
-    """Give a finished temporary file a name that is free, in one step. Raises FileExistsError where none is."""
+    """Rename a temporary file to a free name, atomically. Raises FileExistsError otherwise."""
     try:
         os.link(temporary, path)
     except FileExistsError:
         raise
-    except OSError:  # a file system without hard links: the name is taken first, empty
+    except OSError:  # a file system without hard links: reserve the name with an empty file first
         os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
         try:
             os.replace(temporary, path)
@@ -199,7 +200,7 @@ def move_to_free(temporary: Path, path: Path) -> None:
 
 
 def mode_of(path: Path) -> int:
-    """Return the permissions that a file at `path` has or would get."""
+    """Return the permissions of the existing or future file at `path`."""
     if path.exists():
         return path.stat().st_mode & 0o7777
     umask = os.umask(0)
@@ -208,13 +209,13 @@ def mode_of(path: Path) -> int:
 
 
 def check_writable(path: Path) -> None:
-    """Raise OutputError for a file that is there and can't be written."""
+    """Raise OutputError for an existing file without write permission."""
     if path.exists() and not os.access(path, os.W_OK):
         raise OutputError(f"{path}: is read-only")
 
 
 def has_bytes(path: Path, pieces: Sequence[Bytes]) -> bool:
-    """Return whether a plain file at `path` holds exactly these pieces."""
+    """Return True if a regular file at `path` contains exactly these chunks."""
     if not path.is_file() or path.stat().st_size != sum(len(piece) for piece in pieces):
         return False
     with path.open("rb") as file:
@@ -226,9 +227,9 @@ def has_bytes(path: Path, pieces: Sequence[Bytes]) -> bool:
 
 
 def _replace_set(new: Mapping[Path, Path], main: Path) -> None:
-    """Rename the temporary files `new`, by the path that each is to get, so that `main` never stands in a mixed set.
+    """Rename the temporary files `new` to their keys so that `main` never exists in a mixed set.
 
-    Whatever fails, or is interrupted but by SIGKILL, leaves the old set as it was.
+    Any error, or interruption other than SIGKILL, restores the old set.
     """
     with signals.hold_signals():
         if len(new) > 1:

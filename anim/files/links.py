@@ -1,4 +1,4 @@
-"""Links to files: resolved once, at the start, so that a file and all that belongs beside it come from one folder."""
+"""Resolve links once at the start, so that a file and its companions have the same folder."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 
 
 def resolve_links(path: Path) -> Path:
-    """Return where the file lies that a link leads to, also one that is not there yet; any other path as it is.
+    """Return the target of a link, existing or not; any other path unchanged.
 
-    A link to what has no place in a folder (/dev/stdin, which may be a pipe) stays as it is, too.
-    followed(s/q.gltf → ../real/q.gltf) → /…/real/q.gltf
+    A link to a target outside the file system (/dev/stdin, which may be a pipe) is unchanged, too.
+    resolve_links(s/q.gltf → ../real/q.gltf) → /…/real/q.gltf
     """
     if not os.path.islink(path):
         return path

@@ -1,4 +1,4 @@
-"""Bytes of files, by path or beside another file by relative address: mapped, and never from outside its folder."""
+"""Read files by path, or by relative address confined to a folder: memory-mapped."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ class CompanionFiles:
         self._files: dict[str, Bytes] = {}
 
     def open(self, address: str) -> Bytes:
-        """Return the bytes of a file. Raises FormatError for one that is not there, or not below the folder."""
+        """Return the bytes of a file. Raises FormatError for a missing one, or one outside the folder."""
         if address not in self._files:
             self._files[address] = open_relative(self._folder, address)
         return self._files[address]
 
 
 def map_file(path: Path, ending: str = ".glb") -> Bytes:
-    """Return the bytes of a file. ending: of the files that are meant, for the hint where `path` is a folder."""
+    """Return the bytes of a file. ending: expected extension, for the hint if `path` is a folder."""
     try:
         if path.is_dir():
             raise FormatError("is a folder", help=_in_folder(path, ending))
         with path.open("rb") as file:
             is_plain = path.is_file() and os.fstat(file.fileno()).st_size > 0
-            if not is_plain or sys.platform == "win32":  # where a mapped file can't be replaced by its output
+            if not is_plain or sys.platform == "win32":  # a mapped file could not be replaced there
                 return np.frombuffer(file.read(), np.uint8)
             return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
     except OSError as error:
@@ -42,12 +42,12 @@ def map_file(path: Path, ending: str = ".glb") -> Bytes:
 
 
 def _in_folder(folder: Path, ending: str) -> str:
-    """What to name instead of a folder: a file that is there, since most commands take one."""
+    """Hint instead of a folder: an existing file in it, since most commands need a file."""
     found = min(folder.glob(f"*{ending}"), default=None)
     if found is None:
         return f"name a file (there is no {ending} in it)"
     name = str(found)
-    return f"name a file in it, such as {name if name[0] != '-' else f'./{name}'}"  # or it would be an option
+    return f"name a file in it, such as {name if name[0] != '-' else f'./{name}'}"  # "-x" is an option
 
 
 def open_relative(folder: Path, address: str) -> Bytes:
@@ -60,19 +60,22 @@ def open_relative(folder: Path, address: str) -> Bytes:
 
 
 def refuse_relative(address: str) -> Bytes:
-    """Raise FormatError: an input that comes through a pipe has no files beside it."""
+    """Raise FormatError: an input from a pipe has no other files."""
     raise FormatError(
         f"'{address}' lies beside the file, but the input is a pipe", help="give the file's path, or pipe a GLB"
     )
 
 
 def locate(folder: Path, address: str) -> Path:
-    """Return where a file in or below the folder lies; links that lead out of it are refused. Raises FormatError."""
+    """Return the path of a file in or below the folder. Raises FormatError.
+
+    Links to files outside the folder are rejected.
+    """
     path = folder / address
     try:
         outside = folder.resolve() not in path.resolve().parents
         there, regular = path.exists(), path.is_file()
-    except (OSError, RuntimeError, ValueError) as error:  # a name too long, a loop of links, half a character
+    except (OSError, RuntimeError, ValueError) as error:  # a name too long, a loop of links, a lone surrogate
         raise FormatError(f"'{address[:60]}' can't be looked up ({str(error).lower()[:60]})") from None
     if outside:
         raise FormatError(f"'{address}' leads out of the file's folder (only files beside it are read)")

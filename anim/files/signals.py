@@ -1,4 +1,4 @@
-"""Signals that would stop us, held back while files change places."""
+"""Defer termination signals during critical file operations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ STOPS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") i
 
 @contextmanager
 def hold_signals() -> Iterator[None]:
-    """Keep signals that stop us until the end. Only the main thread can, and only it gets them."""
+    """Defer termination signals until the end of the block.
+
+    Only the main thread can, and only it receives them.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return

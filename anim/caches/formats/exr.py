@@ -1,4 +1,4 @@
-"""EXR of three channels ↔ rows of numbers, through OpenEXR (extra `exr`)."""
+"""EXR of three channels ↔ pixel arrays, through OpenEXR (extra `exr`)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TYPES = {"float": np.float32, "half": np.float16}
 
 
 def write(pixels: AnyArray, outputs: Outputs, name: str) -> None:
-    """Write pixels (height, width, 3), float32 or float16, as R, G, B; losslessly packed (ZIP)."""
+    """Write pixels (height, width, 3), float32 or float16, as R, G, B; losslessly compressed (ZIP)."""
     package = _package()
     header = {"compression": package.ZIP_COMPRESSION, "type": package.scanlineimage}
     with temporary_files.temp_output(outputs, name, ".exr") as path:
@@ -23,14 +23,14 @@ def write(pixels: AnyArray, outputs: Outputs, name: str) -> None:
 
 
 def read(inputs: Inputs, name: str) -> AnyArray:
-    """Return the pixels (height, width, 3). Raises FormatError for what OpenEXR can't read."""
+    """Return the pixels (height, width, 3). Raises FormatError for an invalid file."""
     package = _package()
     with temporary_files.temp_input(inputs, name, ".exr") as path, temporary_files.silence_native():
         try:
             with package.File(path) as file:
                 channels = file.channels()
                 if "RGB" in channels:
-                    return np.array(channels["RGB"].pixels)  # a copy: they dangle once the file is closed
+                    return np.array(channels["RGB"].pixels)  # a copy: the array is invalid once the file is closed
                 return np.stack([np.array(channels[key].pixels) for key in "RGB"], axis=-1)
         except KeyError:
             raise FormatError("EXR has no channels R, G and B") from None

@@ -28,16 +28,16 @@ LAYOUTS: dict[str, Write] = {
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write a GLB in the layout that `writing.layout` names. Raises RangeError for another."""
+    """Write a GLB in the layout `writing.layout`. Raises RangeError for an unknown one."""
     if writing.layout not in LAYOUTS:
         raise RangeError(f"layout is '{writing.layout}' (expected {', '.join(LAYOUTS)})")
     return LAYOUTS[writing.layout](cache, outputs, writing)
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    """Return the frames of a flip-book of ours, or what the first clip of any other glTF plays.
+    """Return the frames of a flip-book of this library, or the first clip of another glTF as frames.
 
-    Morph targets and skins (linear blend) are played at the clip's own keys, or at `reading.fps`.
+    Morph targets and skins (linear blend) are evaluated at the clip's own keys, or at `reading.fps`.
     """
     with read_all(inputs, inputs.main) as data:
         document = container.read(np.frombuffer(data, np.uint8))
@@ -51,7 +51,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 def pages(document: Document) -> VertexCache | None:
-    """Return the frames of a flip-book of ours, None for any other document."""
+    """Return the frames of a flip-book of this library, None for any other document."""
     for node in json_array(document.json, "nodes"):
         said = (node.get("extras") or {}).get(gltf_flipbook.EXTRAS) if isinstance(node.get("extras"), dict) else None
         if isinstance(said, dict) and said.get("cache") == gltf_flipbook.NAME:

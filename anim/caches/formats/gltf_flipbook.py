@@ -1,7 +1,7 @@
-"""VertexCache → .glb as a flip-book: a mesh for every frame, of which one is shown at a time, with nothing in between.
+"""VertexCache → .glb as a flip-book: a mesh for every frame, one visible at a time, no interpolation.
 
-No limit of morph targets, no loss, but every frame costs 12 bytes a vertex. Shown by KHR_node_visibility, which an
-animation pointer switches, or by a scale of 0 or 1, which every viewer of glTF knows.
+No limit of morph targets, lossless, but every frame costs 12 bytes a vertex. Pages are switched by KHR_node_visibility
+with an animation pointer, or by a scale of 0 or 1, supported by every glTF viewer.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ POINTER, VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
 
 
 def write_visibility(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write a flip-book whose pages are switched by KHR_node_visibility."""
+    """Write a flip-book with pages switched by KHR_node_visibility."""
     _write(cache, outputs, by_scale=False)
     return WriteResult(notes=(f"needs a viewer that knows {VISIBILITY}; the layout flip-scale plays everywhere",))
 
 
 def write_scale(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write a flip-book whose pages are switched by their scale."""
+    """Write a flip-book with pages switched by their scale."""
     _write(cache, outputs, by_scale=True)
     return WriteResult()
 
@@ -69,7 +69,7 @@ def _write(cache: VertexCache, outputs: Outputs, *, by_scale: bool) -> None:
 
 
 def _attributes(file: GlbFile, chunk: FrameChunk, i: int, handedness: Floats | None) -> dict[str, int]:
-    """The accessors of frame i of a chunk."""
+    """Accessors of frame i of a chunk."""
     found = {"POSITION": file.add(chunk.positions[i].astype("<f4"), target=VERTICES, bounds=True)}
     if chunk.normals is not None:
         found["NORMAL"] = file.add(chunk.normals[i].astype("<f4"), target=VERTICES)
@@ -79,7 +79,7 @@ def _attributes(file: GlbFile, chunk: FrameChunk, i: int, handedness: Floats | N
 
 
 def _page(frame: int, *, by_scale: bool) -> Any:
-    """A node with the mesh of a frame, hidden unless it is the first."""
+    """A node with the mesh of a frame, visible only for the first frame."""
     from pygltflib import Node
 
     node = Node(mesh=frame)
@@ -100,7 +100,7 @@ def _target(node: int, *, by_scale: bool) -> Any:
 
 
 def _keys(times: AnyArray, frame: int) -> AnyArray:
-    """When a page changes: it is hidden before its time and from the next page's on; the last one stays."""
+    """Key times of a page: hidden before its time and from the next page's on; the last one remains."""
     if frame == 0:
         return times[:2]
     return np.concatenate((times[:1], times[frame : frame + 2]))

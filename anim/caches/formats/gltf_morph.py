@@ -1,9 +1,9 @@
-"""VertexCache → .glb with morph targets: every viewer plays it, smoothly between frames.
+"""VertexCache → .glb with morph targets, supported by every viewer, interpolated between frames.
 
-Three forms are tried, and the smallest that keeps every vertex of every frame within the limit is written:
-`keyframes`, one target for each frame that straight lines between others don't give; `basis`, few shapes (principal
-components) with a weight each per frame; `both`, the shapes of the kept frames. Between frames weights go in straight
-lines, and so do vertices, so the worst over the frames is the worst over all times. All weights are within 0…1.
+Three encodings are tried, and the smallest with every vertex of every frame within the limit is written: `keyframes`,
+one target for each frame that linear interpolation does not reproduce; `basis`, few shapes (principal components) with
+a weight each per frame; `both`, the shapes of the retained frames. Between frames weights are linear, and so are
+vertices, hence the maximum error over the frames is the maximum over all times. All weights are within 0…1.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from anim.errors import RangeError, UnsupportedError
 from anim.gltf.authoring_parts import VERTICES
 from anim.model import FrameChunk, VertexCache
 
-DEFAULT_ERROR = 1e-3  # of the diagonal, where no limit is given
-MAX_BYTES = 1 << 30  # of positions, which are in memory here, three times over
+DEFAULT_ERROR = 1e-3  # fraction of the diagonal, without a given limit
+MAX_BYTES = 1 << 30  # of positions, three times this in memory
 MAX_TARGETS = 1024
-PORTABLE_TARGETS = 8  # what glTF promises; engines take more
+PORTABLE_TARGETS = 8  # guaranteed by glTF; most engines support more
 BATCH = 16  # frames compared at a time
-MARGINS = 0.98, 0.5  # of the limit, what rounding to float32 may not eat; the second where it did
+MARGINS = 0.98, 0.5  # fractions of the limit, reserve for rounding to float32; the second if the first fails
 NAME, EXTRAS = "cache", "gltf_anim"
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write the smallest form within `writing.max_error` m, by default 0.1 % of the diagonal.
+    """Write the smallest encoding within `writing.max_error` m, by default 0.1 % of the diagonal.
 
-    Raises UnsupportedError for caches over 1 GB, RangeError where no form keeps the limit.
+    Raises UnsupportedError for caches over 1 GB, RangeError if no encoding satisfies the limit.
     """
     if 12 * cache.frame_count * cache.vertex_count > MAX_BYTES:
         raise UnsupportedError(
@@ -58,7 +58,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
 def _smallest_encoding(
     positions: AnyArray, times: Floats, limit: float, *, quantize: bool
 ) -> tuple[MorphEncoding, float] | None:
-    """The form of fewest bytes that keeps the limit as it is stored, and its error; None where none does."""
+    """The smallest encoding within the limit as stored, and its error; None if there is none."""
 
     def within(forms: Iterable[MorphEncoding]) -> list[tuple[MorphEncoding, float]]:
         changed = (encode_morphs(form, quantize=quantize) for form in forms)
@@ -77,7 +77,7 @@ def _smallest_encoding(
 
 
 def _pca_targets(positions: AnyArray, times: Floats, limit: float, *, most: int) -> Iterator[MorphEncoding]:
-    """Forms of few shapes that may be the smallest; the number of targets decides, nearly."""
+    """Candidate encodings of few shapes; their size depends mostly on the target count."""
     for name, share in (("basis", 0.0), ("both", 0.5)):
         frames = reduce_frames(positions, times, limit * share) if share else np.arange(len(positions))
         if share and len(frames) == len(positions):
@@ -95,8 +95,8 @@ def _frame_targets(positions: AnyArray, kept: Ints) -> MorphEncoding:
 
 
 def _worst(positions: AnyArray, times: Floats, form: MorphEncoding) -> float:
-    """Farthest that a vertex of any frame is from where a viewer puts it."""
-    keys = times[form.frames].astype(np.float32)  # as the file has them
+    """Maximum distance of a vertex of any frame from its position in a viewer."""
+    keys = times[form.frames].astype(np.float32)  # as stored
     flat = form.targets.reshape(len(form.targets), form.base.size)
     worst = 0.0
     for first in range(0, len(positions), BATCH):
@@ -151,16 +151,16 @@ def _write(cache: VertexCache, whole: FrameChunk, form: MorphEncoding, outputs: 
 
 
 def _directions(normals: AnyArray | None, form: MorphEncoding) -> AnyArray | None:
-    """Normals or tangents (1 + M, V, 3) of the base, unit, and of each target: the nearest that the weights allow."""
+    """Normals or tangents (1 + M, V, 3) of the base, unit, and of each target: least-squares fit."""
     if normals is None:
         return None
     kept = normals[form.frames].astype(np.float64)
     design = np.concatenate((np.ones((len(kept), 1)), form.weights), axis=1)
     rcond = np.finfo(np.float64).eps * max(design.shape)
-    found = np.linalg.pinv(design, rcond) @ kept.reshape(len(kept), -1)  # as lstsq, a hundred times as fast
+    found = np.linalg.pinv(design, rcond) @ kept.reshape(len(kept), -1)  # equals lstsq, a hundred times faster
     solved: AnyArray = found.reshape(-1, *normals.shape[1:])
     length = np.maximum(np.linalg.norm(solved[0], axis=1, keepdims=True), 1e-3)
-    solved /= length  # a base normal has to be unit; scaling all of a vertex's normals turns none of them
+    solved /= length  # a base normal must be unit; scaling all normals of a vertex keeps their directions
     up = np.where(np.abs(np.linalg.norm(solved[0], axis=1, keepdims=True) - 1) < 1e-6, solved[0], (0.0, 1.0, 0.0))
     solved[0] = up
     return solved

@@ -1,4 +1,4 @@
-"""A GLB made from nothing by pygltflib, its numbers streamed into a file as they come."""
+"""Author a GLB with pygltflib, its accessor data streamed into a temporary file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 
 class GlbFile:
-    """What a document needs to become a GLB. gltf: pygltflib's object, to which nodes, meshes and clips are added."""
+    """A GLB under construction.
+
+    gltf: pygltflib's object, to which nodes, meshes and clips are added.
+    """
 
     def __init__(self) -> None:
         self.gltf: GLTF2 = create_document()
@@ -38,9 +41,9 @@ class GlbFile:
         bounds: bool = False,
         width: int | None = None,
     ) -> int:
-        """Append rows (n, C), already of their stored type, and return the number of their accessor.
+        """Append rows (n, C), already of their stored type, and return the index of their accessor.
 
-        width: bytes from vertex to vertex where that is more than the row itself (rows of 3 shorts stand 8 apart).
+        width: bytes per vertex if greater than the row itself (rows of 3 shorts have a stride of 8).
         """
         rows = np.ascontiguousarray(rows)
         stride = None
@@ -67,13 +70,13 @@ class GlbFile:
         )
 
     def add_indices(self, faces: AnyArray, vertices: int) -> int | None:
-        """Append triangles (T, 3) and return the number of their accessor, None where there are none."""
+        """Append triangles (T, 3) and return the index of their accessor, None for no triangles."""
         if not len(faces):
             return None
         return self.add(faces.reshape(-1, 1).astype("<u2" if vertices < 65535 else "<u4"), target=INDICES)
 
     def write(self, outputs: Outputs, name: str) -> None:
-        """Write the GLB. Raises UnsupportedError beyond 4 GiB."""
+        """Write the GLB. Raises UnsupportedError above 4 GiB."""
         from pygltflib import Buffer
 
         self.gltf.buffers.append(Buffer(byteLength=self.size))
@@ -90,13 +93,13 @@ class GlbFile:
 
 
 def signed(tangents: AnyArray, handedness: Floats) -> AnyArray:
-    """Return TANGENT (V, 4) of unit tangents (V, 3) and their signs; one without a direction gets some, as it must."""
+    """Return TANGENT (V, 4) of unit tangents (V, 3) and signs; zero tangents get a valid direction."""
     has = np.linalg.norm(tangents, axis=1, keepdims=True) > 0.5
     return np.concatenate((np.where(has, tangents, (1, 0, 0)), handedness[:, None]), axis=1).astype("<f4")
 
 
 def primitive(attributes: dict[str, int], indices: int | None, targets: Sequence[dict[str, int]] = ()) -> Any:
-    """Return pygltflib's primitive with the file's only material: triangles, or points where there are no indices."""
+    """Return a primitive with the file's only material: triangles, or points without indices."""
     from pygltflib import Attributes, Primitive
 
     found = Primitive(attributes=Attributes(**attributes), indices=indices, material=0, mode=None)

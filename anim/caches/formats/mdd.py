@@ -1,7 +1,7 @@
 """VertexCache ↔ .mdd, LightWave's point cache: big-endian, with the time of every frame.
 
-int32 frames, int32 points, float32 seconds of each frame, then float32 xyz of every point, frame by frame. A rest mesh
-in the same order of vertices lies beside it.
+int32 frames, int32 points, float32 seconds of each frame, then float32 xyz of every point, frame by frame. A companion
+rest mesh has the same order of vertices.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ HEADER = struct.Struct(">ii")
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    """Return the cache in the main file, with the faces of the rest mesh beside it where there is one."""
+    """Return the cache in the main file, with the faces of its rest mesh if there is one."""
     with inputs.open(inputs.main) as file:
         frames, points = HEADER.unpack(read_exactly(file, HEADER.size, "the header"))
         frame_blocks.check_size(file, HEADER.size + 4 * max(frames, 0), frames, points)
@@ -40,7 +40,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write the cache and a rest mesh beside it; times become float32."""
+    """Write the cache and its rest mesh; times become float32."""
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
         file.write(cache.times.astype(">f4").tobytes())

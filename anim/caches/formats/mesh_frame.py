@@ -1,6 +1,7 @@
 """One frame ↔ the bytes of an OBJ, PLY or STL file, vertices in their order, written by trimesh.
 
-A comment in the file (the header of an STL) keeps what these formats have no place for: "gltf-anim time=0.5 up=z".
+A comment in the file (the header of an STL) stores properties without a field in these formats: "gltf-anim time=0.5
+up=z".
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ import numpy as np
 from anim.arrays import AnyArray, Ints
 from anim.errors import FormatError
 
-OBJ_DIGITS = 9  # behind the point
+OBJ_DIGITS = 9  # decimals
 REMARK = re.compile(rb"gltf-anim ((?:[a-z]+=\S+ ?)+)")
 _TRIMESH = b"https://github.com/mikedh/trimesh"
 
 
 @dataclass(frozen=True, slots=True)
 class MeshFrame:
-    """positions (V, 3) float32, faces (T, 3), normals (V, 3) float32 or None, and the words of the remark."""
+    """positions (V, 3) float32, faces (T, 3), normals (V, 3) float32 or None, values of the comment."""
 
     positions: AnyArray
     faces: Ints
@@ -31,7 +32,7 @@ class MeshFrame:
 
 
 def write(still: MeshFrame, ending: str) -> bytes:
-    """Return the bytes of a file: ".ply" binary, ".obj" text, ".stl" binary, which keeps no order of vertices."""
+    """Return a file's bytes: ".ply" binary, ".obj" text, ".stl" binary, without a vertex order."""
     from trimesh import Trimesh
     from trimesh.exchange import obj, ply, stl
 
@@ -49,7 +50,7 @@ def write(still: MeshFrame, ending: str) -> bytes:
 
 
 def read(data: bytes, ending: str) -> MeshFrame:
-    """Return what a file holds, polygons cut into triangles. Raises FormatError for what trimesh can't read."""
+    """Parse a file, polygons triangulated. Raises FormatError for an invalid one."""
     positions, faces, normals = _read_obj(data) if ending == ".obj" else _read_by_trimesh(data, ending)
     if not len(positions):
         raise FormatError("has no vertices")
@@ -61,13 +62,13 @@ def read(data: bytes, ending: str) -> MeshFrame:
 
 
 def comment_of(head: bytes) -> dict[str, str]:
-    """Return the words of our remark in the first bytes of a file, none where there is no such."""
+    """Return the values of this library's comment in the first bytes of a file; empty without one."""
     found = REMARK.search(head[:1024])
     return dict(word.split("=", 1) for word in found[1].decode("ascii", "replace").split()) if found else {}
 
 
 def _with_comment(data: bytes, opening: bytes, remark: bytes) -> bytes:
-    """The file with the comment that trimesh puts in replaced by ours; in front of all where there is none."""
+    """The file with trimesh's comment replaced by this library's, or with it prepended."""
     if opening + _TRIMESH in data[:200]:
         return data.replace(opening + _TRIMESH, opening + remark, 1)
     first, _, others = data.partition(b"\n") if data.startswith(b"ply") else (b"", b"", data)
@@ -81,14 +82,14 @@ def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray
         mesh: Any = trimesh.load(io.BytesIO(data), file_type=ending[1:], process=False, validate=False)
         positions = np.asarray(mesh.vertices)
         faces: Ints = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64).reshape(-1, 3)
-    except Exception as error:  # trimesh raises whatever it met
+    except Exception as error:  # trimesh raises exceptions of any type
         raise FormatError(f"is no {ending} that can be read ({' '.join(str(error).split())[:120]})") from None
     has_normals = ending == ".ply" and b"property float nx" in data[:1024] and "vertex_normals" in mesh._cache
     return positions, faces, np.asarray(mesh.vertex_normals, np.float32) if has_normals else None
 
 
 def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
-    """Vertices of an OBJ in the order of its lines, which trimesh gives up where there are normals."""
+    """Vertices of an OBJ in the order of its lines, which trimesh changes for files with normals."""
     rows: dict[bytes, list[list[float]]] = {b"v": [], b"vn": []}
     faces: list[list[int]] = []
     same_normals = True
@@ -111,6 +112,6 @@ def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
 
 
 def _index(word: bytes, count: int) -> int:
-    """A vertex by its number, from 1 on, or from the end where it is negative."""
+    """Index of a vertex from its 1-based number, or from a negative one, counted from the end."""
     number = int(word)
     return number - 1 if number > 0 else count + number

@@ -1,4 +1,4 @@
-"""VertexCache ↔ a numbered file a frame: walk_00001.ply, walk_00002.ply, …; a single frame is walk.ply itself."""
+"""VertexCache ↔ one numbered file per frame: walk_00001.ply, …; a single frame is walk.ply itself."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from anim.caches.transforms import frame_spacing
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
 
-DEFAULT_FPS = 24.0  # for files of others, which say nothing
-HEAD = 1024  # bytes in which our remark lies
+DEFAULT_FPS = 24.0  # for files of other programs, which have no rate
+HEAD = 1024  # bytes that contain the comment
 
 
 def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
-    """Return the frames that belong together: of walk.ply if it is there, else of all walk_*.ply in order.
+    """Return the frames of one sequence: of walk.ply if it exists, else of all walk_*.ply in order.
 
-    All have the format that `ending` names, whatever they are called.
-    Frames that a longer sequence of ours left behind a shorter one are no part of it: the first file says how many are.
-    Raises FormatError where one of these is missing, as after a write that was killed.
-    Times are those that our own files say, else frames at `reading.fps` or 24 per second. The first frame gives the
-    faces; every other must have as many vertices.
+    All have the format of `ending`, whatever their names.
+    Remaining frames of an older, longer sequence of this library are ignored: the first file states the frame count.
+    Raises FormatError for a missing frame, as after an interrupted write.
+    Times are those stored in this library's files, else frames at `reading.fps` or 24 per second. The first frame gives
+    the faces; every other must have as many vertices.
     """
     names = sequence_members(inputs)
     with read_all(inputs, names[0]) as data:
@@ -45,7 +45,7 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
-    """Write a file of the format `ending` for each frame, numbered from 1; the main file itself for the only one."""
+    """Write a file of the format `ending` per frame, numbered from 1; the main file for a single frame."""
     faces: Ints = cache.faces
     for chunk in cache.chunks():
         for i, positions in enumerate(chunk.positions):
@@ -60,19 +60,19 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
 
 
 def frame_number(name: str, number: int) -> str:
-    """Return the name of a frame's file: numbered("walk.ply", 7) → "walk_00007.ply"."""
+    """Return the name of a frame's file: frame_number("walk.ply", 7) → "walk_00007.ply"."""
     return f"{_stem(name)}_{number:05d}{PurePath(name).suffix}"
 
 
 def sequence_files(main: str, names: Iterable[str]) -> Sequence[str]:
-    """Return those of the names that are numbered frames of `main`, in order."""
+    """Return the numbered frames of `main` among the names, in order."""
     pattern = re.compile(re.escape(_stem(main)) + r"_(\d+)" + re.escape(PurePath(main).suffix))
     found = sorted((int(match[1]), name) for name in names if (match := pattern.fullmatch(name)))
     return [name for _, name in found]
 
 
 def sequence_members(inputs: Inputs) -> Sequence[str]:
-    """Return the files that are read for the main one: itself, or its frames. Raises FormatError where none is."""
+    """Return the files to read: the main one, or its frames. Raises FormatError without any."""
     names = inputs.names()
     is_numbered = re.search(r"_\d+$", PurePath(inputs.main).stem) is not None
     if inputs.main in names and not is_numbered:
@@ -84,7 +84,7 @@ def sequence_members(inputs: Inputs) -> Sequence[str]:
 
 
 def _of_one_sequence(main: str, names: Sequence[str], count: str) -> Sequence[str]:
-    """The frames that belong to the first of these files, of a sequence of ours; all, of others' (count is "")."""
+    """Frames of the first file's sequence (`count` of them); all, for other programs' (count is "")."""
     if not count.isdecimal() or not int(count):
         return names
     if int(count) == 1:

@@ -1,4 +1,4 @@
-"""Morph targets and their weights as a file stores them: all weights within 0…1, numbers rounded.
+"""Morph targets and their weights as stored: all weights within 0…1, values rounded.
 
 glTF allows any weight, but Blender clamps them to 0…1 (its importer widens a slider by the first key alone), Unity does
 too, and viewers compute bounding boxes for weights of 0…1.
@@ -17,9 +17,9 @@ SHORT = 32767
 
 @dataclass(frozen=True, slots=True)
 class MorphEncoding:
-    """A way to say all frames: frame f is scale · (base + Σ weights[f] targets).
+    """An encoding of all frames: frame f is scale · (base + Σ weights[f] targets).
 
-    base: (V, 3). targets: (M, V, 3) float32. frames: (K,) which have a key. weights: (K, M). scale: m per unit.
+    base: (V, 3). targets: (M, V, 3) float32. frames: (K,) with a key. weights: (K, M). scale: m per unit.
     """
 
     kind: str
@@ -30,16 +30,16 @@ class MorphEncoding:
     scale: float = 1.0
 
     def size(self, *, quantize: bool) -> int:
-        """Bytes of the numbers in a file."""
+        """Bytes of the accessor data in a file."""
         return self.targets.size // 3 * (8 if quantize else 12) + 4 * self.weights.size + 4 * len(self.frames)
 
 
 def encode_morphs(form: MorphEncoding, *, quantize: bool) -> MorphEncoding:
-    """Return the form as a file keeps it: the same motion with every weight in 0…1, all rounded to float32.
+    """Return the encoding as stored: the same motion with every weight in 0…1, all rounded to float32.
 
-    quantize: targets become multiples of 1 / 32767 within ±1, each by its own factor, which its weights take back; the
-    form gets a scale where a target moves a vertex by more than 1 m.
-    The base takes what rounding changed on average, so that moving it to where all weights are positive costs nothing.
+    quantize: targets become multiples of 1 / 32767 within ±1, each by its own factor, with the inverse in its weights;
+    the encoding gets a scale if a target moves a vertex by more than 1 m.
+    The mean rounding error is added to the base, so that shifting it to positive weights adds no error.
     (weights −1, 3 of target t) → weights 0, 1 of 4 t, and base − t
     """
     changed = _to_unit_range(form)
@@ -47,7 +47,7 @@ def encode_morphs(form: MorphEncoding, *, quantize: bool) -> MorphEncoding:
         changed = _quantize(changed)
     weights = changed.weights.astype(np.float32).astype(np.float64)
     changed = replace(changed, weights=weights)
-    if form.kind == "keyframes":  # the base is a frame, exactly
+    if form.kind == "keyframes":  # the base is exactly a frame
         base = form.base.astype(np.float64)
     else:
         base = form.base + _mean_offset(form) - changed.scale * _mean_offset(changed)
@@ -55,10 +55,10 @@ def encode_morphs(form: MorphEncoding, *, quantize: bool) -> MorphEncoding:
 
 
 def _to_unit_range(form: MorphEncoding) -> MorphEncoding:
-    """The form with each target's weights from 0 to 1; its base is not moved yet.
+    """The encoding with each target's weights from 0 to 1, before its base is shifted.
 
-    Of the two ends of a weight the one nearer to 0 becomes 0 (the target is turned over if that is the upper end): so
-    the base stays as near as it can to the shape that it was.
+    The end of a weight's range nearer to 0 becomes 0 (the target is negated if that is the upper end), so that the base
+    remains as near as possible to its shape.
     """
     low, high = form.weights.min(axis=0), form.weights.max(axis=0)
     is_low = np.abs(low) <= np.abs(high)
@@ -72,13 +72,13 @@ def _to_unit_range(form: MorphEncoding) -> MorphEncoding:
 def _quantize(form: MorphEncoding) -> MorphEncoding:
     size = np.abs(form.targets).max(axis=(1, 2), initial=0.0).astype(np.float64)
     size = np.where(size > 0, size, 1.0)
-    scale = 2.0 ** np.ceil(np.log2(size.max(initial=1.0)))  # a power of two, which rounds nothing
+    scale = 2.0 ** np.ceil(np.log2(size.max(initial=1.0)))  # a power of two, which adds no rounding
     targets = (np.rint(form.targets / size[:, None, None] * SHORT) / SHORT).astype(np.float32)
     return replace(form, targets=targets, weights=form.weights * (size / scale), scale=float(scale))
 
 
 def _mean_offset(form: MorphEncoding) -> Floats:
-    """What the targets add to the base (V, 3), on average over all keys, in units of the form."""
+    """Mean displacement by the targets (V, 3) over all keys, in units of the encoding."""
     total = np.zeros(form.base.shape)
     for target, weight in zip(form.targets, form.weights.mean(axis=0), strict=True):
         total += weight * target

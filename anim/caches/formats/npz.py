@@ -1,6 +1,6 @@
-"""VertexCache ↔ .npz: the lossless hub, a zip of numpy arrays that `np.load` reads.
+"""VertexCache ↔ .npz: lossless interchange, a zip of numpy arrays, readable by `np.load`.
 
-| array | shape, type | what |
+| array | shape, type | content |
 |---|---|---|
 | positions | (F, V, 3) float32 | m |
 | normals | (F, V, 3) float32 | absent without normals |
@@ -8,11 +8,11 @@
 | handedness | (V,) int8 | ±1, of tangents: bitangent = normal × tangent · handedness |
 | times | (F,) float64 | s |
 | faces | (T, 3) int32 | triangles, counterclockwise |
-| rest | (V, 3) float32, float64 where that is too coarse | m; absent where unknown |
+| rest | (V, 3) float32, or float64 where that is too coarse | m; absent if unknown |
 | meta | () unicode, JSON | schema, up, parts: [{name, vertices: [first, end], faces: [first, end], node, material}] |
 
-Only positions, times and faces have to be there. Members are stored without compression, so that positions are written
-and read frame by frame; compressed members (`np.savez_compressed`) are read too.
+Only positions, times and faces are required. Members are stored without compression, so that positions are written and
+read frame by frame; compressed members (`np.savez_compressed`) are read too.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from anim.model import FrameChunk, MeshPart, VertexCache
 
 SCHEMA = 1
 DIRECTIONS = ("normals", "tangents")
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every member: same cache, same bytes
+EPOCH = (1980, 1, 1, 0, 0, 0)  # of every member, for reproducible bytes
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    """Return the cache in the main file; frames are read when they are asked for, a chunk at a time."""
+    """Return the cache in the main file; frames are read on iteration, a chunk at a time."""
     with inputs.open(inputs.main) as file, _opened(file) as archive:
         shape = _shape(archive, "positions")
         if shape is None:
@@ -73,7 +73,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write the cache into the main file, frame by frame; nothing is lost."""
+    """Write the cache losslessly into the main file, frame by frame."""
     with (
         outputs.create(outputs.main) as file,
         zipfile.ZipFile(file, "w") as archive,
@@ -88,7 +88,8 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
         _put(archive, "meta", np.array(json.dumps(about(cache))))
         shape = (cache.frame_count, cache.vertex_count, 3)
         wanted = [name for name, has in zip(DIRECTIONS, (cache.has_normals, cache.has_tangents), strict=True) if has]
-        aside = {name: stack.enter_context(tempfile.TemporaryFile()) for name in wanted}  # they come with positions
+        # Chunks hold these together with positions, but members of a zip are written one after another.
+        aside = {name: stack.enter_context(tempfile.TemporaryFile()) for name in wanted}
         with _member(archive, "positions", shape) as member:
             for chunk in cache.chunks():
                 member.write(np.ascontiguousarray(chunk.positions, "<f4").data)
@@ -110,7 +111,7 @@ def _opened(file: BinaryIO) -> zipfile.ZipFile:
 
 
 def _reads(job: Callable[[], Any]) -> Any:
-    """The result of a job on a zip; whatever a broken one raises becomes a FormatError."""
+    """Result of a job on a zip; any exception of an invalid zip becomes a FormatError."""
     try:
         return job()
     except AnimError:
@@ -174,7 +175,7 @@ def _meta(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def parts_of(meta: dict[str, Any]) -> tuple[MeshPart, ...]:
-    """Return the parts that `meta` lists. Raises FormatError where they are not understood."""
+    """Return the parts in `meta`. Raises FormatError for an invalid list."""
     try:
         return tuple(
             MeshPart(str(p["name"]), _pair(p["vertices"]), _pair(p["faces"]), int(p["node"]), int(p["material"]))
@@ -203,7 +204,7 @@ def _chunks(inputs: Inputs, shape: tuple[int, ...], present: Sequence[str]) -> I
 
 
 def _frames(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> Callable[[int], AnyArray]:
-    """What gives the next frames of a member, again and again."""
+    """Function that reads the next frames (count, V, 3) of a member."""
     member = archive.open(f"{name}.npy")
     _, dtype = _header(member, name)
     per_frame = shape[1] * 3 * dtype.itemsize
@@ -226,7 +227,7 @@ def _put(archive: zipfile.ZipFile, name: str, array: AnyArray) -> None:
 
 
 def _member(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> IO[bytes]:
-    """A member for float32 of this shape, its header written, open for the numbers."""
+    """A member for float32 of this shape, open for its data after the written header."""
     member = archive.open(_info(name), "w", force_zip64=True)
     npy.write_array_header_1_0(member, {"descr": "<f4", "fortran_order": False, "shape": shape})
     return member
@@ -242,7 +243,7 @@ def _rest(rest: Floats) -> AnyArray:
 
 
 def about(cache: VertexCache) -> dict[str, Any]:
-    """Return what `meta` says of a cache."""
+    """Return the `meta` of a cache."""
     parts = [
         {"name": p.name, "vertices": list(p.vertices), "faces": list(p.faces), "node": p.node, "material": p.material}
         for p in cache.parts

@@ -1,8 +1,8 @@
-"""VertexCache ↔ .pc2, the point cache of 3ds Max and Blender: little-endian, even steps, no frame rate.
+"""VertexCache ↔ .pc2, the point cache of 3ds Max and Blender: little-endian, without a frame rate.
 
 32 bytes: "POINTCACHE2\\0", int32 version 1, int32 points, float32 start frame, float32 frames per sample, int32
-samples; then float32 xyz of every point, sample by sample (as Blender's own exporter writes it). A rest mesh beside it
-has its vertices in the same order and keeps the frame rate in a comment.
+samples; then float32 xyz of every point, sample by sample (like Blender's own exporter). A companion rest mesh has its
+vertices in the same order and stores the frame rate in a comment.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from anim.model import VertexCache
 
 MAGIC = b"POINTCACHE2\0"
 HEADER = struct.Struct("<12siiffi")
-DEFAULT_FPS = 24.0  # Blender's own default, for files of others that say nothing
+DEFAULT_FPS = 24.0  # Blender's default, for files of other programs, which have no rate
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    """Return the cache in the main file, with the faces of the rest mesh beside it where there is one.
+    """Return the cache in the main file, with the faces of its rest mesh if there is one.
 
-    Frames per second: `reading.fps`, or what the rest mesh says, or 24.
+    Frames per second: `reading.fps`, or the rest mesh's, or 24.
     """
     with inputs.open(inputs.main) as file:
         data = read_exactly(file, HEADER.size, "the header")
@@ -51,7 +51,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write the cache and a rest mesh beside it. Raises RangeError where frames don't come at even steps."""
+    """Write the cache and its rest mesh. Raises RangeError for frames at uneven steps."""
     fps, notes = _rate(cache.times)
     notes += (f"PC2 keeps no frame rate: play it at {fps:g} frames per second",)
     start = round(float(cache.times[0]) * fps, 6)
@@ -63,7 +63,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
 
 
 def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
-    """Frames per second, and what has to be said about the last frame, which may come early at a clip's end."""
+    """Frames per second, and notes about the last frame, which may be early at a clip's end."""
     if len(times) == 1:
         return DEFAULT_FPS, ()
     step, off = frame_spacing.frame_spacing(times)

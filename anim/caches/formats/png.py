@@ -1,4 +1,4 @@
-"""PNG of 16 bits a channel ↔ pixels, by pypng: Pillow has no RGB of 16 bits."""
+"""PNG of 16 bits a channel ↔ pixels, by pypng: Pillow does not support RGB of 16 bits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Pixels = NDArray[np.uint16]
 
 
 def write(bands: Iterable[Pixels], file: BinaryIO, *, width: int, height: int) -> None:
-    """Write pixels that come as bands (rows, width, 3) from the top down."""
+    """Write pixels from bands (rows, width, 3) in top-down order."""
     import png
 
     writer = png.Writer(width, height, greyscale=False, bitdepth=BIT_DEPTH, compression=COMPRESSION_LEVEL)
@@ -26,7 +26,7 @@ def write(bands: Iterable[Pixels], file: BinaryIO, *, width: int, height: int) -
 
 
 def read(data: bytes) -> Pixels:
-    """Return the pixels (height, width, 3) of an RGB file of 16 bits, whichever program wrote it.
+    """Return the pixels (height, width, 3) of an RGB file of 16 bits, of any program.
 
     Raises FormatError for a damaged file, UnsupportedError for other kinds of PNG.
     """

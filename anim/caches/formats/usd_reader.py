@@ -20,10 +20,10 @@ from anim.model import FrameChunk, VertexCache
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    """Return all meshes of the stage in one cache, in metres, at every time at which one has points.
+    """Return all meshes of the stage in one cache, in metres, at every time code of any points.
 
-    Meshes are placed by their transforms and follow each other in the order of the stage; polygons become triangles.
-    Raises UnsupportedError without usd-core, FormatError where the stage has no mesh.
+    Meshes are transformed to world space and concatenated in the order of the stage; polygons become triangles.
+    Raises UnsupportedError without usd-core, FormatError for a stage without meshes.
     """
     with _opened(inputs) as stage:
         codes, rate, faces, still = stage.codes(), reading.fps or stage.rate, stage.faces(), stage.positions(None)
@@ -43,7 +43,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 @contextmanager
 def _opened(inputs: Inputs) -> Iterator[_Stage]:
-    """Give the stage in the main file; whatever usd-core finds wrong with it becomes a FormatError."""
+    """Yield the stage in the main file; any error of usd-core becomes a FormatError."""
     usd_writer.package()
     from pxr import Tf
 
@@ -52,12 +52,12 @@ def _opened(inputs: Inputs) -> Iterator[_Stage]:
             with temporary_files.silence_native():
                 stage = _Stage(path)
             yield stage
-        except (Tf.ErrorException, UnicodeDecodeError):  # its own words are about its source code, and not always text
+        except (Tf.ErrorException, UnicodeDecodeError):  # its messages are about its source code, not always text
             raise FormatError("is no USD that can be read") from None
 
 
 class _Stage:
-    """The meshes of a stage, opened from an input."""
+    """Meshes of a stage, opened from an input."""
 
     def __init__(self, path: str) -> None:
         stages, geom, _ = usd_writer.package()
@@ -80,7 +80,7 @@ class _Stage:
             self.kept = {}
 
     def codes(self) -> Floats:
-        """Time codes at which any mesh has points; one at 0 where nothing moves."""
+        """Time codes with points of any mesh; 0 for a static stage."""
         found = {code for mesh in self._meshes for code in mesh.GetPointsAttr().GetTimeSamples()}
         return np.array(sorted(found) or [0.0])
 
@@ -97,7 +97,7 @@ class _Stage:
         return np.concatenate(found)
 
     def positions(self, code: float | None) -> Floats | None:
-        """Points of all meshes at a time code, None for the default ones where a mesh has none."""
+        """Points of all meshes at a time code, None for the default ones if a mesh has none."""
         rows = []
         for mesh in self._meshes:
             points = np.asarray(mesh.GetPointsAttr().Get(self._default if code is None else code) or (), np.float64)
@@ -108,15 +108,15 @@ class _Stage:
         return np.concatenate(rows)
 
     def normals(self, code: float) -> Floats:
-        """Normals of all meshes at a time code, turned as their meshes."""
+        """World-space normals of all meshes at a time code."""
         return self._turned(self._normals, code, lambda matrix: np.asarray(np.linalg.inv(matrix).T, np.float64))
 
     def tangents(self, code: float) -> Floats:
-        """Tangents of all meshes at a time code, turned as their meshes."""
+        """World-space tangents of all meshes at a time code."""
         return self._turned(self._tangents, code, lambda matrix: matrix)
 
     def _turned(self, of: Callable[[Any, Any], Any], code: float, turn: Callable[[Floats], Floats]) -> Floats:
-        """Unit directions of all meshes, as rows times what `turn` makes of each mesh's matrix (3, 3)."""
+        """Unit directions of all meshes: rows times `turn` of each mesh's matrix (3, 3)."""
         rows = []
         for mesh in self._meshes:
             matrix = np.array(mesh.ComputeLocalToWorldTransform(code))[:3, :3]

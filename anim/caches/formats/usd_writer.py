@@ -1,9 +1,9 @@
-"""VertexCache → .usdc/.usda: a mesh whose points are time samples, through usd-core (extra `usd`).
+"""VertexCache → .usdc/.usda: a mesh with time-sampled points, through usd-core (extra `usd`).
 
-Stage: upAxis as the cache, metersPerUnit 1, timeCodesPerSecond the frame rate, start and end time code. Mesh: points,
-extent and, where there are, vertex normals and primvars:tangents (float4: xyz and handedness) at every frame; the mesh
-at rest is their default. It is saved chunk by chunk, a .usda as a .usdc first that is then
-spelled out, so its length is bounded by the disk.
+Stage: upAxis of the cache, metersPerUnit 1, timeCodesPerSecond the frame rate, start and end time code. Mesh: points,
+extent and, if present, vertex normals and primvars:tangents (float4: xyz and handedness) at every frame; the rest mesh
+is their default. It is saved chunk by chunk, a .usda as a temporary .usdc that is then exported as text, so only the
+disk limits its length.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from anim.caches.storage import Outputs
 from anim.errors import UnsupportedError
 from anim.model import VertexCache
 
-DEFAULT_FPS = 24.0  # USD's own
+DEFAULT_FPS = 24.0  # USD's own default
 PRIM = "/mesh"
-TANGENTS = "tangents"  # a primvar, as exporters from glTF name it
-KEY = "gltf_anim"  # of the layer's custom data: the parts, as in an .npz
-PER_SECOND = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # rates that frames are tried on
+TANGENTS = "tangents"  # primvar name used by exporters from glTF
+KEY = "gltf_anim"  # in the layer's custom data: the parts, as in an .npz
+PER_SECOND = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # frame rates tried, in this order
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
-    """Write a stage with one mesh, ".usdc" binary or ".usda" text; nothing is lost.
+    """Write a stage with one mesh losslessly, ".usdc" binary or ".usda" text.
 
     Raises UnsupportedError without usd-core.
     """
@@ -69,7 +69,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
 
 
 def package() -> tuple[Any, Any, Any]:
-    """Return usd-core's Usd, UsdGeom and Vt. Raises UnsupportedError where it isn't installed."""
+    """Return usd-core's Usd, UsdGeom and Vt. Raises UnsupportedError if it is not installed."""
     try:
         from pxr import Usd, UsdGeom, Vt
     except ImportError:
@@ -110,7 +110,7 @@ def _bounds(vt: Any, rows: AnyArray) -> Any:
 
 
 def _rate(times: Floats) -> float:
-    """The first common rate on whose frames all times but the last lie, else 24: codes may be fractions."""
+    """The first common rate with all times but the last on its frames, else 24: codes may be fractions."""
     for rate in PER_SECOND:
         off = times[: max(len(times) - 1, 1)] * rate
         if np.abs(off - np.rint(off)).max() < 1e-3:

@@ -1,4 +1,4 @@
-"""How large the motion in a cache is."""
+"""Bounding box of the motion in a cache."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from anim.model import VertexCache
 
 
 def bounds(cache: VertexCache) -> tuple[Floats, Floats]:
-    """Return the least and the greatest x, y, z (3,) of all vertices of all frames, in one pass; 0 without vertices."""
+    """Return the minimum and maximum x, y, z (3,) of all vertices of all frames; 0 without vertices.
+
+    The cache is read in one pass.
+    """
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
     for chunk in cache.chunks():
         least = np.minimum(least, chunk.positions.min(axis=(0, 1), initial=np.inf))
@@ -18,6 +21,6 @@ def bounds(cache: VertexCache) -> tuple[Floats, Floats]:
 
 
 def diagonal(cache: VertexCache) -> float:
-    """Return the length of the diagonal of the box around the whole motion, in metres."""
+    """Return the diagonal of the bounding box of the whole motion, in metres."""
     least, most = bounds(cache)
     return float(np.linalg.norm(most - least))

@@ -1,4 +1,4 @@
-"""A glTF document as it plays → VertexCache: skins by linear blend, morph targets, nodes."""
+"""glTF document → VertexCache: evaluates skins by linear blend, morph targets, nodes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from anim.skinning.bake import bake
 def evaluate_document(
     document: Document, *, clip: int = 0, fps: float | None = None, note: Callable[[str], None] = lambda _: None
 ) -> VertexCache:
-    """Return every vertex of the file while a clip plays, in world space, nodes depth-first, primitives in order.
+    """Return every vertex of the file during a clip, in world space, nodes depth-first.
 
-    At `fps` frames per second, else at the clip's own keys; without clips the rest pose. The cache's `chosen` says
-    which clip it is. A file that we wrote says which axis is up. note: is told of skin weights that don't add up to 1.
-    Raises NotFoundError where the file has no vertices.
+    Primitives are in order. Frames are at `fps` per second, else at the clip's own keys; without clips there is one,
+    the rest pose. The cache's `chosen` is the clip's label. The up axis is that stored by this library. note: called
+    with a line about skin weights that do not sum to 1.
+    Raises NotFoundError for a file without vertices.
     """
     scene, clips = reader.scene(document), reader.clips(document)
     for bad in unnormalized_weights(scene.instances):
@@ -39,7 +40,7 @@ def evaluate_document(
 
 
 def directions(document: Document) -> tuple[str, ...]:
-    """Return "normals" and "tangents" where a mesh has them, which `play` leaves out."""
+    """Return "normals" and "tangents" if a mesh has them; `evaluate_document` omits both."""
     primitives = [each for mesh in json_array(document.json, "meshes") for each in mesh.get("primitives", [])]
     return tuple(
         word

@@ -1,4 +1,4 @@
-"""The fewest frames between which straight lines stay near all others."""
+"""Reduce frames under a bound on the error of linear interpolation."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 
-BATCH = 1 << 22  # numbers compared at a time
+BATCH = 1 << 22  # values compared at a time
 
 
 def reduce_frames(positions: AnyArray, times: Floats, limit: float) -> Ints:
-    """Return the numbers of frames to keep: every vertex of the others lies within `limit` m of the line between.
+    """Return the indices of frames to keep: linear interpolation reproduces the others within `limit` m.
 
-    positions (F, V, 3). The first and the last frame stay. Greedy: each step goes as far as it can, found by doubling
-    and halving, so it is near the fewest but not always there.
+    positions (F, V, 3). The first and the last frame are kept. Greedy: each interval is extended as far as possible, by
+    doubling and bisection, so the result is near the minimum but not always equal to it.
     """
     kept, last = [0], len(positions) - 1
     while kept[-1] < last:

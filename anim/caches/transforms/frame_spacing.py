@@ -1,4 +1,4 @@
-"""Whether frames come at even steps, which numbered files and rows of pixels can't say by themselves."""
+"""Detect uneven frame times, which numbered files and rows of pixels cannot store."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import numpy as np
 
 from anim.arrays import Floats
 
-EVEN = 1e-3  # share of a step by which frames may be off their grid
+EVEN = 1e-3  # fraction of a step by which a frame may deviate from the grid
 
 
 def frame_spacing(times: Floats) -> tuple[float, Floats]:
-    """Return the step in seconds of at least two frames, and by how many steps each (F,) is off its grid.
+    """Return the step in seconds of at least two frames, and the deviation of each (F,) in steps.
 
-    The last frame doesn't count for the step: at a clip's end it may come early.
+    The last frame is excluded from the step: at a clip's end it may be early.
     """
     step = float(times[1] - times[0])
     if len(times) > 2 and round(float(times[-2] - times[0]) / step) == len(times) - 2:
-        step = float(times[-2] - times[0]) / (len(times) - 2)  # rounding of the first step would add up
+        step = float(times[-2] - times[0]) / (len(times) - 2)  # rounding of the first step would accumulate
     return step, np.abs(times - times[0] - step * np.arange(len(times))) / step
 
 
 def notes(times: Floats) -> tuple[str, ...]:
-    """Return what the user of files that only count frames should know, a line each; nothing where steps are even."""
+    """Return notes for files that only count frames, a line each; none for even steps."""
     if len(times) < 3:
         return ()
     _, off = frame_spacing(times)
@@ -32,5 +32,5 @@ def notes(times: Floats) -> tuple[str, ...]:
 
 
 def last_frame_note(times: Floats, off: Floats) -> str:
-    """Return the words for a last frame that is off the grid."""
+    """Return the note about a last frame with a deviation from the grid."""
     return f"the last frame is at {times[-1]:.4g} s, {off[-1]:.2g} steps off"

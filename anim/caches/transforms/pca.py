@@ -1,4 +1,4 @@
-"""A few shapes whose weighted sums give all frames: principal components under a bound on the worst vertex."""
+"""Principal components of all frames under a bound on the maximum vertex error."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 
-BLOCK = 1 << 22  # numbers taken at a time, in float64
-RANK = 1e-15  # share of the largest eigenvalue below which there is only noise
+BLOCK = 1 << 22  # values processed at a time, in float64
+RANK = 1e-15  # fraction of the largest eigenvalue; smaller ones are noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +23,11 @@ class PcaBasis:
 
 
 def fit_basis(positions: AnyArray, limit: float, *, most: int) -> PcaBasis | None:
-    """Return the fewest shapes with every vertex of every frame within `limit` m; None where `most` are too few.
+    """Return the fewest shapes within `limit` m for every vertex of every frame; None above `most`.
 
-    positions: (F, V, 3). Found through the F×F products of frames, which keep half of float64's digits: enough for
-    limits above 1e-6 of the extent. Each shape's largest move is 1 m, so that integers can hold it well. Memory: the
-    shapes and a block of vertices.
+    positions: (F, V, 3). Computed from the F×F products of frames, with half of float64's digits: sufficient for limits
+    above 1e-6 of the extent. Each shape's maximum displacement is 1 m, for integer storage. Memory: the shapes and a
+    block of vertices.
     """
     products = np.zeros((len(positions), len(positions)))
     for _, rows, _ in _blocks(positions):
@@ -51,7 +51,7 @@ def fit_basis(positions: AnyArray, limit: float, *, most: int) -> PcaBasis | Non
 
 
 def _blocks(positions: AnyArray) -> Iterator[tuple[slice, Floats, Floats]]:
-    """Some vertices, where they are less their mean over the frames (F, 3 n), and that mean (3 n)."""
+    """Blocks of vertices, minus their mean over the frames (F, 3 n), and that mean (3 n)."""
     step = max(BLOCK // (3 * len(positions)), 1)
     for first in range(0, positions.shape[1], step):
         some = slice(first, first + step)
@@ -74,7 +74,7 @@ def _min_shapes(positions: AnyArray, vectors: Floats, limit: float) -> int | Non
 
 
 def _fits(positions: AnyArray, vectors: Floats, limit: float) -> bool:
-    """Whether these columns (F, k) are enough for every vertex."""
+    """True if these columns (F, k) reproduce every vertex within the limit."""
     for _, rows, _ in _blocks(positions):
         off = (rows - vectors @ (vectors.T @ rows)).reshape(-1, 3)
         if float(np.einsum("vi,vi->v", off, off).max(initial=0.0)) > limit * limit:

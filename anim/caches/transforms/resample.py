@@ -1,4 +1,4 @@
-"""A cache at other times: vertices go in straight lines from frame to frame."""
+"""Resample a cache: linear interpolation of vertices between frames."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from anim.sampling import frame_times
 
 Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents of one frame
 
-SAME = 1e-6  # s; times closer than this are the same frame
+SAME = 1e-6  # s; closer times are the same frame
 
 
 def resample_frames(cache: VertexCache, times: Floats) -> VertexCache:
-    """Return the cache with frames at increasing `times` (F,) in seconds; outside the frames it holds still.
+    """Return the cache with frames at increasing `times` (F,) in seconds, constant outside its range.
 
     Memory: some frames of the old cache and a chunk of the new.
     """
@@ -36,12 +36,15 @@ def resample_frames(cache: VertexCache, times: Floats) -> VertexCache:
 
 
 def at_rate(cache: VertexCache, fps: float) -> VertexCache:
-    """Return the cache with frames at start + k / fps, and one at its end. Raises RangeError unless fps is above 0."""
+    """Return the cache with frames at start + k / fps, and one at its end.
+
+    Raises RangeError unless fps is above 0.
+    """
     return resample_frames(cache, frame_times(float(cache.times[0]), float(cache.times[-1]), fps=fps))
 
 
 def at_time(cache: VertexCache, time: float) -> VertexCache:
-    """Return the cache with one frame, at `time` in seconds. Raises RangeError for one outside the cache."""
+    """Return the cache with one frame, at `time` in seconds. Raises RangeError outside its range."""
     first, last = float(cache.times[0]), float(cache.times[-1])
     if not first - SAME <= time <= last + SAME:
         raise RangeError(f"there is no frame at {time:g} s (the cache goes from {first:g} s to {last:g} s)")
@@ -61,7 +64,7 @@ def _chunks(cache: VertexCache, left: Ints, right: Ints, share: Floats) -> Itera
 
 
 class _Window:
-    """The last frames that were read of a cache."""
+    """Window of the frames read last from a cache."""
 
     def __init__(self, cache: VertexCache) -> None:
         self._chunks = cache.chunks()

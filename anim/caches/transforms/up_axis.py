@@ -1,4 +1,4 @@
-"""A cache with another axis up."""
+"""Convert the up axis of a cache."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ UPS = ("y", "z")
 
 
 def to_up_axis(cache: VertexCache, up: str) -> VertexCache:
-    """Return the cache with this axis up: "y" as in glTF, "z" as in Blender, where (x, y, z) becomes (x, −z, y).
+    """Return the cache with another up axis: "y" as in glTF, "z" as in Blender: (x, y, z) → (x, −z, y).
 
-    Raises RangeError for another axis. The cache itself where nothing is to do.
+    Raises RangeError for another axis. The cache itself if it has this axis.
     """
     if up not in UPS:
         raise RangeError(f"up is '{up}' (expected y or z)")

@@ -1,4 +1,4 @@
-"""A cache with its vertices in another order, or fewer of them."""
+"""Reorder the vertices of a cache, or remove unused ones."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ ORDERS = ("file", "blender")
 
 
 def reorder(cache: VertexCache, order: str) -> VertexCache:
-    """Return the cache with vertices in the order of the file, or as Blender's glTF importer has them.
+    """Return the cache with vertices in the order of the file, or of Blender's glTF importer.
 
-    Blender leaves out vertices that no triangle of a primitive uses and keeps the others in ascending order, primitive
-    by primitive. Raises RangeError for another order.
+    Blender removes vertices that no triangle of a primitive uses and keeps the others in ascending order, primitive by
+    primitive. Raises RangeError for another order.
     """
     if order not in ORDERS:
         raise RangeError(f"order is '{order}' (expected file or blender)")

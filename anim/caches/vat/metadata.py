@@ -1,9 +1,8 @@
-"""The JSON beside a vertex animation texture.
+"""JSON metadata of a vertex animation texture.
 
-schema 1 · kind "vertex animation texture" · preset · engine {axes "x z y", signs, units_per_meter} · vertices ·
-frames · fps (where even) · times_s · width · height · rows_per_frame · origin "top left" · position {file, format,
-encoding, offset, scale} · normal {the same} or null · mesh · uv_set 1 · uv_v "top" or "bottom": where
-v is 0 · up.
+schema 1 · kind "vertex animation texture" · preset · engine {axes "x z y", signs, units_per_meter} · vertices · frames
+· fps (if even) · times_s · width · height · rows_per_frame · origin "top left" · position {file, format, encoding,
+offset, scale} · normal {the same} or null · mesh · uv_set 1 · uv_v "top" or "bottom": origin of v · up.
 Positions are in the engine's axes and units.
 """
 
@@ -25,7 +24,7 @@ FORMATS = ("float", "half", "unorm16")
 
 @dataclass(frozen=True, slots=True)
 class VatMetadata:
-    """What the JSON says. format: of FORMATS; encoding: "absolute" or "offset" (from the mesh at rest)."""
+    """Metadata. format: of FORMATS; encoding: "absolute" or "offset" (from the rest mesh)."""
 
     preset: str
     position: str
@@ -42,7 +41,7 @@ class VatMetadata:
     up: str
 
     def with_normals(self, name: str) -> VatMetadata:
-        """Return the same with normals in a file of this name."""
+        """Return a copy with normals in a file of this name."""
         return replace(self, normal=name)
 
 
@@ -87,7 +86,7 @@ def text(about: VatMetadata, engine: Preset) -> bytes:
 
 
 def parse(data: bytes) -> VatMetadata:
-    """Return what a JSON says. Raises FormatError where it is none of ours or not whole."""
+    """Parse a JSON. Raises FormatError for foreign or incomplete metadata."""
     try:
         content = json.loads(data)
         if not isinstance(content, dict) or content.get("kind") != KIND or content["preset"] not in PRESETS:

@@ -1,4 +1,4 @@
-"""Whose axes a texture's positions have, and what that engine does to textures. Each only permutes, negates, scales."""
+"""Engine presets of textures: permuted, negated and scaled axes, and the engine's row order."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from anim.errors import RangeError
 class Preset:
     """One engine.
 
-    axes: which of glTF's x, y, z (0, 1, 2) become its x, y, z; signs: and turned round or not. per_meter: its units in
-    1 m. is_flipped: whether v counts from the bottom row where the engine's own loader has put the texture.
-    endings: the files it reads whole. advice: what to set, a line each.
+    axes: indices of glTF's axes (0, 1, 2) for its x, y, z; signs: ±1 for each. per_meter: its units per metre.
+    is_flipped: True if v counts from the bottom row after the engine's own loader.
+    endings: extensions of lossless formats. advice: settings for the user, a line each.
     """
 
     axes: tuple[int, int, int]
@@ -30,7 +30,7 @@ class Preset:
 NEAREST = "nearest filter, no mipmaps, no compression, no sRGB"
 PRESETS = {
     "plain": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr", ".png"), (f"axes of glTF, v from the top; {NEAREST}",)),
-    "three": Preset(  # EXRLoader puts the last row first
+    "three": Preset(  # EXRLoader flips the rows
         (0, 1, 2), (1, 1, 1), 1.0, True, (".exr",), (f"EXRLoader, FloatType or HalfFloatType; {NEAREST}",)
     ),
     "godot": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr",), (f"import as lossless; {NEAREST}",)),
@@ -40,7 +40,7 @@ PRESETS = {
 
 
 def preset(name: str, ending: str) -> Preset:
-    """Return the preset of this name. Raises RangeError for an unknown one, or an ending that the engine spoils."""
+    """Return a preset. Raises RangeError for an unknown one, or an extension lossy in the engine."""
     found = PRESETS.get(name)
     if found is None:
         raise RangeError(f"preset is '{name}' (expected {', '.join(PRESETS)})")
@@ -50,12 +50,12 @@ def preset(name: str, ending: str) -> Preset:
 
 
 def to_engine(points: AnyArray, preset: Preset, *, lengths: bool = True) -> AnyArray:
-    """Return points (..., 3) in m as the engine has them; with `lengths` off as directions, in no unit."""
+    """Return points (..., 3) in m in the engine's axes and units; unscaled directions without `lengths`."""
     scale = preset.per_meter if lengths else 1.0
     return points[..., list(preset.axes)] * np.array(preset.signs, np.float64) * scale
 
 
 def from_engine(points: AnyArray, preset: Preset, *, lengths: bool = True) -> AnyArray:
-    """Return what `to_engine` was given."""
+    """Return the inverse of `to_engine`."""
     scale = preset.per_meter if lengths else 1.0
     return (points / (np.array(preset.signs, np.float64) * scale))[..., list(np.argsort(preset.axes))]

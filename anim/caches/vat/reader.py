@@ -1,4 +1,4 @@
-"""Textures → VertexCache: the way back, by the JSON that lies beside them."""
+"""Textures → VertexCache, by their JSON metadata."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from anim.model import FrameChunk, Mesh, VertexCache
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    """Return the frames in textures, as exactly as their numbers allow; faces are those of the mesh beside them."""
+    """Return the frames in textures, to their precision; faces are those of the companion mesh."""
     name = f"{inputs.main}.json"
     if name not in inputs.names():
         raise FormatError(f"'{name}' is not beside it, and only that says what the pixels mean")

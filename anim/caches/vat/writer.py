@@ -1,16 +1,16 @@
-"""VertexCache ↔ textures: a vertex is a column, a frame a row (or some rows), for shaders to read.
+"""VertexCache → vertex animation textures: a vertex is a column, a frame a row (or several rows).
 
-| file | what |
+| file | content |
 |---|---|
 | NAME.exr or .png | positions: pixel x, y of vertex v in frame f: x = v % width, y = f · rows_per_frame + v // width |
-| NAME.exr-normal.exr | normals in the same pixels, n · ½ + ½ in a PNG; only where the cache has them |
-| NAME.exr.json | what a shader needs to know: see `texture_about` |
-| NAME.exr-mesh.glb | the mesh at rest; its TEXCOORD_1 is the middle of each vertex's pixel in frame 0 |
+| NAME.exr-normal.exr | normals in the same pixels, n · ½ + ½ in a PNG; only if the cache has them |
+| NAME.exr.json | metadata for shaders: see `metadata` |
+| NAME.exr-mesh.glb | the rest mesh; its TEXCOORD_1 is the center of each vertex's pixel in frame 0 |
 
-Beside a NAME.png they are NAME.png-normal.png, NAME.png.json and NAME.png-mesh.glb.
+For a NAME.png they are NAME.png-normal.png, NAME.png.json and NAME.png-mesh.glb.
 
-Row 0 is at the top of the file. A pixel p means position = offset + scale · p, plus the mesh at rest where `encoding`
-is "offset"; PNG numbers count from 0 to 1. EXR of floats is lossless and absolute; half floats and PNG are offsets.
+Row 0 is at the top of the file. A pixel p means position = offset + scale · p, plus the rest mesh if `encoding` is
+"offset"; PNG values range from 0 to 1. EXR of floats is lossless and absolute; half floats and PNG are offsets.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from anim.errors import RangeError
 from anim.gltf.authoring_parts import VERTICES
 from anim.model import VertexCache
 
-MAX_WIDTH, MAX_HEIGHT = 4096, 8192  # pixels that desktop engines take
+MAX_WIDTH, MAX_HEIGHT = 4096, 8192  # pixels supported by desktop engines
 UNORM = 65535
 
 
 @dataclass(frozen=True, slots=True)
 class TextureLayout:
-    """Where vertices lie. width: pixels. rows: of a frame."""
+    """Texture layout of vertices. width: pixels. rows: per frame."""
 
     width: int
     rows: int
@@ -47,32 +47,32 @@ class TextureLayout:
 
     @property
     def height(self) -> int:
-        """Pixels from top to bottom."""
+        """Total rows."""
         return self.rows * self.frames
 
 
 @dataclass(frozen=True, slots=True)
 class PixelEncoding:
-    """How numbers become pixels: number = offset + scale · pixel, (3,) each; kind: float, half or unorm16."""
+    """Linear encoding: value = offset + scale · pixel, (3,) each; kind: float, half or unorm16."""
 
     kind: str
     offset: Floats
     scale: Floats
 
     def pixels(self, numbers: AnyArray) -> AnyArray:
-        """Return the pixels that stand for numbers (..., 3)."""
+        """Encode values (..., 3) as pixels."""
         if self.kind == "unorm16":
             return np.rint((numbers - self.offset) / self.scale * UNORM).clip(0, UNORM).astype(np.uint16)
         return numbers.astype(exr.TYPES[self.kind])
 
     def numbers(self, pixels: AnyArray) -> Floats:
-        """Return what pixels (..., 3) stand for."""
+        """Decode pixels (..., 3) to values."""
         shares = pixels / UNORM if self.kind == "unorm16" else pixels.astype(np.float64)
         return self.offset + self.scale * shares
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
-    """Write textures as ".exr" or ".png", JSON and mesh. Raises RangeError for more than 4096 × 8192 pixels."""
+    """Write textures as ".exr" or ".png", JSON and mesh. Raises RangeError above 4096 × 8192 pixels."""
     engine = presets.preset(writing.preset, ending)
     grid = _grid(cache)
     kind = "unorm16" if ending == ".png" else writing.depth
@@ -121,7 +121,7 @@ def _grid(cache: VertexCache) -> TextureLayout:
 
 
 def of_directions(kind: str) -> PixelEncoding:
-    """Return how numbers from −1 to 1 become pixels."""
+    """Return the encoding of values from −1 to 1."""
     return PixelEncoding(kind, np.full(3, -1.0), np.full(3, 2.0)) if kind == "unorm16" else _plain(kind)
 
 
@@ -141,7 +141,7 @@ def _encode_pixels(cache: VertexCache, engine: Preset, base: AnyArray, kind: str
     return PixelEncoding(kind, least, np.where(span > 0, span, 1.0))
 
 
-Band = tuple[AnyArray, float]  # pixels (n, V, 3) of some frames, and the farthest that a number is off
+Band = tuple[AnyArray, float]  # pixels (n, V, 3) of some frames, and the maximum error
 
 
 def _bands(cache: VertexCache, engine: Preset, base: AnyArray, packed: PixelEncoding) -> Iterator[Band]:
@@ -181,7 +181,7 @@ def _write_image(
 def _write_mesh(
     cache: VertexCache, still: Floats, grid: TextureLayout, engine: Preset, outputs: Outputs, name: str
 ) -> None:
-    """The mesh at rest as a GLB, in glTF's axes: the engine's importer turns it as the preset turns the texture."""
+    """The rest mesh as a GLB, in glTF's axes: the engine's importer converts it like the preset."""
     from pygltflib import Mesh, Node
 
     file = GlbFile()
