@@ -45,9 +45,9 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
 
 
 def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
-    """Return key times (K,) in seconds as a read-only float64 array: K ≥ 1, finite, ≥ 0, strictly increasing.
+    """Return key times (K,) in seconds as a read-only float64 array: K ≥ 1, finite, ≥ 0, increasing.
 
-    The same array object is checked once only, since many tracks share one time axis.
+    Times are strictly increasing. The same array object is checked once only, since many tracks share one time axis.
     Raises ShapeError, or RangeError with the index of the first invalid key.
     """
     if isinstance(values, np.ndarray) and _CHECKED_AXES.get(id(values)) is values:
@@ -83,7 +83,7 @@ def unique_sorted(values: Floats) -> Floats:
 
 
 def _is_finite(array: AnyArray) -> bool:
-    """Whether every number is finite; a finite sum of squares is a fast proof."""
+    """True if every number is finite; a finite sum of squares is a fast proof."""
     flat = array.reshape(-1)
     return math.isfinite(flat.dot(flat)) or bool(np.isfinite(array).all())
 
@@ -117,7 +117,7 @@ def restore_fields(instance: Any, state: list[Any]) -> None:
 
 
 def _is_frozen(array: AnyArray) -> bool:
-    """Whether the memory of `array` is read-only through itself and through all of its bases."""
+    """True if the memory of `array` is read-only through itself and through all of its bases."""
     owner: object = array
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:

@@ -36,7 +36,10 @@ def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
 
 
 def parse_angle(text: str, name: str) -> float:
-    """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises RangeError otherwise, or without unit."""
+    """Return an angle above 0 in radians from "0.05deg" or "0.001rad".
+
+    Raises RangeError otherwise, or without unit.
+    """
     value, unit = _split(text, name)
     if unit not in ANGLES or value <= 0:
         raise RangeError(f"{name} is '{text}' (expected an angle above 0 with its unit, like 0.05deg or 0.001rad)")

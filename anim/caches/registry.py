@@ -21,7 +21,7 @@ Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
 
 
 class Files(Enum):
-    """Which files hold a cache: one is enough, one for each frame, or several that say nothing without each other."""
+    """Files of a cache: a single one, one per frame, or several that are valid only together."""
 
     ONE = "one"
     FRAMES = "frames"
@@ -94,15 +94,15 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
 
 
 def reader_for(ending: str) -> Read:
-    """Return what reads files of this ending (".npz"): reader_for(".pc2")(inputs, Reading()) → VertexCache.
+    """Return the reader of a format: reader_for(".pc2")(inputs, ReadOptions()) → VertexCache.
 
-    What it reads has this format, whatever the name. Raises UnsupportedError for an ending that no cache has.
+    It reads this format from files of any name. Raises UnsupportedError for an unknown file extension.
     """
     return _of(ending).read
 
 
 def writer_for(ending: str) -> Write:
-    """Return what writes this format, whatever the name: writer_for(".npz")(cache, outputs, Writing()) → Written."""
+    """Return the writer of a format: writer_for(".npz")(cache, outputs, WriteOptions()) → WriteResult."""
     return _of(ending).write
 
 

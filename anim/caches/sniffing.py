@@ -9,7 +9,7 @@ HEAD = 1024  # bytes that are enough for every signature
 
 
 def sniff_format(head: bytes, size: int) -> str:
-    """Return the file extension of a format by the first bytes of a file, `HEAD` of them if possible, and its size.
+    """Return the file extension of a format by a file's first bytes (`HEAD`, if possible) and its size.
 
     Raises FormatError for bytes that no cache format starts with.
     """

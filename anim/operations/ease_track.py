@@ -73,7 +73,7 @@ class EasedTrack:
         return segment.evaluate(self._track, left, np.where(self._inside[left], evaluate(self._cubics, u), u))
 
     def rates(self, times: Floats, before: bool) -> Floats:
-        """Return the one-sided derivative per second (F, C), of rotations the angular velocity (F, 3), at times (F,)."""
+        """Return the one-sided derivative per second (F, C), of rotations the angular velocity (F, 3), at `times`."""
         left, u = self._place(times, before=before)
         inside = self._inside[left]
         share = np.where(inside, evaluate(self._cubics, u), u)
