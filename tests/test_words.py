@@ -29,7 +29,6 @@ PENDING = (  # packages whose docstrings are not rewritten yet
     "anim/measure",
     "anim/model",
     "anim/operations",
-    "anim/optimization",
     "anim/sampling",
     "anim/show",
     "anim/skinning",

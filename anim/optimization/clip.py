@@ -1,4 +1,4 @@
-"""One clip, optimized: every track sorted by what can be done with it, searched, and put together again."""
+"""Optimization of one clip: tracks sorted by treatment, searched, and assembled into a solution."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ from anim.optimization.search.plan import TrackAction, TrialResult
 from anim.optimization.search.search import search
 from anim.optimization.search.solution import Solution, value_bytes
 from anim.optimization.search.source_motion import PATHS, SourceMotion, analyze_source, key_grid
-from anim.optimization.search.trial import CHORDS_NOTICED, TrialRunner
-from anim.optimization.tracks import clip_ends, lossless, morph_weights, pointer_tracks
+from anim.optimization.search.trial import CHORD_BOUND_FRACTION, TrialRunner
+from anim.optimization.tracks import clip_ends, key_reduction, lossless, morph_weights
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
 
-MORPH_BUDGET_FRACTION = 0.4  # of the bound that morph weights may use where joints move too
-MORPH_ALONE = 0.95
-NOT_UNIT = 0.1  # of the bound, that a rotation's length may move the farthest point in players that don't normalize
+MORPH_BUDGET_FRACTION = 0.4  # of the bound, for morph weights of a clip that moves joints too
+MORPH_ONLY_BUDGET_FRACTION = 0.95  # of the bound, for morph weights of a clip that moves no joint
+MAX_LENGTH_ERROR_FRACTION = 0.1  # of the bound; error of the farthest point from non-unit keys
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A clip to optimize. shared: per track, values that other clips hold it at, the best first.
+    """A clip to optimize.
 
-    unused: (tracks of the clip) whether no clip moves the property away from rest. bound: m, what the search may use.
+    shared: per track, constants that other clips use for the same property, the most frequent first.
+    unused: (tracks of the clip) whether every clip keeps the property at its rest value. bound: m, for the search.
     """
 
     clip: Clip
@@ -39,16 +40,16 @@ class Task:
     bound: float
 
 
-def solve(setting: Context, task: Task) -> Solution | None:
-    """Return the clip in as few bytes as the effort finds; None where no way keeps the bounds."""
-    return _SortedTracks(setting, task).solution()
+def solve(context: Context, task: Task) -> Solution | None:
+    """Return the smallest solution within the bounds that the effort finds; None if there is none."""
+    return _TrackSorter(context, task).solution()
 
 
-class _SortedTracks:
-    """The tracks of one clip, by what can be done with them."""
+class _TrackSorter:
+    """The tracks of one clip, sorted by treatment: dropped, kept, reduced alone or left to the search."""
 
-    def __init__(self, setting: Context, task: Task) -> None:
-        self._setting = setting
+    def __init__(self, context: Context, task: Task) -> None:
+        self._context = context
         self._task = task
         self._clip = task.clip
         self._done: dict[int, tuple[Track, EncodedKeys]] = {}
@@ -57,17 +58,17 @@ class _SortedTracks:
         self._spent = 0.0
         for i, track in enumerate(task.clip.tracks):
             self._sort(i, track)
-        self._thin_weights()
+        self._reduce_weights()
 
     def solution(self) -> Solution | None:
-        found = self._searched(self._free)
+        found = self._search(self._free)
         splines = [i for i in self._free if self._clip.tracks[i].interpolation is Interpolation.CUBICSPLINE]
         if found is not None:
             splines = [i for i in splines if i in found and self._spline_is_smaller(i, found[i][0], found)]
-        if splines:  # smaller than lines, or maybe too bent for any
+        if splines:  # smaller than lines, or possibly too curved for lines within the bound
             for i in splines:
                 self._keep_exactly(i)
-            others = self._searched([i for i in self._free if i not in splines])
+            others = self._search([i for i in self._free if i not in splines])
             found = found if others is None else others
         if found is None:
             return None
@@ -76,82 +77,84 @@ class _SortedTracks:
         return _with_ends(self._clip, every, dropped)
 
     def _sort(self, i: int, track: Track) -> None:
-        policy, exact = self._setting.policy, self._setting.bounds.max_error == 0
+        policy, exact = self._context.policy, self._context.bounds.max_error == 0
         if track.node is None or track.path == "pointer":
-            self._put(i, pointer_tracks.reduce_pointer_keys(track, self._setting.bounds.max_pointer_error))
-        elif self._is_unseen(i):
+            self._keep_track(i, key_reduction.reduce_pointer_keys(track, self._context.bounds.max_pointer_error))
+        elif self._is_invisible(i):
             self._dropped.append(i)
         elif track.path == "weights":
             pass
-        elif track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or self._is_bent(track):
+        elif (
+            track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or self._is_off_unit(track)
+        ):
             self._keep_exactly(i)
         else:
             self._free.append(i)
 
-    def _is_bent(self, track: Track) -> bool:
-        """Whether rotations are so far from unit length that players which don't normalize them show something else."""
+    def _is_off_unit(self, track: Track) -> bool:
+        """Return whether rotations are so far from unit length that players without normalization differ."""
         if track.path != "rotation" or track.interpolation is Interpolation.CUBICSPLINE:
             return False
-        off = np.abs(np.linalg.norm(track.values, axis=1) - 1).max()
-        return bool(2 * off * self._setting.size > NOT_UNIT * self._task.bound)
+        error = np.abs(np.linalg.norm(track.values, axis=1) - 1).max()
+        return bool(2 * error * self._context.size > MAX_LENGTH_ERROR_FRACTION * self._task.bound)
 
-    def _is_unseen(self, i: int) -> bool:
+    def _is_invisible(self, i: int) -> bool:
         node = self._clip.tracks[i].node
-        policy = self._setting.policy
-        return policy.drop_invisible and node not in policy.keep and bool(self._setting.unseen[node])
+        policy = self._context.policy
+        return policy.drop_invisible and node not in policy.keep and bool(self._context.invisible[node])
 
     def _keep_exactly(self, i: int) -> None:
         track = self._clip.tracks[i]
         slim = lossless.reduce_lossless(track)
-        if len(slim.times) == 1 and self._droppable(i) and track.node is not None and track.path in PATHS:
-            is_exact = self._setting.bounds.max_error == 0  # a rest pose in decimals differs from float32 keys
+        if len(slim.times) == 1 and self._is_droppable(i) and track.node is not None and track.path in PATHS:
+            is_exact = self._context.bounds.max_error == 0  # a rest pose in decimals differs from float32 keys
             precision = np.float64 if is_exact else np.float32
-            rest = getattr(self._setting.skeleton, track.path)[track.node].astype(precision)
+            rest = getattr(self._context.skeleton, track.path)[track.node].astype(precision)
             value = slim.values[0].astype(precision)
             if (value == rest).all() or (track.path == "rotation" and (value == -rest).all()):
                 self._dropped.append(i)
                 return
-        self._put(i, slim)
+        self._keep_track(i, slim)
 
-    def _put(self, i: int, track: Track) -> None:
-        self._done[i] = _unchanged(track)
+    def _keep_track(self, i: int, track: Track) -> None:
+        self._done[i] = _with_own_keys(track)
 
-    def _droppable(self, i: int) -> bool:
-        policy = self._setting.policy
+    def _is_droppable(self, i: int) -> bool:
+        policy = self._context.policy
         if self._clip.tracks[i].node in policy.keep:
             return False
         return policy.drop is Drop.REST or (policy.drop is Drop.UNUSED and self._task.unused[i])
 
-    def _thin_weights(self) -> None:
-        """Morph weights have a share of the bound of their own; what they use of it the search may not."""
-        setting = self._setting
+    def _reduce_weights(self) -> None:
+        """Reduce morph weights within their own fraction of the bound; the search gets the rest."""
+        context = self._context
         weights = [i for i, track in enumerate(self._clip.tracks) if track.path == "weights" and i not in self._done]
-        share = MORPH_BUDGET_FRACTION if self._free else MORPH_ALONE
-        bound = share * self._task.bound / max(len(weights), 1)
+        fraction = MORPH_BUDGET_FRACTION if self._free else MORPH_ONLY_BUDGET_FRACTION
+        bound = fraction * self._task.bound / max(len(weights), 1)
         for i in weights:
             track = self._clip.tracks[i]
             assert track.node is not None
-            reach = setting.morph_reach(track.node)
-            exact = setting.bounds.max_error == 0 or track.node in setting.policy.keep
+            reach = context.morph_reach(track.node)
+            exact = context.bounds.max_error == 0 or track.node in context.policy.keep
             if exact or not reach.size or track.interpolation is Interpolation.STEP:
-                self._put(i, lossless.reduce_lossless(track))
+                self._keep_track(i, lossless.reduce_lossless(track))
                 continue
-            from_rest = morph_weights.weight_error(track, setting.weights_at_rest(track.node), reach)
-            if self._droppable(i) and from_rest <= bound:
+            from_rest = morph_weights.weight_error(track, context.weights_at_rest(track.node), reach)
+            if self._is_droppable(i) and from_rest <= bound:
                 self._dropped.append(i)
                 self._spent += from_rest
                 continue
-            new, stored, off = morph_weights.reduce_weights(
-                track, reach, bound, key_grid([track]), setting.coding.packing
+            new, stored, error = morph_weights.reduce_weights(
+                track, reach, bound, key_grid([track]), context.coding.packing
             )
             if track.interpolation is Interpolation.CUBICSPLINE and self._spline_is_smaller(i, new, {i: (new, stored)}):
-                self._put(i, lossless.reduce_lossless(track))
+                self._keep_track(i, lossless.reduce_lossless(track))
                 continue
             self._done[i] = new, stored
-            self._spent += off
+            self._spent += error
 
     def _spline_is_smaller(self, i: int, lines: Track, found: Mapping[int, tuple[Track, EncodedKeys]]) -> bool:
-        """Whether the source's own spline takes fewer bytes than lines do, each with its part of a time axis."""
+        """Return whether the source's spline takes fewer bytes than lines, each with its part of a time axis."""
         if len(lines.times) == 1:
             return False
         own = self._bytes(self._clip.tracks[i], self._clip.tracks)
@@ -159,34 +162,34 @@ class _SortedTracks:
 
     def _bytes(self, track: Track, all_tracks: Sequence[Track]) -> float:
         sharing = sum(each.times is track.times for each in all_tracks)
-        axis = self._setting.coding.prices.axis + 4 * len(track.times)
+        axis = self._context.coding.byte_costs.axis + 4 * len(track.times)
         return value_bytes(track) + axis / sharing
 
-    def _searched(self, free: Sequence[int]) -> dict[int, tuple[Track, EncodedKeys]] | None:
-        """The free tracks as the search left them, without those that it dropped; None where it found no way."""
-        setting = self._setting
+    def _search(self, free: Sequence[int]) -> dict[int, tuple[Track, EncodedKeys]] | None:
+        """Search the free tracks; None without a solution. Tracks that the search drops are absent."""
+        context = self._context
         if not free:
             return {}
         bound = self._task.bound
         found = analyze_source(
-            setting.skeleton,
+            context.skeleton,
             self._clip,
             free,
-            setting.points,
-            setting.answering,
-            reference=setting.policy.reference,
-            noticed=CHORDS_NOTICED * bound,
+            context.points,
+            context.answering,
+            reference=context.policy.reference,
+            chord_tolerance=CHORD_BOUND_FRACTION * bound,
         )
-        allowed = np.full(len(setting.points), bound - self._spent)
-        bench = TrialRunner(
-            setting.skeleton,
+        allowed = np.full(len(context.points), bound - self._spent)
+        runner = TrialRunner(
+            context.skeleton,
             found,
-            BoundUsage(setting.skeleton, found, setting.points, allowed, replace(setting.bounds, max_error=bound)),
-            setting.coding,
-            np.array([self._droppable(i) for i in free], np.bool_),
+            BoundUsage(context.skeleton, found, context.points, allowed, replace(context.bounds, max_error=bound)),
+            context.coding,
+            np.array([self._is_droppable(i) for i in free], np.bool_),
             [self._task.shared[i] for i in free],
         )
-        outcome = search(bench, bound, setting.effort)
+        outcome = search(runner, bound, context.effort)
         return None if outcome is None else _tracks(self._clip, found, outcome)
 
 
@@ -194,7 +197,7 @@ def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, 
     axes: dict[bytes, Floats] = {}
     result = {}
     for k, moving in enumerate(found.moving):
-        if outcome.fates[k] == TrackAction.DROPPED:
+        if outcome.actions[k] == TrackAction.DROPPED:
             continue
         stored = outcome.keys[k]
         if k in outcome.on:
@@ -221,16 +224,16 @@ def _new_track(track: Track, at: Floats, stored: EncodedKeys) -> Track:
 def _with_ends(clip: Clip, every: dict[int, tuple[Track, EncodedKeys]], dropped: list[int]) -> Solution:
     """The solution, with at least one track, and with keys at the clip's start and end."""
     if not every and clip.tracks:
-        every = {0: _unchanged(clip_ends.single_key(clip.tracks[0]))}
+        every = {0: _with_own_keys(clip_ends.single_key(clip.tracks[0]))}
         dropped = [i for i in dropped if i != 0]
     made = Clip(clip.name, tuple(track for track, _ in every.values()))
     if every and (made.end < clip.end or made.start > clip.start):
         number = min(every, key=lambda i: (len(every[i][0].times), every[i][0].values.shape[1], i))
-        every[number] = _unchanged(clip_ends.extend(every[number][0], clip.start, clip.end))
+        every[number] = _with_own_keys(clip_ends.extend(every[number][0], clip.start, clip.end))
     ordered = [every[i] for i in sorted(every)]
     tracks, stored = tuple(track for track, _ in ordered), tuple(each for _, each in ordered)
     return Solution(Clip(clip.name, tracks), stored, tuple(dropped))
 
 
-def _unchanged(track: Track) -> tuple[Track, EncodedKeys]:
+def _with_own_keys(track: Track) -> tuple[Track, EncodedKeys]:
     return track, EncodedKeys(track.values, "as it is")

@@ -1,4 +1,4 @@
-"""One clip from search to verdict, again until it holds: the work that each process does by itself."""
+"""Optimization of one clip, the task of one process: search and verification until all bounds hold."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from anim.optimization.search.solution import Solution
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification, verify
 
-TIGHTER = 0.97  # of the share that a clip was beyond its bound, for the next search
-HARDLY = 0.995  # less for the next search where the vertex that was off most had not been measured
-REDUCED_BUDGET = 0.5  # of the source's keys; with fewer, a clip is smaller than any version without loss
-ROUNDS = 6  # of searching and verifying; after them a clip that still fails is kept without loss
+RETRY_FACTOR = 0.97  # applied to bound / measured error for the next search
+NEW_VERTEX_RETRY_FACTOR = 0.995  # the same if the worst vertex was not among the measured points
+MAX_REDUCED_KEY_FRACTION = 0.5  # of the source's keys; below it the lossless version cannot be smaller
+MAX_ROUNDS = 6  # of search and verification; a clip that fails the last one is stored losslessly
 
 
 @dataclass(frozen=True, slots=True)
 class ClipResult:
-    """A clip that needs no more work: what became of it, and how far it is from its source.
+    """An optimized clip with its verification.
 
-    without_loss: whether no lossy way was found that holds all bounds.
+    without_loss: whether no lossy solution within all bounds was found.
     """
 
     solution: Solution
@@ -36,10 +36,10 @@ class ClipResult:
 
 
 class ClipOptimizer:
-    """What every process works with; each part is made where it is first needed.
+    """Data shared by all clips of a file in one process; each part is computed on first use.
 
-    before, after: the scene as it was, and in its new rest pose. clips: all of the file. detailed: whether verdicts are
-    to have statistics.
+    before, after: the scene in its original and in its new rest pose. clips: all of the file. detailed: whether
+    verifications include statistics.
     """
 
     def __init__(
@@ -52,13 +52,13 @@ class ClipOptimizer:
         self.detailed = detailed
 
     def context(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Context:
-        """Return the setting, with some more vertices measured, (number of the surface, number of the vertex)."""
+        """Return the search context; extra: additional points, (index of the surface, index of the vertex)."""
         if not extra:
             return self._default_context
         return self._context(extra)
 
     def verify(self, number: int, after: Clip) -> Verification:
-        """Return how far a new version of clip `number` is from its source."""
+        """Return the error of a new version of clip `number` against its source."""
         return verify(
             self._ruler,
             self.clips[number],
@@ -71,7 +71,10 @@ class ClipOptimizer:
         )
 
     def worst_vertex(self, found: Verification) -> frozenset[tuple[int, int]]:
-        """Return the vertex that was off most, (number of the surface, number of the vertex); none of a shell."""
+        """Return the vertex with the largest error, (index of the surface, index of the vertex).
+
+        Empty for shell points.
+        """
         error = found.error
         names = [surface.name for surface, _ in self._ruler.pairs.surfaces]
         return frozenset((i, error.vertex) for i, name in enumerate(names) if name == error.place and error.vertex >= 0)
@@ -94,57 +97,61 @@ class ClipOptimizer:
 
     @cached_property
     def _ruler(self) -> ErrorMetric:
-        share = self.request.bounds.shell / (diagonal(self.before) or 1.0)
-        return ErrorMetric(self.before, self.after, shell=None if self.request.policy.drop_invisible else share)
+        fraction = self.request.bounds.shell / (diagonal(self.before) or 1.0)
+        return ErrorMetric(self.before, self.after, shell=None if self.request.policy.drop_invisible else fraction)
 
     @cached_property
     def _prover(self) -> Prover:
         return Prover(self._ruler)
 
 
-def optimize_clip(site: ClipOptimizer, item: tuple[int, Task]) -> ClipResult:
-    """Return clip `item[0]` in the fewest bytes found within all bounds, judged as it will be stored.
+def optimize_clip(optimizer: ClipOptimizer, item: tuple[int, Task]) -> ClipResult:
+    """Return clip `item[0]` in the fewest bytes found within all bounds, verified as stored.
 
-    Splines and steps as they are compete too: lines in place of a few of them can take more.
+    The lossless version competes too: a few splines or steps can be smaller than the lines that replace them.
     """
     number, task = item
-    setting = site.context()
-    found = [each for effort in setting.effort.all() if (each := _within(site, number, task, effort)) is not None]
-    best = min(found, key=lambda each: each.solution.size(setting.coding), default=None)
-    if best is not None and _keys(best.solution.clip) < REDUCED_BUDGET * _keys(task.clip):
+    context = optimizer.context()
+    found = [
+        each
+        for effort in context.effort.all()
+        if (each := _search_within_bounds(optimizer, number, task, effort)) is not None
+    ]
+    best = min(found, key=lambda each: each.solution.size(context.coding), default=None)
+    if best is not None and _keys(best.solution.clip) < MAX_REDUCED_KEY_FRACTION * _keys(task.clip):
         return best
-    exact = solve(replace(setting, bounds=replace(setting.bounds, max_error=0.0)), task)
+    exact = solve(replace(context, bounds=replace(context.bounds, max_error=0.0)), task)
     assert exact is not None
-    if best is not None and best.solution.size(setting.coding) <= exact.size(setting.coding):
+    if best is not None and best.solution.size(context.coding) <= exact.size(context.coding):
         return best
-    is_last_resort = best is None and site.request.bounds.max_error > 0
-    return ClipResult(exact, site.verify(number, exact.clip), without_loss=is_last_resort)
+    is_last_resort = best is None and optimizer.request.bounds.max_error > 0
+    return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=is_last_resort)
 
 
-def verify_solution(site: ClipOptimizer, item: tuple[int, Clip]) -> Verification:
-    """Return how far a new version of clip `item[0]` is from its source."""
-    return site.verify(*item)
+def verify_solution(optimizer: ClipOptimizer, item: tuple[int, Clip]) -> Verification:
+    """Return the error of a new version of clip `item[0]` against its source."""
+    return optimizer.verify(*item)
 
 
 def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 
 
-def _within(site: ClipOptimizer, number: int, task: Task, effort: Effort) -> ClipResult | None:
-    """What a search finds that holds, None if nothing does.
+def _search_within_bounds(optimizer: ClipOptimizer, number: int, task: Task, effort: Effort) -> ClipResult | None:
+    """Search until a solution passes verification; None if none does.
 
-    After each search that fails, the vertex that was off most is measured too, and the search gets less to spend.
+    After each failure the vertex with the largest error becomes a measured point, and the bound is reduced.
     """
     extra: frozenset[tuple[int, int]] = frozenset()
-    for _ in range(ROUNDS):
-        solution = solve(replace(site.context(extra), effort=effort), task)
+    for _ in range(MAX_ROUNDS):
+        solution = solve(replace(optimizer.context(extra), effort=effort), task)
         if solution is None:
             return None
-        found = site.verify(number, solution.clip)
+        found = optimizer.verify(number, solution.clip)
         if found.holds:
             return ClipResult(solution, found)
-        worst = site.worst_vertex(found)
-        factor = HARDLY if worst - extra else min(TIGHTER / found.usage, TIGHTER)
+        worst = optimizer.worst_vertex(found)
+        factor = NEW_VERTEX_RETRY_FACTOR if worst - extra else min(RETRY_FACTOR / found.usage, RETRY_FACTOR)
         extra |= worst
         task = replace(task, bound=task.bound * factor)
     return None

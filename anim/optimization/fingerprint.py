@@ -1,6 +1,6 @@
-"""A mark in the file that says what it was optimized with, so that the same command changes nothing again.
+"""A fingerprint of clips and options in `asset.extras`, so that a repeated command changes nothing.
 
-Without it a second run would spend the bound a second time: nothing else in a file tells its motion from the source's.
+Without it a second run would use the bound a second time, because the source's motion is not in the file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ KEY = "gltf-anim"
 
 
 def add_mark(document: Document, clips: Iterable[Clip], options: str) -> Document:
-    """Return the document with a mark of its clips and the options in `asset.extras`; as it is where that is taken."""
+    """Return the document with a mark of its clips and options in `asset.extras`.
+
+    Unchanged if `extras` is no object.
+    """
     asset = document.json["asset"]
     extras = asset.get("extras", {})
     if not isinstance(extras, dict):

@@ -1,4 +1,4 @@
-"""A document whose animations take fewer bytes, and whose motion stays within bounds that are measured on it."""
+"""Optimization of a document's animations: fewer bytes, within error bounds measured on the result."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.optimization.verification import Verification
 from anim.optimization.writing import changed_clips, write_solutions
 
-MARGIN = 0.985  # of the bound, that a search may use
+SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
 
 
 @dataclass(frozen=True, slots=True)
 class Optimized:
-    """The new document, and by number of the clip what became of it and how far it is from its source.
+    """The new document, with solutions and verifications by index of the clip.
 
-    moved: (node, path) of rest values that moved. without_loss: numbers of the clips that no lossy way was found for.
+    moved: (node, path) of changed rest values. without_loss: indices of the clips without a lossy solution.
     unchanged: whether the input is the output of the same request.
     """
 
@@ -52,12 +52,13 @@ def optimize(
     detailed: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Optimized:
-    """Return the document with its animations in fewer bytes, each within the bounds as measured on what was written.
+    """Return the document with smaller animations, each within the bounds as measured on the written data.
 
-    scene, clips: of the document. chosen: numbers of the clips to optimize, all by default. workers: processes; the
-    result is the same for any number. start: how they start, as `multiprocessing` calls it. detailed: verdicts with
-    statistics. progress: called with the share done.
-    A clip for which no lossy way holds all bounds is kept without loss. Output of the same request comes back as it is.
+    scene, clips: of the document. chosen: indices of the clips to optimize, all by default. workers: number of
+    processes; the result is the same for any number. start: start method of `multiprocessing`. detailed: verifications
+    with statistics. progress: called with the fraction done.
+    A clip without a lossy solution within all bounds is stored losslessly. Output of the same request comes back
+    unchanged.
     """
     chosen = range(len(clips)) if chosen is None else chosen
     options = f"{request.name} {tuple(chosen)}"
@@ -65,8 +66,8 @@ def optimize(
         return Optimized(document, {}, {}, unchanged=True)
     request = _visible_clips(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
-    site = ClipOptimizer(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
-    tasks = _tasks(site, chosen)
+    optimizer = ClipOptimizer(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
+    tasks = _tasks(optimizer, chosen)
     solutions: dict[int, Solution] = {}
     verdicts: dict[int, Verification] = {}
     without_loss: list[int] = []
@@ -74,40 +75,40 @@ def optimize(
     def name(item: tuple[int, object]) -> str:
         return reader.clip_label(clips[item[0]].name, item[0])
 
-    with process_pool(min(workers, len(tasks)), site, start=start) as workforce:
-        results = workforce.each(optimize_clip, tasks, label=name)
+    with process_pool(min(workers, len(tasks)), optimizer, start=start) as pool:
+        results = pool.each(optimize_clip, tasks, label=name)
         for (number, _), each in zip(tasks, results, strict=True):
             solutions[number], verdicts[number] = each.solution, each.verdict
             without_loss += [number] if each.without_loss else []
             progress(len(solutions) / len(tasks))
         lossy = {i: each for i, each in solutions.items() if i not in without_loss}
-        slimmer = drop_redundant_keys(lossy, site.after.skeleton, request)
+        slimmer = drop_redundant_keys(lossy, optimizer.after.skeleton, request)
         items = [(i, each.clip) for i, each in slimmer.items()]
-        for (number, _), found in zip(items, workforce.each(verify_solution, items, label=name), strict=True):
+        for (number, _), found in zip(items, pool.each(verify_solution, items, label=name), strict=True):
             if found.holds:
                 solutions[number], verdicts[number] = slimmer[number], found
     new = write_solutions(base.document if base else document, solutions, request.packing)
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):
-        verdicts[number] = site.verify(number, read_back[number])
+        verdicts[number] = optimizer.verify(number, read_back[number])
     done = fingerprint.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 
 def _visible_clips(request: Request, scene: Scene) -> Request:
-    """The request, for a scene without a vertex as if nothing were invisible: nodes are all that it shows."""
+    """The request; invisible nodes stay if the scene has no vertex, because its nodes are then the motion."""
     if has_vertices(scene):
         return request
     return replace(request, policy=replace(request.policy, drop_invisible=False))
 
 
-def _tasks(site: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:
-    shared = find_constants(site.context(), site.clips)
+def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:
+    shared = find_constants(optimizer.context(), optimizer.clips)
     tasks = []
     for i in chosen:
-        clip = site.clips[i]
+        clip = optimizer.clips[i]
         targets = [(-1 if track.node is None else track.node, track.path) for track in clip.tracks]
         values = tuple(shared.values.get(target, ()) for target in targets)
         unused = tuple(target in shared.unused for target in targets)
-        tasks.append((i, Task(clip, values, unused, MARGIN * site.request.bounds.max_error)))
+        tasks.append((i, Task(clip, values, unused, SEARCH_BOUND_FRACTION * optimizer.request.bounds.max_error)))
     return tasks

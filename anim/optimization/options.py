@@ -1,4 +1,4 @@
-"""What an optimization may cost the motion, what it may remove, and how hard it tries: all options in three values."""
+"""Options of an optimization: error bounds, permitted removals, and search effort."""
 
 from __future__ import annotations
 
@@ -7,35 +7,35 @@ from enum import StrEnum
 
 
 class Drop(StrEnum):
-    """Which channels that only repeat the rest pose may go."""
+    """Removal of channels that only repeat the rest pose."""
 
-    REST = "rest"  # every channel that stays within the bound of the rest pose, clip by clip
-    UNUSED = "unused"  # only what no clip ever moves away from the rest pose: safe where a player blends clips
-    NEVER = "never"  # none; they become a single key
+    REST = "rest"  # each channel within the bound of the rest pose, clip by clip
+    UNUSED = "unused"  # only properties at rest in all clips: safe for players that blend clips
+    NEVER = "never"  # none; such channels become a single key
 
 
 class Reference(StrEnum):
-    """What the result must stay near to."""
+    """The times at which the result must match the source."""
 
-    CURVE = "curve"  # the motion at every moment
-    KEYS = "keys"  # the motion at the source's key times
+    CURVE = "curve"  # all times
+    KEYS = "keys"  # the source's key times
 
 
 class Packing(StrEnum):
-    """How the numbers of animations are stored."""
+    """The storage of animation data."""
 
-    CORE = "core"  # plain accessors: every player reads them
+    CORE = "core"  # plain accessors, supported by every player
     EXT = "ext"  # EXT_meshopt_compression
     KHR = "khr"  # KHR_meshopt_compression, bitstream version 1
 
     @property
     def extension(self) -> str:
-        """The glTF extension it needs; empty for none."""
+        """The glTF extension required; empty for none."""
         return {"core": "", "ext": "EXT_meshopt_compression", "khr": "KHR_meshopt_compression"}[self.value]
 
 
 class Objective(StrEnum):
-    """What is counted when two ways compete."""
+    """The size that a search minimizes."""
 
     FILE = "file"  # bytes on disk
     GZIP = "gzip"  # bytes after gzip, where JSON is nearly free
@@ -43,11 +43,11 @@ class Objective(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """How far the result may be from the source.
+    """Error bounds of the result against the source.
 
-    max_error: m on the surface, 0 for lossless in float32. shell: m, radius of the sphere on which a node without
-    vertices counts. max_pointer_error: share of the range of a track that moves no node. max_angle: rad of any node's
-    own rotation, or None. max_speed_error: m/s of any vertex, or None.
+    max_error: m on the surface, 0 for lossless in float32. shell: m, radius of the shell points around nodes without
+    vertices. max_pointer_error: fraction of the range of a track that moves no node. max_angle: rad of any node's world
+    rotation, or None. max_speed_error: m/s of any vertex, or None.
     """
 
     max_error: float
@@ -59,10 +59,10 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """What may be removed or moved beside keys.
+    """Permitted removals and changes apart from keys.
 
-    keep: numbers of the nodes whose channels stay exact. rebase_rest: the rest pose may move where every
-    clip drives the property. drop_invisible: channels of nodes that carry no vertex may go.
+    keep: indices of the nodes whose channels stay exact. rebase_rest: whether the rest pose may change if every
+    clip animates the property. drop_invisible: whether channels of nodes without vertices may be dropped.
     """
 
     drop: Drop = Drop.UNUSED
@@ -74,14 +74,13 @@ class Policy:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How long a search goes on.
+    """The extent of a search.
 
-    rounds: of feedback. thresholds: shares of the bound tried as what a track may be off to be held. axes: further
-    ways to choose time axes. favoring: rounds with more room for long tracks. leeways: where rotations make up for each
-    other, how much of what that shortens levers by is given to their budgets at once, as powers. finishing: factors
-    tried on all budgets at the end. strays: random changes tried. descent: times that each track is tried with coarser
-    storage, where a codec makes that smaller. cycles: times that all of this is done at most, as long as it saves
-    bytes. besides: another effort, whose result counts where it is smaller.
+    rounds: of feedback. thresholds: fractions of the bound tried as tolerance for constant tracks. axes: further
+    layouts of time axes. long_track_rounds: rounds with larger budgets for long tracks. leeways: exponents on the
+    budget gain of world-space compensation. finishing: factors tried on all budgets at the end. random_trials: number
+    of random changes. coarsen_passes: passes of coarser storage, track by track, with a codec. cycles: maximum
+    repetitions of all stages, as long as one saves bytes. also_try: another effort; the smaller result counts.
     """
 
     rounds: int
@@ -96,7 +95,7 @@ class Effort:
     also_try: Effort | None = None
 
     def all(self) -> list[Effort]:
-        """Return the efforts that are made one after the other: the smallest result counts."""
+        """Return all efforts to run in turn; the smallest result counts."""
         return [*(self.also_try.all() if self.also_try else ()), self]
 
 

@@ -1,7 +1,7 @@
-"""Work on many clips at once, in processes; the order of results, and so the output, never depends on how many.
+"""A process pool for work on many clips; results keep the order of tasks for any number of processes.
 
-Processes live only as long as this one: each waits on a pipe that nobody writes to and whose other end only this
-process holds. However this process ends, the system closes that end, and they are gone.
+Worker processes live only as long as their parent: each waits on a pipe without any writer, whose other end only the
+parent holds open. The system closes that end when the parent exits, and the workers exit too.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 
 
 class ProcessPool:
-    """Runs one function on many arguments. `shared` is handed to every process once."""
+    """Runs one function on many arguments; `shared` is passed to every process once."""
 
     def __init__(self, pool: ProcessPoolExecutor | None, shared: Any) -> None:
         self._pool, self._shared = pool, shared
@@ -33,8 +33,8 @@ class ProcessPool:
     ) -> Iterator[Result]:
         """Yield function(shared, task) for every task, in order.
 
-        label: what errors call a task. Raises UnsupportedError where a process ended before its work did, as the system
-        ends one where memory runs out.
+        label: name of a task for errors. Raises UnsupportedError if a process ended before its work did, as the system
+        ends one when memory runs out.
         """
         if self._pool is None:
             yield from (function(self._shared, task) for task in tasks)
@@ -53,35 +53,35 @@ class ProcessPool:
 
 @contextmanager
 def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator[ProcessPool]:
-    """Give a crew of so many processes; of none, in this process, where one is enough.
+    """Provide a pool of `workers` processes; for one, the work runs in this process.
 
-    start: "spawn" for fresh processes, for which callers guard their main module as `multiprocessing` asks; "fork" for
-    copies of this one, quicker, where no other thread runs. All inherit the environment: `cli.main` has set
-    OPENBLAS_NUM_THREADS to 1 in it, so that each has a core of its own.
+    start: "spawn" for fresh processes, for which callers guard their main module as `multiprocessing` requires; "fork"
+    for copies of this one, quicker, if no other thread runs. All inherit the environment: `cli.main` has set
+    OPENBLAS_NUM_THREADS to 1 in it, so that each process uses one core.
     """
     if workers <= 1:
         yield ProcessPool(None, shared)
         return
     context = multiprocessing.get_context(start)
-    lifeline, held = context.Pipe(duplex=False)
-    inherited = held if start == "fork" else None  # copies of this process hold the other end too, and close it
+    lifeline, parent_end = context.Pipe(duplex=False)
+    inherited = parent_end if start == "fork" else None  # forked copies inherit the parent's end and must close it
     pool = ProcessPoolExecutor(workers, context, _set_up, (shared, lifeline, inherited))
     try:
         yield ProcessPool(pool, shared)
         pool.shutdown()
     finally:
-        held.close()  # whoever still works ends now, and nobody waits for it
+        parent_end.close()  # running workers exit now, without a wait
         pool.shutdown(wait=False, cancel_futures=True)
         lifeline.close()
 
 
-_run_in_worker: list[Any] = []  # what every task of a worker process works with; set once, before the first
+_run_in_worker: list[Any] = []  # the shared value of a worker process; set once, before its first task
 
 
 def _set_up(shared: Any, lifeline: Connection, inherited: Connection | None) -> None:
     for stop in (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])):
-        signal.signal(stop, signal.SIG_DFL)  # copies of this process have its handlers, and would go on
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches us all; the process that started us says what follows
+        signal.signal(stop, signal.SIG_DFL)  # forked copies inherit handlers, and would not exit
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent decides
     if inherited is not None:
         inherited.close()
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
@@ -89,7 +89,7 @@ def _set_up(shared: Any, lifeline: Connection, inherited: Connection | None) -> 
 
 
 def _end_with(lifeline: Connection) -> None:
-    """End this process when the other end of the pipe is closed."""
+    """Exit this process when the other end of the pipe is closed."""
     lifeline.poll(None)
     os._exit(1)
 

@@ -1,4 +1,4 @@
-"""Size against error: the curve of a file, and the smallest error that fits a number of bytes."""
+"""Rate-distortion curve of a file, and the smallest error within a byte limit."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from dataclasses import dataclass
 ERROR_FRACTIONS = tuple(
     10.0 ** (-exponent / 2) for exponent in range(10, 3, -1)
 )  # of the diagonal: 1e-5 to 1e-2, two a decade
-LEAST, MOST = 1e-6, 0.1  # of the diagonal: where a bound that fits is looked for
-STEPS = 9  # of halving the logarithm: within 2 % of the smallest such bound
+MIN_BOUND_PER_DIAGONAL, MAX_BOUND_PER_DIAGONAL = 1e-6, 0.1  # range of the search
+NUM_BISECTIONS = 9  # of the bound's logarithm: within 2 % of the smallest such bound
 
 
 @dataclass(frozen=True, slots=True)
 class RatePoint:
-    """A bound, m, with the bytes of the file it leads to and the error, m, that is left.
+    """A bound, m, with the size of the resulting file in bytes and its error, m.
 
     animation: bytes of keys and of their JSON, without meshes and images.
     """
@@ -27,26 +27,27 @@ class RatePoint:
 
 
 def curve(
-    diagonal: float, tried: Callable[[float], RatePoint], shares: Sequence[float] = ERROR_FRACTIONS
+    diagonal: float, tried: Callable[[float], RatePoint], fractions: Sequence[float] = ERROR_FRACTIONS
 ) -> Iterator[RatePoint]:
-    """Yield sizes at bounds from small to large. tried: makes one, for a bound in metres."""
-    for share in sorted(shares):
-        yield tried(share * diagonal)
+    """Yield sizes at bounds from small to large. tried: optimizes with a bound in metres."""
+    for fraction in sorted(fractions):
+        yield tried(fraction * diagonal)
 
 
 def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], RatePoint]) -> RatePoint | None:
-    """Return the smallest bound found that takes at most `max_bytes`; None where even a tenth of the diagonal doesn't.
+    """Return the smallest bound found that takes at most `max_bytes`; None if there is none.
 
-    Halves the logarithm of the bound; sizes fall with it but for the noise of the search, some percent.
+    Bounds go up to a tenth of the diagonal. Bisects the logarithm of the bound; sizes decrease with it except for the
+    noise of the search, a few percent.
     """
     exact = tried(0.0)
     if exact.size <= max_bytes:
         return exact
-    best = tried(MOST * diagonal)
+    best = tried(MAX_BOUND_PER_DIAGONAL * diagonal)
     if best.size > max_bytes:
         return None
-    low, high = math.log(LEAST * diagonal), math.log(MOST * diagonal)
-    for _ in range(STEPS):
+    low, high = math.log(MIN_BOUND_PER_DIAGONAL * diagonal), math.log(MAX_BOUND_PER_DIAGONAL * diagonal)
+    for _ in range(NUM_BISECTIONS):
         middle = (low + high) / 2
         found = tried(math.exp(middle))
         if found.size <= max_bytes:

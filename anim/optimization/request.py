@@ -1,4 +1,4 @@
-"""What is asked of an optimization, in one value."""
+"""The request of an optimization: all its options in one value."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from anim.optimization.verification import PLAYERS
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for.
+    """Bounds, policy, storage and effort of an optimization.
 
-    effort: a name in EFFORTS. players: names in PLAYERS, who must show the motion rightly. given: the bounds as they
-    were given, where they are shares of the diagonal: another rest pose has another, and yet it is the same request.
+    effort: a name in EFFORTS. players: names in PLAYERS; the bounds hold for each. given: the bounds as given, if
+    relative to the diagonal: another rest pose has another diagonal, but the request is the same.
     """
 
     bounds: Bounds
@@ -26,5 +26,5 @@ class Request:
 
     @property
     def name(self) -> str:
-        """What is the same of two requests that ask for the same."""
+        """Text that is equal for equal requests."""
         return repr(replace(self, bounds=Bounds(0.0, 0.0)) if self.given else self)

@@ -1,4 +1,4 @@
-"""The rest pose moved to where clips hold it, so that they need not say so."""
+"""Rebase of the rest pose onto the most common constants, so that clips can drop those channels."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from anim.gltf.document import Document, Json, json_array
 from anim.model import Clip, Scene, Skeleton
 from anim.optimization.search.source_motion import PATHS
 
-SAME = 2e-4  # in units of the value: constants this near count as one
-CONSTANT_TOLERANCE = 1e-4  # a track that stays this near its first value is a constant
-WORTH = 1e-5  # a rest value nearer than this to the constant stays
+EQUAL_TOLERANCE = 2e-4  # in units of the value: constants this close count as equal
+CONSTANT_TOLERANCE = 1e-4  # in units of the value: a track this close to its first value is constant
+MIN_REST_CHANGE = 1e-5  # in units of the value: a smaller difference leaves the rest value
 
 
 @dataclass(frozen=True, slots=True)
 class RebasedDocument:
-    """A scene and its document in a new rest pose. moved: (node, path) of every rest value that changed."""
+    """A scene and its document in a new rest pose. moved: (node, path) of every changed rest value."""
 
     document: Document
     scene: Scene
@@ -28,10 +28,10 @@ class RebasedDocument:
 
 
 def rebase(document: Document, scene: Scene, clips: Sequence[Clip], *, exact: bool = False) -> RebasedDocument:
-    """Return the scene with the commonest constant as rest value of every property that all clips drive.
+    """Return the scene with the most common constant of each property as its rest value.
 
-    What no clip drives, in any clip, keeps its rest value: it is seen. Values are the shortest
-    decimals that are the same in float32; exact: in float64 too.
+    Only properties that every clip animates change; the rest value of others is visible in some clip. Values are the
+    shortest decimals that are equal in float32; exact: in float64 too.
     """
     skeleton = scene.skeleton
     values = _most_common_value(skeleton, clips)
@@ -64,7 +64,9 @@ def _most_common_value(skeleton: Skeleton, clips: Sequence[Clip]) -> dict[tuple[
     for (node, path), rows in constants.items():
         value = _most_common(np.array(rows), path)
         rest = getattr(skeleton, path)[node]
-        if np.abs(value - rest).max() > WORTH and np.abs(value + rest).max() > WORTH * (path == "rotation"):
+        if np.abs(value - rest).max() > MIN_REST_CHANGE and np.abs(value + rest).max() > MIN_REST_CHANGE * (
+            path == "rotation"
+        ):
             found[node, path] = value
     return found
 
@@ -73,7 +75,7 @@ def _most_common(rows: Floats, path: str) -> Floats:
     if path == "rotation":
         rows = rows * np.where(rows @ rows[0] < 0, -1.0, 1.0)[:, None]
         rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    near = (np.abs(rows[:, None] - rows).max(axis=2) < SAME).sum(axis=1)
+    near = (np.abs(rows[:, None] - rows).max(axis=2) < EQUAL_TOLERANCE).sum(axis=1)
     return np.asarray(rows[int(near.argmax())])
 
 

@@ -1,4 +1,4 @@
-"""What is known of all clips before any is searched: which properties never leave rest, and which values they share."""
+"""Constants common to all clips, found before any search: properties at rest, and shared values."""
 
 from __future__ import annotations
 
@@ -14,26 +14,29 @@ from anim.optimization.search.context import Context
 from anim.optimization.search.source_motion import PATHS
 from anim.optimization.tracks import morph_weights
 
-CONSTANT_TOLERANCE = 0.5  # of the bound: a track that stays this near a value may be held at it
+CONSTANT_TOLERANCE = 0.5  # of the bound: a track this close to a value may become that constant
 
 Target = tuple[int, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """unused: properties that no clip moves away from rest. values: by property, where clips hold it, most first."""
+    """Constants of all clips.
+
+    unused: properties at rest in all clips. values: by property, constants of its tracks, the most frequent first.
+    """
 
     unused: frozenset[Target]
     values: dict[Target, tuple[Floats, ...]]
 
 
-def find_constants(setting: Context, clips: Sequence[Clip]) -> Constants:
-    """Return what all clips have in common, judged with levers of the rest pose."""
-    meters = _meters(setting)
+def find_constants(context: Context, clips: Sequence[Clip]) -> Constants:
+    """Return the constants of all clips; distances use the rest pose's moment arms."""
+    meters = _meters_per_unit(context)
     moved: set[Target] = set()
     seen: set[Target] = set()
     values: dict[Target, list[_Value]] = {}
-    bound = CONSTANT_TOLERANCE * setting.bounds.max_error
+    bound = CONSTANT_TOLERANCE * context.bounds.max_error
     for clip in clips:
         for track in clip.tracks:
             if track.node is None or track.path == "pointer":
@@ -41,14 +44,14 @@ def find_constants(setting: Context, clips: Sequence[Clip]) -> Constants:
             target = (track.node, track.path)
             if track.path == "weights":
                 seen.add(target)
-                if not _weights_rest(setting, track, bound):
+                if not _weights_rest(context, track, bound):
                     moved.add(target)
                 continue
             unit = meters[PATHS.index(track.path)][track.node]
             seen.add(target)
-            if unit * _difference(track, getattr(setting.skeleton, track.path)[track.node]) > bound:
+            if unit * _difference(track, getattr(context.skeleton, track.path)[track.node]) > bound:
                 moved.add(target)
-                _note(values.setdefault(target, []), track, unit, bound)
+                _count_constant(values.setdefault(target, []), track, unit, bound)
     chosen = {
         target: tuple(each.value for each in sorted(found, key=lambda each: -each.clips))
         for target, found in values.items()
@@ -56,25 +59,25 @@ def find_constants(setting: Context, clips: Sequence[Clip]) -> Constants:
     return Constants(frozenset(seen - moved), chosen)
 
 
-def _weights_rest(setting: Context, track: Track, bound: float) -> bool:
-    """Whether morph weights leave every vertex within `bound` of the rest pose; splines that move never do."""
+def _weights_rest(context: Context, track: Track, bound: float) -> bool:
+    """Return whether morph weights keep every vertex within `bound` of rest; false for splines that move."""
     assert track.node is not None
-    reach = setting.morph_reach(track.node)
+    reach = context.morph_reach(track.node)
     if not reach.size or track.interpolation is Interpolation.CUBICSPLINE:
         return False
-    return morph_weights.weight_error(track, setting.weights_at_rest(track.node), reach) <= bound
+    return morph_weights.weight_error(track, context.weights_at_rest(track.node), reach) <= bound
 
 
 class _Value:
-    """A value at which clips hold a property."""
+    """A constant of a property, with the number of clips that use it."""
 
     def __init__(self, value: Floats) -> None:
         self.value = value
         self.clips = 1
 
 
-def _note(found: list[_Value], track: Track, unit: float, bound: float) -> None:
-    """Count the track for a value that is near all of its keys, its own middle where none is."""
+def _count_constant(found: list[_Value], track: Track, unit: float, bound: float) -> None:
+    """Count the track for a constant near all of its keys; without one, add its own middle if near."""
     for each in found:
         if unit * _difference(track, each.value) <= bound:
             each.clips += 1
@@ -88,7 +91,7 @@ def _note(found: list[_Value], track: Track, unit: float, bound: float) -> None:
 
 
 def _difference(track: Track, value: Floats) -> float:
-    """How far the track's keys are from a value, at most, in its own units; a spline that moves, endlessly."""
+    """Largest distance of the track's keys from a value, in its units; infinite for a spline that moves."""
     if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
         assert track.out_tangents is not None
         if track.in_tangents.any() or track.out_tangents.any():
@@ -99,14 +102,14 @@ def _difference(track: Track, value: Floats) -> float:
     return float(apart.max())
 
 
-def _meters(setting: Context) -> tuple[Floats, Floats, Floats]:
-    """How far a point moves per unit of each node's translation, rotation and scale (N,), in the rest pose."""
-    world, skeleton = setting.rest_world, setting.skeleton
-    places = setting.points.places(world[:, None])[:, 0]
+def _meters_per_unit(context: Context) -> tuple[Floats, Floats, Floats]:
+    """Displacement of a point per unit of each node's translation, rotation and scale (N,), at rest."""
+    world, skeleton = context.rest_world, context.skeleton
+    places = context.points.places(world[:, None])[:, 0]
     count = len(skeleton)
     reach = np.zeros(count)
     for node in range(count):
-        mine = places[setting.points.on(skeleton.descendants(node))]
+        mine = places[context.points.on(skeleton.descendants(node))]
         reach[node] = np.linalg.norm(mine - world[node, :, 3], axis=1).max(initial=0.0)
     lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max(axis=1)
     widening = np.where(skeleton.parents < 0, 1.0, lengths[skeleton.parents])

@@ -1,4 +1,4 @@
-"""Solutions → the document that holds them, and proof that it holds exactly them."""
+"""Writing of solutions into a document, and the check that it contains exactly them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from anim.model import Clip, Track
 from anim.optimization.options import Packing
 from anim.optimization.search.solution import Solution
 
-FILTERS = {"quaternion": "QUATERNION", "exponent": "EXPONENTIAL"}  # what meshopt calls the forms of `coding`
+FILTERS = {"quaternion": "QUATERNION", "exponent": "EXPONENTIAL"}  # meshopt's names of EncodedKeys.form
 
 
 def write_solutions(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
-    """Return the document with the clips numbered in `solutions` in place of its own, and no number left over."""
+    """Return the document with the clips indexed in `solutions` in place of its own; no unused accessors."""
     clips = {i: each.clip for i, each in sorted(solutions.items())}
     if not packing.extension:
         return reindex.drop_placeholders(writer.replace_clips(document, clips))
@@ -32,7 +32,7 @@ def write_solutions(document: Document, solutions: Mapping[int, Solution], packi
 
 
 def changed_clips(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) -> list[int]:
-    """Return the numbers of the clips that, read from the new document, are unlike their solution: none."""
+    """Return the indices of the clips that differ from their solution when read from the new document."""
     return [i for i, each in solutions.items() if not _is_same(read_back[i], each.clip)]
 
 

@@ -16,7 +16,7 @@ from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from anim.measure.error.surface import is_measured_at
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
-from anim.optimization.rate_distortion import ERROR_FRACTIONS, MOST, curve
+from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, curve
 from anim.optimization.request import Request
 from anim.optimization.verification import PLAYERS
 from cli.errors import UsageError
@@ -250,7 +250,7 @@ def _check_report(report: str, input: str, output: str) -> None:
 
 def _draw_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
     sizes = []
-    bounds = (0.0, *ERROR_FRACTIONS, MOST)  # also the lossless size, and the smallest size of any bound
+    bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
     for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
         voice.info(optimize_report.curve_line(sized, work.scale))
         sizes.append(sized)

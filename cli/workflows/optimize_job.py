@@ -17,7 +17,7 @@ from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.optimization.optimize import Optimized, optimize
-from anim.optimization.rate_distortion import MOST, RatePoint, smallest_error
+from anim.optimization.rate_distortion import MAX_BOUND_PER_DIAGONAL, RatePoint, smallest_error
 from anim.optimization.request import Request
 from cli.errors import CheckError
 from cli.io import documents, scenes
@@ -79,7 +79,7 @@ class OptimizeJob:
 
         ceiling: m, the greatest allowed error; None for a tenth of the diagonal. Raises CheckError if nothing fits.
         """
-        most = MOST * self.scale if ceiling is None else ceiling
+        most = MAX_BOUND_PER_DIAGONAL * self.scale if ceiling is None else ceiling
         if ceiling is not None:
             self._check_fit(self.sized(request, most), max_bytes)
         best = smallest_error(max_bytes, self.scale, lambda max_error: self.sized(request, max_error))

@@ -1,4 +1,4 @@
-"""How the keyed tracks of a clip come to their time axes: by bytes, all on one, or every so many frames."""
+"""Layouts of time axes for the keyed tracks of a clip: merged by bytes, one shared axis, or even keys."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from anim.optimization.search.time_axes import SharedAxis, merge_axes
 from anim.optimization.tracks.key_reduction import greedy_keys, joint_greedy_keys
 from anim.optimization.tracks.quantization import Encoding
 
-CONSTANT_TOLERANCE = 0.1  # of the bound: a track that is less off its middle value gets no table
-ASKED = 4.0  # of the bound: larger budgets are hardly ever asked for
+CONSTANT_TOLERANCE = 0.1  # of the bound: tracks this close to their middle value get no table
+MAX_BUDGET_PER_BOUND = 4.0  # larger budgets are rare
 
 
 class TimeAxisSearch:
-    """Time axes for one clip; what was found for a track and a budget is kept.
+    """Search for the time axes of one clip; results per track and budget are cached.
 
-    bound: m, the largest error of all: tracks that stay far below it by themselves are hardly ever keyed.
+    bound: m, the error bound of the clip: tracks far below it are rarely keyed.
     """
 
-    def __init__(self, truth: SourceMotion, coding: Encoding, bound: float) -> None:
-        self.grid = truth.grid
-        self.own = truth.own
+    def __init__(self, source: SourceMotion, coding: Encoding, bound: float) -> None:
+        self.grid = source.grid
+        self.own = source.own
         self.coding = coding
-        self.key_bytes = np.array([coding.key_bytes(each.path) for each in truth.moving])
-        self._scaled = _scaled(truth)
-        moved = np.array([each.from_middle for each in truth.moving])
+        self.key_bytes = np.array([coding.key_bytes(each.path) for each in source.moving])
+        self._scaled = _scaled(source)
+        moved = np.array([each.from_middle for each in source.moving])
         self._tabled = np.flatnonzero(moved > CONSTANT_TOLERANCE * bound)
-        if not fits(len(self._tabled), truth.grid):
+        if not fits(len(self._tabled), source.grid):
             self._tabled = np.empty(0, np.int64)
-        self._segments = SegmentErrors(self._scaled[self._tabled], truth.grid, ASKED * bound)
+        self._segments = SegmentErrors(self._scaled[self._tabled], source.grid, MAX_BUDGET_PER_BOUND * bound)
         self._rows: dict[tuple[int, float], Bools] = {}
 
     def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-        """Return the axes of the tracks `keyed` under their budgets (G,) in metres, by the layout of that name."""
+        """Return the axes of the tracks `keyed` under their budgets (G,) in metres, by the layout `name`."""
         return LAYOUTS[name](self, keyed, budgets) if len(keyed) else []
 
     def scaled(self, keyed: Ints, budgets: Floats) -> Floats:
@@ -46,16 +46,16 @@ class TimeAxisSearch:
         return np.asarray(self._scaled[keyed] / budgets[keyed][:, None, None])
 
     def greedy_keys(self, keyed: Ints, budgets: Floats) -> Bools:
-        """Return which keys (k, K) each track must keep by itself."""
+        """Return the keys (k, K) that each track requires by itself."""
         names = [(i, float(budgets[i])) for i in keyed.tolist()]
         new = [k for k, name in enumerate(names) if name not in self._rows]
         if new:
-            found = self._searched(keyed[new], budgets)
+            found = self._search(keyed[new], budgets)
             self._rows.update((names[k], row) for k, row in zip(new, found, strict=True))
         return np.array([self._rows[name] for name in names])
 
-    def _searched(self, keyed: Ints, budgets: Floats) -> Bools:
-        """The same, from the table for the tracks in it, else anew."""
+    def _search(self, keyed: Ints, budgets: Floats) -> Bools:
+        """The same without the cache: from the table for the tracks in it, else by a new search."""
         rows = np.searchsorted(self._tabled, keyed)
         there = np.isin(keyed, self._tabled)
         found = np.zeros((len(keyed), len(self.grid)), np.bool_)
@@ -65,26 +65,26 @@ class TimeAxisSearch:
             found[~there] = greedy_keys(self.scaled(keyed[~there], budgets), self.grid)
         return found
 
-    def merged(self, keyed: Ints, keep: Bools) -> list[SharedAxis]:
-        """Return the axes of fewest bytes for tracks that need the keys `keep` (k, K)."""
-        prices, width = self.coding.prices, self.key_bytes[keyed]
+    def merge(self, keyed: Ints, keep: Bools) -> list[SharedAxis]:
+        """Return the axes of fewest bytes for tracks that require the keys `keep` (k, K)."""
+        prices, width = self.coding.byte_costs, self.key_bytes[keyed]
         axes = merge_axes(keep, width, axis_bytes=prices.axis, time_bytes=self.coding.time_bytes)
         return [SharedAxis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
 
 
 def _merge_by_bytes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-    return layouts.merged(keyed, layouts.greedy_keys(keyed, budgets))
+    return layouts.merge(keyed, layouts.greedy_keys(keyed, budgets))
 
 
-def _own(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-    """Keys that the source has too: players that mix by components cut the same corners."""
+def _source_key_axes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+    """Axes of source keys only: players with component-wise interpolation then deviate like the source."""
     kinds, kind = np.unique(layouts.own[keyed], axis=0, return_inverse=True)
     axes = []
     for number, mask in enumerate(kinds):
         members = keyed[kind.reshape(-1) == number]
         keep = np.zeros((len(members), len(mask)), np.bool_)
         keep[:, mask] = greedy_keys(layouts.scaled(members, budgets)[:, mask], layouts.grid[mask])
-        axes += layouts.merged(members, keep)
+        axes += layouts.merge(members, keep)
     return axes
 
 
@@ -105,7 +105,7 @@ def _even_axis(nth: int) -> Layout:
 Layout: TypeAlias = Callable[[TimeAxisSearch, Ints, Floats], list[SharedAxis]]
 LAYOUTS: dict[str, Layout] = {
     "merged": _merge_by_bytes,
-    "own": _own,
+    "own": _source_key_axes,
     "joint": _one_axis,
     "full": _even_axis(1),
     "second": _even_axis(2),
@@ -113,9 +113,9 @@ LAYOUTS: dict[str, Layout] = {
 }
 
 
-def _scaled(truth: SourceMotion) -> Floats:
+def _scaled(source: SourceMotion) -> Floats:
     """Values on the grid, in metres, padded to four components (G, K, 4)."""
-    scaled = np.zeros((len(truth.moving), len(truth.grid), 4))
-    for i, each in enumerate(truth.moving):
-        scaled[i, :, : each.values.shape[1]] = each.values[truth.on_grid] * each.meters
+    scaled = np.zeros((len(source.moving), len(source.grid), 4))
+    for i, each in enumerate(source.moving):
+        scaled[i, :, : each.values.shape[1]] = each.values[source.on_grid] * each.meters
     return scaled

@@ -1,4 +1,4 @@
-"""What players show of one clip, judged: how far off it is, as shares of what it may be."""
+"""Bound usage of a trial: errors of the sample points as fractions of their bounds."""
 
 from __future__ import annotations
 
@@ -11,68 +11,68 @@ from anim.maths import matrix, quaternion
 from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Skeleton
 from anim.optimization.options import Bounds
+from anim.optimization.search.playback import local_matrices
 from anim.optimization.search.source_motion import ROTATION, SourceMotion
-from anim.optimization.search.world_matrices import local_matrices
 
-MIN_GAP_S = 1e-4  # s; speeds are not taken over less
+MIN_INTERVAL_S = 1e-4  # s; minimum time step of a speed
 
 
 class BoundUsage:
-    """Judges a clip shown as translation (N, W, 3), rotation (N, W, 4) and scale (N, W, 3) of all nodes.
+    """Measures a clip played as translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes.
 
-    allowed: (P,) m that each point may be off.
+    allowed: (P,) m, error bound of each point.
     """
 
     def __init__(
-        self, skeleton: Skeleton, truth: SourceMotion, points: PointMatrix, allowed: Floats, bounds: Bounds
+        self, skeleton: Skeleton, source: SourceMotion, points: PointMatrix, allowed: Floats, bounds: Bounds
     ) -> None:
         self.bounds = bounds
         self._skeleton = skeleton
-        self._truth = truth
+        self._source = source
         self.points = points
         self._rows = points.rows()
         self._allowed = allowed
-        self._local = local_matrices(skeleton, truth.local)
-        self._changing = np.unique([each.node for each in truth.moving]).astype(np.int64)
-        self._nodes = np.array([each.node for each in truth.moving], np.int64)
-        self._turning = np.array([each.path == "rotation" for each in truth.moving], np.bool_)
+        self._local = local_matrices(skeleton, source.local)
+        self._changing = np.unique([each.node for each in source.moving]).astype(np.int64)
+        self._nodes = np.array([each.node for each in source.moving], np.int64)
+        self._turning = np.array([each.path == "rotation" for each in source.moving], np.bool_)
 
     def slerp_raw(self, shown: Sequence[Floats]) -> Floats:
-        """Return the strain of each point (P,) where rotations run along arcs."""
-        return self._usage(shown, self._truth.columns)
+        """Return the bound usage of each point (P,) for players with slerp."""
+        return self._usage(shown, self._source.columns)
 
     def nlerp(self, shown: Sequence[Floats]) -> Floats:
-        """Return the same against the truth as players show it that mix quaternions by components."""
-        return self._usage(shown, self._truth.by_chord)
+        """Return the same for players with component-wise interpolation, against the source played by them."""
+        return self._usage(shown, self._source.by_chord)
 
     def own(self, shown: Sequence[Floats]) -> Floats:
-        """Return what share of the bound on angles each track (G,) takes: turns of all nodes above add up."""
+        """Return the fraction of the angle bound that each track (G,) uses: errors of all ancestors add up."""
         own = np.zeros(len(self._nodes))
         if self.bounds.max_angle is None:
             return own
-        turned = quaternion.angle_between(shown[ROTATION], self._truth.local[ROTATION]).max(axis=1)  # (N,)
+        turned = quaternion.angle_between(shown[ROTATION], self._source.local[ROTATION]).max(axis=1)  # (N,)
         parents = self._skeleton.parents
-        for level in self._truth.levels[1:]:
+        for level in self._source.levels[1:]:
             turned[level] += turned[parents[level]]
-        for level in reversed(self._truth.levels[1:]):
+        for level in reversed(self._source.levels[1:]):
             np.maximum.at(turned, parents[level], turned[level])
         own[self._turning] = turned[self._nodes[self._turning]] / self.bounds.max_angle
         return own
 
     def _usage(self, shown: Sequence[Floats], columns: Floats) -> Floats:
         moved = self._rows.moves(stack_points(self._world(shown), self.points.nodes) - columns)
-        strain = _longest(moved) / self._allowed
-        if self.bounds.max_speed_error is not None and len(self._truth.at) > 1:
-            gaps = np.maximum(np.diff(self._truth.at), MIN_GAP_S).astype(np.float32)
-            strain = np.maximum(strain, _longest(np.diff(moved, axis=2) / gaps) / self.bounds.max_speed_error)
-        return np.asarray(strain, np.float64)
+        usage = _longest(moved) / self._allowed
+        if self.bounds.max_speed_error is not None and len(self._source.at) > 1:
+            gaps = np.maximum(np.diff(self._source.at), MIN_INTERVAL_S).astype(np.float32)
+            usage = np.maximum(usage, _longest(np.diff(moved, axis=2) / gaps) / self.bounds.max_speed_error)
+        return np.asarray(usage, np.float64)
 
     def _world(self, shown: Sequence[Floats]) -> Floats:
-        """World matrices (N, W, 3, 4): only nodes that a track may change need new local ones."""
+        """World matrices (N, W, 3, 4); only nodes that a track may change get new local matrices."""
         local = self._local.copy()
         changing = self._changing
         local[changing] = matrix.from_trs(*(part[changing] for part in shown))
-        return matrix.accumulate_world(local, self._skeleton.parents, list(self._truth.levels))
+        return matrix.accumulate_world(local, self._skeleton.parents, list(self._source.levels))
 
 
 def _longest(moved: Floats) -> Floats:

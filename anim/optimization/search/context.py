@@ -1,4 +1,4 @@
-"""What all clips of a file are optimized under: the scene's measured points, the bounds, and what may be removed."""
+"""Search context of all clips of a file: the scene's sample points, bounds, policy and encoding."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from anim.sampling.pose import rest_pose, world_by_node
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """All that a clip's optimization needs beside the clip.
+    """The inputs of a clip's optimization, apart from the clip.
 
-    size: m, the diagonal of the box around the points at rest. rest_world: (N, 3, 4) world matrices of the rest pose.
-    surfaces: those with morph targets. answering: by node that any clip moves, which points (P,) hang on it.
-    unseen: (N,) nodes that carry no vertex, nor does a node on them; the node of a skinned mesh is none.
+    size: m, the diagonal of the points' bounding box in the rest pose. rest_world: (N, 3, 4) world matrices of the rest
+    pose. surfaces: those with morph targets. answering: by index of a node that any clip animates, mask (P,) of the
+    points bound to it or its descendants. invisible: (N,) nodes that, with their descendants, carry no vertex; the node
+    of a skinned mesh is none.
     """
 
     skeleton: Skeleton
@@ -34,14 +35,14 @@ class Context:
     points: PointMatrix
     surfaces: tuple[Surface, ...]
     answering: Mapping[int, Bools]
-    unseen: Bools
+    invisible: Bools
     bounds: Bounds
     policy: Policy
     coding: Encoding
     effort: Effort
 
     def morph_reach(self, node: int) -> Floats:
-        """Return how far (M, V), in metres, each morph target of a node's mesh moves each vertex at weight 1."""
+        """Return the displacement (M, V), m, of each vertex by each morph target of a node at weight 1."""
         return morph_weights.influence_radius(self.surfaces, node, self.widening(node))
 
     def weights_at_rest(self, node: int) -> Floats:
@@ -49,9 +50,9 @@ class Context:
         return next(part.rest_weights for part in self.surfaces if part.owner == node)
 
     def widening(self, node: int) -> float:
-        """Return how many metres of the world one unit of a node's own space is at most, in the rest pose.
+        """Return the largest world length, in metres, of one unit of a node's own space in the rest pose.
 
-        Of a skinned mesh the joints' spaces count, not its node's.
+        For a skinned mesh the joints' spaces count, not its node's.
         """
         carriers = [node, *(n for part in self.surfaces if part.owner == node for n in part.nodes.tolist())]
         return float(np.sqrt((self.rest_world[carriers, :, :3] ** 2).sum(axis=1)).max())
@@ -67,13 +68,13 @@ def build_context(
     effort: Effort,
     extra: Set[tuple[int, int]] = frozenset(),
 ) -> Context:
-    """Return the setting for the clips of a scene.
+    """Return the search context for the clips of a scene.
 
-    extra: vertices to measure beside those that stick out, (number of the surface, number of the vertex).
+    extra: additional vertices to measure beside the extreme ones, (index of the surface, index of the vertex).
     """
     skeleton = scene.skeleton
     unseen = nodes_without_vertices(skeleton, surfaces(scene) if has_vertices(scene) else [])
-    shells = set(np.flatnonzero(unseen & _moved(skeleton, clips)).tolist())
+    shells = set(np.flatnonzero(unseen & _moving_nodes(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
     world = world_by_node(skeleton, rest_pose(skeleton))[:, 0]
@@ -95,8 +96,8 @@ def build_context(
     )
 
 
-def _moved(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:
-    """Which nodes (N,) any clip moves, by a track of their own or of a node above."""
+def _moving_nodes(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:
+    """Mask (N,) of the nodes that any clip moves, by a track of their own or of an ancestor."""
     moved = np.zeros(len(skeleton), np.bool_)
     for clip in clips:
         for track in clip.tracks:

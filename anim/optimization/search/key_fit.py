@@ -1,4 +1,4 @@
-"""Key values that serve the whole motion between them, not only the moments at which they stand."""
+"""Least-squares fit of key values to the motion between keys."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from anim.maths import quaternion
 from anim.optimization.search import playback
 from anim.sampling.track import KeyInterval
 
-ENDS = 4.0  # weight of the first and the last moment: loops and cuts must still meet
-STEPS = 1  # Gauss-Newton steps for rotations
-DENSE = 200_000  # numbers; longer clips are solved by bands
+END_WEIGHT = 4.0  # weight of the first and the last time: loops and cuts must stay continuous
+NUM_GAUSS_NEWTON_STEPS = 1  # for rotations
+MAX_DENSE_VALUES = 200_000  # matrix entries; longer clips use a banded solver
 
 Solver: TypeAlias = Callable[[Floats], Floats]  # values (W, n) → keys (K, n)
 
@@ -24,33 +24,33 @@ class KeyFit:
 
     def __init__(self, place: KeyInterval, keys: int) -> None:
         weights = np.ones(len(place.u))
-        weights[0] = weights[-1] = ENDS
-        self._place = place
-        is_small = len(place.u) * keys <= DENSE
-        self.numbers = len(place.u) * (keys if is_small else 4)  # that are kept, about
-        self._solved = (_dense if is_small else _banded)(place, keys, weights)
+        weights[0] = weights[-1] = END_WEIGHT
+        self._interval = place
+        is_small = len(place.u) * keys <= MAX_DENSE_VALUES
+        self.num_values = len(place.u) * (keys if is_small else 4)  # approximate, for the cache's limit
+        self._solve = (_dense if is_small else _banded)(place, keys, weights)
 
     def vectors(self, values: Floats) -> Floats:
-        """Return keys (K, G, C) whose lines are nearest to the values (W, G, C)."""
-        return self._solved(values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
+        """Return keys (K, G, C) whose linear interpolation is nearest to the values (W, G, C)."""
+        return self._solve(values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
     def rotations(self, values: Floats, keys: Floats) -> Floats:
-        """Return unit keys (K, G, 4) whose arcs are nearest to the rotations (W, G, 4), from `keys` on.
+        """Return unit keys (K, G, 4) whose slerp is nearest to the rotations (W, G, 4), starting at `keys`.
 
-        Only what is left at a right angle to the curve counts: a linear fit of quaternions would also make up for the
-        chord's shorter length, by keys that lie beside the motion.
+        Only the residual perpendicular to the curve counts: a linear fit of quaternions would also compensate the
+        chord's shorter length, with keys that deviate from the motion.
         """
-        for _ in range(STEPS):
-            shown = playback.slerp_raw(keys, self._place)
+        for _ in range(NUM_GAUSS_NEWTON_STEPS):
+            shown = playback.slerp_raw(keys, self._interval)
             near = np.where(quaternion.dot(values, shown)[..., None] < 0, -values, values)
-            off = near - shown
-            off -= quaternion.dot(off, shown)[..., None] * shown
-            keys = quaternion.normalize(keys + self.vectors(off))
+            error = near - shown
+            error -= quaternion.dot(error, shown)[..., None] * shown
+            keys = quaternion.normalize(keys + self.vectors(error))
         return keys
 
 
 def _dense(place: KeyInterval, keys: int, weights: Floats) -> Solver:
-    """One small matrix for all there is to do."""
+    """Solver with one dense matrix."""
     hats = np.zeros((len(weights), keys))
     every = np.arange(len(weights))
     hats[every, place.left] += 1 - place.u
@@ -61,7 +61,7 @@ def _dense(place: KeyInterval, keys: int, weights: Floats) -> Solver:
 
 
 def _banded(place: KeyInterval, keys: int, weights: Floats) -> Solver:
-    """The same in time and memory that grow with the number of keys, not with its square: hats meet only neighbors."""
+    """Solver in time and memory linear in the number of keys: hat functions overlap only their neighbors'."""
     from scipy.linalg import solveh_banded
     from scipy.sparse import csr_array
 

@@ -1,8 +1,8 @@
-"""Rotations that make up for what the nodes above them show: each turns its node as it truly lies in the world.
+"""World-space compensation: rotations that correct the errors of their ancestors.
 
-What a joint's rotation is off carries all that hangs on it. Where the joints below aim at their true direction in the
-world instead of their own true values, under parents as players will show them, it carries only the next joints: the
-lever of a hip is the thigh and no longer the whole leg, so that upper joints may be stored far coarser.
+The error of a joint's rotation moves all its descendants. If the joints below target their source orientation in the
+world instead of their own source values, under parents as players will show them, the error only moves the next
+joints: the moment arm of a hip is the thigh and no longer the whole leg, so that upper joints allow coarser storage.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Skeleton
 from anim.optimization.search.candidates import Candidate, Candidates
+from anim.optimization.search.playback import level_world_matrices
 from anim.optimization.search.source_motion import PROBE_FRAMES, SourceMotion
 from anim.optimization.search.time_axes import SharedAxis
-from anim.optimization.search.world_matrices import level_world_matrices
 
-MAX_ANGLE_RAD = 20.0  # times that a lever may seem longer than what is left of it
+MAX_BUDGET_GAIN = 20.0  # ratio of the moment arm to the compensated one
 
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """Nodes (n,) of one depth, their parents (n,), and the tracks (n,) that turn them; −1 for none."""
+    """Nodes (n,) of one depth, their parents (n,), and their rotation tracks (n,); −1 for none."""
 
     nodes: Ints
     parents: Ints
@@ -34,28 +34,29 @@ class _Level:
 
 
 class ParentCompensation:
-    """Finds keys level by level, from the roots on."""
+    """Computes keys level by level, from the roots down."""
 
-    def __init__(self, skeleton: Skeleton, truth: SourceMotion, candidates: Candidates) -> None:
-        self._truth = truth
+    def __init__(self, skeleton: Skeleton, source: SourceMotion, candidates: Candidates) -> None:
+        self._source = source
         self._candidates = candidates
         tracks = np.full(len(skeleton), -1)
-        for i, each in enumerate(truth.moving):
+        for i, each in enumerate(source.moving):
             if each.path == "rotation":
                 tracks[each.node] = i
-        self._levels = [_Level(level, skeleton.parents[level], tracks[level]) for level in truth.levels]
-        self._true = np.empty_like(truth.local[1])
+        self._levels = [_Level(level, skeleton.parents[level], tracks[level]) for level in source.levels]
+        self._true = np.empty_like(source.local[1])
         for level, above in self._descending(self._true):
-            self._true[level.nodes] = quaternion.multiply(above, quaternion.normalize(truth.local[1][level.nodes]))
+            self._true[level.nodes] = quaternion.multiply(above, quaternion.normalize(source.local[1][level.nodes]))
 
     def follow(
-        self, axes: Sequence[SharedAxis], misses: Sequence[float], rotation: Floats
+        self, axes: Sequence[SharedAxis], tolerances: Sequence[float], rotation: Floats
     ) -> Iterator[tuple[int, Candidate]]:
-        """Return each rotation track on an axis with its candidate, and put what it shows into `rotation` (N, W, 4).
+        """Yield each rotation track on an axis with its candidate.
 
-        misses: (G,) what storing may miss, in units of values. rotation: what is shown of tracks on no axis.
+        Writes the played values of each to `rotation` (N, W, 4).
+        tolerances: (G,) for storage, in units of values. rotation: played values of tracks without an axis.
         """
-        on = np.full(len(self._truth.moving) + 1, -1)  # the last stands for nodes without a track
+        on = np.full(len(self._source.moving) + 1, -1)  # the last entry is for nodes without a track
         for number, axis in enumerate(axes):
             on[list(axis.members)] = number
         world = np.empty_like(rotation)
@@ -64,36 +65,38 @@ class ParentCompensation:
             for number in np.unique(axis_of[axis_of >= 0]).tolist():
                 here = np.flatnonzero(axis_of == number)
                 nodes, members = level.nodes[here], level.tracks[here].tolist()
-                found = self._candidates.compensated(axes[number], members, self._targets(nodes, above[here]), misses)
+                found = self._candidates.compensated(
+                    axes[number], members, self._targets(nodes, above[here]), tolerances
+                )
                 for node, member, candidate in zip(nodes.tolist(), members, found, strict=True):
                     rotation[node] = candidate.shown
                     yield member, candidate
             world[level.nodes] = quaternion.multiply(above, quaternion.normalize(rotation[level.nodes]))
 
     def _descending(self, world: Floats) -> Iterator[tuple[_Level, Floats]]:
-        """Every level with the world rotations (n, W, 4) of its nodes' parents, which must be there by then."""
+        """Every level with the world rotations (n, W, 4) of its nodes' parents, which callers fill in before."""
         yield self._levels[0], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(self._levels[0].nodes), *world.shape[1:]))
         for level in self._levels[1:]:
             yield level, world[level.parents]
 
     def _targets(self, nodes: Ints, above: Floats) -> Floats:
-        """What rotations (W, n, 4) under such parents (n, W, 4) leave the nodes as they truly lie."""
-        aims = quaternion.multiply(quaternion.conjugate(above), self._true[nodes])
-        own = self._truth.local[1][nodes]
-        return np.swapaxes(np.where(quaternion.dot(aims, own)[..., None] < 0, -aims, aims), 0, 1)
+        """Local rotations (W, n, 4) that restore the source's world orientation under parents (n, W, 4)."""
+        targets = quaternion.multiply(quaternion.conjugate(above), self._true[nodes])
+        own = self._source.local[1][nodes]
+        return np.swapaxes(np.where(quaternion.dot(targets, own)[..., None] < 0, -targets, targets), 0, 1)
 
 
-def budget_gain(skeleton: Skeleton, truth: SourceMotion, points: PointMatrix) -> Floats:
-    """Return by how much each track (G,) reaches farther than to where others can make up for it; 1 for no rotation.
+def budget_gain(skeleton: Skeleton, source: SourceMotion, points: PointMatrix) -> Floats:
+    """Return the ratio of each track's moment arm to the compensated one (G,); 1 except for rotations.
 
-    Others are the next nodes below that a track turns; nothing makes up for points that hang on none of these.
+    The compensated arm ends at the next animated rotation below; points bound above that are not compensated.
     """
-    turning = {each.node: i for i, each in enumerate(truth.moving) if each.path == "rotation"}
-    nth = max(1, -(-len(truth.at) // PROBE_FRAMES))
-    world = level_world_matrices(skeleton, [part[:, ::nth] for part in truth.local], truth.levels)
-    turner = np.full(len(skeleton) + 1, -1)  # the nearest node that turns each; the last stands for "no parent"
+    turning = {each.node: i for i, each in enumerate(source.moving) if each.path == "rotation"}
+    nth = max(1, -(-len(source.at) // PROBE_FRAMES))
+    world = level_world_matrices(skeleton, [part[:, ::nth] for part in source.local], source.levels)
+    turner = np.full(len(skeleton) + 1, -1)  # nearest rotated ancestor; the last entry is for "no parent"
     reach = np.zeros(len(skeleton))
-    for level in truth.levels:
+    for level in source.levels:
         turner[level] = turner[skeleton.parents[level]]
         for node in (node for node in level.tolist() if node in turning):
             if turner[node] >= 0:
@@ -104,7 +107,7 @@ def budget_gain(skeleton: Skeleton, truth: SourceMotion, points: PointMatrix) ->
     mine = np.flatnonzero(carriers >= 0)
     away = np.linalg.norm(points.places(world)[mine] - world[carriers[mine], :, :, 3], axis=-1).max(axis=1)
     np.maximum.at(reach, carriers[mine], away)
-    shorter = np.ones(len(truth.moving))
+    shorter = np.ones(len(source.moving))
     for node, i in turning.items():
-        shorter[i] = np.clip(truth.moving[i].meters / max(2 * reach[node], 1e-30), 1, MAX_ANGLE_RAD)
+        shorter[i] = np.clip(source.moving[i].meters / max(2 * reach[node], 1e-30), 1, MAX_BUDGET_GAIN)
     return shorter

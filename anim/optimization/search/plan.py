@@ -1,4 +1,4 @@
-"""A plan for one clip, and what it led to."""
+"""The plan of a trial for one clip, and its result."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from anim.optimization.tracks.quantization import EncodedKeys
 
 
 class TrackAction(IntEnum):
-    """What becomes of a track."""
+    """Treatment of a track."""
 
     DROPPED = 0
-    HELD = 1
+    CONSTANT = 1
     KEYED = 2
 
 
 class RotationTarget(Enum):
-    """What the keys of rotations are to come near to."""
+    """Values that the keys of rotations approximate."""
 
     LOCAL = "the track's own values"
     WORLD = "the direction in the world that its node truly has"
@@ -27,10 +27,10 @@ class RotationTarget(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How a trial goes about it.
+    """Parameters of a trial.
 
-    budgets: (G,) m that each track may move a point. threshold: m, what a track may be off in any case to be dropped or
-    held. axes: how time axes are chosen, a name of LAYOUTS. coarser: (G,) factors on what storing may miss.
+    budgets: (G,) m, permitted error of each track. threshold: m, minimum tolerance for tracks to be dropped or
+    constant. axes: layout of time axes, a name in LAYOUTS. coarser: (G,) factors on the tolerance of storage.
     """
 
     budgets: Floats
@@ -42,15 +42,15 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """What a plan led to.
+    """Result of a plan.
 
-    fates: (G,). keys: by track, as stored; none of dropped ones. on: by keyed track, which times of the grid (K,) it
-    has. strain: (P,) the error of each point, as a share of what it may be. own: (G,) the same for bounds on each track
-    by itself. size: bytes.
+    actions: (G,). keys: by track, as stored; none for dropped tracks. on: by keyed track, mask (K,) of its times on the
+    grid. usage: (P,) the error of each point as a fraction of its bound. own: (G,) the same for bounds on single
+    tracks. size: bytes.
     """
 
     plan: Plan
-    fates: Ints
+    actions: Ints
     keys: Mapping[int, EncodedKeys]
     on: Mapping[int, Bools]
     usage: Floats
@@ -59,5 +59,5 @@ class TrialResult:
 
     @property
     def worst(self) -> float:
-        """The largest share of any bound; up to 1 all hold."""
+        """The largest fraction of any bound; all bounds hold up to 1."""
         return max(float(self.usage.max(initial=0.0)), float(self.own.max(initial=0.0)))

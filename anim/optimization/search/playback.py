@@ -1,16 +1,19 @@
-"""How players show keys: along arcs or along chords, with rotations as they are stored, unit or not."""
+"""Playback of stored keys: slerp, nlerp, linear interpolation and world matrices, rotations unit or not."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from anim.arrays import Floats
-from anim.maths import quaternion
+from anim.arrays import Floats, Ints
+from anim.maths import matrix, quaternion
+from anim.model import Skeleton
 from anim.sampling.track import KeyInterval
 
 
 def slerp_raw(keys: Floats, place: KeyInterval) -> Floats:
-    """Return slerp (W, G, 4) between stored quaternions (K, G, 4), not normalized: what three.js shows."""
+    """Return slerp (W, G, 4) between stored quaternions (K, G, 4), not normalized, as in three.js."""
     here = np.arange(len(keys) - 1)
     a, b = keys[here], keys[here + 1]
     b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
@@ -25,20 +28,20 @@ def slerp_raw(keys: Floats, place: KeyInterval) -> Floats:
 
 
 def nlerp(keys: Floats, place: KeyInterval) -> Floats:
-    """Return the normalized mix (W, G, 4) of quaternions (K, G, 4) by components: what Unity's glTFast shows."""
+    """Return nlerp (W, G, 4) between quaternions (K, G, 4), as in Unity's glTFast."""
     a, b = keys[place.left], keys[place.right]
     b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
     return quaternion.normalize(a + place.u[:, None, None] * (b - a))
 
 
 def linear_error(keys: Floats, place: KeyInterval) -> Floats:
-    """Return the mix (W, G, C) of vectors (K, G, C)."""
+    """Return linear interpolation (W, G, C) between vectors (K, G, C)."""
     a = keys[place.left]
     return np.asarray(a + place.u[:, None, None] * (keys[place.right] - a))
 
 
 def arc_distance(angle: Floats) -> Floats:
-    """Return how far, in radians of turn, chord and arc are from each other at most, for keys `angle` (...) rad apart.
+    """Return the largest angle in radians between slerp and nlerp, for keys `angle` (...) rad apart.
 
     The cubic is within 4 % up to 90°, where the two are 0.92° apart.
     """
@@ -46,8 +49,35 @@ def arc_distance(angle: Floats) -> Floats:
 
 
 def steps(keys: Floats) -> Floats:
-    """Return the angles (K - 1, ...) in radians of the turns from key to key of rotations (K, ..., 4)."""
+    """Return the angles (K - 1, ...) in radians between neighboring rotations (K, ..., 4)."""
     return quaternion.angle_between(keys[:-1], keys[1:])
+
+
+def required_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
+    """Return the nodes of each depth, roots first, that are in `nodes` or above one of them."""
+    needed = np.zeros(len(skeleton), np.bool_)
+    for node in nodes.tolist():
+        while node >= 0 and not needed[node]:
+            needed[node] = True
+            node = int(skeleton.parents[node])
+    return tuple(level[needed[level]] for level in skeleton.levels())
+
+
+def level_world_matrices(skeleton: Skeleton, local: Sequence[Floats], levels: Sequence[Ints]) -> Floats:
+    """Return world matrices (N, F, 3, 4) from translation, rotation and scale (N, F, ·), not normalized.
+
+    Matrices of nodes outside `levels` are undefined.
+    """
+    return matrix.accumulate_world(local_matrices(skeleton, local), skeleton.parents, list(levels))
+
+
+def local_matrices(skeleton: Skeleton, local: Sequence[Floats]) -> Floats:
+    """Return local matrices (N, F, 3, 4) of all nodes from translation, rotation and scale (N, F, ·)."""
+    translation, rotation, scale = local
+    matrices = matrix.from_trs(translation, rotation, scale)
+    if len(skeleton.sheared):
+        matrices[skeleton.sheared] = skeleton.sheared_local[:, None]
+    return matrices
 
 
 def _length(vectors: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""The fewest keys for any budget: what every straight segment of every track misses is worked out once."""
+"""Table of segment errors, for the fewest keys under any budget."""
 
 from __future__ import annotations
 
@@ -6,48 +6,48 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 
-SPANS = (32, 64)  # keys that one segment covers at most: those of a second, but no fewer and no more than these
-MAX_SPAN = 40_000_000  # numbers in a table; beyond, callers search anew for each budget (`keys.needed`)
-NEATNESS = 1e-3  # of a key: among the ways with fewest keys the one that misses least is taken
+SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
+MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
+ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
 
 def fits(tracks: int, times: Floats) -> bool:
-    """Return whether a table for so many tracks with keys at `times` (K,), in seconds, is affordable."""
-    return tracks * len(times) * _span(times) <= MAX_SPAN
+    """Return whether a table for `tracks` tracks with keys at `times` (K,), in seconds, fits in memory."""
+    return tracks * len(times) * _span(times) <= MAX_TABLE_VALUES
 
 
 class SegmentErrors:
-    """What lines between two keys miss of a track, for G tracks and all pairs of their K keys up to a second apart.
+    """Largest errors of linear segments between all pairs of K keys up to a second apart, for G tracks.
 
-    values: (G, K, C) in metres. times: (K,) s. limit: m; of segments that miss more it doesn't matter how much.
+    values: (G, K, C) in metres. times: (K,) s. limit: m; larger errors may be approximate.
     """
 
     def __init__(self, values: Floats, times: Floats, limit: float) -> None:
         tracks, count, _ = values.shape
         self._count = count
         span = _span(times)
-        # missed[e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite where there is none
-        self._missed = np.full((count, tracks, span), np.inf, np.float32)
+        # errors[e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
+        self._errors = np.full((count, tracks, span), np.inf, np.float32)
         bent = np.arange(tracks)
         for n in range(span):
-            missed = _segment_error(values[bent], times, n + 1)
-            self._missed[n + 1 :, bent, n] = missed.T
-            bent = bent[(missed <= limit).any(axis=1)]  # if all segments miss by too much, so do nearly all longer ones
+            error = _segment_error(values[bent], times, n + 1)
+            self._errors[n + 1 :, bent, n] = error.T
+            bent = bent[(error <= limit).any(axis=1)]  # longer segments of the others nearly all exceed it too
 
     def greedy_keys(self, tracks: Ints, budgets: Floats) -> Bools:
-        """Return which keys (k, K) the `tracks` (k,) must keep so that lines miss none by over its budget (k,) in m."""
-        shares = self._missed[:, tracks] * (1 / budgets).astype(np.float32)[:, None]
+        """Return the keys (k, K) of the `tracks` (k,) so that no segment's error exceeds the budget (k,) in m."""
+        shares = self._errors[:, tracks] * (1 / budgets).astype(np.float32)[:, None]
         span = shares.shape[2]
-        costs = np.where(shares <= 1, 1 + NEATNESS * shares, np.float32(np.inf))
+        costs = np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
         total = np.full((len(tracks), self._count), np.inf, np.float32)
         total[:, 0] = 0
         came = np.zeros((len(tracks), self._count), np.int64)
         every = np.arange(len(tracks))
         for end in range(1, self._count):
             width = min(span, end)
-            ways = total[:, end - width : end][:, ::-1] + costs[end, :, :width]
-            best = ways.argmin(axis=1)
-            total[:, end] = ways[every, best]
+            totals = total[:, end - width : end][:, ::-1] + costs[end, :, :width]
+            best = totals.argmin(axis=1)
+            total[:, end] = totals[every, best]
             came[:, end] = end - 1 - best
         return _trace(came)
 
@@ -55,24 +55,24 @@ class SegmentErrors:
 def _span(times: Floats) -> int:
     duration = float(times[-1] - times[0])
     per_second = int(np.ceil((len(times) - 1) / duration)) if duration > 0 else 1
-    return max(min(max(per_second, SPANS[0]), SPANS[1], len(times) - 1), 1)
+    return max(min(max(per_second, SPAN_RANGE[0]), SPAN_RANGE[1], len(times) - 1), 1)
 
 
 def _segment_error(values: Floats, times: Floats, length: int) -> Floats:
-    """What segments over `length` gaps miss (G, K - length), 0 for neighbors."""
+    """Errors of segments over `length` intervals (G, K - length), 0 for neighbors."""
     starts = values.shape[1] - length
     largest = np.zeros((len(values), starts))
     a, b = values[:, :starts], values[:, length:]
     whole = times[length:] - times[:starts]
     for inner in range(1, length):
-        share = ((times[inner : inner + starts] - times[:starts]) / whole)[:, None]
-        off = a + share * (b - a) - values[:, inner : inner + starts]
-        np.maximum(largest, np.einsum("gkc,gkc->gk", off, off), out=largest)
+        fraction = ((times[inner : inner + starts] - times[:starts]) / whole)[:, None]
+        error = a + fraction * (b - a) - values[:, inner : inner + starts]
+        np.maximum(largest, np.einsum("gkc,gkc->gk", error, error), out=largest)
     return np.asarray(np.sqrt(largest))
 
 
 def _trace(came: Ints) -> Bools:
-    """Which keys (k, K) lie on the ways that `came` (k, K) leads back along, from the last key to the first."""
+    """Mask (k, K) of the keys on the optimal paths, traced back in `came` (k, K) from the last key."""
     tracks, count = came.shape
     keep = np.zeros((tracks, count), np.bool_)
     at = np.full(tracks, count - 1)

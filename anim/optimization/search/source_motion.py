@@ -1,5 +1,4 @@
-"""What one clip really does: its tracks on a grid of times, where that puts every node, and how far a change of each
-track can carry a measured point."""
+"""Source motion of a clip: tracks on a grid of times, node matrices, and the moment arm of each track."""
 
 from __future__ import annotations
 
@@ -14,27 +13,27 @@ from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimization.options import Reference
 from anim.optimization.search import playback
-from anim.optimization.search.world_matrices import level_world_matrices, required_levels
+from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.tracks.loop_closure import closure_sign
 from anim.sampling import sample_pose, times
 from anim.sampling.track import find_interval
 
-CUBIC_STEP = 1 / 60  # s; a spline is looked at this often, and CUBIC_PIECES times a piece at least
+CUBIC_STEP = 1 / 60  # s; sample step of splines, with at least CUBIC_SEGMENTS samples per segment
 CUBIC_SEGMENTS = 8
 MAX_CUBIC_SEGMENTS = 256
-PROBE_FRAMES = 64  # at most so many moments at which levers are measured
+PROBE_FRAMES = 64  # maximum number of times at which moment arms are measured
 PATHS = ("translation", "rotation", "scale")
 ROTATION = PATHS.index("rotation")
 
 
 @dataclass(frozen=True, slots=True)
 class SourceTrack:
-    """One track that a search may change, as it truly runs.
+    """One track of the search, with its source values.
 
-    number: in its clip. values: (W, C) at the times to measure at; rotations unit, without jumps of sign. rest: (C,),
-    for rotations on the side of the first value. middle: (C,), the single value that fits best. meters: how far a
-    point moves per unit of the value, about. from_rest, from_middle: m, how far rest and middle are off, at most.
-    closure: s where the last value is s times the first, 0 where it is another (see `closure`).
+    index: in its clip. values: (W, C) at the measurement times; rotations unit, signs continuous. rest: (C,), of
+    rotations with the sign of the first value. middle: (C,), the constant with the smallest error. meters: approximate
+    displacement of a point per unit of the value. from_rest, from_middle: m, largest error of rest and middle.
+    closure: s if the last value is s times the first, else 0 (see `closure_sign`).
     """
 
     index: int
@@ -51,13 +50,13 @@ class SourceTrack:
 
 @dataclass(frozen=True, slots=True)
 class SourceMotion:
-    """A clip on the times where it is measured.
+    """A clip at its measurement times.
 
-    grid: (K,) s, where keys may lie. at: (W,) s, the grid and what lies between. on_grid: (K,) the grid within `at`.
-    moving: (G) tracks that may change. own: (G, K) which keys the source has for each, or has on its spline.
-    answering: (G, P) which points answer for each.
-    local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes. levels: of the nodes that count.
-    columns: (4 J, 3 W) world matrices of the points' nodes; by_chord: the same where rotations run along chords.
+    grid: (K,) s, possible key times. at: (W,) s, the grid and times between. on_grid: (K,) indices of the grid in `at`.
+    moving: (G) tracks of the search. own: (G, K) mask of source keys, all for splines. answering: (G, P) mask of the
+    points that each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes.
+    levels: of the nodes with points. columns: (4 J, 3 W) world matrices of the points' nodes; by_chord: the same with
+    nlerp.
     """
 
     grid: Floats
@@ -80,16 +79,16 @@ def analyze_source(
     below: Mapping[int, Bools],
     *,
     reference: Reference,
-    noticed: float,
+    chord_tolerance: float,
 ) -> SourceMotion:
-    """Return what `clip` does to `points`; the tracks numbered in `free` may change, all others stay as they are.
+    """Return the source motion of `clip` on `points`; only the tracks with indices in `free` may change.
 
-    below: by node of a free track, which points (P,) hang on it. noticed: m; where chords and arcs, or both ends of a
-    track, are closer than this they count as one.
+    below: by index of a free track's node, mask (P,) of the points bound to it or its descendants. chord_tolerance: m;
+    slerp and nlerp, or both ends of a track, count as equal if closer.
     """
     tracks = [clip.tracks[i] for i in free]
     grid = key_grid(tracks)
-    at = grid if reference is Reference.KEYS else moments(grid, clip.tracks)
+    at = grid if reference is Reference.KEYS else measurement_times(grid, clip.tracks)
     local = _local(skeleton, clip, at)
     levels = required_levels(skeleton, points.nodes)
     world = level_world_matrices(skeleton, local, levels)
@@ -97,22 +96,23 @@ def analyze_source(
     reach = _influence_radius(world, points, {node: below[node] for node in nodes})
     widening = _widening(skeleton, world, levels)
     moving = tuple(
-        _moving(number, track, skeleton, local, reach, widening, noticed)
+        _source_track(number, track, skeleton, local, reach, widening, chord_tolerance)
         for number, track in zip(free, tracks, strict=True)
     )
     answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
     columns = stack_points(world, points.nodes)
     by_chord = columns
     if any(
-        each.path == "rotation" and each.meters * _mean_interval(clip.tracks[each.index]) > noticed for each in moving
+        each.path == "rotation" and each.meters * _max_chord_error(clip.tracks[each.index]) > chord_tolerance
+        for each in moving
     ):
-        by_chord = stack_points(level_world_matrices(skeleton, _by_chords(clip, at, local), levels), points.nodes)
+        by_chord = stack_points(level_world_matrices(skeleton, _nlerp_local(clip, at, local), levels), points.nodes)
     return SourceMotion(
         grid,
         at,
         np.searchsorted(at, grid),
         moving,
-        np.array([_own(track, grid) for track in tracks]).reshape(len(tracks), len(grid)),
+        np.array([_source_keys(track, grid) for track in tracks]).reshape(len(tracks), len(grid)),
         answering,
         local,
         levels,
@@ -122,21 +122,21 @@ def analyze_source(
 
 
 def key_grid(tracks: Sequence[Track]) -> Floats:
-    """Return every time (K,) at which a new key may lie: the keys of all tracks, and points on their splines."""
+    """Return all possible times of new keys (K,): the keys of all tracks, and samples of their splines."""
     axes = [track.times for track in {id(track.times): track for track in tracks}.values()]
-    axes += [_on_splines(track.times) for track in tracks if track.interpolation is Interpolation.CUBICSPLINE]
+    axes += [_spline_times(track.times) for track in tracks if track.interpolation is Interpolation.CUBICSPLINE]
     return times.key_times(np.concatenate(axes)) if axes else np.zeros(1)
 
 
-def moments(grid: Floats, tracks: Sequence[Track]) -> Floats:
-    """Return the times (W,) to measure at: the grid, the middle of its gaps, and both sides of every jump."""
+def measurement_times(grid: Floats, tracks: Sequence[Track]) -> Floats:
+    """Return the times (W,) to measure at: the grid, its interval middles, and both sides of every jump."""
     jumps = [track.times for track in tracks if track.interpolation is Interpolation.STEP]
     jumps = [axis[(axis > grid[0]) & (axis < grid[-1])] for axis in jumps]
     before = [np.nextafter(axis, -np.inf) for axis in jumps]
     return unique_sorted(np.concatenate([grid, (grid[1:] + grid[:-1]) / 2, *jumps, *before]))
 
 
-def _on_splines(axis: Floats) -> Floats:
+def _spline_times(axis: Floats) -> Floats:
     pieces = np.clip(np.ceil(np.diff(axis) / CUBIC_STEP), CUBIC_SEGMENTS, MAX_CUBIC_SEGMENTS).astype(np.int64)
     inner = [np.linspace(a, b, n + 1) for a, b, n in zip(axis[:-1], axis[1:], pieces.tolist(), strict=True)]
     return np.concatenate(inner) if inner else axis
@@ -150,8 +150,8 @@ def _local(skeleton: Skeleton, clip: Clip, at: Floats) -> tuple[Floats, Floats, 
     return translation, rotation, scale
 
 
-def _by_chords(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
-    """The same, as players show it that mix quaternions by components."""
+def _nlerp_local(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+    """The same in players with component-wise interpolation."""
     rotation = local[1].copy()
     for track in clip.tracks:
         if track.path == "rotation" and track.interpolation is Interpolation.LINEAR and track.node is not None:
@@ -160,28 +160,28 @@ def _by_chords(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> 
     return local[0], rotation, local[2]
 
 
-def _mean_interval(track: Track) -> float:
-    """How far chord and arc are apart, as quaternions."""
+def _max_chord_error(track: Track) -> float:
+    """Largest distance between slerp and nlerp, in quaternion units."""
     if track.interpolation is not Interpolation.LINEAR or len(track.times) < 2:
         return 0.0
     return float(playback.arc_distance(playback.steps(track.values).max())) / 2
 
 
-def _own(track: Track, grid: Floats) -> Bools:
-    """Which times of the grid (K,) are keys of the track; all of them for splines."""
+def _source_keys(track: Track, grid: Floats) -> Bools:
+    """Mask of the grid (K,) at the track's keys; all for splines."""
     if track.interpolation is Interpolation.CUBICSPLINE:
         return np.ones(len(grid), np.bool_)
     return np.asarray(np.isin(grid, times.key_times(track.times)))
 
 
-def _moving(
+def _source_track(
     number: int,
     track: Track,
     skeleton: Skeleton,
     local: tuple[Floats, Floats, Floats],
     reach: dict[int, float],
     widening: Floats,
-    noticed: float,
+    chord_tolerance: float,
 ) -> SourceTrack:
     node = track.node
     assert node is not None
@@ -197,12 +197,12 @@ def _moving(
     else:
         meters = reach[node] / max(float(np.abs(values).min()), 1e-6)
     from_rest, from_middle = (float(np.linalg.norm(values - each, axis=1).max() * meters) for each in (rest, middle))
-    closure = closure_sign(values, noticed / meters if meters else 0.0)
+    closure = closure_sign(values, chord_tolerance / meters if meters else 0.0)
     return SourceTrack(number, node, track.path, values, rest, middle, float(meters), from_rest, from_middle, closure)
 
 
 def _influence_radius(world: Floats, points: PointMatrix, answering: dict[int, Bools]) -> dict[int, float]:
-    """For each node, how far the points that answer for it are from it at most, times what it carries of them."""
+    """For each node, the largest distance of the points it moves, in metres."""
     frames = world[:, :: max(1, -(-world.shape[1] // PROBE_FRAMES))]
     places = points.places(frames)
     found = {}
@@ -213,8 +213,10 @@ def _influence_radius(world: Floats, points: PointMatrix, answering: dict[int, B
 
 
 def _widening(skeleton: Skeleton, world: Floats, levels: Sequence[Ints]) -> Floats:
-    """For each node (N,), how many metres of the world one unit of its parent's space is at most; 0 where no point
-    hangs on it."""
+    """For each node (N,), the largest world length, in metres, of one unit of its parent's space.
+
+    0 without points.
+    """
     needed = np.concatenate(levels)
     lengths = np.zeros(len(skeleton))
     lengths[needed] = np.sqrt((world[needed, ..., :3] ** 2).sum(axis=-2)).max(axis=(1, 2), initial=0.0)

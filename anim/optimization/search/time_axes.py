@@ -1,4 +1,4 @@
-"""Which tracks share a time axis: key sets are merged while that saves bytes."""
+"""Assignment of tracks to shared time axes: key sets are merged while that saves bytes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from anim.arrays import Bools, Floats
 
 @dataclass(frozen=True, slots=True)
 class SharedAxis:
-    """Keys (K,) of the grid that the tracks `members` all have."""
+    """Mask (K,) of the grid's times that are the keys of all tracks `members`."""
 
     keys: Bools
     members: tuple[int, ...]
 
 
 def merge_axes(keep: Bools, key_bytes: Floats, *, axis_bytes: float, time_bytes: float) -> list[SharedAxis]:
-    """Return the axes of fewest bytes found for tracks that need the keys `keep` (G, K).
+    """Return the axes of fewest bytes found for tracks that require the keys `keep` (G, K).
 
     key_bytes: (G,) of one key of each track. An axis costs `axis_bytes` and `time_bytes` per key. The pair whose
     union saves most is merged until none saves anything.

@@ -1,4 +1,4 @@
-"""Tracks that a clip would be shorter without: one key of what rests, and keys at the clip's start and end."""
+"""Single keys of constant tracks, and keys that preserve the clip's start and end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ def single_key(track: Track) -> Track:
 
 
 def extend(track: Track, start: float, end: float) -> Track:
-    """Return the track with its first value held from `start` on, its last up to `end`; a spline by zero tangents."""
+    """Return the track with its first value constant from `start`, its last up to `end`.
+
+    Splines get zero tangents there.
+    """
     head, tail = bool(track.times[0] > start), bool(track.times[-1] < end)
     inner = slice(1, None) if head and tail and len(track.times) == 1 else slice(None)  # two keys hold one value
     rows = [0] * head + list(range(len(track.times))[inner]) + [-1] * tail

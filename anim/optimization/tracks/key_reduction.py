@@ -1,18 +1,24 @@
-"""Which keys are needed: the longest straight segments that stay within one unit of the values, track by track."""
+"""Key reduction: greedy longest linear segments within a tolerance, track by track or jointly."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
+from anim.model import Interpolation, Track, ValueKind
+from anim.optimization.tracks.lossless import reduce_lossless
+from anim.sampling.track import sample
 
 UNBOUNDED = 1 << 30
+POINTER_BOUND_FRACTION = 0.9  # of the bound; the rest covers rounding to float32
 
 
 def greedy_keys(values: Floats, times: Floats) -> Bools:
-    """Return which of K values each of G tracks must keep (G, K) so that lines between them miss none by over 1.
+    """Return the keys (G, K) of G tracks so that linear interpolation has no error above 1.
 
-    values: (G, K, C), scaled so that 1 is what may be missed. times: (K,). The first and the last key always stay.
+    values: (G, K, C), scaled so that 1 is the tolerance. times: (K,). The first and the last key always stay.
     From each key the farthest reachable one is searched by doubling and then halving the step, all tracks at once;
     greedy choices of the longest segment give few keys, though not always the fewest.
     """
@@ -31,7 +37,7 @@ def greedy_keys(values: Floats, times: Floats) -> Bools:
         tested = end > good
         fits = np.zeros(len(track), np.bool_)
         if tested.any():
-            fits[tested] = _straight(values, times, track[tested], start[tested], end[tested])
+            fits[tested] = _is_straight(values, times, track[tested], start[tested], end[tested])
         good = np.where(fits, end, good)
         step = np.where(fits & doubling, step * 2, step)
         bad = np.where(tested & ~fits, end, bad)
@@ -50,7 +56,7 @@ def greedy_keys(values: Floats, times: Floats) -> Bools:
 
 
 def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
-    """Return which keys (K,) all tracks together must keep on one axis; as `needed`, but for the worst track."""
+    """Return the keys (K,) of all tracks on one axis; as `greedy_keys`, with the error of the worst track."""
     count = values.shape[1]
     keep = np.zeros(count, np.bool_)
     keep[0] = keep[-1] = True
@@ -63,7 +69,7 @@ def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
             if end <= good:
                 break
             here = np.full(len(values), start), np.full(len(values), end)
-            if _straight(values, times, every, *here).all():
+            if _is_straight(values, times, every, *here).all():
                 good, step = end, step * 2
             else:
                 bad = end
@@ -72,13 +78,28 @@ def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
     return keep
 
 
-def _straight(values: Floats, times: Floats, track: Ints, start: Ints, end: Ints) -> Bools:
-    """Whether the line of each track from key `start` to key `end` misses nothing between by over 1."""
+def reduce_pointer_keys(track: Track, bound: float) -> Track:
+    """Return a pointer track in fewer keys, with an error up to `bound` as a fraction of its range.
+
+    Only LINEAR tracks are reduced; STEP and CUBICSPLINE keep every key that changes something.
+    """
+    extent = float(np.ptp(track.values, axis=0).max(initial=0.0))
+    if bound <= 0 or extent == 0 or track.interpolation is not Interpolation.LINEAR or track.kind is ValueKind.DISCRETE:
+        return reduce_lossless(track)
+    if track.kind is ValueKind.ROTATION:
+        extent = 1.0
+    scaled = sample(track, track.times) / (POINTER_BOUND_FRACTION * bound * extent)
+    keep = greedy_keys(scaled[None], track.times)[0]
+    return reduce_lossless(replace(track, times=track.times[keep], values=track.values[keep]))
+
+
+def _is_straight(values: Floats, times: Floats, track: Ints, start: Ints, end: Ints) -> Bools:
+    """Return whether the line of each track from key `start` to key `end` has errors up to 1 between."""
     inner = end - start - 1
     first = np.concatenate(([0], np.cumsum(inner)[:-1]))
     own = np.repeat(np.arange(len(track)), inner)
     frame = np.arange(inner.sum()) - first[own] + start[own] + 1
-    share = ((times[frame] - times[start[own]]) / (times[end] - times[start])[own])[:, None]
+    u = ((times[frame] - times[start[own]]) / (times[end] - times[start])[own])[:, None]
     a, b = values[track, start][own], values[track, end][own]
-    off = a + share * (b - a) - values[track[own], frame]
-    return np.asarray(np.maximum.reduceat((off * off).sum(axis=1), first) <= 1)
+    error = a + u * (b - a) - values[track[own], frame]
+    return np.asarray(np.maximum.reduceat((error * error).sum(axis=1), first) <= 1)

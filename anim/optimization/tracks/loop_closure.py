@@ -1,6 +1,6 @@
-"""Tracks that end where they start: the first and the last key of such a track stay equal, to the bit.
+"""Loop closure: the equal first and last keys of a track stay equal, to the bit.
 
-q and −q are the same rotation; where a turn comes back as −q, the last key is the first with all signs changed, so that
+q and −q are the same rotation; if the last key is −q, it stays the first one with all signs changed, so that
 neighboring keys keep their signs.
 """
 
@@ -14,9 +14,10 @@ from anim.model import Clip, Track, ValueKind
 
 
 def closure_sign(values: Floats, tolerance: float) -> float:
-    """Return s where the last of the values (K, C) is s · the first within `tolerance`, in their units, 0 for none.
+    """Return s if the last of the values (K, C) is s · the first within `tolerance`; 0 for none.
 
-    s is −1 for rotations that come back with the other sign only; callers pass no other values that change sign.
+    tolerance: in units of the values. s is −1 only for rotations that end with the opposite sign; callers pass no other
+    values that change sign.
     ([0 0 0 1] … [0 0 0 −1], 0) → −1
     """
     signs = (1.0, -1.0) if values.shape[1] == 4 else (1.0,)
@@ -40,7 +41,7 @@ def close_ends(keys: Floats, signs: Floats) -> Floats:
 
 
 def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:
-    """Return the targets that end `before` in the very value they start with, and `after` in another.
+    """Return the targets with equal first and last values in `before`, but not in `after`.
 
     Tracks that `after` lacks are at rest, and so closed.
     """
@@ -49,6 +50,6 @@ def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:
 
 
 def _is_closed(track: Track) -> bool:
-    """Whether the first and the last value, which are held to the clip's ends, are equal to the bit; q and −q are."""
-    first, last = track.values[[0, -1]].tolist()  # numpy takes longer for so few numbers
+    """Return whether the first and the last value are equal to the bit; q and −q are equal."""
+    first, last = track.values[[0, -1]].tolist()  # faster than numpy for so few values
     return bool(first == last or (track.kind is ValueKind.ROTATION and first == [-each for each in last]))

@@ -1,4 +1,4 @@
-"""Tracks with nothing in them that can be left out: the same values at every time, in fewer keys."""
+"""Lossless key reduction: the same values at every time, in fewer keys."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from anim.arrays import Bools
 from anim.model import FLOAT32, AccessorFormat, Interpolation, Track
 
 INT16 = AccessorFormat(5122, normalized=True)
-UNIT = 1e-12  # off the length 1: nothing, in float64
+UNIT_LENGTH_TOLERANCE = 1e-12  # deviation from 1 that is rounding in float64
 
 
 def reduce_lossless(track: Track) -> Track:
-    """Return the track without keys that change nothing, in int16 where that holds every value of a rotation.
+    """Return the track without redundant keys, in int16 if that represents every rotation exactly.
 
-    A value that is held over several keys keeps the first and the last of them; at the track's ends, where players
-    hold the value anyway, one. STEP keeps each key that differs from the one before.
+    A value that is constant over several keys keeps the first and the last of them, or one at the track's ends, where
+    players extend it as a constant. STEP keeps each key that differs from the previous one.
     """
     if track.interpolation is not Interpolation.CUBICSPLINE:
         kept = _reduce(track)
     else:
-        kept = _single_key_or_none(track) if _rests(track) else track
+        kept = _single_key_or_none(track) if _is_constant_spline(track) else track
     return replace(kept, storage=INT16) if _fits_int16(kept) else kept
 
 
 def _reduce(track: Track) -> Track:
-    same = (track.values[1:] == track.values[:-1]).all(axis=1)  # as the key before
+    same = (track.values[1:] == track.values[:-1]).all(axis=1)  # equal to the previous key
     if track.interpolation is Interpolation.STEP:
         return _select_keys(track, np.concatenate(([True], ~same)), track.interpolation)
     before, after = np.concatenate(([True], same)), np.concatenate((same, [True]))
@@ -45,9 +45,15 @@ def _select_keys(track: Track, keep: Bools, interpolation: Interpolation) -> Tra
 
 
 def _single_key_or_none(track: Track) -> Track:
-    """One key for a spline that rests. Players normalize splines, but not all of them single keys: rotations that
-    float32 left a little too long or too short stay a spline, of two keys."""
-    if track.path != "rotation" or len(track.times) == 1 or abs(float(np.linalg.norm(track.values[0])) - 1) < UNIT:
+    """One key for a constant spline; two if its rotation is not unit.
+
+    Players normalize splines, but not all of them normalize single keys.
+    """
+    if (
+        track.path != "rotation"
+        or len(track.times) == 1
+        or abs(float(np.linalg.norm(track.values[0])) - 1) < UNIT_LENGTH_TOLERANCE
+    ):
         return _select_keys(track, np.arange(len(track.times)) == 0, Interpolation.LINEAR)
     assert track.in_tangents is not None
     assert track.out_tangents is not None
@@ -60,8 +66,8 @@ def _single_key_or_none(track: Track) -> Track:
     )
 
 
-def _rests(track: Track) -> bool:
-    """Whether a spline never leaves its first value."""
+def _is_constant_spline(track: Track) -> bool:
+    """Return whether a spline never leaves its first value."""
     assert track.in_tangents is not None
     assert track.out_tangents is not None
     tangents = not track.in_tangents.any() and not track.out_tangents.any()

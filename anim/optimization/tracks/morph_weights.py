@@ -1,4 +1,4 @@
-"""Morph weights in fewer keys and fewer bits: no vertex may leave its path by more than a given distance."""
+"""Morph weights in fewer keys and bits, within a bound on the displacement of any vertex."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling.track import sample
 
-KEY_BUDGET_FRACTION = 0.6  # share of the bound that leaving out keys may use
-QUANTIZATION_BUDGET_FRACTION = 0.35  # share that storing may use
-FEW = 8  # keys up to which meshopt's filter, 4 bytes a weight before its codec, is not better than integers
-FORMS = (AccessorFormat(5121, normalized=True), AccessorFormat(5123, normalized=True))
-LARGEST = {5121: 255.0, 5123: 65535.0}
+KEY_BUDGET_FRACTION = 0.6  # of the bound, for key reduction
+QUANTIZATION_BUDGET_FRACTION = 0.35  # of the bound, for storage
+MAX_PLAIN_KEYS = 8  # up to here integers are no larger than meshopt's filter, with 4 bytes per weight
+INTEGER_FORMATS = (AccessorFormat(5121, normalized=True), AccessorFormat(5123, normalized=True))
+MAX_INTEGERS = {5121: 255.0, 5123: 65535.0}
 
 
 def influence_radius(surfaces: Sequence[Surface], node: int, widening: float) -> Floats:
-    """Return how far (M, V), in metres, each morph target of a node moves each vertex at weight 1; unmoved ones are
-    left out. widening: how much larger the world is than the mesh's space, at most."""
+    """Return the displacement (M, V), m, of each vertex by each morph target of a node at weight 1.
+
+    Vertices without displacement are left out. widening: largest world length of one unit of the mesh's space.
+    """
     moved = [np.sqrt((part.targets**2).sum(axis=-1)) for part in surfaces if part.owner == node and len(part.targets)]
     if not moved:
         return np.zeros((0, 0))
@@ -33,23 +35,23 @@ def influence_radius(surfaces: Sequence[Surface], node: int, widening: float) ->
 
 
 def weight_error(track: Track, weights: Floats, reach: Floats) -> float:
-    """Return how far, in metres, fixed weights (M,) put any vertex from where the track does, at most, at its keys."""
-    return _interval_error(sample(track, track.times) - weights, reach)
+    """Return the largest displacement, m, between constant weights (M,) and the track, at its keys."""
+    return _displacement(sample(track, track.times) - weights, reach)
 
 
 def reduce_weights(
     track: Track, reach: Floats, bound: float, grid: Floats, packing: Packing
 ) -> tuple[Track, EncodedKeys, float]:
-    """Return the weights in fewer keys, how they are stored, and by how much, in metres, a vertex is off at most.
+    """Return the weights in fewer keys, their encoding, and the largest displacement in metres.
 
-    grid: (K,) s, where keys may lie; for splines finer than their keys. Splines become lines.
+    grid: (K,) s, possible key times, for splines finer than their keys. Splines become linear.
     """
     values = sample(track, grid)
     keep = _greedy_weight_keys(values, grid, reach, KEY_BUDGET_FRACTION * bound)
     keys, times = values[keep], grid[keep]
     if np.ptp(keys, axis=0).max(initial=0.0) == 0:
         keys, times = keys[:1], times[:1]
-    keys, storage, stored = _stored(keys, reach, QUANTIZATION_BUDGET_FRACTION * bound, packing)
+    keys, storage, stored = _encode_weights(keys, reach, QUANTIZATION_BUDGET_FRACTION * bound, packing)
     new = replace(
         track,
         interpolation=Interpolation.LINEAR,
@@ -59,20 +61,20 @@ def reduce_weights(
         out_tangents=None,
         storage=storage,
     )
-    return new, stored, _interval_error(sample(new, grid) - values, reach)
+    return new, stored, _displacement(sample(new, grid) - values, reach)
 
 
 def _greedy_weight_keys(values: Floats, grid: Floats, reach: Floats, bound: float) -> Floats:
-    """Numbers of the keys that greedy longest segments keep."""
+    """Indices of the keys at the ends of greedy longest segments."""
     kept, start, last = [0], 0, len(grid) - 1
     while start < last:
         good, step = start + 1, 2
-        while good < last and _straight(values, grid, reach, bound, start, min(good + step, last)):
+        while good < last and _is_straight(values, grid, reach, bound, start, min(good + step, last)):
             good, step = min(good + step, last), step * 2
         bad = min(good + step, last + 1)
         while bad - good > 1:
             middle = (good + bad) // 2
-            if _straight(values, grid, reach, bound, start, middle):
+            if _is_straight(values, grid, reach, bound, start, middle):
                 good = middle
             else:
                 bad = middle
@@ -81,22 +83,24 @@ def _greedy_weight_keys(values: Floats, grid: Floats, reach: Floats, bound: floa
     return np.array(kept)
 
 
-def _straight(values: Floats, grid: Floats, reach: Floats, bound: float, start: int, end: int) -> bool:
+def _is_straight(values: Floats, grid: Floats, reach: Floats, bound: float, start: int, end: int) -> bool:
     inner = slice(start + 1, end)
-    share = ((grid[inner] - grid[start]) / (grid[end] - grid[start]))[:, None]
-    return _interval_error(values[start] + share * (values[end] - values[start]) - values[inner], reach) <= bound
+    u = ((grid[inner] - grid[start]) / (grid[end] - grid[start]))[:, None]
+    return _displacement(values[start] + u * (values[end] - values[start]) - values[inner], reach) <= bound
 
 
-def _interval_error(difference: Floats, reach: Floats) -> float:
-    """How far weights that differ by (F, M) put any vertex from its place, at most."""
+def _displacement(difference: Floats, reach: Floats) -> float:
+    """Largest displacement of any vertex by differences of weights (F, M)."""
     return float((np.abs(difference) @ reach).max(initial=0.0))
 
 
-def _stored(keys: Floats, reach: Floats, bound: float, packing: Packing) -> tuple[Floats, AccessorFormat, EncodedKeys]:
-    largest = float(reach.sum(axis=0).max(initial=0.0))  # m, where all weights are off by 1
-    if packing is Packing.CORE or len(keys) <= FEW:
-        for form in FORMS:
-            scale = LARGEST[form.component_type]
+def _encode_weights(
+    keys: Floats, reach: Floats, bound: float, packing: Packing
+) -> tuple[Floats, AccessorFormat, EncodedKeys]:
+    largest = float(reach.sum(axis=0).max(initial=0.0))  # m, for an error of 1 in all weights
+    if packing is Packing.CORE or len(keys) <= MAX_PLAIN_KEYS:
+        for form in INTEGER_FORMATS:
+            scale = MAX_INTEGERS[form.component_type]
             if keys.min() >= 0 and keys.max() <= 1 and largest / (2 * scale) <= bound:
                 rounded = np.rint(keys * scale) / scale
                 return rounded, form, EncodedKeys(rounded, "integers")

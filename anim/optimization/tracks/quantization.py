@@ -1,4 +1,4 @@
-"""How values are stored, and what that makes of them: int16 or float32 in core glTF, filters under meshopt."""
+"""Quantization of key values: int16 or float32 in core glTF, filters under meshopt."""
 
 from __future__ import annotations
 
@@ -14,31 +14,33 @@ from anim.arrays import Bools, Floats
 from anim.gltf.meshopt import codec, storage
 from anim.optimization.options import Objective, Packing
 
-INT16 = 32767.0
-FEW = 2  # keys up to which float32 takes no more bytes than int16 with its longer JSON
-INT16_ERROR = 2.5e-5  # quaternion units that rounding to int16 may miss, and be worth it
-FILTER_ERROR = 4e-5  # the same for meshopt's quaternion filter, whose output is int16 too
-FILTER_BITS = (5, 16)
-FILTER_STEP = 2.45 / 4  # what that filter may miss, times its largest integer: √3 components by half a step, and √2 / 2
-EXPONENT_STEP = 1.5 / 2  # what meshopt's exponential filter may miss, in its powers of two
+MAX_INT16 = 32767.0
+MAX_FLOAT32_KEYS = 2  # up to here float32 is no larger than int16 with its longer JSON
+MIN_INT16_ERROR = 2.5e-5  # quaternion units; tolerance from which int16 is used
+MIN_FILTER_ERROR = 4e-5  # the same for meshopt's quaternion filter, whose output is int16 too
+FILTER_BIT_RANGE = (5, 16)
+FILTER_ERROR_STEPS = (
+    2.45 / 4
+)  # error of that filter times its largest integer: √3 components by half a step, and √2 / 2
+EXPONENT_ERROR_STEPS = 1.5 / 2  # error of meshopt's exponential filter, in its powers of two
 MANTISSA_BITS = 22  # of meshopt's exponential filter, without the sign
 
 
-Form: TypeAlias = tuple[str, int]  # a name of Stored.form, and its bits per component or power of two
+Form: TypeAlias = tuple[str, int]  # EncodedKeys.form, and its bits per component or power of two
 
 
 @dataclass(frozen=True, slots=True)
 class ByteCosts:
-    """Bytes of JSON that a search counts with.
+    """Bytes of JSON in a search's size estimate.
 
-    track: for a track with an output of its own: channel, sampler and accessor. repeated: for one that has the same
-    keys as another: its channel. held: for a track with a single key, whose accessor others may share. axis: for the
+    track: for a track with an output of its own: channel, sampler and accessor. repeated: for one with the keys of
+    another: its channel. single_key: for a track with a single key, whose accessor others may share. axis: for the
     accessor of a time axis.
     """
 
     track: float
     repeated: float
-    held: float
+    single_key: float
     axis: float
 
 
@@ -48,10 +50,10 @@ BYTE_COSTS = {Objective.FILE: ByteCosts(175, 56, 95, 120), Objective.GZIP: ByteC
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """How keys are stored, and what that costs."""
+    """Storage of keys, and its cost."""
 
     packing: Packing
-    prices: ByteCosts
+    byte_costs: ByteCosts
 
     @property
     def time_bytes(self) -> float:
@@ -59,7 +61,7 @@ class Encoding:
         return 4.0 if self.packing is Packing.CORE else 2.5
 
     def key_bytes(self, path: str) -> float:
-        """Bytes of one key's value."""
+        """Return the bytes of one key's value."""
         if self.packing is Packing.CORE:
             return 8.0 if path == "rotation" else 12.0
         return 4.5
@@ -76,11 +78,11 @@ class Encoding:
 
 @dataclass(frozen=True, slots=True)
 class EncodedKeys:
-    """Keys as they will be stored.
+    """Keys as stored.
 
     values: (K, C) as they decode. form: "int16", "float32", "quaternion" or "exponent", the last two meshopt's
-    filters. codes: their filtered bytes, 8 a key or 4 a component. miss: in units of the values, by how much filtering
-    may have missed them.
+    filters. codes: their filtered bytes, 8 per key or 4 per component. error: largest error of the filter, in units of
+    the values.
     """
 
     values: Floats
@@ -90,66 +92,74 @@ class EncodedKeys:
 
     @property
     def name(self) -> bytes:
-        """What is the same of two tracks that are stored alike."""
+        """Bytes that are equal for tracks with equal storage."""
         return self.codes or self.values.tobytes()
 
-    def only(self, keep: Bools) -> EncodedKeys:
+    def select_keys(self, keep: Bools) -> EncodedKeys:
         """Return the keys of a mask (K,)."""
         rows = np.frombuffer(self.codes, np.uint8).reshape(len(keep), -1)[keep]
         return replace(self, values=self.values[keep], codes=rows.tobytes())
 
     def exact(self) -> Floats:
-        """Return the values as meshopt itself decodes them: its filter computes in float32, a search needn't."""
+        """Return the values as meshopt decodes them: its filter computes in float32, unlike the search."""
         if self.form != "quaternion":
             return self.values
         return storage.decompress_document(storage.FilteredValues("QUATERNION", self.codes), 4)
 
 
-def choose_format(values: Floats, path: str, miss: float, packing: Packing) -> Form:
-    """Return the smallest form that misses keys (K, C) by about `miss` at most, in units of the values."""
+def choose_format(values: Floats, path: str, tolerance: float, packing: Packing) -> Form:
+    """Return the smallest format for keys (K, C) with an error up to about `tolerance`, in their units."""
     if packing is Packing.CORE:
-        return ("int16", 0) if path == "rotation" and miss >= INT16_ERROR and len(values) > FEW else ("float32", 0)
-    if path == "rotation" and miss >= FILTER_ERROR:
-        return "quaternion", filter_bits(miss)
-    return "exponent", exponent(values, miss)
+        return (
+            ("int16", 0)
+            if path == "rotation" and tolerance >= MIN_INT16_ERROR and len(values) > MAX_FLOAT32_KEYS
+            else ("float32", 0)
+        )
+    if path == "rotation" and tolerance >= MIN_FILTER_ERROR:
+        return "quaternion", filter_bits(tolerance)
+    return "exponent", exponent(values, tolerance)
 
 
 def encode(values: Floats, form: Form) -> EncodedKeys:
-    """Return keys (K, C) in a form."""
+    """Return keys (K, C) in a format."""
     kind, number = form
     if kind == "int16":
-        return EncodedKeys(np.rint(values * INT16) / INT16, kind)
+        return EncodedKeys(np.rint(values * MAX_INT16) / MAX_INT16, kind)
     if kind == "float32":
         return EncodedKeys(values.astype(np.float32).astype(np.float64), kind)
     if kind == "quaternion":
         return encode_all([values], [form])[0]
     mantissa = np.rint(values * 2.0**-number)
-    return EncodedKeys(mantissa * 2.0**number, kind, _exponent_codes(mantissa, number), EXPONENT_STEP * 2.0**number)
+    return EncodedKeys(
+        mantissa * 2.0**number, kind, _exponent_codes(mantissa, number), EXPONENT_ERROR_STEPS * 2.0**number
+    )
 
 
 def encode_all(values: Sequence[Floats], forms: Sequence[Form]) -> list[EncodedKeys]:
-    """Return the keys (K, C) of each track in its form: all quaternions are decoded in one go."""
+    """Return the keys (K, C) of each track in its format; all quaternions are decoded in one call."""
     filtered = [i for i, (kind, _) in enumerate(forms) if kind == "quaternion"]
     codes = [_quaternion_codes(values[i], forms[i][1]) for i in filtered]
-    decoded = np.split(_decoded(b"".join(codes)), np.cumsum([len(each) // 8 for each in codes])[:-1])
-    misses = [FILTER_STEP / ((1 << (forms[i][1] - 1)) - 1) for i in filtered]
-    found = dict(zip(filtered, map(EncodedKeys, decoded, repeat("quaternion"), codes, misses), strict=True))
+    decoded = np.split(_decode_quaternions(b"".join(codes)), np.cumsum([len(each) // 8 for each in codes])[:-1])
+    tolerances = [FILTER_ERROR_STEPS / ((1 << (forms[i][1] - 1)) - 1) for i in filtered]
+    found = dict(zip(filtered, map(EncodedKeys, decoded, repeat("quaternion"), codes, tolerances), strict=True))
     return [found[i] if i in found else encode(values[i], forms[i]) for i in range(len(forms))]
 
 
 def constant_cost(value: Floats) -> EncodedKeys:
-    """Return a single key (1, C) at `value` (C,): float32, whose JSON is shorter than that of integers."""
+    """Return a single key (1, C) at `value` (C,), in float32, whose JSON is shorter than that of integers."""
     return EncodedKeys(value[None].astype(np.float32).astype(np.float64), "float32")
 
 
-def filter_bits(miss: float) -> int:
-    """Return the bits per component at which the quaternion filter misses by `miss` at most."""
-    return min(max(math.ceil(1 + math.log2(1 + FILTER_STEP / miss)), FILTER_BITS[0]), FILTER_BITS[1])
+def filter_bits(tolerance: float) -> int:
+    """Return the bits per component for an error of the quaternion filter up to `tolerance`."""
+    return min(
+        max(math.ceil(1 + math.log2(1 + FILTER_ERROR_STEPS / tolerance)), FILTER_BIT_RANGE[0]), FILTER_BIT_RANGE[1]
+    )
 
 
-def exponent(values: Floats, miss: float) -> int:
-    """Return the power of two whose multiples miss values by `miss` at most, and still fit a mantissa of 23 bits."""
-    wanted = math.floor(math.log2(miss / EXPONENT_STEP)) if miss > 0 else -40
+def exponent(values: Floats, tolerance: float) -> int:
+    """Return the power of two for rounding errors up to `tolerance`, within a mantissa of 23 bits."""
+    wanted = math.floor(math.log2(tolerance / EXPONENT_ERROR_STEPS)) if tolerance > 0 else -40
     largest = float(np.abs(values).max(initial=1e-9)) or 1e-9
     return max(wanted, math.ceil(math.log2(largest)) - MANTISSA_BITS)
 
@@ -173,8 +183,8 @@ def _quaternion_codes(values: Floats, bits: int) -> bytes:
     return bytes(np.ascontiguousarray(encode_filter_quat(values.astype(np.float32), 8, bits)).view(np.uint8))
 
 
-def _decoded(codes: bytes) -> Floats:
-    """Unit quaternions (K, 4) as the filter gives them back: through int16, so not exactly unit."""
+def _decode_quaternions(codes: bytes) -> Floats:
+    """Unit quaternions (K, 4) as the filter decodes them: through int16, so not exactly unit."""
     rows = np.frombuffer(codes, "<i2").reshape(-1, 4).astype(np.int64)
     three = rows[:, :3] * (1 / math.sqrt(2) / (rows[:, 3] | 3))[:, None]
     largest = rows[:, 3] & 3
@@ -183,7 +193,7 @@ def _decoded(codes: bytes) -> Floats:
     result[every, largest] = np.sqrt(np.maximum(0, 1 - (three * three).sum(axis=1)))
     for k in range(3):
         result[every, (largest + 1 + k) % 4] = three[:, k]
-    return np.asarray(np.rint(result * INT16) / INT16)
+    return np.asarray(np.rint(result * MAX_INT16) / MAX_INT16)
 
 
 def _exponent_codes(mantissa: Floats, power: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Keys that rounding made redundant: storing puts some of them where their neighbors lead anyway."""
+"""Removal of keys that became redundant by rounding to the storage format."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from anim.optimization.tracks.quantization import EncodedKeys
 
 
 def drop_redundant_keys(solutions: Mapping[int, Solution], skeleton: Skeleton, request: Request) -> dict[int, Solution]:
-    """Return the solutions, by number of the clip, that take fewer bytes without redundant keys; no others.
+    """Return the solutions, by index of the clip, that take fewer bytes without redundant keys; no others.
 
-    Redundant is what `removable_keys` of `anim.measure.inspect.track_statistics` finds in all clips together, as
-    `inspect` counts it; first and last keys stay. The motion changes by about a millionth of each track's range: judge
-    it again. Tracks that must stay exact keep all keys.
+    Redundant keys are those of `anim.measure.inspect.track_statistics.removable_keys` over all clips together, as
+    counted by `inspect`; first and last keys stay. The motion changes by about a millionth of each track's range and
+    must be verified again. Tracks that must stay exact keep all keys.
     """
     places = [(n, k) for n, each in solutions.items() for k in range(len(each.stored))]
     free = [(n, k) for n, k in places if not _is_exact(solutions[n].clip.tracks[k], request)]
@@ -37,29 +37,29 @@ def _is_exact(track: Track, request: Request) -> bool:
 
 
 def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -> list[tuple[Track, EncodedKeys]]:
-    """The tracks with their keys as stored, without redundant ones; those that lose none keep their `Stored`."""
+    """The tracks without redundant keys; those that lose none keep their `EncodedKeys`."""
     axes: dict[bytes, Floats] = {}
-    while True:  # a key that goes may make others needed
+    while True:  # a removed key can make others necessary
         tracks = _share_axes([track for track, _ in pairs], axes)
-        masks = [_every_other(mask) for mask in removable_keys(tracks, skeleton)]
+        masks = [_alternate_keys(mask) for mask in removable_keys(tracks, skeleton)]
         if not any(mask.any() for mask in masks):
             return [(track, stored) for track, (_, stored) in zip(tracks, pairs, strict=True)]
         pairs = [
-            (_only(track, ~mask), stored.only(~mask)) if mask.any() else (track, stored)
+            (_select_keys(track, ~mask), stored.select_keys(~mask)) if mask.any() else (track, stored)
             for track, (_, stored), mask in zip(tracks, pairs, masks, strict=True)
         ]
 
 
 def _share_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
-    """The tracks with equal times in one array, as one accessor of the file holds them."""
+    """The tracks with equal times in one array, as in one accessor of the file."""
     shared = [axes.setdefault(track.times.tobytes(), as_key_times(track.times)) for track in tracks]
     return [
         track if track.times is axis else replace(track, times=axis) for track, axis in zip(tracks, shared, strict=True)
     ]
 
 
-def _every_other(mask: Bools) -> Bools:
-    """The first, third, … key of every run: a key is judged by its neighbors, which must not go with it."""
+def _alternate_keys(mask: Bools) -> Bools:
+    """The first, third, … key of every run: a key is redundant only if its neighbors stay."""
     if not mask.any():
         return mask
     begins = np.flatnonzero(mask & ~np.concatenate(([False], mask[:-1])))
@@ -69,7 +69,7 @@ def _every_other(mask: Bools) -> Bools:
     return np.asarray(mask & (since % 2 == 0))
 
 
-def _only(track: Track, keep: Bools) -> Track:
+def _select_keys(track: Track, keep: Bools) -> Track:
     arriving, leaving = (None if part is None else part[keep] for part in (track.in_tangents, track.out_tangents))
     return replace(
         track, times=track.times[keep], values=track.values[keep], in_tangents=arriving, out_tangents=leaving

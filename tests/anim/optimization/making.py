@@ -58,7 +58,9 @@ def truth_of(of: Scene, what: Clip, points: PointMatrix, reference: Reference = 
     below = {
         track.node: points.on(of.skeleton.descendants(track.node)) for track in what.tracks if track.node is not None
     }
-    return analyze_source(of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, noticed=1e-6)
+    return analyze_source(
+        of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, chord_tolerance=1e-6
+    )
 
 
 def setting_of(

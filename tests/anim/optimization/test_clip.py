@@ -31,9 +31,9 @@ def _solved(
     packing: Packing = Packing.CORE,
     of: Scene = OF,
 ) -> Solution:
-    setting = setting_of(of, [what], max_error=max_error, policy=policy, packing=packing)
+    context = setting_of(of, [what], max_error=max_error, policy=policy, packing=packing)
     count = len(what.tracks)
-    found = solve(setting, Task(what, ((),) * count, (unused,) * count, max_error))
+    found = solve(context, Task(what, ((),) * count, (unused,) * count, max_error))
     assert found is not None
     assert (found.clip.name, found.clip.start, found.clip.end) == (what.name, what.start, what.end)
     assert len(found.stored) == len(found.clip.tracks) >= 1
@@ -150,8 +150,8 @@ def test_turns_far_from_unit_length_are_left_alone() -> None:
 
 def test_nothing_is_found_below_float32() -> None:
     what = waving()
-    setting = setting_of(OF, [what], max_error=1e-13)
-    assert solve(setting, Task(what, ((),) * 5, (False,) * 5, 1e-13)) is None
+    context = setting_of(OF, [what], max_error=1e-13)
+    assert solve(context, Task(what, ((),) * 5, (False,) * 5, 1e-13)) is None
 
 
 def test_pointers_go_along() -> None:

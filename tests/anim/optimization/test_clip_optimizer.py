@@ -46,10 +46,10 @@ def test_a_search_that_was_given_too_much_is_tightened(monkeypatch: pytest.Monke
     """Three times the bound: the first result fails, a later one holds, with the worst vertices measured."""
     asked: list[tuple[float, int]] = []
 
-    def watched(setting: Context, task: Task) -> Solution | None:
-        if setting.bounds.max_error > 0:
-            asked.append((task.bound, len(setting.points)))
-        return solve(setting, task)
+    def watched(context: Context, task: Task) -> Solution | None:
+        if context.bounds.max_error > 0:
+            asked.append((task.bound, len(context.points)))
+        return solve(context, task)
 
     monkeypatch.setattr(site_, "solve", watched)
     found = optimize_clip(_site(), (0, _task(3 * BOUND)))
@@ -60,8 +60,8 @@ def test_a_search_that_was_given_too_much_is_tightened(monkeypatch: pytest.Monke
 
 
 def test_what_never_holds_is_kept_without_loss(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stubborn(setting: Context, task: Task) -> Solution | None:
-        return solve(setting, task if setting.bounds.max_error == 0 else replace(task, bound=100.0))
+    def stubborn(context: Context, task: Task) -> Solution | None:
+        return solve(context, task if context.bounds.max_error == 0 else replace(task, bound=100.0))
 
     monkeypatch.setattr(site_, "solve", stubborn)
     found = optimize_clip(_site(), (0, _task(BOUND)))
@@ -85,7 +85,7 @@ def test_large_turns_on_one_of_two_axes() -> None:
     snap = track("rotation", times, about("z", [0, 150] * 10 + [0]), node=1)
     sway = track("translation", np.linspace(0, 2, 17), np.outer(np.sin(np.arange(17)), [1.0, 0, 0]), node=0)
     what = clip(snap, sway)
-    site = ClipOptimizer(Request(Bounds(0.02, 0.02), effort="fast"), OF, OF, (what,))
-    found = optimize_clip(site, (0, Task(what, ((), ()), (False, False), 0.0197)))
+    optimizer = ClipOptimizer(Request(Bounds(0.02, 0.02), effort="fast"), OF, OF, (what,))
+    found = optimize_clip(optimizer, (0, Task(what, ((), ()), (False, False), 0.0197)))
     assert found.verdict.holds
     assert not found.without_loss

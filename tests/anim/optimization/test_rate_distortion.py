@@ -6,7 +6,14 @@ import math
 
 import pytest
 
-from anim.optimization.rate_distortion import ERROR_FRACTIONS, LEAST, MOST, RatePoint, curve, smallest_error
+from anim.optimization.rate_distortion import (
+    ERROR_FRACTIONS,
+    MAX_BOUND_PER_DIAGONAL,
+    MIN_BOUND_PER_DIAGONAL,
+    RatePoint,
+    curve,
+    smallest_error,
+)
 
 DIAGONAL = 3.0
 
@@ -46,9 +53,9 @@ def test_without_error_where_that_fits() -> None:
 
 
 def test_nothing_fits_too_few_bytes() -> None:
-    assert smallest_error(_sized(MOST * DIAGONAL).size - 1, DIAGONAL, _sized) is None
-    assert smallest_error(_sized(MOST * DIAGONAL).size, DIAGONAL, _sized) is not None
-    assert ERROR_FRACTIONS[0] > LEAST
+    assert smallest_error(_sized(MAX_BOUND_PER_DIAGONAL * DIAGONAL).size - 1, DIAGONAL, _sized) is None
+    assert smallest_error(_sized(MAX_BOUND_PER_DIAGONAL * DIAGONAL).size, DIAGONAL, _sized) is not None
+    assert ERROR_FRACTIONS[0] > MIN_BOUND_PER_DIAGONAL
 
 
 def test_what_is_given_back_was_tried_and_fits_though_sizes_are_noisy() -> None:

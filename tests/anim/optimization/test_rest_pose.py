@@ -16,7 +16,7 @@ from tests.clips import about, clip, track
 OF = scene()
 DOCUMENT = Document({"asset": {"version": "2.0"}, "nodes": [{"name": str(i)} for i in range(6)]}, ())
 BENT = about("x", 30).astype(np.float32).astype(np.float64)
-HELD = track("rotation", [0, 1], np.tile(BENT, (2, 1)), node=1)
+CONSTANT = track("rotation", [0, 1], np.tile(BENT, (2, 1)), node=1)
 MOVING = track("rotation", TIMES, turning(1.0), node=1)
 OTHER = track("scale", TIMES, np.ones((25, 3)), node=2)
 
@@ -26,21 +26,21 @@ def _rebased(*clips: tuple[object, ...], document: Document = DOCUMENT) -> Rebas
 
 
 def test_what_every_clip_drives_goes_to_the_commonest_constant() -> None:
-    found = _rebased((HELD,), (MOVING,), (HELD, OTHER))
+    found = _rebased((CONSTANT,), (MOVING,), (CONSTANT, OTHER))
     assert found.moved == ((1, "rotation"),)
     assert found.scene.skeleton.rotation[1] == pytest.approx(BENT, abs=1e-6)
     assert np.array(found.document.json["nodes"][1]["rotation"], np.float32).tolist() == BENT.tolist()
 
 
 def test_what_one_clip_leaves_alone_stays() -> None:
-    found = _rebased((HELD,), (HELD,), (OTHER,))
+    found = _rebased((CONSTANT,), (CONSTANT,), (OTHER,))
     assert found.moved == ()
     assert found.document is DOCUMENT
     assert found.scene is OF
 
 
 def test_nothing_moves_in_any_clip() -> None:
-    clips = [clip(HELD, OTHER), clip(MOVING), clip(HELD)]
+    clips = [clip(CONSTANT, OTHER), clip(MOVING), clip(CONSTANT)]
     found = rebase(DOCUMENT, OF, clips)
     ruler = ErrorMetric(OF, found.scene)
     assert found.moved
@@ -49,15 +49,15 @@ def test_nothing_moves_in_any_clip() -> None:
 
 
 def test_constants_of_most_clips_win() -> None:
-    other = replace(HELD, values=np.tile(about("z", 50), (2, 1)))
-    found = _rebased((other,), (HELD,), (replace(HELD, values=-HELD.values),))
+    other = replace(CONSTANT, values=np.tile(about("z", 50), (2, 1)))
+    found = _rebased((other,), (CONSTANT,), (replace(CONSTANT, values=-CONSTANT.values),))
     turn = found.scene.skeleton.rotation[1]
     assert abs(turn @ BENT) == pytest.approx(1)
 
 
 def test_all_other_properties_and_nodes_stay_as_they_were() -> None:
     before = OF.skeleton
-    found = _rebased((HELD,), (HELD,))
+    found = _rebased((CONSTANT,), (CONSTANT,))
     for path in ("translation", "scale"):
         assert (getattr(found.scene.skeleton, path) == getattr(before, path)).all()
     others = np.arange(6) != 1
@@ -75,7 +75,7 @@ def test_rest_that_is_already_there_stays() -> None:
 def test_a_node_with_a_matrix_stays() -> None:
     nodes = [{**node, "matrix": np.eye(4).ravel().tolist()} for node in DOCUMENT.json["nodes"]]
     document = replace(DOCUMENT, json={**DOCUMENT.json, "nodes": nodes})
-    assert _rebased((HELD,), document=document).moved == ()
+    assert _rebased((CONSTANT,), document=document).moved == ()
 
 
 def test_no_clips() -> None:
@@ -85,7 +85,7 @@ def test_no_clips() -> None:
 @pytest.mark.parametrize("exact", [False, True])
 def test_the_scene_is_what_the_document_says(exact: bool) -> None:
     """Players read decimals as float64 or float32: both get the constant, the former to the last digit if exact."""
-    found = rebase(DOCUMENT, OF, [clip(HELD)], exact=exact)
+    found = rebase(DOCUMENT, OF, [clip(CONSTANT)], exact=exact)
     written = np.array(found.document.json["nodes"][1]["rotation"])
     assert found.scene.skeleton.rotation[1] == pytest.approx(written, abs=1e-16)
     assert (written.astype(np.float32) == BENT).all()

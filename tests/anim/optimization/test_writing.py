@@ -19,10 +19,10 @@ from tests.files import glb_of, opened, opened_fixture
 def _solutions(name: str, packing: Packing) -> dict[int, Solution]:
     document = opened_fixture(name)
     clips = reader.clips(document)
-    setting = setting_of(reader.scene(document), clips, packing=packing)
+    context = setting_of(reader.scene(document), clips, packing=packing)
     solutions = {}
     for i, clip in enumerate(clips):
-        found = solve(setting, Task(clip, ((),) * len(clip.tracks), (False,) * len(clip.tracks), 1e-3))
+        found = solve(context, Task(clip, ((),) * len(clip.tracks), (False,) * len(clip.tracks), 1e-3))
         assert found is not None
         solutions[i] = found
     return solutions

@@ -63,11 +63,11 @@ def test_own_keys_are_those_of_the_source() -> None:
     """Joint 1 has keys at every third time of the grid only: none between them."""
     of, thirds = scene(), TIMES[::3]
     bent = track("rotation", thirds, turning(1.5, times=thirds), node=1)
-    truth = truth_of(of, clip(bent, *waving().tracks[2:3]), every_point(of))
-    layouts = TimeAxisSearch(truth, CORE, 1e-3)
+    source = truth_of(of, clip(bent, *waving().tracks[2:3]), every_point(of))
+    layouts = TimeAxisSearch(source, CORE, 1e-3)
     tight = np.full(2, 1e-9)
     by_track = {i: axis.keys for axis in layouts.axes("own", np.arange(2), tight) for i in axis.members}
-    assert truth.grid[by_track[0]] == pytest.approx(thirds)
-    assert truth.grid[by_track[1]] == pytest.approx(TIMES)
+    assert source.grid[by_track[0]] == pytest.approx(thirds)
+    assert source.grid[by_track[1]] == pytest.approx(TIMES)
     whole = {i: axis.keys for axis in layouts.axes("merged", np.arange(2), tight) for i in axis.members}
     assert whole[0].all()

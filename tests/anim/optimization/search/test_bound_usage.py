@@ -7,9 +7,9 @@ import pytest
 
 from anim.arrays import Floats
 from anim.optimization.options import Bounds
-from anim.optimization.search.bound_usage import MIN_GAP_S, BoundUsage
+from anim.optimization.search.bound_usage import MIN_INTERVAL_S, BoundUsage
+from anim.optimization.search.playback import level_world_matrices
 from anim.optimization.search.source_motion import SourceMotion
-from anim.optimization.search.world_matrices import level_world_matrices
 from tests.anim.optimization.making import every_point, scene, truth_of, waving
 
 OF = scene()
@@ -18,44 +18,44 @@ RNG = np.random.default_rng(11)
 ALLOWED = RNG.uniform(0.5, 2, len(POINTS))
 
 
-def _changed(truth: SourceMotion) -> list[Floats]:
+def _changed(source: SourceMotion) -> list[Floats]:
     """The truth with every moving track a little off."""
-    shown = [part.copy() for part in truth.local]
-    for each in truth.moving:
+    shown = [part.copy() for part in source.local]
+    for each in source.moving:
         path = ("translation", "rotation", "scale").index(each.path)
         shown[path][each.node] += 0.01 * RNG.normal(size=shown[path][each.node].shape)
     return shown
 
 
-def _moves(truth: SourceMotion, shown: list[Floats]) -> Floats:
+def _moves(source: SourceMotion, shown: list[Floats]) -> Floats:
     """How far each point is from where it should be, (P, W, 3)."""
     levels = OF.skeleton.levels()
     return POINTS.places(level_world_matrices(OF.skeleton, shown, levels)) - POINTS.places(
-        level_world_matrices(OF.skeleton, truth.local, levels)
+        level_world_matrices(OF.skeleton, source.local, levels)
     )
 
 
 def test_the_largest_distance_of_each_point() -> None:
-    truth = truth_of(OF, waving(), POINTS)
-    shown = _changed(truth)
-    expected = np.linalg.norm(_moves(truth, shown), axis=2).max(axis=1) / ALLOWED
-    strains = BoundUsage(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0))
-    assert strains.slerp_raw(shown) == pytest.approx(expected, rel=1e-5)
-    assert strains.slerp_raw(truth.local).max() == 0
+    source = truth_of(OF, waving(), POINTS)
+    shown = _changed(source)
+    expected = np.linalg.norm(_moves(source, shown), axis=2).max(axis=1) / ALLOWED
+    usage = BoundUsage(OF.skeleton, source, POINTS, ALLOWED, Bounds(0.1, 0.0))
+    assert usage.slerp_raw(shown) == pytest.approx(expected, rel=1e-5)
+    assert usage.slerp_raw(source.local).max() == 0
 
 
 def test_speeds_count_where_they_are_bounded() -> None:
-    truth = truth_of(OF, waving(), POINTS)
-    shown = _changed(truth)
-    moves = _moves(truth, shown)
-    gaps = np.maximum(np.diff(truth.at), MIN_GAP_S)
+    source = truth_of(OF, waving(), POINTS)
+    shown = _changed(source)
+    moves = _moves(source, shown)
+    gaps = np.maximum(np.diff(source.at), MIN_INTERVAL_S)
     speeds = np.linalg.norm(np.diff(moves, axis=1), axis=2) / gaps
     expected = np.maximum(np.linalg.norm(moves, axis=2).max(axis=1) / ALLOWED, speeds.max(axis=1) / 0.3)
-    strains = BoundUsage(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
-    assert strains.slerp_raw(shown) == pytest.approx(expected, rel=1e-4)
+    usage = BoundUsage(OF.skeleton, source, POINTS, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
+    assert usage.slerp_raw(shown) == pytest.approx(expected, rel=1e-4)
 
 
 def test_without_a_bound_on_angles_tracks_have_no_strain_of_their_own() -> None:
-    truth = truth_of(OF, waving(), POINTS)
-    strains = BoundUsage(OF.skeleton, truth, POINTS, ALLOWED, Bounds(0.1, 0.0))
-    assert not strains.own(_changed(truth)).any()
+    source = truth_of(OF, waving(), POINTS)
+    usage = BoundUsage(OF.skeleton, source, POINTS, ALLOWED, Bounds(0.1, 0.0))
+    assert not usage.own(_changed(source)).any()

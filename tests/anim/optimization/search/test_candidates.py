@@ -23,8 +23,8 @@ FULL = SharedAxis(np.ones(25, np.bool_), (0, 1, 2, 4))
 @pytest.mark.parametrize("packing", list(Packing))
 @pytest.mark.parametrize("axis", [EVERY_THIRD, FULL])
 def test_shown_is_what_the_stored_track_is_at_each_moment(packing: Packing, axis: SharedAxis) -> None:
-    misses = [1e-3] * 5
-    for i, candidate in Candidates(TRUTH, packing).of(axis, misses):
+    tolerances = [1e-3] * 5
+    for i, candidate in Candidates(TRUTH, packing).of(axis, tolerances):
         moving = TRUTH.moving[i]
         assert len(candidate.stored.values) == axis.keys.sum()
         played = track(moving.path, TRUTH.grid[axis.keys], candidate.stored.values, node=0)
@@ -39,16 +39,16 @@ def test_shown_is_what_the_stored_track_is_at_each_moment(packing: Packing, axis
 
 def test_a_full_axis_has_the_truth_as_keys() -> None:
     for i, candidate in Candidates(TRUTH, Packing.CORE).of(FULL, [0.0] * 5):
-        truth = TRUTH.moving[i].values[TRUTH.on_grid]
-        assert (candidate.stored.values == truth.astype(np.float32)).all()
+        source = TRUTH.moving[i].values[TRUTH.on_grid]
+        assert (candidate.stored.values == source.astype(np.float32)).all()
 
 
 def test_fitted_keys_are_nearer_than_the_truths_own() -> None:
     """Over all moments, by least squares; the sway of track 0 is what it gains most on."""
     (candidate,) = [each for i, each in Candidates(TRUTH, Packing.CORE).of(EVERY_THIRD, [0.0] * 5) if i == 0]
-    truth = TRUTH.moving[0].values
-    own = track("translation", TRUTH.grid[EVERY_THIRD.keys], truth[TRUTH.on_grid[EVERY_THIRD.keys]])
-    assert ((candidate.shown - truth) ** 2).sum() < 0.7 * ((sample(own, TRUTH.at) - truth) ** 2).sum()
+    source = TRUTH.moving[0].values
+    own = track("translation", TRUTH.grid[EVERY_THIRD.keys], source[TRUTH.on_grid[EVERY_THIRD.keys]])
+    assert ((candidate.shown - source) ** 2).sum() < 0.7 * ((sample(own, TRUTH.at) - source) ** 2).sum()
 
 
 def test_what_was_made_is_kept() -> None:
@@ -70,7 +70,7 @@ def test_chords() -> None:
 
 
 def test_what_is_kept_is_let_go_when_it_grows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(candidates_, "MOST_KEPT", 0)
+    monkeypatch.setattr(candidates_, "MAX_CACHED_VALUES", 0)
     candidates = Candidates(TRUTH, Packing.EXT)
     first, again = (dict(candidates.of(EVERY_THIRD, [1e-3] * 5)) for _ in range(2))
     assert all(first[i] is not again[i] for i in first)

@@ -21,14 +21,14 @@ SCENE = Scene(NODES, (MeshInstance(1, CUBE, None, np.zeros(1)),))
 MOVING = clip(track("rotation", [0, 1], about("x", [0, 9]), node=1))
 
 
-def _shells(setting: Context) -> set[int]:
+def _shells(context: Context) -> set[int]:
     """Nodes that are measured around, by six points each."""
-    points = setting.points
+    points = context.points
     return {node for i, node in enumerate(points.nodes.tolist()) if (points.joints[:, 0] == i).sum() == 6}
 
 
 def test_nodes_that_carry_nothing_are_unseen() -> None:
-    assert setting_of(SCENE, [MOVING]).unseen.tolist() == [False, False, True, True, True]
+    assert setting_of(SCENE, [MOVING]).invisible.tolist() == [False, False, True, True, True]
 
 
 def test_moved_nodes_without_vertices_count_by_shells() -> None:
@@ -46,12 +46,12 @@ def test_shells_go_with_what_is_dropped() -> None:
 
 
 def test_widening_is_the_largest_scale_to_the_world() -> None:
-    setting = setting_of(SCENE, [MOVING])
-    assert [setting.widening(node) for node in (0, 1, 4)] == pytest.approx([2, 2, 1])
-    assert [surface.owner for surface in setting.surfaces] == [1]
+    context = setting_of(SCENE, [MOVING])
+    assert [context.widening(node) for node in (0, 1, 4)] == pytest.approx([2, 2, 1])
+    assert [surface.owner for surface in context.surfaces] == [1]
 
 
 def test_scenes_without_vertices_have_shells_only() -> None:
-    setting = setting_of(Scene(NODES, ()), [MOVING])
-    assert setting.unseen.all()
-    assert _shells(setting) == {1, 2}
+    context = setting_of(Scene(NODES, ()), [MOVING])
+    assert context.invisible.all()
+    assert _shells(context) == {1, 2}

@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation, Slerp
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.optimization.search import key_fit
-from anim.optimization.search.key_fit import ENDS, KeyFit
+from anim.optimization.search.key_fit import END_WEIGHT, KeyFit
 from anim.sampling.track import find_interval
 
 RNG = np.random.default_rng(17)
 KEYS = np.array([0.0, 0.8, 1.0, 2.5])
 AT = np.linspace(0, 2.5, 41)
-WEIGHTS = np.r_[ENDS, np.ones(39), ENDS]
+WEIGHTS = np.r_[END_WEIGHT, np.ones(39), END_WEIGHT]
 
 
 def test_vectors_are_the_least_squares_of_numpy() -> None:
@@ -70,7 +70,7 @@ def test_long_clips_are_solved_by_bands_to_the_same_keys(monkeypatch: pytest.Mon
     turns = quaternion.align_signs(Rotation.from_rotvec(0.1 * np.cumsum(RNG.normal(size=(41, 3)), axis=0)).as_quat())
     start = turns[[0, 13, 16, 40]][:, None]
     dense = KeyFit(find_interval(KEYS, AT), 4)
-    monkeypatch.setattr(key_fit, "DENSE", 0)
+    monkeypatch.setattr(key_fit, "MAX_DENSE_VALUES", 0)
     banded = KeyFit(find_interval(KEYS, AT), 4)
     assert banded.vectors(values) == pytest.approx(dense.vectors(values), abs=1e-9)
     assert banded.rotations(turns[:, None], start) == pytest.approx(dense.rotations(turns[:, None], start), abs=1e-12)

@@ -37,25 +37,25 @@ def _directions(rotation: Floats) -> Rotation:
     return found
 
 
-def _shown(truth: SourceMotion, keys: Bools) -> tuple[Floats, Floats]:
+def _shown(source: SourceMotion, keys: Bools) -> tuple[Floats, Floats]:
     """What all rotations show, stored coarsely: each for itself, and aiming at the world."""
     axis = SharedAxis(keys, (0, 1, 2, 3))
-    candidates = Candidates(truth, Packing.EXT)
-    local, aimed = truth.local[1].copy(), truth.local[1].copy()
+    candidates = Candidates(source, Packing.EXT)
+    local, aimed = source.local[1].copy(), source.local[1].copy()
     for i, each in candidates.of(axis, COARSE):
-        local[truth.moving[i].node] = each.shown
-    found = dict(ParentCompensation(ARM.skeleton, truth, candidates).follow([axis], COARSE, aimed))
+        local[source.moving[i].node] = each.shown
+    found = dict(ParentCompensation(ARM.skeleton, source, candidates).follow([axis], COARSE, aimed))
     assert sorted(found) == [0, 1, 2, 3]
-    assert all((aimed[truth.moving[i].node] == each.shown).all() for i, each in found.items())
+    assert all((aimed[source.moving[i].node] == each.shown).all() for i, each in found.items())
     return local, aimed
 
 
 @pytest.mark.parametrize("keys", [EVERY_KEY, np.arange(25) % 4 == 0])
 def test_directions_are_no_more_off_below_than_above(keys: Bools) -> None:
-    truth = _truth()
-    local, aimed = _shown(truth, keys)
-    off = [(_directions(shown) * _directions(truth.local[1]).inv()).magnitude().max() for shown in (local, aimed)]
-    alone = (Rotation.from_quat(aimed[0]) * Rotation.from_quat(truth.local[1][0]).inv()).magnitude().max()
+    source = _truth()
+    local, aimed = _shown(source, keys)
+    off = [(_directions(shown) * _directions(source.local[1]).inv()).magnitude().max() for shown in (local, aimed)]
+    alone = (Rotation.from_quat(aimed[0]) * Rotation.from_quat(source.local[1][0]).inv()).magnitude().max()
     assert off[1] < 0.65 * off[0]
     assert off[1] < 2 * alone or not keys.all()
 
@@ -68,14 +68,16 @@ def test_roots_are_as_they_were() -> None:
 
 def test_tracks_on_no_axis_are_made_up_for() -> None:
     """Joint 1 is held straight: joint 2 turns for both."""
-    truth = _truth()
+    source = _truth()
     axis = SharedAxis(EVERY_KEY, (0, 2, 3))
-    shown = truth.local[1].copy()
+    shown = source.local[1].copy()
     shown[1] = [0, 0, 0, 1]
-    for _ in ParentCompensation(ARM.skeleton, truth, Candidates(truth, Packing.CORE)).follow([axis], [0.0] * 4, shown):
+    for _ in ParentCompensation(ARM.skeleton, source, Candidates(source, Packing.CORE)).follow(
+        [axis], [0.0] * 4, shown
+    ):
         pass
-    off = _directions(shown[:3]) * _directions(truth.local[1][:3]).inv()
-    assert off.magnitude()[truth.on_grid].max() < 1e-5
+    off = _directions(shown[:3]) * _directions(source.local[1][:3]).inv()
+    assert off.magnitude()[source.on_grid].max() < 1e-5
 
 
 def test_leeway_is_the_whole_arm_against_one_bone() -> None:
@@ -84,14 +86,14 @@ def test_leeway_is_the_whole_arm_against_one_bone() -> None:
 
 def _reach(node: int) -> float:
     """How far the tip gets from a node at most, by scipy; in bones of 1 m."""
-    truth = _truth()
-    tip = np.zeros((len(truth.at), 3))
+    source = _truth()
+    tip = np.zeros((len(source.at), 3))
     for i in range(3, node - 1, -1):
-        tip = Rotation.from_quat(truth.local[1][i]).apply(tip + np.array([1.0, 0, 0]))
+        tip = Rotation.from_quat(source.local[1][i]).apply(tip + np.array([1.0, 0, 0]))
     return float(np.linalg.norm(tip, axis=1).max())
 
 
 def test_only_rotations_have_leeway() -> None:
     sway = track("translation", TIMES, np.ones((25, 3)) * TIMES[:, None], node=0)
-    truth = truth_of(ARM, clip(sway, *BENDS.tracks), TIP)
-    assert budget_gain(ARM.skeleton, truth, TIP)[0] == 1
+    source = truth_of(ARM, clip(sway, *BENDS.tracks), TIP)
+    assert budget_gain(ARM.skeleton, source, TIP)[0] == 1

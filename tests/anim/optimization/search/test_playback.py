@@ -11,8 +11,11 @@ from scipy.spatial.transform import Rotation, Slerp
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.optimization.search import playback
+from anim.optimization.search.playback import level_world_matrices, required_levels
+from anim.sampling import sample_pose, world_matrices
 from anim.sampling.track import find_interval
-from tests.clips import about
+from tests.anim.optimization.making import scene, waving
+from tests.clips import about, skeleton
 
 RNG = np.random.default_rng(11)
 KEYS = np.array([0.0, 0.3, 0.35, 1.5, 4.0])
@@ -103,3 +106,18 @@ def test_steps_are_the_turns_from_key_to_key() -> None:
     for g in range(3):
         turns = Rotation.from_quat(keys[:, g])
         assert found[:, g] == pytest.approx((turns[1:] * turns[:-1].inv()).magnitude(), abs=1e-7)
+
+
+def test_worlds_are_those_of_poses() -> None:
+    of, at = scene(), np.linspace(0, 2, 9)
+    shown = sample_pose(of.skeleton, waving(), at)
+    local = [np.swapaxes(part, 0, 1) for part in (shown.translation, shown.rotation, shown.scale)]
+    found = level_world_matrices(of.skeleton, local, of.skeleton.levels())
+    assert found == pytest.approx(np.swapaxes(world_matrices(of.skeleton, shown), 0, 1), abs=1e-12)
+
+
+def test_only_ancestors_are_needed() -> None:
+    # 0 ─ 1 ─ 2,  1 ─ 3,  4
+    tree = skeleton([-1, 0, 1, 1, -1])
+    assert [level.tolist() for level in required_levels(tree, np.array([3]))] == [[0], [1], [3]]
+    assert required_levels(tree, np.array([4]))[0].tolist() == [4]

@@ -17,11 +17,11 @@ OF = scene()
 
 def _bench(bound: float) -> TrialRunner:
     points = every_point(OF)
-    truth = truth_of(OF, waving(), points)
-    count = len(truth.moving)
+    source = truth_of(OF, waving(), points)
+    count = len(source.moving)
     allowed = np.full(len(points), bound)
-    strains = BoundUsage(OF.skeleton, truth, points, allowed, Bounds(bound, 0.0))
-    return TrialRunner(OF.skeleton, truth, strains, CORE, np.ones(count, bool), [()] * count)
+    usage = BoundUsage(OF.skeleton, source, points, allowed, Bounds(bound, 0.0))
+    return TrialRunner(OF.skeleton, source, usage, CORE, np.ones(count, bool), [()] * count)
 
 
 def test_more_effort_and_more_room_take_fewer_bytes() -> None:
@@ -54,7 +54,7 @@ def test_the_same_every_time(effort: str) -> None:
 def test_everything_goes_under_a_bound_that_allows_it() -> None:
     found = search(_bench(100.0), 100.0, EFFORTS["fast"])
     assert found is not None
-    assert (found.fates == TrackAction.DROPPED).all()
+    assert (found.actions == TrackAction.DROPPED).all()
 
 
 def test_none_where_float32_itself_is_too_coarse() -> None:

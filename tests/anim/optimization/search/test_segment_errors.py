@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from anim.arrays import Bools, Floats
 from anim.optimization.search import segment_errors
-from anim.optimization.search.segment_errors import SPANS, SegmentErrors, fits
+from anim.optimization.search.segment_errors import SPAN_RANGE, SegmentErrors, fits
 from anim.optimization.tracks.key_reduction import greedy_keys
 
 
@@ -82,8 +82,8 @@ def test_long_lines_have_a_key_now_and_then() -> None:
     times = np.arange(300.0)
     keep = SegmentErrors(times[None, :, None] * np.ones(3), times, np.inf).greedy_keys(np.array([0]), np.array([1e-3]))
     at = np.flatnonzero(keep[0])
-    assert np.diff(at).max() <= SPANS[0]
-    assert len(at) == 2 + (299 - 1) // SPANS[0]
+    assert np.diff(at).max() <= SPAN_RANGE[0]
+    assert len(at) == 2 + (299 - 1) // SPAN_RANGE[0]
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -96,7 +96,7 @@ def test_tables_are_kept_within_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     assert fits(100, np.arange(2000) / 30)
     assert not fits(2000, np.arange(20_000) / 30)
     assert not fits(400, np.arange(2000) / 240)
-    monkeypatch.setattr(segment_errors, "MOST", 10)
+    monkeypatch.setattr(segment_errors, "MAX_TABLE_VALUES", 10)
     assert not fits(2, np.arange(4.0))
 
 

@@ -42,7 +42,7 @@ def test_axes_count_once() -> None:
 
 def test_single_keys_are_cheaper() -> None:
     held = clip(track("translation", [0], [[1, 2, 3]], node=0))
-    assert _solution(held).size(CORE) == PRICE.held + 12 + PRICE.axis + 4
+    assert _solution(held).size(CORE) == PRICE.single_key + 12 + PRICE.axis + 4
 
 
 def test_filtered_tracks_count_as_the_codec_has_them() -> None:

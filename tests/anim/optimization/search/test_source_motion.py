@@ -11,8 +11,8 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Scene
 from anim.optimization.options import Reference
-from anim.optimization.search.source_motion import PATHS, key_grid, moments
-from anim.optimization.search.world_matrices import level_world_matrices, required_levels
+from anim.optimization.search.playback import level_world_matrices, required_levels
+from anim.optimization.search.source_motion import PATHS, key_grid, measurement_times
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.optimization.making import every_point, scene, truth_of, turning, waving
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
@@ -34,7 +34,7 @@ def test_keys_may_lie_on_every_key_and_within_splines() -> None:
 
 def test_moments_lie_on_keys_between_them_and_before_jumps() -> None:
     steps = track("translation", [0, 0.25, 2], np.zeros((3, 3)), STEP)
-    at = moments(np.array([0.0, 1, 2]), [steps])
+    at = measurement_times(np.array([0.0, 1, 2]), [steps])
     assert at.tolist() == [0, np.nextafter(0.25, 0), 0.25, 0.5, 1, 1.5, 2]
 
 
@@ -70,15 +70,15 @@ def test_worlds_are_products_of_matrices_with_turns_as_stored() -> None:
 def test_columns_are_the_sampled_pose() -> None:
     of, what = scene(), waving()
     points = every_point(of)
-    truth = truth_of(of, what, points)
-    assert (truth.at[truth.on_grid] == truth.grid).all()
-    expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, truth.at)).swapaxes(0, 1)
-    assert truth.columns == pytest.approx(stack_points(expected, points.nodes), abs=1e-12)
+    source = truth_of(of, what, points)
+    assert (source.at[source.on_grid] == source.grid).all()
+    expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, source.at)).swapaxes(0, 1)
+    assert source.columns == pytest.approx(stack_points(expected, points.nodes), abs=1e-12)
 
 
 def test_keys_only() -> None:
-    truth = truth_of(scene(), waving(), every_point(scene()), Reference.KEYS)
-    assert (truth.at == truth.grid).all()
+    source = truth_of(scene(), waving(), every_point(scene()), Reference.KEYS)
+    assert (source.at == source.grid).all()
 
 
 def test_rest_and_middle_are_off_by_what_they_say() -> None:
@@ -104,21 +104,21 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
     of = scene(seed, stretch=stretch)
     what = waving()
     points = every_point(of)
-    truth = truth_of(of, what, points)
+    source = truth_of(of, what, points)
     rng = np.random.default_rng(seed)
-    before = points.places(level_world_matrices(of.skeleton, truth.local, truth.levels))
-    for g, each in enumerate(truth.moving):
-        local = tuple(part.copy() for part in truth.local)
+    before = points.places(level_world_matrices(of.skeleton, source.local, source.levels))
+    for g, each in enumerate(source.moving):
+        local = tuple(part.copy() for part in source.local)
         change = 1e-4 * rng.normal(size=each.values.shape)
         changed = each.values + change
         if each.path == "rotation":
             changed = quaternion.normalize(changed)
             change = changed - each.values
         local[PATHS.index(each.path)][each.node] = changed
-        after = points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), truth.levels))
+        after = points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), source.levels))
         moved = np.linalg.norm(after - before, axis=2)
         allowed = each.meters * np.linalg.norm(change, axis=1).max()
-        assert moved[truth.answering[g]].max(initial=0.0) <= slack * allowed
+        assert moved[source.answering[g]].max(initial=0.0) <= slack * allowed
         assert moved.max() > 0.05 * allowed  # and it says no more than it must
 
 
@@ -128,8 +128,8 @@ def test_chords_count_only_where_they_leave_the_arc() -> None:
 
     def both(*tracks: Floats) -> bool:
         times = np.linspace(0, 2, len(tracks[0]))
-        truth = truth_of(of, clip(track("rotation", times, tracks[0], node=1)), points)
-        return truth.by_chord is not truth.columns
+        source = truth_of(of, clip(track("rotation", times, tracks[0], node=1)), points)
+        return source.by_chord is not source.columns
 
     assert not both(turning(0.2))
     assert both(about("z", [0, 90]))
@@ -141,11 +141,11 @@ def test_chords_are_normalized_mixes() -> None:
     points = PointMatrix(np.array([0]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
     rotation = track("rotation", [0, 1], about("z", [0, 120]))
     quarters = track("scale", [0, 0.25, 1], np.ones((3, 3)))
-    truth = truth_of(of, clip(rotation, quarters), points)
-    x_axis = truth.by_chord.reshape(4, 3, -1)[0].T
-    quarter = int(np.searchsorted(truth.at, 0.25))
+    source = truth_of(of, clip(rotation, quarters), points)
+    x_axis = source.by_chord.reshape(4, 3, -1)[0].T
+    quarter = int(np.searchsorted(source.at, 0.25))
     mix = 0.75 * about("z", 0) + 0.25 * about("z", 120)
-    assert truth.at[quarter] == 0.25
+    assert source.at[quarter] == 0.25
     assert x_axis[quarter] == pytest.approx(Rotation.from_quat(mix).as_matrix()[:, 0])
-    along_arc = truth.columns.reshape(4, 3, -1)[0].T
+    along_arc = source.columns.reshape(4, 3, -1)[0].T
     assert along_arc[quarter] == pytest.approx([np.cos(np.radians(30)), 0.5, 0])

@@ -33,26 +33,26 @@ def _bench(
     what: Clip, *, bounds: Bounds | None = None, droppable: bool = True, shared: Floats | None = None, of: Scene = OF
 ) -> TrialRunner:
     points: PointMatrix = every_point(of)
-    truth: SourceMotion = truth_of(of, what, points)
-    count = len(truth.moving)
-    strains = BoundUsage(of.skeleton, truth, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
+    source: SourceMotion = truth_of(of, what, points)
+    count = len(source.moving)
+    usage = BoundUsage(of.skeleton, source, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
     values = [() if shared is None else (shared,)] * count
-    return TrialRunner(of.skeleton, truth, strains, CORE, np.full(count, droppable), values)
+    return TrialRunner(of.skeleton, source, usage, CORE, np.full(count, droppable), values)
 
 
-def _plan(bench: TrialRunner, budget: float = BOUND / 3, **more: object) -> Plan:
-    count = len(bench.truth.moving)
+def _plan(runner: TrialRunner, budget: float = BOUND / 3, **more: object) -> Plan:
+    count = len(runner.source.moving)
     plan = Plan(np.full(count, budget), 0.0, "merged", np.ones(count))
     return replace(plan, **more)  # type: ignore[arg-type]
 
 
-def _clip(what: Clip, bench: TrialRunner, outcome: TrialResult) -> Clip:
+def _clip(what: Clip, runner: TrialRunner, outcome: TrialResult) -> Clip:
     """What the outcome says would be written."""
     tracks = []
-    for k, moving in enumerate(bench.truth.moving):
-        if outcome.fates[k] == TrackAction.DROPPED:
+    for k, moving in enumerate(runner.source.moving):
+        if outcome.actions[k] == TrackAction.DROPPED:
             continue
-        at = bench.truth.grid[outcome.on[k]] if k in outcome.on else [0.0]
+        at = runner.source.grid[outcome.on[k]] if k in outcome.on else [0.0]
         tracks.append(track(moving.path, at, outcome.keys[k].values, node=moving.node))
     return clip(*tracks, name=what.name)
 
@@ -60,11 +60,11 @@ def _clip(what: Clip, bench: TrialRunner, outcome: TrialResult) -> Clip:
 @pytest.mark.parametrize("axes", LAYOUTS)
 def test_the_error_is_the_rulers(axes: str) -> None:
     what = waving()
-    bench = _bench(what)
-    outcome = bench.run(_plan(bench, axes=axes))
+    runner = _bench(what)
+    outcome = runner.run(_plan(runner, axes=axes))
     ruler = ErrorMetric(OF)
     arcs, chords = (
-        ruler.error_at(what, _clip(what, bench, outcome), bench.truth.at, player=player).max_error
+        ruler.error_at(what, _clip(what, runner, outcome), runner.source.at, player=player).max_error
         for player in ("raw", "nlerp")
     )
     expected = arcs if outcome.worst > 1 else max(arcs, chords)
@@ -73,51 +73,51 @@ def test_the_error_is_the_rulers(axes: str) -> None:
 
 
 def test_the_size_is_keys_and_json() -> None:
-    bench = _bench(waving(), droppable=False)
-    outcome = bench.run(_plan(bench))
-    assert outcome.fates.tolist() == [
+    runner = _bench(waving(), droppable=False)
+    outcome = runner.run(_plan(runner))
+    assert outcome.actions.tolist() == [
         TrackAction.KEYED,
         TrackAction.KEYED,
         TrackAction.KEYED,
-        TrackAction.HELD,
-        TrackAction.HELD,
+        TrackAction.CONSTANT,
+        TrackAction.CONSTANT,
     ]
     axes = {on.tobytes(): int(on.sum()) for on in outcome.on.values()}
     data = sum(4 * count for count in axes.values())
     for i in range(3):
         keys = outcome.keys[i]
         data += keys.values.size * {"int16": 2, "float32": 4}[keys.form]
-    text = 3 * CORE.prices.track + 2 * CORE.prices.held + len(axes) * CORE.prices.axis
+    text = 3 * CORE.byte_costs.track + 2 * CORE.byte_costs.single_key + len(axes) * CORE.byte_costs.axis
     assert outcome.size == data + text
 
 
 def test_what_rests_is_dropped_only_where_it_may_be() -> None:
-    kept, dropped = (bench.run(_plan(bench)) for bench in (_bench(waving(), droppable=False), _bench(waving())))
-    assert (kept.fates[3], dropped.fates[3]) == (TrackAction.HELD, TrackAction.DROPPED)
-    assert (kept.fates[4], dropped.fates[4]) == (TrackAction.HELD, TrackAction.HELD)
+    kept, dropped = (runner.run(_plan(runner)) for runner in (_bench(waving(), droppable=False), _bench(waving())))
+    assert (kept.actions[3], dropped.actions[3]) == (TrackAction.CONSTANT, TrackAction.DROPPED)
+    assert (kept.actions[4], dropped.actions[4]) == (TrackAction.CONSTANT, TrackAction.CONSTANT)
     assert kept.keys[3].values.tolist() == [[1, 1, 1]]
     assert kept.keys[4].values.tolist() == [[0.75, 0.75, 0.75]]
     assert 3 not in dropped.keys
 
 
 def test_held_as_other_clips_hold_it() -> None:
-    bench = _bench(
+    runner = _bench(
         clip(track("scale", [0, 1], [[1.2, 1.2, 1.2], [1.2001, 1.2, 1.2]], node=4)), shared=np.full(3, 1.2002)
     )
-    outcome = bench.run(_plan(bench))
-    assert outcome.fates.tolist() == [TrackAction.HELD]
+    outcome = runner.run(_plan(runner))
+    assert outcome.actions.tolist() == [TrackAction.CONSTANT]
     assert outcome.keys[0].values[0] == pytest.approx([1.2002] * 3, rel=1e-6)
 
 
 def test_chords_are_asked_where_they_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     """150° in a step or two would do along arcs; players that mix components cut the corner."""
-    monkeypatch.setattr(axis_layouts, "ASKED", math.inf)
+    monkeypatch.setattr(axis_layouts, "MAX_BUDGET_PER_BOUND", math.inf)
     times = np.linspace(0, 2, 49)
     angles = np.radians(150) * times / 2
     values = np.stack((0 * angles, 0 * angles, np.sin(angles / 2), np.cos(angles / 2)), axis=1)
-    bench = _bench(clip(track("rotation", times, values, node=1)))
-    plan = _plan(bench, budget=2.0)
-    cheap, thorough = bench.run(plan, smaller_than=0.0), bench.run(plan)
+    runner = _bench(clip(track("rotation", times, values, node=1)))
+    plan = _plan(runner, budget=2.0)
+    cheap, thorough = runner.run(plan, smaller_than=0.0), runner.run(plan)
     assert cheap.worst < 0.2
     assert thorough.worst > 1
     assert cheap.size == thorough.size
@@ -126,10 +126,10 @@ def test_chords_are_asked_where_they_matter(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_bound_on_angles() -> None:
     what = clip(track("rotation", np.linspace(0, 2, 25), turning(1.0), node=1))
-    bench = _bench(what, bounds=Bounds(BOUND, 0.0, max_angle=math.radians(0.2)))
-    outcome = bench.run(_plan(bench, budget=0.2))
-    written = _clip(what, bench, outcome)
-    a, b = (sample_pose(OF.skeleton, each, bench.truth.at).rotation for each in (what, written))
+    runner = _bench(what, bounds=Bounds(BOUND, 0.0, max_angle=math.radians(0.2)))
+    outcome = runner.run(_plan(runner, budget=0.2))
+    written = _clip(what, runner, outcome)
+    a, b = (sample_pose(OF.skeleton, each, runner.source.at).rotation for each in (what, written))
     turned = np.degrees(quaternion.angle_between(a, b)[:, 1].max())
     assert float(outcome.own[0]) * 0.2 == pytest.approx(turned, rel=0.01)
 
@@ -150,6 +150,6 @@ def test_tracks_stored_alike_count_once() -> None:
     times = np.linspace(0, 2, 25)
     both = _bench(clip(*(track("rotation", times, turning(1.0), node=node) for node in (1, 2))))
     alone = _bench(clip(track("rotation", times, turning(1.0), node=1)))
-    pair, one = (bench.run(_plan(bench, axes="full")) for bench in (both, alone))
-    assert pair.fates.tolist() == [TrackAction.KEYED, TrackAction.KEYED]
-    assert pair.size - one.size == CORE.prices.repeated
+    pair, one = (runner.run(_plan(runner, axes="full")) for runner in (both, alone))
+    assert pair.actions.tolist() == [TrackAction.KEYED, TrackAction.KEYED]
+    assert pair.size - one.size == CORE.byte_costs.repeated

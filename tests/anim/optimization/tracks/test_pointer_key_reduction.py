@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.model import AccessorFormat
-from anim.optimization.tracks.pointer_tracks import reduce_pointer_keys
+from anim.optimization.tracks.key_reduction import reduce_pointer_keys
 from anim.sampling.track import sample
 from tests.clips import STEP, about, track
 
