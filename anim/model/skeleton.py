@@ -31,6 +31,7 @@ class Skeleton:
     scale: Floats
     sheared: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     sheared_local: Floats = field(default_factory=lambda: np.empty((0, 3, 4)))
+    _levels: Any = field(init=False, repr=False)  # tuple of (M,) for each depth
 
     def __setstate__(self, state: list[Any]) -> None:
         arrays.restore_fields(self, state)
@@ -49,7 +50,7 @@ class Skeleton:
         set_field(self, "sheared_local", arrays.as_floats(self.sheared_local, "X 3 4", name="sheared_local"))
         if len(self.sheared_local) != len(self.sheared):
             raise ShapeError(f"sheared_local has {len(self.sheared_local)} matrices for {len(self.sheared)} nodes")
-        self.levels()
+        set_field(self, "_levels", _find_levels(self.parents))
 
     def __repr__(self) -> str:
         roots = np.flatnonzero(self.parents < 0)
@@ -71,23 +72,25 @@ class Skeleton:
         return found
 
     def levels(self) -> list[Ints]:
-        """Return the nodes by depth, roots first, so that parents precede their children.
+        """Return the nodes by depth, roots first, so that parents precede their children."""
+        return list(self._levels)
 
-        Raises FormatError for a cycle or a parent that does not exist.
-        """
-        if len(self.parents) and (self.parents.min() < -1 or self.parents.max() >= len(self.parents)):
-            raise FormatError("a node's parent does not exist")
-        levels: list[Ints] = []
-        done = 0
-        level = np.flatnonzero(self.parents < 0)
-        children = _children(self.parents)
-        while len(level):
-            levels.append(level)
-            done += len(level)
-            level = np.array([c for p in level.tolist() for c in children.get(p, ())], dtype=np.int64)
-        if done != len(self.parents):
-            raise FormatError("nodes form a cycle (expected trees)")
-        return levels
+
+def _find_levels(parents: Ints) -> tuple[Ints, ...]:
+    """The nodes of each depth; raises FormatError for a cycle or a parent that does not exist."""
+    if len(parents) and (parents.min() < -1 or parents.max() >= len(parents)):
+        raise FormatError("a node's parent does not exist")
+    levels: list[Ints] = []
+    done = 0
+    level = np.flatnonzero(parents < 0)
+    children = _children(parents)
+    while len(level):
+        levels.append(arrays.freeze(level))
+        done += len(level)
+        level = np.array([c for p in level.tolist() for c in children.get(p, ())], dtype=np.int64)
+    if done != len(parents):
+        raise FormatError("nodes form a cycle (expected trees)")
+    return tuple(levels)
 
 
 def _children(parents: Ints) -> dict[int, list[int]]:

@@ -8,9 +8,12 @@ from typing import TypeAlias
 
 from anim.arrays import Floats
 from anim.model import Interpolation, Track, ValueKind
+from anim.model.track import PATHS
 
 Rule: TypeAlias = tuple[str, Interpolation, ValueKind, int]
 Tangents: TypeAlias = tuple[Floats, Floats]
+
+_KINDS = {path: ValueKind.ROTATION if path == "rotation" else ValueKind.VECTOR for path in PATHS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,8 @@ class TrackGroup:
 
 def rule(track: Track) -> Rule:
     """Return the grouping key of a track: path, interpolation, value type, number of components."""
-    return track.path, track.interpolation, track.kind, track.values.shape[1]
+    kind = _KINDS[track.path] if track.pointer is None and track.path in _KINDS else track.kind
+    return track.path, track.interpolation, kind, track.values.shape[1]
 
 
 def stack_values(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:

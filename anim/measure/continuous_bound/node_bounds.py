@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,10 @@ from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
 from anim.measure.continuous_bound.intervals import Intervals
 from anim.measure.continuous_bound.rotation_bounds import rotation_bounds
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
-from anim.measure.continuous_bound.track_partition import ClipVersion
+from anim.measure.continuous_bound.track_partition import ClipVersion, pick_tracks
 from anim.sampling.batch import Batch
+
+UNIT_TOLERANCE = 1e-6  # of |q|², up to which players that normalize and players that do not agree
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,7 @@ def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, p
     local = local_bounds(first, second, where, players=players)
     matrices, origins = np.empty_like(local.matrices), np.empty_like(local.origins)
     jumps = np.zeros((2, *local.jumps.shape[1:]))
+    has_jumps = bool(local.jumps.any())
     for depth, nodes in enumerate(first.skeleton.levels()):
         own, origin, leap = local.matrices[:, :, nodes], local.origins[:, :, nodes], local.jumps[0, nodes]
         if depth == 0:
@@ -45,7 +48,7 @@ def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, p
         parent = matrices[:, :, above]
         matrices[:, :, nodes] = product(parent, own)
         origins[:, :, nodes] = origins[:, :, above] + product(parent, origin)
-        if local.jumps.any():
+        if has_jumps:
             jumps[0, nodes] = jumps[0, above] * (own[0, 1] + leap) + parent[0, 1] * leap
             jumps[1, nodes] = jumps[1, above] + jumps[0, above] * origin[0, 1]
     return NodeBounds(matrices, origins, jumps)
@@ -70,10 +73,13 @@ def _rotations(
 ) -> tuple[Floats, Floats]:
     """Majorants (3, 2, N, G) of all nodes' rotations, and jumps (N, G)."""
     a, b = first.skeleton.rotation, second.skeleton.rotation
-    square = (a * a).sum(axis=1)
+    held, other = _held(first, "rotation"), _held(second, "rotation")
+    square = (held * held).sum(axis=1)
     found = np.repeat(resting(square + np.abs(1 - square))[..., None], len(where), axis=-1)
     jumps = np.zeros(found.shape[2:])
-    for nodes, tracks, gaps in _groups(first, second, "rotation", where):
+    differs = (held != other).any(axis=1) | (np.abs(1 - square) > UNIT_TOLERANCE)
+    uneven = set(np.flatnonzero(differs).tolist()) | _late(first, where) | _late(second, where)
+    for nodes, tracks, gaps in _groups(first, second, "rotation", where, uneven):
         place = {node: i for i, node in enumerate(nodes.tolist())}
         some, leaps = rotation_bounds(
             rotation_endpoints(a[nodes], tracks[0], place, gaps, players=players),
@@ -89,7 +95,8 @@ def _vectors(
 ) -> Floats:
     """Majorants (3, 2, N, G) of all nodes' translations or scales."""
     a, b = getattr(first.skeleton, path), getattr(second.skeleton, path)
-    found = np.repeat(resting(size(a.T))[..., None], len(where), axis=-1)
+    held, other = _held(first, path), _held(second, path)
+    found = np.repeat(resting(size(held.T), size((other - held).T))[..., None], len(where), axis=-1)
     for nodes, tracks, gaps in _groups(first, second, path, where):
         place = {node: i for i, node in enumerate(nodes.tolist())}
         both = endpoints(a[nodes], tracks[0], place, gaps), endpoints(b[nodes], tracks[1], place, gaps)
@@ -97,29 +104,46 @@ def _vectors(
     return found
 
 
+def _held(version: ClipVersion, path: str) -> Floats:
+    """Constant values (N, C) of the nodes that do not move: of their tracks, or of the rest pose."""
+    values: Floats = getattr(version.skeleton, path).copy()
+    for batch in _of_path(version.still, path):
+        values[[track.node for track in batch.tracks if track.node is not None]] = batch.values[0]
+    return values
+
+
+def _late(version: ClipVersion, where: Intervals) -> set[int]:
+    """Nodes with a constant rotation that starts after the first interval: players may normalize only from there on."""
+    late = [batch for batch in _of_path(version.still, "rotation") if batch.times[-1] > where.edges[1]]
+    return _nodes(late)
+
+
 def _groups(
-    first: ClipVersion, second: ClipVersion, path: str, where: Intervals
+    first: ClipVersion, second: ClipVersion, path: str, where: Intervals, uneven: Collection[int] = ()
 ) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Intervals]]:
-    """Nodes that move in either version, with their tracks and all gaps; then those that do not, but are held somewhere
-    by a track or rest elsewhere in the second version, with one gap, which is like any other."""
+    """Nodes that move in either version, with their tracks and all intervals; then those of `uneven` that do not, with
+    one interval, which is like any other."""
     moving = (_of_path(first.moving, path), _of_path(second.moving, path))
     movers = _nodes(*moving)
-    if len(movers):
-        yield movers, moving, where
-    still = (_of_path(first.still, path), _of_path(second.still, path))
-    apart = np.flatnonzero((getattr(first.skeleton, path) != getattr(second.skeleton, path)).any(axis=1))
-    others = np.setdiff1d(np.union1d(_nodes(*still), apart), movers)
-    if len(others):
-        yield others, still, where.first
+    if movers:
+        yield np.array(sorted(movers), np.int64), moving, where
+    if others := set(uneven) - movers:
+        still = [_of_nodes(_of_path(version.still, path), others) for version in (first, second)]
+        yield np.array(sorted(others), np.int64), (still[0], still[1]), where.first
+
+
+def _of_nodes(tracks: list[Batch], nodes: Collection[int]) -> list[Batch]:
+    """The tracks of some nodes."""
+    chosen = [(batch, np.array([track.node in nodes for track in batch.tracks])) for batch in tracks]
+    return [pick_tracks(batch, some) for batch, some in chosen if some.any()]
 
 
 def _of_path(tracks: list[Batch], path: str) -> list[Batch]:
     return [batch for batch in tracks if batch.path == path]
 
 
-def _nodes(*tracks: list[Batch]) -> Ints:
-    found = {track.node for side in tracks for batch in side for track in batch.tracks if track.node is not None}
-    return np.array(sorted(found), np.int64)
+def _nodes(*tracks: list[Batch]) -> set[int]:
+    return {track.node for side in tracks for batch in side for track in batch.tracks if track.node is not None}
 
 
 def _length(vectors: Floats) -> Floats:

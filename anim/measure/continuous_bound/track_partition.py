@@ -45,9 +45,9 @@ def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | No
     for batch in of:
         moves = np.array([(track.node, track.path) in moving for track in batch.tracks])
         if moves.any():
-            side.moving.append(_pick(batch, moves))
+            side.moving.append(pick_tracks(batch, moves))
         if not moves.all():
-            rest = _pick(batch, ~moves)
+            rest = pick_tracks(batch, ~moves)
             tangents = None if rest.tangents is None else (rest.tangents[0][:1], rest.tangents[1][:1])
             side.still.append(replace(rest, times=rest.times[:1], values=rest.values[:1], tangents=tangents))
     return side
@@ -66,7 +66,8 @@ def _keys(batch: Batch, chosen: Bools) -> Iterable[tuple[int | None, str]]:
     return ((track.node, track.path) for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
 
 
-def _pick(batch: Batch, chosen: Bools) -> Batch:
+def pick_tracks(batch: Batch, chosen: Bools) -> Batch:
+    """Return the chosen (G,) of a batch's tracks as a batch."""
     if chosen.all():
         return batch
     tracks = tuple(track for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)

@@ -133,13 +133,17 @@ class SkinnedGroups:
         """Return how far every vertex is displaced at every time, None where nothing carries any."""
         if not self.groups or not len(old.pose.times):
             return None
-        after = matrix.multiply(new.of(self.new.nodes[self.used]), self.new.bind[self.used][:, None])
-        moved = after - matrix.multiply(old.of(self.old.nodes[self.used]), self.old.bind[self.used][:, None])
+        bind = self.new.bind[self.used][:, None]
+        before, after = old.of(self.old.nodes[self.used]), new.of(self.new.nodes[self.used])
+        if self.new is self.old:  # one product for both
+            moved = matrix.multiply(after - before, bind)
+        else:
+            moved = matrix.multiply(after, bind) - matrix.multiply(before, self.old.bind[self.used][:, None])
         before_weights, after_weights = self.old.weights(old.pose), self.new.weights(new.pose)
         rest = self.surface.rest_weights
         if (before_weights == rest).all() and (after_weights == rest).all():
             return SkinnedDisplacement(self._still, moved)
-        change = Change(moved, after, before_weights, after_weights)
+        change = Change(moved, matrix.multiply(after, bind), before_weights, after_weights)
         return MorphedDisplacement(
             self._boxed.sizes(change),
             (self._still.reach, self.groups),
