@@ -1,1 +1,1 @@
-"""Pictures: values in, the bytes of a figure out."""
+"""Plots and filmstrips as bytes of image files."""

@@ -89,7 +89,7 @@ def cardinal(tension: float) -> TangentRule:
 
 
 def tcb(tension: float, continuity: float, bias: float) -> TangentRule:
-    """Return the rule with tension (1: slope 0), continuity (0: C1) and bias (1 overshoots, −1 undershoots).
+    """Return the rule with tension (1: slope 0), continuity (0: C1) and bias (±1: overshoot after or before).
 
     Each in −1 … 1, RangeError otherwise; (0, 0, 0) is catmull-rom. The end slopes are catmull-rom's times 1 − tension.
     Source: Kochanek & Bartels 1984, with their correction for uneven spacing.

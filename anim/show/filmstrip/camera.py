@@ -1,4 +1,4 @@
-"""A camera that looks at a whole motion from a three-quarter view."""
+"""Perspective camera framed on a whole motion in three-quarter view."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 
 AZIMUTH, ELEVATION = 35.0, 14.0  # degrees: from the front (+Z) toward +X, and from above
-FIELD = 24.0  # degrees, from top to bottom: long enough a lens to keep proportions
+FIELD = 24.0  # degrees, vertical field of view: a long focal length keeps proportions
 MARGIN = 0.06  # share of the picture that stays free on each side
 NARROWEST, WIDEST = 0.62, 1.78  # width by height of a picture
 SMALLEST = 1e-6  # m
@@ -18,7 +18,7 @@ SMALLEST = 1e-6  # m
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Where it is and how it looks. eye: (3,) m. axes: rows right, up, back (3, 3). scale: pixels for a slope of 1.
+    """Camera. eye: (3,) m. axes: rows right, up, back (3, 3). scale: pixels for a slope of 1.
 
     width, height: of the picture in pixels.
     """
@@ -47,7 +47,7 @@ class Camera:
 
 
 def fit_camera(points: Floats, *, height: int, azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Camera:
-    """Return the camera that just has all points (P, 3) in its picture; the picture is as wide as they ask for.
+    """Return the camera framed on points (P, 3), with the aspect ratio of their projection.
 
     azimuth, elevation: degrees of the eye around the motion, from +Z toward +X, and above the horizon.
     """
@@ -80,7 +80,7 @@ def _axes(azimuth: float, elevation: float) -> Floats:
 
 
 def _fit(across: Floats, back: Floats, slope: float) -> tuple[float, float]:
-    """Where the eye has to be, sideways and backward, so that two planes through it hold all points between them."""
+    """Eye position, sideways and backward, of the tightest field of view, two planes through the eye, on all points."""
     most = float((across + slope * back).max())
     least = float((-across + slope * back).max())
     return (most - least) / 2, (most + least) / (2 * slope)

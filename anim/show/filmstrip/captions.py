@@ -1,4 +1,4 @@
-"""Text on pictures: titles, names of rows, times, and the legend of colors."""
+"""Text in pictures: titles, row names, times, and the color legend."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Image = NDArray[np.uint8]
 
 
 def write(image: Image, text: str, x: int, y: int, *, color: tuple[int, int, int] = INK) -> None:
-    """Write a text with the top left of its line at x, y pixels; what lies outside the image is cut off."""
+    """Write a text with the top left of its line at x, y pixels, clipped to the image."""
     from PIL import Image as Pillow
     from PIL import ImageDraw
 
@@ -39,15 +39,15 @@ def write(image: Image, text: str, x: int, y: int, *, color: tuple[int, int, int
 
 
 def width(text: str) -> int:
-    """Return how many pixels a text takes across."""
+    """Return the width of a text in pixels."""
     length: float = _font().getlength(_printable(text))
     return math.ceil(length)
 
 
 def wrap_text(text: str, pixels: int) -> list[str]:
-    """Return a text in lines of at most `pixels` across, broken behind spaces and marks where there are any near.
+    """Return a text in lines of at most `pixels`, broken after spaces and punctuation if possible.
 
-    wrapped("Dualwield_Melee_Attack_Chop", 120) → ["Dualwield_Melee_", "Attack_Chop"]
+    wrap_text("Dualwield_Melee_Attack_Chop", 120) → ["Dualwield_Melee_", "Attack_Chop"]
     """
     lines = []
     while width(text) > pixels and len(text) > 1:
@@ -60,12 +60,12 @@ def wrap_text(text: str, pixels: int) -> list[str]:
 
 
 def header_width(title: str, legend: str) -> int:
-    """Return how many pixels a title takes with a legend beside it."""
+    """Return the width in pixels of a title and a legend."""
     return width(title) + (width(legend) + BAR[0] + SPACE if legend else 0)
 
 
 def write_header(image: Image, title: str, legend: str, *, left: int, top: int) -> None:
-    """Write a title at the top left, and at the top right what the far end of the heat's colors means."""
+    """Write a title at the top left, and the legend of the heat map at the top right."""
     write(image, title, left, top)
     if not legend:
         return
@@ -78,7 +78,7 @@ def write_header(image: Image, title: str, legend: str, *, left: int, top: int) 
 
 
 def length(meters: float) -> str:
-    """Return a length in a unit that suits it, in ASCII."""
+    """Return a length with a suitable unit, in ASCII."""
     for unit, factor in (("m", 1.0), ("cm", 1e2), ("mm", 1e3)):
         if meters * factor >= 1 or unit == "mm":
             return f"{meters * factor:.3g} {unit}"
@@ -87,7 +87,7 @@ def length(meters: float) -> str:
 
 @cache
 def _font() -> FreeTypeFont:
-    """The font that Pillow brings along: the same on every machine. Letters it lacks are boxes."""
+    """Font included in Pillow, the same on every machine. Missing glyphs are boxes."""
     from PIL import ImageFont
 
     found = ImageFont.load_default(FONT_SIZE)
@@ -96,5 +96,5 @@ def _font() -> FreeTypeFont:
 
 
 def _printable(text: str) -> str:
-    """The text in one line: what is no letter (line breaks, halves of surrogate pairs) becomes "?"."""
+    """Text in one line: unprintable characters (line breaks, lone surrogates) become "?"."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -1,4 +1,4 @@
-"""What a filmstrip shows: clips of a file by skinning method, or a cache, at chosen times."""
+"""Contents of a filmstrip: clips of a file by skinning method, or a cache, at chosen times."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from anim.show.filmstrip.surface import Surface
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
-AROUND = 48  # frames of the whole motion that the camera is framed on
+AROUND = 48  # frames of the whole motion for the framing of the camera
 MAX_FRAMES = 3000
-THICKER = 1.9  # times as wide as the sticks that go into files
-WIDEST = 1.5  # times the middle one: links to helpers far away don't hide the others
+THICKER = 1.9  # width relative to the sticks in files
+WIDEST = 1.5  # relative to the median width, so that links to distant helper joints don't hide others
 
 
 @dataclass(frozen=True, slots=True)
 class FrameSelection:
-    """Which frames: at these times; or `count` of them evenly spaced; or `fps` a second. From `begin` to `end` s.
+    """Selection of frames: at given times, or `count` evenly spaced, or `fps` per second, from `begin` to `end` s.
 
     begin, end: None for the clip's own.
     """
@@ -46,7 +46,7 @@ class FrameSelection:
     end: float | None = None
 
     def check(self, start: float, end: float) -> None:
-        """Raise RangeError for a wanted time outside all motions, which go from `start` to `end` s."""
+        """Raise RangeError for a requested time outside all motions, which range from `start` to `end` s."""
         for time in self.at:
             if not start - SAME <= time <= end + SAME:
                 raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
@@ -62,9 +62,9 @@ class FrameSelection:
         return first, last
 
     def times(self, start: float, end: float) -> Floats:
-        """Return times (F,) s of a motion from `start` to `end`; of those in `at` none where it has none of them.
+        """Return times (F,) s of a motion from `start` to `end`; of those in `at` the ones within it, maybe none.
 
-        Raises RangeError where nothing of the motion is chosen otherwise, or more than a picture can hold.
+        Raises RangeError if the selection is empty otherwise, or exceeds the greatest number of frames.
         """
         if self.at:
             at = np.unique(np.array(self.at, np.float64))
@@ -80,10 +80,10 @@ class FrameSelection:
 
 @dataclass(frozen=True, slots=True)
 class FilmstripClip:
-    """One motion. clip: its index in the file, −1 for none. name, method: what it is, or empty.
+    """One motion. clip: its index in the file, −1 for none. name, method: for captions, or empty.
 
-    cache: its chosen frames; path: some frames of all of it. colors: (T, 3) linear, of the faces. surface: materials
-    that multiply them, or None. body: (V,) vertices that a skin moves, or None where that is unknown.
+    cache: its chosen frames; path: some frames of the whole motion. colors: (T, 3) linear, of the faces. surface:
+    materials that multiply them, or None. body: (V,) skinned vertices, or None if unknown.
     """
 
     clip: int
@@ -107,12 +107,12 @@ def of_document(
     resolve: Resolve | None = None,
     note: Callable[[str], None] = lambda _: None,
 ) -> list[FilmstripClip]:
-    """Return a shot for each clip by number and each skinning method; without clips one of the rest pose.
+    """Return the motion of each clip index and skinning method; without clips the rest pose.
 
     nodes: only meshes on these; None for all. A file without a mesh is shown as sticks from joint to joint.
-    textures: show base color textures, vertex colors and alpha. resolve: gives the bytes of a file beside the input by
-    its relative path, for images; None where there is no such place. note: called with what can't be shown.
-    Raises NotFoundError for a file without anything.
+    textures: show base color textures, vertex colors and alpha. resolve: gives the bytes of a companion file by its
+    relative path, for images; None for input without a folder. note: called with notes on unsupported content.
+    Raises NotFoundError for a file without meshes and joints.
     """
     for name in methods:
         if name not in SKINNING_METHODS:
@@ -148,7 +148,7 @@ def of_document(
 
 
 def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
-    """Return one shot of a cache. Raises NotFoundError where it has no faces."""
+    """Return the motion of a cache. Raises NotFoundError if it has no faces."""
     if not len(cache.faces):
         raise NotFoundError("has no faces to draw", help="put the rest mesh beside it: NAME-rest.ply")
     cache = up_axis.to_up_axis(cache, "y")
@@ -162,11 +162,11 @@ def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
 def build_strips(
     shots: Sequence[FilmstripClip], *, heated: bool = False, followed: bool | None = None
 ) -> tuple[list[Strip], Extent]:
-    """Return the rows of a filmstrip, and what its camera has to hold.
+    """Return the rows of a filmstrip, and the extent for its camera.
 
-    heated: color how far vertices are from where the clip's first method has them; from the rest pose where there is
-    one method only. Raises NotFoundError where there is no rest pose.
-    followed: whether the camera goes with the figure; None for where it leaves its place by more than its own size.
+    heated: color distances of vertices from the clip's first method, or from the rest pose for a single method. Raises
+    NotFoundError if there is no rest pose.
+    followed: whether the camera follows the figure; None to follow one that travels by more than its own size.
     """
     several_clips = len({shot.clip for shot in shots}) > 1
     found: list[Strip] = []
@@ -206,7 +206,7 @@ def build_strips(
 def _distances(
     shot: FilmstripClip, positions: AnyArray, reference: AnyArray, alone: bool, is_first: bool
 ) -> Floats | None:
-    """Distances (F, V) m from the clip's first method, or from the rest pose of what is alone."""
+    """Distances (F, V) m from the clip's first method, or of a single method from the rest pose."""
     if not alone:
         return None if is_first else heat_map.distances(positions, reference)
     if shot.cache.rest is None:
@@ -215,7 +215,7 @@ def _distances(
 
 
 def _body(scene: Scene, cache: VertexCache) -> Bools:
-    """Vertices (V,) of meshes with a skin."""
+    """Mask (V,) of skinned vertices."""
     skinned = {instance.node for instance in scene.instances if instance.skin is not None}
     body = np.zeros(cache.vertex_count, bool)
     for part in cache.parts:
@@ -224,7 +224,7 @@ def _body(scene: Scene, cache: VertexCache) -> Bools:
 
 
 def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
-    """The scene with the chosen meshes, or with sticks on its joints where it has no faces."""
+    """The scene with the chosen meshes, or with sticks on its joints if it has no faces."""
     if nodes is not None:
         scene = replace(scene, instances=tuple(each for each in scene.instances if each.node in nodes))
         if not any(len(instance.mesh.faces) for instance in scene.instances):
@@ -243,7 +243,7 @@ def _thicker(mesh: Mesh) -> Mesh:
     """Sticks of 24 corners (start, ring, ring, end, ring, ring, …) with wider rings, for small pictures."""
     bodies = mesh.positions.reshape(-1, 24, 3).copy()
     ring = np.array([1, 2, 4, 5, 7, 8, 10, 11, 13, 14, 16, 17, 19, 20, 22, 23])
-    middle = (bodies[:, [1]] + bodies[:, [13]]) / 2  # corners of the ring that face each other
+    middle = (bodies[:, [1]] + bodies[:, [13]]) / 2  # opposite corners of the ring
     radius = np.linalg.norm(bodies[:, [1]] - middle, axis=-1, keepdims=True)
     wanted = THICKER * np.minimum(radius, WIDEST * np.median(radius))
     bodies[:, ring] = middle + wanted / radius * (bodies[:, ring] - middle)
@@ -251,13 +251,13 @@ def _thicker(mesh: Mesh) -> Mesh:
 
 
 def _ends(skeleton: Skeleton) -> frozenset[int]:
-    """Nodes that only mark where their parent's stick ends: those without children."""
+    """Nodes that only mark the end of their parent's stick: those without children."""
     parents = set(skeleton.parents.tolist())
     return frozenset(i for i in range(len(skeleton)) if i not in parents and skeleton.parents[i] >= 0)
 
 
 def _factors(document: Document) -> list[tuple[float, float, float]]:
-    """Base colors of the materials; white where a texture says more, so that parts get colors of their own."""
+    """Base colors of the materials; white for textured ones, so that parts get palette colors."""
     materials = read_materials(document)
     return [(1.0, 1.0, 1.0) if each.texture is not None else each.factor[:3] for each in materials]
 
@@ -267,7 +267,7 @@ def _spread(start: float, end: float) -> Floats:
 
 
 def _places(cache: VertexCache, way: root_path.RootPath | None) -> AnyArray:
-    """Vertices of all frames as the camera sees them, of frames farther apart where they are too many."""
+    """Vertices of all frames relative to the camera; of long motions a subset of frames."""
     step = max(1, -(-cache.frame_count * cache.vertex_count // MAX_POINTS))
     found = []
     for chunk in cache.chunks():

@@ -1,4 +1,4 @@
-"""A motion as a filmstrip: clips one under the other, a row for each method, one camera, times under the frames."""
+"""Filmstrip of motions: a row for each clip and method, one camera, times below the frames."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ HEIGHT = 240  # pixels of a frame
 GAP, EDGE = 3, 12  # pixels between frames, and around all
 APART = 10  # pixels between clips
 WIDEST_TIME = "00.00 s"
-MAX_WIDTH = 1600  # pixels, beyond which frames go into another line
+MAX_WIDTH = 1600  # pixels; frames beyond are wrapped into another line
 PAPER = (247, 247, 248)  # sRGB
-INSIDE = 8  # pixels from the left of a frame to words in it
-LOW = captions.LINE + 3  # pixels from the bottom of a frame to the top of words in it
-MAX_POINTS = 2_000_000  # that the camera is framed on
-CLOSED = 1e-3  # share of the way that vertices move; a loop ends this near its start
+INSIDE = 8  # pixels from the left of a frame to its text
+LOW = captions.LINE + 3  # pixels from the bottom of a frame to the top of its text
+MAX_POINTS = 2_000_000  # for the framing of the camera
+CLOSED = 1e-3  # of the displacement of vertices; the greatest loop gap of a closed loop
 MAX_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
 
 Image = NDArray[np.uint8]
@@ -36,12 +36,12 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """One strip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
+    """Row of a filmstrip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
 
-    distances: (F, V) m, shown as heat instead of the colors where there are any. label: of the row, "dqs".
-    heading: over all rows of one clip, "Walk". way: for a camera that goes with the figure.
-    rest: (V, 3) m, what a checker is fixed to. surface: materials; None for plain colors.
-    clip: which one it is of; rows of one clip stand together.
+    distances: (F, V) m, shown as a heat map instead of the colors, or None. label: of the row, "dqs".
+    heading: above all rows of one clip, "Walk". way: root path for a camera that follows the figure.
+    rest: (V, 3) m, to which a checker is fixed. surface: materials; None for plain colors.
+    clip: index of its clip; rows of one clip are consecutive.
     """
 
     label: str
@@ -59,7 +59,7 @@ class Strip:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """points: (P, 3) m, all places that the motion reaches: what the camera is framed on. ground: its height in m."""
+    """Extent of a motion. points: (P, 3) m, for the framing of the camera. ground: its height in m."""
 
     points: AnyArray
     ground: float
@@ -67,7 +67,7 @@ class Extent:
 
 @dataclass(frozen=True, slots=True)
 class ViewOptions:
-    """height: pixels of a frame. azimuth, elevation: degrees of the camera around the motion.
+    """Options of the view. height: pixels of a frame. azimuth, elevation: degrees of the camera around the motion.
 
     checker: squares fixed to the rest pose on the surface. wire: the edges of its triangles.
     """
@@ -80,9 +80,9 @@ class ViewOptions:
 
 
 def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: ViewOptions = ViewOptions()) -> Image:
-    """Return the picture (H, W, 3) of all rows under each other, clip by clip; long ones go on in a next line.
+    """Return the picture (H, W, 3) of all rows, clip by clip; long rows are wrapped.
 
-    Rows of one clip stay together in each line, so that methods are compared at the same times.
+    Rows of one clip are wrapped together, so that methods can be compared at the same times.
     Raises RangeError for pictures of less than 32 or more than 4096 pixels.
     """
     scenery = _scenery(extent, look)
@@ -113,13 +113,13 @@ def _clip_height(clip: Sequence[Strip], per_line: int, height: int) -> int:
 
 
 def _grid(width: int) -> tuple[int, int]:
-    """How many frames go into a line at most, and pixels from one to the next: words under them need room too."""
+    """Greatest number of frames per line, and pixels from one to the next, wide enough for captions."""
     pitch = max(width, captions.width(WIDEST_TIME)) + GAP
     return max((MAX_WIDTH - 2 * EDGE) // pitch, 1), pitch
 
 
 def _columns(row: Strip, per_line: int) -> tuple[int, int]:
-    """How many frames a line has, all about equally many, and how many lines there are."""
+    """Number of frames per line, about equal for all, and number of lines."""
     lines = -(-len(row.times) // per_line)
     return -(-len(row.times) // lines), lines
 
@@ -137,7 +137,7 @@ def _draw_row(
     per_line: int,
     size: tuple[int, int],
 ) -> None:
-    """Draw the frames of a row, which is the first number of `place` among the second, under `top` pixels."""
+    """Draw the frames of a row below `top` pixels. place: index of the row, and number of rows."""
     (r, count), (width, height) = place, size
     columns, pitch = _columns(row, per_line)[0], _grid(width)[1]
     for f, frame in enumerate(frames):
@@ -152,7 +152,7 @@ def _draw_row(
 
 
 def _render_moment(row: Strip, frame: int) -> list[str]:
-    """When a frame is, and how far the figure has got where the camera goes with it: "0.50 s", "1.2 m"."""
+    """Captions of a frame: time and, if the camera follows the figure, traveled distance: "0.50 s", "1.2 m"."""
     time = f"{row.times[frame]:.2f} s"
     if row.root_path is None:
         return [time]
@@ -162,9 +162,9 @@ def _render_moment(row: Strip, frame: int) -> list[str]:
 def animate_frames(
     rows: Sequence[Strip], extent: Extent, *, title: str = "", look: ViewOptions = ViewOptions()
 ) -> Iterator[Image]:
-    """Yield the pictures (H, W, 3) of an endless film, the rows side by side; the shorter ones wait for the longest.
+    """Yield the frames (H, W, 3) of a looped film, with rows side by side; shorter ones repeat their last frame.
 
-    Raises RangeError for more pixels than memory should hold.
+    Raises RangeError for more than MAX_PIXELS.
     """
     scenery = _scenery(extent, look)
     width, height = scenery.camera.width, scenery.camera.height
@@ -192,7 +192,7 @@ def animate_frames(
 
 
 def film_times(rows: Sequence[Strip]) -> Floats:
-    """Return the times (F,) s of a film of the rows: of the longest; a loop's last frame, which is its first, is none.
+    """Return the times (F,) s of a film of the rows: of the longest one; for loops without the duplicate last frame.
 
     At least one row.
     """
@@ -201,7 +201,7 @@ def film_times(rows: Sequence[Strip]) -> Floats:
 
 
 def _repeat_last(frames: Iterator[Image]) -> Iterator[Image]:
-    """The frames, and the last of them for good."""
+    """The frames, followed by endless repetitions of the last one."""
     last = next(frames)
     yield last
     for last in frames:
@@ -211,7 +211,7 @@ def _repeat_last(frames: Iterator[Image]) -> Iterator[Image]:
 
 
 def _is_loop(rows: Sequence[Strip]) -> bool:
-    """Whether all rows end together, where they began, and are elsewhere between."""
+    """Whether all rows are moving closed loops of equal duration."""
     if len({len(row.times) for row in rows}) > 1:
         return False
     for row in rows:
@@ -280,5 +280,5 @@ def _header_width(rows: Sequence[Strip], title: str) -> int:
 
 
 def _legend(rows: Sequence[Strip]) -> str:
-    """What the heat's far end means, empty without heat."""
+    """Legend of the greatest distance of the heat map, empty without one."""
     return captions.length(_max_extent(rows)) if any(row.distances is not None for row in rows) else ""

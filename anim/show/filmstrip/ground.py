@@ -1,4 +1,4 @@
-"""Height of the ground under a motion: under the feet, not under what hands hold."""
+"""Ground height of a motion: below the feet, ignoring held props."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from anim.arrays import AnyArray, Bools, Floats
 from anim.model import VertexCache
 
-FOOT_FRACTION = 0.05  # of the height at rest; vertices that rest lower than this are feet, wheels, hems
-FLOOR_FRACTION = 0.05  # of the height; feet that lift or sink less than this stand at 0, the floor of the scene
+FOOT_FRACTION = 0.05  # of the rest pose's height; vertices below this are feet, wheels, hems
+FLOOR_FRACTION = 0.05  # of the height; feet within this distance of 0 are on the floor of the scene
 
 
 def ground_height(cache: VertexCache, body: Bools | None = None) -> float:
-    """Return the height in m of the ground of a motion: the lowest place of its feet, 0 where that is near.
+    """Return the ground height in m of a motion: the lowest position of its feet, 0 if that is near.
 
-    Feet are the vertices that are lowest in the rest pose, in the first frame where there is none: they need no names,
-    and a sword that is pointed at the ground is none of them.
-    body: (V,) vertices that can be feet; those that a skin moves, where props are meshes of their own.
+    Feet are the lowest vertices of the rest pose, or of the first frame without one: this needs no names, and a sword
+    that points at the ground is excluded.
+    body: (V,) vertices that can be feet: the skinned ones, if props are separate meshes.
     """
     rest = cache.rest if cache.rest is not None else next(iter(cache.chunks())).positions[0]
     chosen = np.ones(len(rest), bool) if body is None or not body.any() else body

@@ -1,4 +1,4 @@
-"""Distances as colors: from none, a light gray, over yellow and red to a dark violet at the farthest."""
+"""Heat map of distances: light gray at 0, yellow, red, dark violet at the greatest."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STOPS = np.array(
 
 
 def colors(shares: Floats) -> Floats:
-    """Return linear colors (..., 3) of shares (...) from 0 to 1."""
+    """Return linear colors (..., 3) of fractions (...) from 0 to 1."""
     place = np.clip(shares, 0, 1) * (len(STOPS) - 1)
     low = np.minimum(place.astype(np.int64), len(STOPS) - 2)
     part = (place - low)[..., None]
@@ -29,11 +29,11 @@ def colors(shares: Floats) -> Floats:
 
 
 def heat_colors(distances: AnyArray, faces: Ints, most: float) -> Floats:
-    """Return colors (T, 3) of faces from distances (V,) at their corners; `most` is the farthest."""
+    """Return colors (T, 3) of faces from distances (V,) at their corners, scaled to the greatest, `most`."""
     return colors(distances[faces].mean(axis=1) / most if most > 0 else np.zeros(len(faces)))
 
 
 def distances(positions: AnyArray, others: AnyArray) -> Floats:
-    """Return how far vertices (..., V, 3) are from others, in m."""
+    """Return the distances (..., V) in m between vertices (..., V, 3) and others."""
     found: Floats = np.linalg.norm(positions.astype(np.float64) - others, axis=-1)
     return found

@@ -1,4 +1,4 @@
-"""Pictures → bytes of a file, by Pillow: PNG, and animated WebP, GIF and APNG."""
+"""Encoding of pictures by Pillow: PNG, and animated WebP, GIF and APNG."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from anim.show.filmstrip.filmstrip import Image
 COMPRESSION_LEVEL = 9
 WEBP_QUALITY = 88
 MOVING = {".webp": "WEBP", ".gif": "GIF", ".apng": "PNG"}
-TICK = {".gif": 10}  # ms in which times are kept, else 1
-MAX_FPS = {".gif": 50}  # quicker ones are shown at a tenth of the speed by most programs, else 1000
+TICK = {".gif": 10}  # ms, resolution of frame durations; 1 for other formats
+MAX_FPS = {".gif": 50}  # most programs play faster files at a tenth of the speed; 1000 for other formats
 
 
 def png(image: Image) -> bytes:
-    """Return a PNG of 8 bits a channel that says its colors are sRGB. image: (H, W, 3)."""
+    """Return a PNG of 8 bits per channel, tagged as sRGB. image: (H, W, 3)."""
     from PIL import Image as Pillow
     from PIL.PngImagePlugin import PngInfo
 
@@ -31,9 +31,9 @@ def png(image: Image) -> bytes:
 
 
 def moving(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
-    """Return the bytes of an endless film. ending: one of MOVING.
+    """Return the bytes of a looped film. ending: one of MOVING.
 
-    Raises RangeError for more frames per second than the format has.
+    Raises RangeError for more frames per second than the format supports.
     """
     from PIL import Image as Pillow
 
@@ -54,7 +54,7 @@ def moving(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
 
 
 def durations(frames: int, ending: str, *, fps: float) -> list[int]:
-    """Return how long each frame is shown, in ms that the format can keep: together as long as they should."""
+    """Return frame durations in ms, multiples of the format's resolution with the exact sum."""
     tick = TICK.get(ending, 1)
     ends = np.rint(np.arange(frames + 1) * 1000 / fps / tick) * tick
     return [round(each) for each in np.diff(ends).tolist()]

@@ -1,4 +1,4 @@
-"""Document + baked mesh → Surface: materials of the file on the faces of a cache."""
+"""Materials of a document on the faces of a baked cache."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from anim.show.filmstrip.texture import Texels, TextureSampler, decode_image
 
 
 class MaterialReader:
-    """Reads the surfaces of one document; images are decoded once. note: called with what can't be shown, a line each.
+    """Reader of the surfaces of a document; images are decoded once. note: called with notes, a line each.
 
-    resolve: gives the bytes of a file beside the input by its relative path; None where there is no such place.
+    resolve: gives the bytes of a companion file by its relative path; None for input without a folder.
     """
 
     def __init__(self, document: Document, resolve: Resolve | None, note: Callable[[str], None]) -> None:
@@ -36,7 +36,7 @@ class MaterialReader:
         self._read: dict[str, VertexColors] = {}
 
     def surface(self, cache: VertexCache) -> tuple[Surface, Floats]:
-        """Return the materials on a cache of the document, and the base colors (T, 3) that they multiply."""
+        """Return the materials on a cache of the document, and the base colors (T, 3) multiplied by them."""
         texcoords, colors = np.zeros((cache.vertex_count, 2)), np.ones((cache.vertex_count, 4))
         coating = np.zeros(len(cache.faces), np.int64)
         coatings: list[Coating] = []
@@ -55,7 +55,7 @@ class MaterialReader:
         return surface, palette.face_colors(cache, factors, painted)
 
     def _primitives(self, cache: VertexCache) -> Iterator[tuple[MeshPart, VertexColors]]:
-        """Yield the parts of a cache, and their colors; empty primitives are no parts."""
+        """Yield the parts of a cache with their colors, without empty primitives."""
         nodes, meshes = json_array(self._document.json, "nodes"), json_array(self._document.json, "meshes")
         for node, parts in groupby(cache.parts, key=lambda part: part.node):
             mesh = nodes[node]["mesh"]
@@ -100,5 +100,5 @@ class MaterialReader:
 
 
 def _is_black(colors: Floats) -> bool:
-    """Whether most vertices are black: a game's masks, which would hide the texture."""
+    """Whether most vertices are black: masks of a game, which would hide the texture."""
     return bool(np.median(colors[:, :3].max(axis=1)) == 0)

@@ -1,4 +1,4 @@
-"""Colors of faces for pictures: what the materials say, else muted ones by part."""
+"""Colors of faces: from materials, otherwise from a muted palette by part."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from anim.arrays import Floats
 from anim.model import VertexCache
 
 CLAY = (0.60, 0.36, 0.18)
-# Linear light: one for each part, again from the start where there are more.
+# Linear light: one for each part, repeated cyclically.
 PARTS = (
     CLAY,
     (0.22, 0.33, 0.42),
@@ -20,15 +20,15 @@ PARTS = (
     (0.62, 0.50, 0.30),
     (0.34, 0.26, 0.38),
 )
-DARKEST = 0.035  # so that black things still have a shape
+DARKEST = 0.035  # so that shading of black parts stays visible
 
 
 def face_colors(
     cache: VertexCache, materials: Sequence[tuple[float, float, float]] = (), painted: Collection[int] = ()
 ) -> Floats:
-    """Return a linear color (T, 3) for every face. materials: base colors by number; white counts as none.
+    """Return linear colors (T, 3) of all faces. materials: base colors by index; white counts as none.
 
-    painted: parts by number whose color is multiplied by a texture or vertex colors, so that it stays as it is.
+    painted: indices of parts with a texture or vertex colors, which keep their base color.
     """
     colors = np.tile(np.array(CLAY), (len(cache.faces), 1))
     for i, part in enumerate(cache.parts):

@@ -1,4 +1,4 @@
-"""Which triangle is seen at which pixel: a z-buffer in numpy, no GPU and no driver."""
+"""Rasterization of triangles by a z-buffer in numpy, without GPU and driver."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 
 BATCH = 1 << 20  # rows of triangles drawn at a time
-EDGE = 1e-9  # pixels by which a middle may lie outside, so that neighbors leave no gap
-FLAT = 1e-12  # pixels²; triangles of less area are seen from the side
+EDGE = 1e-9  # pixels; tolerance of the inside test, to avoid gaps between adjacent triangles
+FLAT = 1e-12  # pixels²; triangles of less area are seen edge-on
 
 # (triangles (S,), columns (S,), rows (S,) of pixels) → whether each is drawn there (S,)
 AlphaTest: TypeAlias = Callable[[Ints, Ints, Ints], Bools]
 
 
 def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: AlphaTest | None = None) -> Ints:
-    """Return the number of the nearest triangle at each pixel (height, width), −1 where there is none.
+    """Return the index of the nearest triangle at each pixel (height, width), −1 for none.
 
     corners: (T, 3, 3): x and y in pixels from the top left, and nearness, which grows toward the eye and is linear on
-    the screen (1 / distance). A pixel belongs to a triangle that its middle lies in. Both sides are seen.
-    alpha_test: says which pixels of which triangles are drawn; None for all.
-    Each triangle is cut into rows, each row into the pixels between its edges; the nearest of all stays.
+    the screen (1 / distance). A triangle covers the pixels with their center inside. Both sides are visible.
+    alpha_test: mask of the drawn pixels of triangles; None for all.
+    Each triangle is split into rows, each row into the pixels between its edges.
     """
     seen: Ints = np.full(height * width, -1, np.int64)
     nearest = np.full(height * width, -np.inf)
@@ -46,7 +46,7 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
 
 
 def _planes(corners: Floats) -> tuple[Floats, Floats, Ints]:
-    """Coefficients of x, y and 1 for the three barycentric shares (T, 3, 3) and nearness (T, 3) of usable triangles."""
+    """Coefficients of x, y and 1 for barycentric weights (T, 3, 3) and nearness (T, 3) of non-degenerate triangles."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     chosen: Ints = np.flatnonzero((np.abs(area) > FLAT) & np.isfinite(corners).all(axis=(1, 2)))

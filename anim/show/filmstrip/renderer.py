@@ -1,4 +1,4 @@
-"""One frame of a mesh as a picture: flat-shaded over a ground with a grid and a soft shadow."""
+"""Rendering of one frame of a mesh: flat-shaded on a ground with a grid and a soft shadow."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ if TYPE_CHECKING:
     from anim.show.filmstrip.surface import Surface
 
 SAMPLES = 3  # across and down in each pixel
-BAND = 1 << 22  # samples that are drawn at a time, about: they take 60 bytes each
+BAND = 1 << 22  # samples drawn at a time, approximately: 60 bytes each
 # Linear light.
 SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
 LINE, SHADOW = np.array([0.52, 0.53, 0.55]), np.array([0.16, 0.17, 0.20])
 KEY, FILL = np.array([-0.45, 0.80, 0.55]), np.array([0.75, 0.25, 0.30])  # directions of lights, in the camera's frame
 KEY_LIGHT, FILL_LIGHT, FROM_ABOVE, FROM_BELOW = 0.72, 0.14, 0.34, 0.16
-SHADOW_DEPTH = 0.55  # how much light the ground loses
-STEEPER = 0.5  # the light that casts shadows falls this much more from above, so that they stay near
+SHADOW_DEPTH = 0.55  # fraction of light removed by the shadow
+STEEPER = 0.5  # added to the height of the shadow light's direction, for short shadows
 SHADOW_BLUR = 0.012  # of the picture's height
 CELLS = 7.0  # squares of the grid across the motion, about
 GRID_DEPTH = 0.38
-DOT, DOT_DEPTH = 0.08, 0.75  # radius of marks on the ground as a share of their spacing, and how dark they are
-FADED = 1.6  # radii of the motion from its middle, where the ground's grid ends
+DOT, DOT_DEPTH = 0.08, 0.75  # radius of marks on the ground relative to their spacing, and their darkness
+FADED = 1.6  # radii of the motion; distance from its center at which the grid ends
 GAMMA = 2.2
 
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """What all frames share. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m.
+    """View shared by all frames. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m.
 
-    background: (H, W, 3) linear, with the grid as it lies while the camera stands where it began.
+    background: (H, W, 3) linear, with the grid for the initial camera position.
     """
 
     camera: Camera
@@ -49,7 +49,7 @@ class SceneView:
 
 
 def setup_view(camera: Camera, points: Floats, ground: float) -> SceneView:
-    """Return the stage for a motion whose vertices are `points` (P, 3), with the ground at a height in m."""
+    """Return the view of a motion with the vertices `points` (P, 3), and the ground at a height in m."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low[[0, 2]] + high[[0, 2]]) / 2
     reach = max(float(np.linalg.norm(high - low)) / 2, 1e-6)
@@ -57,7 +57,7 @@ def setup_view(camera: Camera, points: Floats, ground: float) -> SceneView:
 
 
 def moved(stage: SceneView, place: Floats, milestones: Floats) -> SceneView:
-    """Return the stage under a camera that has gone to a place (2,), m in x and z from where it began.
+    """Return the view of a camera translated by `place` (2,), m in x and z from its initial position.
 
     milestones: (M, 2) m of x and z, shown as dots on the ground.
     """
@@ -72,7 +72,7 @@ def moved(stage: SceneView, place: Floats, milestones: Floats) -> SceneView:
 
 
 def mark_spacing(stage: SceneView) -> float:
-    """Return the distance in m from mark to mark along the way of a figure that the camera goes with."""
+    """Return the distance in m between marks along the root path of a followed figure."""
     return nice(stage.reach / 2)
 
 
@@ -88,8 +88,8 @@ def render_frame(
 ) -> Floats:
     """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces.
 
-    marks: drawn on the surface, each over the one before. surface: materials, whose alpha always counts; their colors
-    multiply the others where the picture is `tinted`.
+    marks: drawn on the surface, in order. surface: materials; their alpha always applies, their colors multiply the
+    others if `tinted`.
     """
     camera = stage.camera
     corners = _enlarge(camera, SAMPLES).project(positions)[faces]
@@ -110,7 +110,7 @@ def _paint(
     *,
     tinted: bool,
 ) -> None:
-    """Draw triangles over some rows (H, W, 3) of a picture. painted: (T + 1, 3), their colors, and what none has."""
+    """Draw triangles into some rows (H, W, 3) of a picture. painted: (T + 1, 3), colors of triangles and of none."""
     height, width = band.shape[:2]
     alpha_test = None if surface is None else surface.alpha_test(corners)
     seen = visible_faces(corners, width=width * SAMPLES, height=height * SAMPLES, alpha_test=alpha_test)
@@ -130,7 +130,7 @@ def _paint(
 
 
 def to_srgb(image: Floats) -> np.ndarray:
-    """Return linear light as bytes of sRGB (nearly: one power for all)."""
+    """Return linear light as sRGB bytes, approximated by a single power."""
     return np.rint(np.clip(image, 0, 1) ** (1 / GAMMA) * 255).astype(np.uint8)
 
 
@@ -139,7 +139,7 @@ def _enlarge(camera: Camera, times: int) -> Camera:
 
 
 def _shade(camera: Camera, positions: Floats, faces: Ints) -> Floats:
-    """Light (T,) that each face sends to the eye: a key and a fill light, and the sky above."""
+    """Brightness (T,) of faces: key light, fill light and sky."""
     a, b, c = (positions[faces[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -171,7 +171,7 @@ def _background(camera: Camera, ground: float, middle: Floats, reach: float, pla
 
 
 def _draw_dot(image: Floats, camera: Camera, spot: Floats, radius: float) -> None:
-    """Draw a disc that lies on the ground: an ellipse, as flat as the eye is low."""
+    """Draw a disc on the ground, projected as an ellipse."""
     x, y, near = camera.project(spot)
     across = max(radius * near * camera.scale, 1.2)
     away = (camera.eye - spot) / np.linalg.norm(camera.eye - spot)
@@ -184,7 +184,7 @@ def _draw_dot(image: Floats, camera: Camera, spot: Floats, radius: float) -> Non
 
 
 def _lines(places: Floats, step: float) -> Floats:
-    """How much (H, W) of a pixel is line of a grid of this step, less where lines come too near each other."""
+    """Coverage (H, W) of pixels by lines of a grid of this step, faded for dense lines."""
     spread = np.abs(np.gradient(places, axis=0)) + np.abs(np.gradient(places, axis=1)) + 1e-9
     off = np.abs((places / step + 0.5) % 1 - 0.5) * step
     found: Floats = np.clip(1 - off / (0.75 * spread), 0, 1) * np.clip(step / (6 * spread), 0, 1)
@@ -192,13 +192,13 @@ def _lines(places: Floats, step: float) -> Floats:
 
 
 def nice(length: float) -> float:
-    """Return the nearest of 1, 2, 5, 10, … below a length."""
+    """Return the greatest of …, 1, 2, 5, 10, … below a length."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(factor * power for factor in (1, 2, 5) if factor * power <= length * 1.0001)
 
 
 def _shadow(stage: SceneView, positions: Floats, faces: Ints, surface: Surface | None) -> Floats:
-    """How dark (H, W) the ground is: what the key light finds in its way, made soft."""
+    """Darkness (H, W) of the ground: the blurred shadow of the key light."""
     camera = stage.camera
     if camera.eye[1] <= stage.ground:
         return np.zeros((camera.height, camera.width))

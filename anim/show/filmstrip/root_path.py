@@ -1,4 +1,4 @@
-"""The way that a figure travels over the ground, for a camera that goes with it."""
+"""Root path of a figure on the ground, for a camera that follows it."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import VertexCache
 
-FAR = 1.0  # diagonals of the figure; a camera that stands still has what travels less in its picture
-SMOOTH = 5  # frames before and after that a place is the mean of: the camera doesn't sway with each step
+FAR = 1.0  # diagonals of the figure; a static camera covers shorter paths
+SMOOTH = 5  # frames before and after in the running mean, so that the camera doesn't sway with each step
 
 
 @dataclass(frozen=True, slots=True)
 class RootPath:
-    """Where a figure has got to. times: (P,) s. places: (P, 2) m of x and z, from where it began: start (2,)."""
+    """Root path. times: (P,) s. places: (P, 2) m of x and z, relative to its start (2,)."""
 
     times: Floats
     places: Floats
     start: Floats
 
     def at(self, times: float | Floats) -> Floats:
-        """Return the places (..., 2) m at times (...) s."""
+        """Return the positions (..., 2) m at times (...) s."""
         return np.stack([np.interp(times, self.times, self.places[:, i]) for i in (0, 1)], axis=-1)
 
     def distance(self, times: float | Floats) -> Floats:
-        """Return how far along its way (...) m the figure is at times (...) s."""
+        """Return the arc length (...) m of the path at times (...) s."""
         return np.asarray(np.interp(times, self.times, self._distances()))
 
     def milestones(self, time: float, spacing: float) -> Floats:
-        """Return the places (M, 2), m in x and z, every `spacing` m along the way, up to that at `time`."""
+        """Return the positions (M, 2), m in x and z, every `spacing` m along the path up to `time`."""
         along = np.arange(0, float(self.distance(time)) + 1e-9, spacing)
         distances = self._distances()
         places = np.stack([np.interp(along, distances, self.places[:, i]) for i in (0, 1)], axis=-1)
@@ -42,12 +42,12 @@ class RootPath:
 
 
 def travels(cache: VertexCache) -> bool:
-    """Return whether a figure leaves the place where it began by more than its own size."""
+    """Return whether a figure travels from its start by more than its own size."""
     return _extent(_centers(cache)) > FAR * _size(cache)
 
 
 def root_path(cache: VertexCache) -> RootPath:
-    """Return the way of the middle of all vertices over the ground, without the sway of single steps."""
+    """Return the path of the mean of all vertices on the ground, smoothed over steps."""
     centers = _centers(cache)
     smooth = _smoothed(centers)
     return RootPath(cache.times, smooth - smooth[0], smooth[0])
@@ -70,7 +70,7 @@ def _extent(places: Floats) -> float:
 
 
 def _smoothed(places: Floats) -> Floats:
-    """A running mean (P, 2) that keeps both ends, and straight ways as they are."""
+    """Running mean (P, 2) that preserves both ends and straight lines."""
     half = min(SMOOTH, len(places) - 1)
     before, after = 2 * places[0] - places[half:0:-1], 2 * places[-1] - places[-2 : -half - 2 : -1]
     padded = np.concatenate((before, places, after))

@@ -1,4 +1,4 @@
-"""Materials of a mesh as they are drawn: base color textures, vertex colors and alpha at samples of a picture."""
+"""Materials of a mesh for drawing: base color textures, vertex colors and alpha at samples of a picture."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from anim.show.filmstrip.surface_pattern import barycentric
 from anim.show.filmstrip.texture import TextureSampler
 
 SAMPLES_AT_A_TIME = 1 << 18
-COVERAGE = (np.array([[0, 7, 3], [6, 5, 2], [4, 1, 8]]) + 0.5) / 9  # alpha that each of 3 × 3 samples asks for
-OPAQUE = -1.0  # a cutoff that every alpha passes
+COVERAGE = (np.array([[0, 7, 3], [6, 5, 2], [4, 1, 8]]) + 0.5) / 9  # least alpha of each of 3 × 3 samples
+OPAQUE = -1.0  # cutoff below every alpha
 
 
 @dataclass(frozen=True, slots=True)
 class Coating:
-    """What a primitive is drawn with. texture: None for none. alpha: of the base color factor.
+    """Material of a primitive. texture: None for none. alpha: of the base color factor.
 
-    cutoff: alpha below which nothing is drawn; OPAQUE for no test; None for blending, by the samples of a pixel that
-    are drawn (alpha to coverage), which needs no order of faces.
+    cutoff: alpha below which nothing is drawn; OPAQUE for no test; None for blending by the number of drawn samples per
+    pixel (alpha to coverage), which needs no order of faces.
     """
 
     texture: TextureSampler | None = None
@@ -35,7 +35,7 @@ class Coating:
 class Surface:
     """Materials on the faces (T, 3) of a mesh. coating: (T,) index of each face's coating among `coatings`.
 
-    texcoords: (V, 2). colors: (V, 4) linear RGBA of vertices, or None where all are white.
+    texcoords: (V, 2). colors: (V, 4) linear RGBA of vertices, or None if all are white.
     """
 
     faces: Ints
@@ -52,12 +52,12 @@ class Surface:
         return self._rgba(corners, samples, faces)[:, :3]
 
     def alpha_test(self, corners: Floats) -> AlphaTest | None:
-        """Return the test of which faces are drawn where, None for all everywhere. corners: (T, 3, 3) on the screen."""
+        """Return the alpha test of faces, None if all are opaque. corners: (T, 3, 3) on the screen."""
         is_opaque = all(each.cutoff == OPAQUE for each in self.coatings)
         return None if is_opaque else partial(self._is_drawn, corners)
 
     def _is_drawn(self, corners: Floats, faces: Ints, x: Ints, y: Ints) -> Bools:
-        """Return whether faces (S,) are drawn at the samples in columns x and rows y, by their alpha.
+        """Return a mask (S,) of the faces (S,) drawn at the samples in columns x and rows y, by their alpha.
 
         corners: (T, 3, 3) of all faces on the screen, in the same unit as x and y.
         """
@@ -72,7 +72,7 @@ class Surface:
         return result
 
     def _rgba(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
-        """Texture times vertex colors, with the whole alpha."""
+        """Product of texture and vertex colors, with the full alpha."""
         result = np.empty((len(faces), 4))
         for start in range(0, len(faces), SAMPLES_AT_A_TIME):
             some = slice(start, start + SAMPLES_AT_A_TIME)
@@ -96,6 +96,6 @@ class Surface:
 
 
 def _groups(indices: Ints) -> Iterator[tuple[int, Ints]]:
-    """Yield each index that is there, and where it is."""
+    """Yield each distinct index with its positions."""
     for i in np.unique(indices).tolist():
         yield i, np.flatnonzero(indices == i)

@@ -1,4 +1,4 @@
-"""Marks on a surface that show stretch and twist: a checker fixed to the rest pose, and the edges of faces."""
+"""Surface patterns that show stretch and twist: a checker fixed to the rest pose, and edges of faces."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from anim.arrays import AnyArray, Floats, Ints
 CELLS = 10.0  # squares of a checker along the diagonal of the rest pose
 DARK, LIGHT = 0.38, 1.12  # brightness of the squares
 EDGE, EDGE_WIDTH = 0.30, 1.1  # brightness of edges, and their width in pixels
-FINE, COARSE = 3.0, 9.0  # pixels; edges of triangles smaller than the first hardly show, from the second on they do
-MIN_CELLS = 0.12  # share of the darkness that is left to edges of the smallest triangles
+FINE, COARSE = 3.0, 9.0  # pixels of triangle size: edges fade in from the first to the second
+MIN_CELLS = 0.12  # relative darkness of the edges of the smallest triangles
 
 # (corners (S, 3, 3) on the screen, x and y of samples (S, 2), their faces (S,)) → brightness (S,)
 SurfaceMarks = Callable[[Floats, Floats, Ints], Floats]
@@ -21,18 +21,18 @@ SurfaceMarks = Callable[[Floats, Floats, Ints], Floats]
 
 @dataclass(frozen=True, slots=True)
 class Checker:
-    """Cubes of the rest pose, dark and light in turn, carried along by the surface.
+    """Checker of cubes in the rest pose, dark and light alternately, deformed with the surface.
 
-    rest: (V, 3) m. faces: (T, 3). It needs no texture coordinates: what is straight at rest shows how it bends.
+    rest: (V, 3) m. faces: (T, 3). It needs no texture coordinates: lines straight at rest show the bending.
     """
 
     rest: AnyArray
     faces: Ints
 
     def brightness(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
-        """Return the brightness (S,) at samples (S, 2) in pixels of the faces (S,) whose corners (S, 3, 3) are given.
+        """Return the brightness (S,) at samples (S, 2) in pixels of faces (S,) with corners (S, 3, 3).
 
-        Shares of the corners are those in space: on the screen, weighted by nearness.
+        Barycentric weights are perspective-correct: those on the screen, weighted by nearness.
         """
         shares = barycentric(corners, samples) * corners[:, :, 2]
         shares /= shares.sum(axis=1, keepdims=True)
@@ -45,9 +45,9 @@ class Checker:
 
 
 def edges(corners: Floats, samples: Floats, faces: Ints) -> Floats:
-    """Return the brightness (S,) at samples (S, 2) in pixels: dark near an edge of the face whose corners are given.
+    """Return the brightness (S,) at samples (S, 2) in pixels, dark near the edges of faces with the given corners.
 
-    Edges that lie close together are fainter, so that the surface stays visible.
+    Dense edges are fainter, so that the surface stays visible.
     """
     heights = _heights(corners)
     is_near = (barycentric(corners, samples) * heights).min(axis=1) < EDGE_WIDTH / 2
@@ -56,7 +56,7 @@ def edges(corners: Floats, samples: Floats, faces: Ints) -> Floats:
 
 
 def barycentric(corners: Floats, samples: Floats) -> Floats:
-    """Return the shares (S, 3) on the screen of triangles' corners (S, 3, ≥ 2) at samples (S, 2)."""
+    """Return the barycentric weights (S, 3) on the screen of corners (S, 3, ≥ 2) at samples (S, 2)."""
     a, b, c = (corners[:, i, :2] for i in range(3))
     area = _cross(b - a, c - a)
     two, three = _cross(samples - a, c - a) / area, _cross(b - a, samples - a) / area
@@ -64,7 +64,7 @@ def barycentric(corners: Floats, samples: Floats) -> Floats:
 
 
 def _heights(corners: Floats) -> Floats:
-    """Heights (S, 3) in pixels of triangles over the edge opposite each corner: a share times it is a distance."""
+    """Heights (S, 3) in pixels over the edge opposite each corner; times the weight they are distances to the edge."""
     flat = corners[..., :2]
     area = np.abs(_cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]))
     opposite = np.linalg.norm(flat[:, [2, 0, 1]] - flat[:, [1, 2, 0]], axis=2)

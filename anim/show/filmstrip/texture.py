@@ -1,4 +1,4 @@
-"""Textures: images decoded by Pillow, sampled at texture coordinates as glTF says (origin at the top left)."""
+"""Textures: images decoded by Pillow, sampled at glTF texture coordinates (origin at the top left)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from anim.show.filmstrip.renderer import GAMMA
 
 MAX_SIDE = 1024  # texels; larger images are reduced, since frames have a few hundred pixels
 MAX_PIXELS = 1 << 27  # of an image in the file
-BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # what decoders raise
+BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # errors of decoders
 FORMATS = ("PNG", "JPEG", "WEBP")
-LINEAR = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)  # light of each byte: what `encoded` turns back
+LINEAR = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)  # linear light of each byte, the inverse of `to_srgb`
 
 Texels = NDArray[np.uint8]
 
@@ -57,7 +57,7 @@ class TextureSampler:
 def decode_image(data: Bytes) -> Texels:
     """Return the texels (H, W, 4) of an encoded image, reduced where it has more than 1024 on a side.
 
-    Raises FormatError for what is no PNG, JPEG or WebP, is damaged, or has more pixels than memory should hold.
+    Raises FormatError for data that is no PNG, JPEG or WebP, damaged images, and more than MAX_PIXELS.
     """
     from PIL import Image
 
@@ -78,7 +78,7 @@ def decode_image(data: Bytes) -> Texels:
 
 
 def _wrap(index: Ints, size: int, mode: int) -> Ints:
-    """Indices within 0 … size − 1; a mode that glTF doesn't know repeats."""
+    """Indices within 0 … size − 1; an unknown mode counts as REPEAT."""
     if mode == CLAMP_TO_EDGE:
         return np.clip(index, 0, size - 1)
     if mode == MIRRORED_REPEAT:

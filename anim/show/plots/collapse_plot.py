@@ -1,4 +1,4 @@
-"""Collapse over time: what linear blending leaves of the radius, and what each method leaves of the volume."""
+"""Plot of collapse over time: index of linear blending, and volume by each method."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ PADDING_FRACTION = 0.04  # of the scale, above and below
 
 
 def collapse_plot(found: Sequence[CollapseFinding], *, title: str, kind: str) -> bytes:
-    """Return a picture of clips as the bytes of a PNG or SVG file: of many the worst twelve, in their own order,
-    without those of one frame.
+    """Return a plot of the worst twelve clips as the bytes of a PNG or SVG file.
 
-    Each: the least collapse index of its mesh over time, the pinched part below 0.7 filled; below it the enclosed
-    volume by each method against bind pose, where the mesh is closed. All clips and methods have one scale.
+    Clips are in their own order; those of one frame are left out. Each: the least collapse index of its mesh over
+    time, filled below 0.7; below it, for closed meshes, the enclosed volume by each method relative to bind pose. All
+    clips and methods have one scale.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
     moving = [each for each in found if len(each.mesh.times) > 1] or list(found)
@@ -75,7 +75,7 @@ def _draw_index(axes: Axes, times: Floats, indices: Floats) -> None:
 
 
 def _volume_range(found: Sequence[CollapseFinding]) -> tuple[float, float]:
-    """The least and the greatest volume of any clip by any method, % of bind pose."""
+    """Least and greatest volume of all clips and methods, % of bind pose."""
     volumes = [each.volume for one in found for each in one.mesh.methods if each.volume is not None]
     low = min((100 * float(each.min()) for each in volumes), default=100.0)
     high = max((100 * float(each.max()) for each in volumes), default=100.0)

@@ -1,4 +1,4 @@
-"""Eases side by side: how far, how fast, and the tempo as a row of dots at even times."""
+"""Plot of easings side by side: value, speed, and dots at even times."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from anim.show.plots.panels import plain
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LIMIT = 24  # eases on one sheet
+LIMIT = 24  # easings on one sheet
 PER_ROW = 4
 POINTS = 301
 DOTS = 20  # steps of even time
-STEEPEST = 8.0  # slopes above are cut off: circ and upright Béziers have infinite ones
+STEEPEST = 8.0  # slopes above are clipped: circ and vertical Béziers have infinite ones
 TOLERANCE = 1e-3  # of the range, for the number of cubics
 
 CELL, MARGIN, LEFT, RIGHT = 2.75, 0.25, 0.5, 0.2  # inches
@@ -45,12 +45,12 @@ TOP, HEAD, CURVE, SLOPE, TEMPO, CAPTION, FOOT = 0.15, 0.54, 2.05, 0.8, 0.3, 0.42
 
 
 def easing_plot(easings: Sequence[Easing], *, kind: str) -> bytes:
-    """Return a picture of eases as the bytes of a PNG or SVG file, four in a row, all to one scale.
+    """Return a plot of easings as the bytes of a PNG or SVG file, four per row, all to one scale.
 
-    Each: f(t), its overshoot filled; f′(t), 1 being constant speed; and a row of dots, one for each twentieth of the
-    time, at the share of the way: close where it is slow, wide where it is fast. The line below the name says what it
-    takes in glTF: the exact cubics, STEP keys, or how many cubics come within 0.1 % of it.
-    Raises RangeError for none or over 24 eases or another kind, UnsupportedError where matplotlib is not installed.
+    Each: f(t), its overshoot filled; f′(t), 1 being constant speed; and a row of dots at f of every twentieth of the
+    time: dense for slow motion, sparse for fast. The line below the name gives its form in glTF: exact cubics, STEP
+    keys, or the number of cubics within 0.1 %.
+    Raises RangeError for none or over 24 easings or another kind, UnsupportedError where matplotlib is not installed.
     """
     if not 0 < len(easings) <= LIMIT:
         raise RangeError(f"{len(easings)} eases are to be drawn (expected 1 to {LIMIT})")
@@ -71,7 +71,7 @@ def easing_plot(easings: Sequence[Easing], *, kind: str) -> bytes:
 
 
 def _slopes(easing: Easing) -> Floats:
-    """f′ (POINTS,), NaN at breaks, cut off at STEEPEST; the bounds are what a STEP or a kink allows to draw."""
+    """f′ (POINTS,), NaN at breakpoints, clipped at STEEPEST."""
     u = _grid(easing)
     slope = np.clip(easing.derivative(u), -STEEPEST, STEEPEST)
     slope[np.isin(u, _jumps(easing))] = np.nan
@@ -79,14 +79,14 @@ def _slopes(easing: Easing) -> Floats:
 
 
 def _grid(easing: Easing) -> Floats:
-    """Shares of the time to draw at: even ones, and both sides of every breakpoint."""
+    """Time fractions of the drawn points: even ones, and both sides of every breakpoint."""
     breaks = np.array(easing.breakpoints)
     sides = np.concatenate((breaks - 1e-9, breaks, breaks + 1e-9))
     return np.sort(np.concatenate((np.linspace(0, 1, POINTS), sides)))
 
 
 def _jumps(easing: Easing) -> list[float]:
-    """Where the value jumps."""
+    """Time fractions of jumps of the value."""
     pieces = easing.exact or ()
     inner = [b.start for a, b in pairwise(pieces) if a.value1 != b.value0]
     return inner + ([1.0] if pieces and pieces[-1].value1 != 1 else [])
@@ -98,7 +98,7 @@ class _Cell:
         self.x, self.y, self.across = x + LEFT, y, CELL - LEFT - RIGHT
 
     def draw(self, values: tuple[float, float], slopes: Floats, steep: tuple[float, float]) -> None:
-        """Draw one ease; values, steep: what all eases on the sheet need of the y axes."""
+        """Draw one easing; values, steep: ranges of the y axes of all easings on the sheet."""
         y = self.y
         size = min(TITLE, TITLE * (CELL - LEFT) / (text_width(self.easing.name, TITLE, "bold") + 0.1))
         self.sheet.text(self.x, y + 0.2, self.easing.name, fontsize=size, weight="bold")
@@ -161,7 +161,7 @@ class _Cell:
         return f"at most {format_number(most)}×" if most < 1e3 else "vertical in places"
 
     def _tempo(self, axes: Axes, values: tuple[float, float]) -> None:
-        """Dots on a track with marks at 0 and 1; values: the least and the greatest of all eases on the sheet."""
+        """Draw dots on a line with marks at 0 and 1; values: the least and the greatest of all easings on the sheet."""
         places = self.easing.value(np.linspace(0, 1, DOTS + 1))
         axes.grid(visible=False)
         axes.spines["bottom"].set_visible(False)
@@ -177,7 +177,7 @@ class _Cell:
 
 
 def _over(axes: Axes, u: float, value: float, words: str, points: int) -> None:
-    """How far an overshoot goes, written `points` above its top or below its foot."""
+    """Write the size of an overshoot `points` above its top or below its bottom."""
     side = {"xytext": (0, points), "textcoords": "offset points", "ha": "center", "annotation_clip": False}
     axes.annotate(words, (u, value), color=COLORS[0], fontsize=SMALL, **side)
 

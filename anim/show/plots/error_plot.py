@@ -1,4 +1,4 @@
-"""How far two versions of clips are apart over time, and by which joints."""
+"""Plot of the error between two versions of clips over time, by joint."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ MARGIN, LEFT, RIGHT, MOST_RIGHT, HEAD, FOOT = 0.2, 0.62, 0.3, 1.5, 0.36, 0.46
 TOP, TALL = 0.62, 1.7
 THIN = 1.1
 TOP_PADDING_FRACTION = 0.06  # of the scale, above
-GAP = 0.12  # of the height, from name to name
-LONGEST = 22  # letters of a joint's name; the end of a longer one
-UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"))  # from so many m on
+GAP = 0.12  # of the height, between names
+LONGEST = 22  # letters of a joint's name; longer ones are cut to their end
+UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"))  # least value in m, factor, name
 
 
 def error_plot(
     profiles: Sequence[ErrorCurve], *, title: str, kind: str, limit: float | None = None, note: str = ""
 ) -> bytes:
-    """Return a picture of clips as the bytes of a PNG or SVG file, the first twelve that differ.
+    """Return a plot of the first twelve differing clips as the bytes of a PNG or SVG file.
 
-    Each: the largest distance of any vertex over time, filled, and over it that of the worst joints' own vertices, by
-    color, the names of the worst at the top.
-    limit: m, drawn as a line. note: words for the head of the sheet.
+    Each: the largest distance of any vertex over time, filled, and in color those of the worst joints' own vertices,
+    with the names of the worst at the top.
+    limit: m, drawn as a line. note: text for the head of the sheet.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
     shown = changed_tracks(profiles)[:LIMIT]
@@ -51,7 +51,7 @@ def error_plot(
 
 
 def changed_tracks(profiles: Sequence[ErrorCurve]) -> list[ErrorCurve]:
-    """Return those of clips that are apart at any time."""
+    """Return the error curves that are not 0 everywhere."""
     return [each for each in profiles if each.error.any()]
 
 
@@ -80,7 +80,7 @@ def _draw(axes: Axes, profile: ErrorCurve, names: Sequence[str], factor: float, 
     axes.set_xlim(*_span(times))
     axes.fill_between(times, error, color=HAIR, alpha=0.45, linewidth=0)
     axes.plot(times, error, color=INK, linewidth=0.8, marker="o" if len(times) == 1 else None)
-    for i in reversed(range(len(profile.joints))):  # the worst on top
+    for i in reversed(range(len(profile.joints))):  # the worst is drawn last
         axes.plot(times, factor * profile.joints[i].error, color=COLORS[i], linewidth=THIN)
         axes.annotate(
             names[i], (1, 1 - i * GAP), xycoords="axes fraction", xytext=(6, 0), textcoords="offset points",

@@ -1,7 +1,7 @@
-"""A sheet of panels, laid out in inches from its top left corner, and its bytes as PNG or SVG.
+"""Figure with panels, laid out in inches from its top left corner, and its bytes as PNG or SVG.
 
-One look for all pictures: ink on white, hairlines instead of boxes, words beside what they name, and colors that
-people with color-blind eyes tell apart (Okabe & Ito 2008), of which x, y, z get the usual red, green, blue.
+One style for all plots: ink on white, hairlines instead of boxes, labels next to their curves, and colors safe for
+color-blind viewers (Okabe & Ito 2008), with the usual red, green, blue for x, y, z.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _STYLE: dict[str, Any] = {
     "axes.linewidth": 0.6,
     "lines.solid_capstyle": "round",
     "lines.solid_joinstyle": "round",
-    "svg.fonttype": "none",  # text stays text: it can be searched, and is drawn in the reader's own sharpness
+    "svg.fonttype": "none",  # text stays text, searchable and sharp at any scale
     "svg.hashsalt": "gltf-anim",
     "path.simplify": True,
     "agg.path.chunksize": 0,
@@ -55,7 +55,7 @@ class Figure:
         self.figure = Figure(figsize=(width, height), dpi=DPI, facecolor=PAPER)
 
     def panel(self, x: float, y: float, width: float, height: float) -> Axes:
-        """Return new axes with hairlines at the ticks of y and nothing else; its top left corner lies at x, y."""
+        """Return new axes with hairlines at the ticks of y only; its top left corner is at x, y."""
         rect = (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height)
         axes = self.figure.add_axes(rect)
         axes.set_facecolor("none")
@@ -68,7 +68,7 @@ class Figure:
         return axes
 
     def text(self, x: float, y: float, words: str, **style: Any) -> float:
-        """Write words whose first baseline lies at x, y, and return their width in inches."""
+        """Write text with its first baseline at x, y, and return its width in inches."""
         style = {"fontsize": TEXT, "va": "baseline", "ha": "left", "parse_math": False, **style}
         self.figure.text(x / self.width, 1 - y / self.height, words, **style)
         return text_width(words, style["fontsize"], style.get("weight", "normal"))
@@ -82,7 +82,7 @@ class Figure:
         self.figure.add_artist(Line2D(across, down, **style))
 
     def render(self, kind: str) -> bytes:
-        """Return the figure as a file, the same bytes every time: no date, no program version, fixed names inside."""
+        """Return the figure as a file with reproducible bytes: no date, no program version, fixed identifiers."""
         out = io.BytesIO()
         metadata = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
         self.figure.savefig(out, format=kind, dpi=DPI, metadata=metadata, facecolor=PAPER)
@@ -91,7 +91,7 @@ class Figure:
 
 @contextmanager
 def style(kind: str) -> Iterator[None]:
-    """Draw inside in the house style, whatever the user's matplotlibrc says.
+    """Set the style of all plots inside, independent of the user's matplotlibrc.
 
     kind: "png" or "svg", RangeError for another. Raises UnsupportedError where matplotlib is not installed.
     """
@@ -108,7 +108,7 @@ def style(kind: str) -> Iterator[None]:
 
 
 def text_width(words: str, points: float, weight: str = "normal") -> float:
-    """Return how wide words are in the style's font, in inches."""
+    """Return the width of a text in the style's font, in inches."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
@@ -118,17 +118,17 @@ def text_width(words: str, points: float, weight: str = "normal") -> float:
 
 
 def format_number(number: float) -> str:
-    """Return a number with three digits, never in the form 1e+02: "0.0123", "12.3", "1230"."""
+    """Return a number with three digits, without exponent: "0.0123", "12.3", "1230"."""
     return f"{float(f'{number:.3g}'):.12f}".rstrip("0").rstrip(".").replace("-", "−")
 
 
 def separate_labels(places: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Return places moved apart to at least `gap`, as little as that takes, within low … high where they fit.
+    """Return positions moved apart by the least amount to distances of at least `gap`, within low … high if they fit.
 
-    spread([1, 1, 5], 2, 0, 9) → [0, 2, 5]
+    separate_labels([1, 1, 5], 2, 0, 9) → [0, 2, 5]
     """
     order = sorted(range(len(places)), key=lambda i: places[i])
-    groups: list[list[float]] = []  # middle of each group of labels that touch, and how many they are
+    groups: list[list[float]] = []  # center of each group of touching labels, and their number
     for i in order:
         groups.append([places[i], 1])
         while True:

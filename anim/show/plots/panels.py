@@ -1,4 +1,4 @@
-"""The panels of one track: values with keys and handles, angle, speed, and the difference of two files."""
+"""Panels of one track: values with keys and handles, angle, speed, and the difference of two files."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 LABEL = 8.0  # points
 BEHIND, PALE, THIN = 4.5, 0.25, 1.1  # width and opacity of a first file's lines, width of the second's
-COLORED = 6  # components in color; the others are a quiet background
-TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px from key to key, from which on there is room for marks
-FAR = 4.0  # times the widest range; values that stand further apart are drawn from their first key
+COLORED = 6  # components in color; the others are in the background
+TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px between keys, least values for each kind of mark
+FAR = 4.0  # times the widest range; values further apart are drawn relative to their first key
 GAP = 12.5  # px between names of components
 ROUND, ROUND_ANGLES = (1.0, 2.0, 2.5, 5.0, 10.0), (1.0, 1.5, 3.0, 4.5, 9.0, 10.0)  # steps of ticks
 DEGREES = 180 / math.pi
@@ -38,7 +38,7 @@ UNITS = ((1e6, "µm", 1e-4), (1e3, "mm", 5e-2))  # factor, name, and the length 
 
 
 def kinds(each: PlotTrack) -> list[str]:
-    """Return what a track is drawn as, from top to bottom: names of DRAW."""
+    """Return the panels of a track, from top to bottom: names of DRAW."""
     names = ["value"]
     if each.track.kind is ValueKind.ROTATION:
         names.append("angle" if each.view in (FROM_REST, COMPONENTS) else "lock")
@@ -50,17 +50,17 @@ def kinds(each: PlotTrack) -> list[str]:
 
 
 def labels(each: PlotTrack) -> list[str]:
-    """Return the names of the components that are drawn in color."""
+    """Return the names of the components drawn in color."""
     return [each.labels[c] for c in _colored(each)]
 
 
 def span(each: PlotTrack) -> tuple[float, float]:
-    """Return the first and last time that are drawn, in seconds: those of the clip."""
+    """Return the first and last drawn time, in seconds: those of the clip."""
     return (each.start, each.end) if each.end > each.start else (each.start - 0.5, each.start + 0.5)
 
 
 def time_axis(axes: Axes, each: PlotTrack, *, labeled: bool) -> None:
-    """Mark seconds below the last panel, with a fine tick for every frame where there is room."""
+    """Mark seconds below the last panel, with fine ticks for frames if they fit."""
     from matplotlib.ticker import FixedLocator, MaxNLocator
 
     low, high = span(each)
@@ -82,7 +82,7 @@ def time_axis(axes: Axes, each: PlotTrack, *, labeled: bool) -> None:
 
 
 def _value(axes: Axes, each: PlotTrack) -> str:
-    """The values: those of the second file over those of the first, keys and handles of the one on top."""
+    """Draw values: those of the second file over those of the first, with keys and handles of the topmost."""
     front = each.other or each.track
     curves = [_curve(each, track) for track in _tracks(each)]
     top = curves[-1]
@@ -110,7 +110,7 @@ def _angle(axes: Axes, each: PlotTrack) -> str:
 
 
 def _lock(axes: Axes, each: PlotTrack) -> str:
-    """How far an order of Euler angles is from gimbal lock, 90° at best; what is nearer than 5° is filled."""
+    """Draw the distance of an Euler order from gimbal lock, at most 90°, filled below 5°."""
     found = [gimbal_distance_line(track, order=each.view) for track in _tracks(each)]
     for i, line in enumerate(found):
         behind = len(found) > 1 and i == 0
@@ -150,7 +150,7 @@ def _difference(axes: Axes, each: PlotTrack) -> str:
 
 
 def _mark_lock(axes: Axes, each: PlotTrack) -> None:
-    """Shade the times at which Euler angles are near gimbal lock, with a line at the nearest."""
+    """Shade the times of Euler angles near gimbal lock, with a line at the nearest."""
     if not each.is_in_degrees or each.view == FROM_REST:
         return
     line = gimbal_distance_line(each.other or each.track, order=each.view)
@@ -181,7 +181,7 @@ def _tracks(each: PlotTrack) -> list[Track]:
 
 
 def _curve(each: PlotTrack, track: Track) -> RotationCurve:
-    """A track as numbers that are drawn."""
+    """A track as drawn values."""
     if each.is_in_degrees:
         return rotation_curve(track, view=each.view, rest=each.rest)
     risers = polylines.step_edges(track) if track.interpolation is Interpolation.STEP else None
@@ -189,13 +189,13 @@ def _curve(each: PlotTrack, track: Track) -> RotationCurve:
 
 
 def _colored(each: PlotTrack) -> list[int]:
-    """Numbers of the components that move most."""
+    """Indices of the components with the largest range."""
     ranges = np.ptp(_curve(each, each.track).keys, axis=0)
     return sorted(np.argsort(-ranges, kind="stable")[:COLORED].tolist())
 
 
 def _color(each: PlotTrack, component: int) -> str:
-    """Red, green and blue for turns about x, y and z; else the next color for each component that moves most."""
+    """Red, green and blue for rotations about x, y and z; else the next color for each component by range."""
     if each.is_in_degrees:
         is_twice = len({label[0] for label in each.labels}) < len(each.labels)
         return COLORS[component if is_twice else "xyz".index(each.labels[component].lower())]
@@ -204,7 +204,7 @@ def _color(each: PlotTrack, component: int) -> str:
 
 
 def _origin(each: PlotTrack, curve: RotationCurve) -> Floats:
-    """What values are drawn from (C,): 0, or the first key where curves far apart would hide how they move."""
+    """Origin (C,) of the drawn values: 0, or the first key if curves are too far apart to show their motion."""
     values = curve.keys
     width = float(np.ptp(values, axis=0).max())
     far = values.shape[1] <= COLORED and float(values.max() - values.min()) > FAR * width > 0
@@ -212,7 +212,7 @@ def _origin(each: PlotTrack, curve: RotationCurve) -> Floats:
 
 
 def _unit(each: PlotTrack, most: float) -> tuple[float, str]:
-    """Factor and name of the unit in which values up to `most` are easy to read."""
+    """Factor and name of a suitable unit for values up to `most`."""
     if each.track.kind is ValueKind.ROTATION:
         return DEGREES, "°"
     if each.track.path != "translation":
@@ -221,7 +221,7 @@ def _unit(each: PlotTrack, most: float) -> tuple[float, str]:
 
 
 def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **look: Any) -> None:
-    """Draw components, those in color over the others, and of those the ones that move least first."""
+    """Draw components in ascending order of range, those in color over the others."""
     if not len(line.times):
         return
     colored = _colored(each)
@@ -233,7 +233,7 @@ def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **l
 
 
 def _limits(axes: Axes, each: PlotTrack, curves: Sequence[RotationCurve], origin: Floats, *, handles: bool) -> None:
-    """Room for all values, and for handles as far as they don't press the curve flat."""
+    """Set the limits for all values, and for handles unless they would flatten the curve."""
     from matplotlib.ticker import MaxNLocator
 
     values = np.concatenate([part for curve in curves for part in (curve.line.values, curve.keys)]) - origin
@@ -255,7 +255,7 @@ def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:
     colored = _colored(each)
     times, values = polylines.handles(front)
     for c in colored:
-        pieces = np.concatenate(np.split(values[:, :, c], 2), axis=1)  # both keys and both handles of every piece
+        pieces = np.concatenate(np.split(values[:, :, c], 2), axis=1)  # both keys and both handles of every segment
         bent = np.tile(np.ptp(pieces, axis=1) > 0, 2)
         color, places = _color(each, c), values[bent, :, c] - origin[c]
         for t, v in zip(times[bent], places, strict=True):
@@ -265,7 +265,7 @@ def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:
 
 
 def _keys(axes: Axes, each: PlotTrack, times: Floats, values: Floats) -> None:
-    """Keys as dots, or as a row of fine ticks at the foot where they are too close."""
+    """Draw keys as dots, or as a row of fine ticks at the bottom if they are too dense."""
     spacing = _spacing(axes, each)
     if spacing < DOTS:
         low, high = axes.get_ylim()
@@ -280,7 +280,7 @@ def _keys(axes: Axes, each: PlotTrack, times: Floats, values: Floats) -> None:
 
 
 def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
-    """Names of components at the right ends of their curves; of equal ones the first is on top."""
+    """Write names of components at the right ends of their curves; of equal ones the first is on top."""
     colored = _colored(each)
     low, high = axes.get_ylim()
     gap = GAP / _size(axes)[1] * (high - low)
@@ -297,7 +297,7 @@ def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
 
 
 def _single(axes: Axes, found: list[Polyline], factor: float, color: str, *, steps: Sequence[float] = ROUND) -> None:
-    """One filled curve from 0 up, or two lines where a second file is compared."""
+    """Draw one filled curve from 0, or two lines for a comparison."""
     from matplotlib.ticker import MaxNLocator
 
     top = max((float(np.nanmax(line.values)) for line in found if len(line.times)), default=0.0) * factor
@@ -314,7 +314,7 @@ def _single(axes: Axes, found: list[Polyline], factor: float, color: str, *, ste
 
 
 def plain(axes: Axes) -> None:
-    """Label the ticks of y with as many decimals as they differ in, and no more."""
+    """Label the ticks of y with the least number of decimals."""
     from matplotlib.ticker import FuncFormatter
 
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value, axes)))
@@ -335,7 +335,7 @@ def _size(axes: Axes) -> tuple[float, float]:
 
 
 def _spacing(axes: Axes, each: PlotTrack) -> float:
-    """Pixels from key to key, the mean."""
+    """Mean interval between keys in pixels."""
     times = (each.other or each.track).times
     low, high = span(each)
     share = float(times[-1] - times[0]) / (high - low) if len(times) > 1 else 1.0

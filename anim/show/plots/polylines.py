@@ -1,4 +1,4 @@
-"""Tracks as lines to draw: values, speeds, handles, and where a line must break."""
+"""Polylines of tracks: values, speeds, handles, with breaks at jumps."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import derivatives
 from anim.sampling.track import sample
 
-POINTS = 800  # of a whole line: one for each pixel of a wide panel
+POINTS = 800  # of a line: one for each pixel of a wide panel
 MOST, LEAST = 40, 2  # points of one piece
 
 
 @dataclass(frozen=True, slots=True)
 class Polyline:
-    """Points (P,) s and (P, C); NaN where it breaks."""
+    """Points (P,) s and (P, C); NaN at breaks."""
 
     times: Floats
     values: Floats
@@ -36,7 +36,7 @@ def value_line(track: Track) -> Polyline:
 
 
 def step_edges(track: Track) -> Polyline:
-    """Return the jumps of a STEP track as upright lines, each its own piece."""
+    """Return the jumps of a STEP track as separate vertical lines."""
     keys = np.flatnonzero((np.diff(track.values, axis=0) != 0).any(axis=1)) + 1
     blank = np.full((len(keys), 1, track.values.shape[1]), np.nan)
     values = np.concatenate((track.values[keys - 1][:, None], track.values[keys][:, None], blank), axis=1)
@@ -71,7 +71,7 @@ def angle_line(track: Track, start: Floats) -> Polyline:
 
 
 def difference_line(track: Track, other: Track) -> Polyline:
-    """Return how far two tracks of one target are apart (P, 1), rad for rotations, over the time of both."""
+    """Return the difference (P, 1) of two tracks of one target, rad for rotations, over the time of both."""
     start, end = min(track.times[0], other.times[0]), max(track.times[-1], other.times[-1])
     keys = np.concatenate((track.times, other.times, np.linspace(start, end, POINTS)))
     times = unique_sorted(keys)
@@ -93,7 +93,7 @@ def handles(track: Track) -> tuple[Floats, Floats]:
 
 
 def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
-    """Times (P, m) within every piece, both ends included, and whether it is followed by a jump (P,)."""
+    """Times (P, m) within every segment, both ends included, and a mask (P,) of those followed by a jump."""
     steps = np.diff(track.times)
     real = np.asarray(steps > PAIR + 2 * FLOAT32 * track.times[1:])
     chosen = np.flatnonzero(real) if pieces_only else np.arange(len(steps))

@@ -1,4 +1,4 @@
-"""Animation bytes against error: the curve that a budget is chosen on."""
+"""Rate-distortion plot: animation bytes against error."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 8.4, 4.8  # inches
 LEFT, RIGHT, TOP, BOTTOM = 0.75, 0.45, 1.05, 0.62
 PADDING_PER_RANGE = 0.08  # of the logarithm of the bytes, on both sides
-ABOVE = 0.13, 0.17  # inches from the panel to the lowest words above it, and from line to line
-APART = 1.5  # inches; words of lines that are nearer go into different lines
+ABOVE = 0.13, 0.17  # inches from the panel to the lowest label above it, and between lines
+APART = 1.5  # inches; labels of marks nearer than this are on different lines
 TICKS = (1, 2, 3, 5)
-CLOSE = 4.0  # times the least; ticks of axes that go no further are evenly spaced
+CLOSE = 4.0  # times the least value; axes of smaller range have evenly spaced ticks
 UNITS = ((1e6, "MB"), (1e3, "kB"), (1, "B"))
 
 
 def rate_distortion_plot(
     sizes: Sequence[RatePoint], diagonal: float, *, title: str, kind: str, source: int | None = None
 ) -> bytes:
-    """Return a picture of bounds at sizes as the bytes of a PNG or SVG file: % of the diagonal over animation bytes.
+    """Return a plot of error bounds, % of the diagonal, over animation bytes as the bytes of a PNG or SVG file.
 
-    Both are logarithmic. Upright lines are the source, what is kept without loss (a bound of 0), and the smallest
-    size, below which no bound leads.
+    Both axes are logarithmic. Vertical lines mark the source, the lossless size (a bound of 0), and the smallest size
+    of any bound.
     source: animation bytes of the file before. Raises RangeError for another kind, UnsupportedError where matplotlib
     is not installed.
     """
@@ -48,7 +48,7 @@ def rate_distortion_plot(
 
 
 def _marks(sizes: Sequence[RatePoint], source: int | None) -> dict[str, int]:
-    """Animation bytes by what they are called."""
+    """Animation bytes by label."""
     marks = {} if source is None else {"source": source}
     without_loss = [each.animation for each in sizes if each.max_error == 0]
     if without_loss:
@@ -58,7 +58,7 @@ def _marks(sizes: Sequence[RatePoint], source: int | None) -> dict[str, int]:
 
 
 def _scale(axes: Axes, counts: Sequence[int]) -> None:
-    """A logarithmic axis of bytes that holds all counts, with round ticks."""
+    """Set a logarithmic axis of bytes for all counts, with round ticks."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = np.log10(max(min(counts), 1)), np.log10(max(max(counts), 1))
@@ -92,7 +92,7 @@ def _draw(axes: Axes, sizes: Sequence[RatePoint], diagonal: float) -> None:
 
 
 def _draw_marks(sheet: Figure, axes: Axes, marks: dict[str, int]) -> None:
-    """Upright lines with words above them, in two lines where they are near each other."""
+    """Draw vertical lines with labels above them, on two lines if they are near each other."""
     first, last = np.log10(axes.get_xlim())
     width = WIDTH - LEFT - RIGHT
     names = list(marks)

@@ -1,4 +1,4 @@
-"""Rotations as numbers that people read: degrees from rest, Euler angles, or the components of the quaternion."""
+"""Curves of rotations: degrees from the rest pose, Euler angles, or quaternion components."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from anim.show.plots import polylines
 from anim.show.plots.polylines import Polyline
 
 FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the twelve orders of Euler angles
-FLOAT32 = 1e-6  # rad from lock, below which rotations stored as float32 don't tell first and third angle apart
-NEAR_LOCK_DEG = 5.0  # rates of angles are 23 times amplified there
+FLOAT32 = 1e-6  # rad from lock, below which float32 rotations can't separate first and third angle
+NEAR_LOCK_DEG = 5.0  # rates of angles are amplified 23 times there
 FULL_TURN_DEG = 360.0
 
 
 @dataclass(frozen=True, slots=True)
 class RotationCurve:
-    """A track as it is drawn. line: its values over time. keys: (K, C). risers: the jumps of a STEP track, or None."""
+    """Drawn curve of a track. line: its values over time. keys: (K, C). risers: the jumps of a STEP track, or None."""
 
     line: Polyline
     keys: Floats
@@ -29,9 +29,9 @@ class RotationCurve:
 
 
 def rotation_curve(track: Track, *, view: str, rest: Floats) -> RotationCurve:
-    """Return a rotation track as degrees (…, 3): about the joint's own axes from rest, or as Euler angles.
+    """Return a rotation track in degrees (…, 3): about the joint's own axes from rest, or as Euler angles.
 
-    view: FROM_REST, or an order such as "ZXY", intrinsic. rest: (4,). Values run on without jumps of whole turns.
+    view: FROM_REST, or an order such as "ZXY", intrinsic. rest: (4,). Values are continuous, without jumps of 360°.
     """
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
         keys = degrees(track.values, view=view, rest=rest)
@@ -65,7 +65,7 @@ def gimbal_distance_line(track: Track, *, order: str) -> Polyline:
 
 
 def _continuous(q: Floats) -> Floats:
-    """Rotation vectors (P, 3) in degrees of unit quaternions (P, 4): past a half turn they go on and don't flip."""
+    """Rotation vectors (P, 3) in degrees of unit quaternions (P, 4), continuous beyond 180°."""
     vectors = np.degrees(quaternion.rotation_vector(quaternion.align_signs(q)))
     for i in range(1, len(vectors)):
         length = float(np.linalg.norm(vectors[i]))

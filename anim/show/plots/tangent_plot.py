@@ -1,4 +1,4 @@
-"""Curves through given values by several tangent rules: overshoot, speed and acceleration, and how smooth each is."""
+"""Plot of curves through given values by several tangent rules: overshoot, speed, acceleration, continuity."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from anim.show.plots.panels import plain
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LIMIT = 6  # rules in one picture, as many as there are colors that are easily told apart
-SEGMENT_POINTS = 129  # points of one piece
-FINE = 2049  # points of one piece where its extremum is looked for
-LENS = 0.04  # of the range; overshoots below are shown magnified too
-VISIBLE = 1e-6  # of the range; overshoots below are rounding
+LIMIT = 6  # rules in one plot, the number of distinguishable colors
+SEGMENT_POINTS = 129  # points of one segment
+FINE = 2049  # points of one segment in the search for its extremum
+LENS = 0.04  # of the range; smaller overshoots are also shown magnified
+VISIBLE = 1e-6  # of the range; smaller overshoots are rounding
 WITHOUT_RULE = {"linear": Interpolation.LINEAR, "step": Interpolation.STEP}
 
 CURVE, SPEED, ACROSS = 2.9, 0.85, 6.1  # inches
@@ -36,13 +36,13 @@ ENTRY = 0.56
 
 
 def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, kind: str) -> bytes:
-    """Return a picture of the curves that tangent rules put through keys, as the bytes of a PNG or SVG file.
+    """Return a plot of curves through keys by tangent rules, as the bytes of a PNG or SVG file.
 
-    Curve, speed and acceleration of every rule are drawn over each other; what lies outside the two keys around it is
-    filled. Beside them stands how smooth each is at its keys, and how far it overshoots.
+    Curve, speed and acceleration of all rules are drawn in common panels; values outside the range of the two
+    neighboring keys are filled. The legend lists continuity at keys and overshoot of each rule.
 
     times: (K,) s, increasing. values: (K,), K ≥ 2. rules: names as in TANGENTS, or "linear", "step"; at most six.
-    Raises RangeError for unknown rules, other numbers of them or another kind, ShapeError for arrays that are no keys,
+    Raises RangeError for unknown rules, too many or another kind, ShapeError for arrays that are not valid keys,
     UnsupportedError where matplotlib is not installed.
     """
     if not 0 < len(rules) <= LIMIT:
@@ -76,10 +76,10 @@ def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, k
 
 @dataclass(frozen=True, slots=True)
 class _Curve:
-    """One rule's curve: points (P,) s and (P, 3) value, speed, acceleration, NaN between pieces.
+    """One rule's curve: points (P,) s and (P, 3) value, speed, acceleration, NaN between segments.
 
-    bounds: the value, or the nearer key where it leaves the range of the two keys around (P,). worst: the greatest
-    such distance, signed. departure: how far it passes a key by. jumps: at the keys.
+    bounds: (P,) the value, clamped to the range of the two neighboring keys. worst: the greatest distance from that
+    range, signed. departure: greatest distance from a key. jumps: at the keys.
     """
 
     name: str
@@ -107,7 +107,7 @@ def _curve(times: Floats, values: Floats, name: str) -> _Curve:
 
 
 def _worst(track: Track, values: Floats) -> float:
-    """The greatest distance from the range of the two keys around, signed; 0 where it is rounding."""
+    """Greatest distance from the range of the two neighboring keys, signed; 0 for rounding errors."""
     k = np.repeat(np.arange(len(values) - 1), FINE)
     found = _points(track, k, np.tile(np.linspace(0, 1, FINE), len(values) - 1))[:, 0]
     off = found - np.clip(found, np.minimum(values[k], values[k + 1]), np.maximum(values[k], values[k + 1]))
@@ -116,7 +116,7 @@ def _worst(track: Track, values: Floats) -> float:
 
 
 def track_name(name: str) -> str:
-    """Return what a rule is called: with its arguments as it understood them."""
+    """Return the name of a rule with its parsed arguments."""
     return name if name in WITHOUT_RULE else table.parse(name).name
 
 
@@ -130,7 +130,7 @@ def _track(times: Floats, values: Floats, name: str) -> tuple[Track, float]:
 
 
 def _points(track: Track, k: arrays.Ints, u: Floats) -> Floats:
-    """Value, speed and acceleration (P, 3) at shares u (P,) of the pieces k (P,), of either end from inside."""
+    """Value, speed and acceleration (P, 3) at u (P,) of the segments k (P,), one-sided at their ends."""
     start, end = track.values[k, 0], track.values[k + 1, 0]
     h = track.times[k + 1] - track.times[k]
     none = np.zeros(len(k))
@@ -144,7 +144,7 @@ def _points(track: Track, k: arrays.Ints, u: Floats) -> Floats:
 
 
 def _broken(points: Floats) -> Floats:
-    """Points (P, ...) with a NaN after every piece."""
+    """Points (P, ...) with a NaN after every segment."""
     pieces = points.reshape(-1, SEGMENT_POINTS, *points.shape[1:])
     gap = np.full((len(pieces), 1, *points.shape[1:]), np.nan)
     return np.concatenate((pieces, gap), axis=1).reshape(-1, *points.shape[1:])
@@ -203,14 +203,14 @@ def _seconds(axes: Axes, times: Floats) -> None:
 
 
 def _entry(sheet: Figure, curve: _Curve, color: str, x: float, y: float) -> None:
-    """One rule in words: name, smoothness, overshoot."""
+    """Write the legend entry of a rule: name, continuity, overshoot."""
     sheet.line((x, x + 0.22), (y - 0.045, y - 0.045), color=color, linewidth=2.4)
     sheet.text(x + 0.32, y, curve.name, fontsize=TEXT + 1, weight="bold", color=color)
     sheet.text(x + 0.32, y + 0.18, f"{_smoothness(curve.jumps)}; {_overshoot(curve)}", fontsize=SMALL, color=SOFT)
 
 
 def _lens(sheet: Figure, curves: Sequence[_Curve], widest: _Curve, x: float, y: float) -> None:
-    """The place where one curve overshoots most, magnified."""
+    """Draw the largest overshoot magnified."""
     off = np.nan_to_num(widest.points[:, 0] - widest.bounds) * np.sign(widest.worst)
     at = int(off.argmax())
     inside = np.flatnonzero(off > 0)
@@ -233,7 +233,7 @@ def _lens(sheet: Figure, curves: Sequence[_Curve], widest: _Curve, x: float, y: 
 
 
 def _smoothness(jumps: KeyJumps) -> str:
-    """The grades of the interior keys: "C1 at every key", "C0 at 1 key, C1 at 3 keys"."""
+    """Continuity at the interior keys: "C1 at every key", "C0 at 1 key, C1 at 3 keys"."""
     counts = Counter(jumps.grades)
     if not counts:
         return "one piece"

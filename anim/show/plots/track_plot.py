@@ -1,4 +1,4 @@
-"""Tracks over time: their keys and tangents, their speed below, rotations as an angle too, a second file on top."""
+"""Plot of tracks over time: values with keys and tangents, speed, rotation angle, and a second file for comparison."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LIMIT = 12  # tracks on one sheet
 
 COLUMN, WIDE = 5.2, 9.2  # inches: a cell of a grid, and one alone
 MARGIN, LEFT, HEAD, CAPTION, FOOT = 0.2, 0.62, 0.36, 0.27, 0.5
-RIGHT, MOST_RIGHT = 0.5, 1.3  # for the names of components, which may take more
+RIGHT, MOST_RIGHT = 0.5, 1.3  # for the names of components, and its greatest value
 TALL, LOW = 1.75, 0.72  # heights of the first panel and of the others
 TOP, TOP_OF_TWO = 0.62, 0.84
 WORDS = {"translation": "translation, m", "rotation": "rotation, quaternion", "scale": "scale, factor", "pointer": ""}
@@ -22,7 +22,7 @@ WORDS = {"translation": "translation, m", "rotation": "rotation, quaternion", "s
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What the two files are called in a comparison."""
+    """Names of the two files of a comparison."""
 
     one: str
     other: str
@@ -31,16 +31,15 @@ class Names:
 def track_plot(
     shown: Sequence[PlotTrack], *, title: str, kind: str, names: Names | None = None, note: str = ""
 ) -> bytes:
-    """Return a picture of tracks as the bytes of a PNG or SVG file.
+    """Return a plot of tracks as the bytes of a PNG or SVG file.
 
     Each track has a panel of its values, with keys and CUBICSPLINE handles (Bézier points, a third of the way), and
     below it one of its speed. A rotation is drawn in degrees about the joint's axes from its rest pose, with the whole
     angle below; as Euler angles, with the distance to gimbal lock below; or as the components of its quaternion.
-    Where the values stand far apart and move little, they are drawn from their first key. Where tracks have a partner
-    in a second file, that is drawn over the first, and their difference at the bottom. Ticks mark frames where their
-    rate is known.
+    Values far apart with small ranges are drawn relative to their first key. A matching track of a second file is
+    drawn over the first, with their difference at the bottom. Ticks mark frames if their rate is known.
 
-    title, note: words for the head of the sheet. names: of the files, where two are compared.
+    title, note: text for the head of the sheet. names: of the files of a comparison.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
     with style(kind):
@@ -81,7 +80,7 @@ def _height(each: PlotTrack) -> float:
 
 
 def _cell(sheet: Figure, each: PlotTrack, x: float, y: float, width: float, slack: float, *, many_clips: bool) -> None:
-    """One track. slack: inches that a neighbor in the row needs more; the first panel takes them."""
+    """Draw one track. slack: inches added to the first panel, to match the height of a neighbor in the row."""
     left = x + LEFT
     names = max(text_width(label, panels.LABEL) for label in panels.labels(each))
     across = width - LEFT - min(max(RIGHT, names + 0.2), MOST_RIGHT)
@@ -109,7 +108,7 @@ def _title(sheet: Figure, each: PlotTrack, x: float, y: float, caption: str, *, 
 
 
 def _what(each: PlotTrack) -> str:
-    """What the values are: "rotation from rest, °", "Euler angles ZXY, °", "scale, factor"."""
+    """Quantity and unit of the values: "rotation from rest, °", "Euler angles ZXY, °", "scale, factor"."""
     if not each.is_in_degrees:
         return WORDS.get(each.track.path, each.track.path)
     return "rotation from rest, °" if each.view == FROM_REST else f"Euler angles {each.view}, °"
@@ -126,7 +125,7 @@ def _keys(each: PlotTrack) -> str:
 
 
 def _tail(name: str, most: int) -> str:
-    """The end of a long name, from a slash on where there is one."""
+    """The end of a long name, from a slash if there is one."""
     if len(name) <= most:
         return name
     end = name[1 - most :]

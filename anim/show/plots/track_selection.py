@@ -1,4 +1,4 @@
-"""Which tracks a picture shows, what they are called, and their partners in a second file."""
+"""Selection of tracks for plots, their names, and matching tracks of a second file."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from anim.operations.selection import Selection
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
-CONSTANT_TOLERANCE = 2e-5  # of the largest value; what moves less than this is rounding of the exporter
+CONSTANT_TOLERANCE = 2e-5  # of the largest value; smaller changes are rounding of the exporter
 COLORS = ("color", "Color", "ColorFactor", "emissiveFactor", "attenuationColor")  # ends of pointers that name colors
-SLOWEST = 8.0  # fps; fewer are the distances of a few poses and no frames
-REGULAR = 0.98  # share of keys on a rate's grid from which on frames are worth showing
+SLOWEST = 8.0  # fps; lower rates are intervals of single poses, not frames
+REGULAR = 0.98  # least fraction of keys on a frame grid for showing frames
 
 
 @dataclass(frozen=True, slots=True)
 class PlotTrack:
     """One track to draw.
 
-    clip, target: names. labels: of its components. start, end: of its clip, s. fps: of its clip, None where unknown.
-    other: the same track in a second file, if there is one to compare. view: what a rotation is drawn as: FROM_REST,
-    COMPONENTS, or an order of Euler angles. rest: (4,) rotation of the node at rest.
+    clip, target: names. labels: of its components. start, end: of its clip, s. fps: of its clip, None if unknown.
+    other: the matching track of a second file, or None. view: representation of a rotation: FROM_REST, COMPONENTS, or
+    an order of Euler angles. rest: (4,) rotation of the node at rest.
     """
 
     clip: str
@@ -53,13 +53,13 @@ class PlotTrack:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What tracks of two files are matched by."""
+        """Key by which tracks of two files are matched."""
         return self.clip, self.target, self.track.path
 
 
 @dataclass(frozen=True, slots=True)
 class TrackSelection:
-    """Tracks to draw, in the file's order, and how many more were meant: still ones, and those above the limit."""
+    """Tracks to draw, in the file's order, and the numbers of omitted ones: constant, and above the limit."""
 
     shown: tuple[PlotTrack, ...]
     still: int = 0
@@ -67,10 +67,10 @@ class TrackSelection:
 
 
 def select_tracks(document: Document, selection: Selection, *, limit: int, view: str = FROM_REST) -> TrackSelection:
-    """Return the selected tracks that move, at most `limit`; still ones only where nothing else is meant.
+    """Return the selected moving tracks, at most `limit`; constant ones only if no track moves.
 
-    view: what rotations are drawn as; with an order of Euler angles only rotations are selected.
-    Raises NotFoundError where no track is selected.
+    view: representation of rotations; with an order of Euler angles only rotations are selected.
+    Raises NotFoundError if no track is selected.
     """
     found = _select(document, selection, view)
     if view not in (FROM_REST, COMPONENTS):
@@ -82,9 +82,9 @@ def select_tracks(document: Document, selection: Selection, *, limit: int, view:
 
 
 def compare(chosen: TrackSelection, other: Document) -> tuple[TrackSelection, int]:
-    """Return the tracks with their partners in another file, by clip, node and path, and how many have none.
+    """Return the tracks with their matches in another file, by clip, node and path, and the number without a match.
 
-    Raises NotFoundError where none has.
+    Raises NotFoundError if there is no match.
     """
     partners = {each.key: each for each in reversed(_select(other, Selection(), FROM_REST))}
     shown = tuple(_with(each, partners.get(each.key)) for each in chosen.shown)
@@ -127,9 +127,9 @@ def _select(document: Document, selection: Selection, view: str) -> list[PlotTra
 
 
 def _align(track: Track) -> Track:
-    """The track with the signs of its quaternions such that curves don't jump where the rotation doesn't.
+    """The track with aligned quaternion signs, so that curves jump only with the rotation.
 
-    CUBICSPLINE stays: there a sign is part of the way.
+    CUBICSPLINE is unchanged: there signs affect the interpolation.
     """
     if track.kind is not ValueKind.ROTATION or track.interpolation is Interpolation.CUBICSPLINE:
         return track
@@ -170,14 +170,14 @@ def _labels(track: Track, targets: Mapping[str, Sequence[str]], view: str) -> tu
 
 
 def _euler_labels(order: str) -> tuple[str, ...]:
-    """The axes in their order, told apart where the first is the third again: ("Z", "X", "Y"), ("Z1", "X", "Z2")."""
+    """Axes in their order, numbered if the first equals the third: ("Z", "X", "Y"), ("Z1", "X", "Z2")."""
     if order[0] != order[2]:
         return tuple(order)
     return f"{order[0]}1", order[1], f"{order[2]}2"
 
 
 def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    """What morph weights are called, by the target's name or number; none for other tracks."""
+    """Names of morph weights, by the target's name or index; none for other tracks."""
     pointer = f"/nodes/{track.node}/weights" if track.path == "weights" else track.pointer or ""
     whole = re.fullmatch(r"(/(?:nodes|meshes)/\d+/weights)(?:/(\d+))?", pointer)
     if whole is None:
@@ -192,7 +192,7 @@ def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[s
 
 
 def _morph_targets(document: Document) -> dict[str, tuple[str, ...]]:
-    """Names of morph targets by the pointer to their weights, where a mesh has any in `extras.targetNames`."""
+    """Names of morph targets by the pointer to their weights, from `extras.targetNames` of meshes."""
     result: dict[str, tuple[str, ...]] = {}
     for i, mesh in enumerate(json_array(document.json, "meshes")):
         names = _target_names(mesh) or _target_names(mesh["primitives"][0])
@@ -212,13 +212,13 @@ def _target_names(owner: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _plot_track(name: str) -> str:
-    """A name as a picture can hold it: XML has no place for control characters."""
+    """A name without control characters, which are invalid in XML."""
     return "".join(c if c.isprintable() else "�" for c in name)
 
 
 def _shorten(names: Sequence[str]) -> tuple[str, ...]:
-    """Names without what all of them begin with, up to the last separator: "face_a", "face_b" → "a", "b"."""
-    first, last = min(names), max(names)  # what these two share, all share
+    """Names without their common prefix up to the last separator: "face_a", "face_b" → "a", "b"."""
+    first, last = min(names), max(names)  # their common prefix is common to all
     same = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
     cut = max(first[:same].rfind(mark) for mark in "_.-/ ") + 1
     short = [name[cut:] for name in names]
