@@ -82,7 +82,7 @@ def test_what_was_written_before_a_failure_is_said(
     run = call("bake", walk, tmp_path / "{clip}.npz", "--fps", "4")
     written = list(tmp_path.glob("*.npz"))
     assert run.code == 3
-    assert f"note: 1 clip written before: {written[0]}\n" in run.err
+    assert f"note: 1 file written before: {written[0]}\n" in run.err
 
 
 @pytest.mark.parametrize("name", ["-x.glb", "-out.gltf"])

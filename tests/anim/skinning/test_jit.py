@@ -24,7 +24,7 @@ assert "numba" not in sys.modules
 from anim.model import Clip
 from tests.anim.skinning.scenes import random_scene
 import numpy as np
-print(bake(random_scene(1), Clip("", ()), times=np.zeros(1)).whole().positions.tobytes().hex())
+print(bake(random_scene(1), Clip("", ()), times=np.zeros(1)).load_all().positions.tobytes().hex())
 """
 
 
