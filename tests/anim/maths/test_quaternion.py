@@ -18,7 +18,7 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def random(count: int, seed: int) -> Floats:
-    return np.asarray(Rotation.random(count, rng=seed).as_quat(), dtype=np.float64)
+    return np.asarray(Rotation.random(count, seed).as_quat(), dtype=np.float64)
 
 
 A, B = random(200, 1), random(200, 2)

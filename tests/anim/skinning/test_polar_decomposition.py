@@ -11,7 +11,7 @@ from anim.skinning.polar_decomposition import RIGID_TOLERANCE, decompose
 
 
 def test_rotations_are_those_of_scipy() -> None:
-    turns = np.concatenate([Rotation.random(200, rng=1).as_quat(), np.eye(4), -np.eye(4), np.full((1, 4), 0.5)])
+    turns = np.concatenate([Rotation.random(200, 1).as_quat(), np.eye(4), -np.eye(4), np.full((1, 4), 0.5)])
     parts = decompose(_moved(Rotation.from_quat(turns).as_matrix()), np.zeros((1, 3)))
     assert parts.scale_shear is None
     assert np.abs(np.abs((parts.rotation[:, 0] * turns).sum(axis=1)) - 1).max() < 1e-15 * 10
@@ -25,7 +25,7 @@ SHEAR = np.array([[1, 2 * RIGID_TOLERANCE, 0], [0, 1, 0], [0, 0, 1]])
 
 @pytest.mark.parametrize("off", [np.diag([1, 1, 1 + RIGID_TOLERANCE]), np.diag([1, -1, 1]), SHEAR, np.zeros((3, 3))])
 def test_one_matrix_with_scale_shear_or_mirror_is_not_rigid(off: Floats) -> None:
-    linear = Rotation.random(5, rng=2).as_matrix()
+    linear = Rotation.random(5, 2).as_matrix()
     assert decompose(_moved(linear), np.zeros((1, 3))).scale_shear is None
     linear[3] = linear[3] @ off
     assert decompose(_moved(linear), np.zeros((1, 3))).scale_shear is not None

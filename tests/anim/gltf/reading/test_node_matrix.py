@@ -169,7 +169,7 @@ def test_decomposing_gives_every_product_back() -> None:
     rng = np.random.default_rng(7)
     for _ in range(300):
         scale = rng.choice([-1, 1], 3) * 10 ** rng.uniform(-4, 4, 3)
-        whole = np.asarray(Rotation.random(random_state=rng).as_matrix() * scale, np.float32).astype(float)
+        whole = np.asarray(Rotation.random(None, rng).as_matrix() * scale, np.float32).astype(float)
         parts = matrix.decompose(np.column_stack([whole, np.zeros(3)]))
         again = matrix.from_trs(*parts[:3])[:, :3]
         assert np.abs(again - whole).max() <= 1e-6 * np.abs(whole).max()

@@ -15,7 +15,7 @@ from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import BYTE_COSTS, EncodedKeys, Encoding
 
 RNG = np.random.default_rng(23)
-TURNS = Rotation.random(200, rng=np.random.default_rng(4)).as_quat()
+TURNS = Rotation.random(200, np.random.default_rng(4)).as_quat()
 VECTORS = np.cumsum(RNG.normal(size=(200, 3)), axis=0)
 
 
