@@ -41,7 +41,7 @@ from anim.skinning import bake as skinning
 AssetLike: TypeAlias = Asset | Document | PathName
 ClipKey: TypeAlias = Clip | str | int
 Length: TypeAlias = str | float
-SHELL = "1%"  # of the diagonal: radius of the sample points around nodes without vertices
+SHELL_PER_DIAGONAL = "1%"  # of the diagonal: radius of the sample points around nodes without vertices
 MAX_POINTER_ERROR = 1e-4  # of the range of a pointer track
 
 
@@ -123,7 +123,7 @@ def optimize(
 
     limits = Bounds(
         length(max_error, "max_error"),
-        length(SHELL, "shell"),
+        length(SHELL_PER_DIAGONAL, "shell"),
         MAX_POINTER_ERROR,
         units.parse_angle(max_angle, "max_angle") if isinstance(max_angle, str) else max_angle,
         None if max_speed_error is None else length(max_speed_error, "max_speed_error"),
@@ -149,7 +149,7 @@ def optimize(
         workers=workers,
         progress=progress,
     )
-    return _optimized(asset, found, limits)
+    return _build_result(asset, found, limits)
 
 
 def bake(
@@ -242,7 +242,7 @@ def sample_poses(
     return sample_table(asset.skeleton, playing, _times(playing, fps, times), space=space)
 
 
-def _optimized(asset: Asset, found: search.Optimized, limits: Bounds) -> OptimizeResult:
+def _build_result(asset: Asset, found: search.Optimized, limits: Bounds) -> OptimizeResult:
     bad = [i for i, each in found.verdicts.items() if not each.holds]
     if bad:
         off = found.verdicts[bad[0]].error

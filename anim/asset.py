@@ -107,10 +107,10 @@ def load(file: PathName | RawBytes | BinaryIO) -> Asset:
         raise ShapeError(f"file is {type(file).__name__} (expected a path or bytes)", help="it is loaded already")
     if isinstance(file, str | os.PathLike):
         path = os.fspath(file)
-        return _named(path, lambda: open_file(path))
+        return _read_asset(path, lambda: open_file(path))
     name = "bytes" if isinstance(file, RAW_BYTES) else str(getattr(file, "name", "file"))
     data = _bytes_of(file)
-    return _named(name, lambda: open_bytes(data, name))
+    return _read_asset(name, lambda: open_bytes(data, name))
 
 
 def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
@@ -141,7 +141,7 @@ def as_asset(value: Asset | Document | PathName) -> Asset:
     return Asset(value) if isinstance(value, Document) else load(value)
 
 
-def _named(name: str, read: Callable[[], Source]) -> Asset:
+def _read_asset(name: str, read: Callable[[], Source]) -> Asset:
     try:
         source = read()
     except AnimError as error:

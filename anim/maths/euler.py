@@ -87,7 +87,7 @@ def unwrap(
     raw = np.stack((wrap_angles(half_sum - half_difference), middle, wrap_angles(half_sum + half_difference)), axis=-1)
     locked = near | far
     free = ~locked.any(axis=0)
-    raw[:, free] = _unwind(raw[:, free])
+    raw[:, free] = _unwrap_triples(raw[:, free])
     for i in np.flatnonzero(~free).tolist():
         raw[:, i] = _interpolate_in_lock(raw[:, i], half_sum[:, i], half_difference[:, i], near[:, i], far[:, i])
     return _complete_triple(raw, order, frame).reshape(*q.shape[:-1], 3)
@@ -157,7 +157,7 @@ def _complete_triple(raw: Floats, order: str, frame: AxesConvention) -> Floats:
     return angles if frame == AxesConvention.EXTRINSIC else angles[..., ::-1].copy()
 
 
-def _unwind(raw: Floats) -> Floats:
+def _unwrap_triples(raw: Floats) -> Floats:
     """Triples (K, ..., 3), each the equivalent one nearest to its predecessor.
 
     The other family is (first + π, −middle, third + π). Distances between two keys are equal in both families, so a
@@ -177,7 +177,7 @@ def _interpolate_in_lock(raw: Floats, half_sum: Floats, half_difference: Floats,
     keys = np.arange(len(raw))
     free = keys[~(near | far)]
     if len(free):
-        unwound = _unwind(raw[free])
+        unwound = _unwrap_triples(raw[free])
         about = np.stack([np.interp(keys, free, unwound[:, axis]) for axis in range(3)], axis=-1)
     else:
         unwound, about = raw[:0], np.zeros_like(raw)

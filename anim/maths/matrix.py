@@ -7,8 +7,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 
-SHORT = 0.01  # of the longest axis; in float32, directions of shorter axes are dominated by rounding
-STRAIGHT = 1e-9  # cosine between axes that counts as 0
+MIN_AXIS_RATIO = 0.01  # of the longest axis; in float32, directions of shorter axes are dominated by rounding
+ORTHOGONALITY_TOLERANCE = 1e-9  # cosine between axes that counts as 0
 
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
@@ -63,17 +63,17 @@ def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 
     shear: largest error of an axis of the recomposed matrix, as a fraction of the axis length. Where it is 0 the parts
     recompose the matrix; elsewhere they are the nearest rotation with the axes' lengths. Directions of axes shorter
-    than SHORT of the longest have less weight: in float32 they are dominated by rounding. A mirroring matrix gets a
+    than MIN_AXIS_RATIO of the longest have less weight: in float32 rounding dominates them. A mirroring matrix gets a
     negative x scale. An axis of length 0 gets scale 0 and a direction orthogonal to the others.
     """
     axes = np.swapaxes(matrix[..., :3], -1, -2)  # rows are the axes
     scale: Floats = np.sqrt((axes * axes).sum(axis=-1))
-    floor = SHORT * scale.max(axis=-1, keepdims=True)
+    floor = MIN_AXIS_RATIO * scale.max(axis=-1, keepdims=True)
     directions = axes / np.where(scale > 0, scale, 1)[..., None]
     if not scale.all():
         directions = _complete_axes(directions, scale)
     cosines = directions @ np.swapaxes(directions, -1, -2)
-    skewed = (np.abs(cosines * (1 - np.eye(3))) > STRAIGHT).any()
+    skewed = (np.abs(cosines * (1 - np.eye(3))) > ORTHOGONALITY_TOLERANCE).any()
     lengths = scale + floor
     mirror = np.where(np.linalg.det(directions) < 0, -1.0, 1.0)
     scale[..., 0] *= mirror

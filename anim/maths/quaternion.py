@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 
-TINY = 1e-8  # below this |xyz| the angle equals its sine in float64
+SMALL_SINE = 1e-8  # below this |xyz| the angle equals its sine in float64
 
 
 def multiply(a: Floats, b: Floats) -> Floats:
@@ -63,7 +63,7 @@ def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
     Source: Shoemake 1985; sin(uθ)/sin θ = u·sinc(uθ)/sinc θ is stable at θ = 0, and θ ≤ 90° keeps sin θ away from 0.
     """
     u = np.asarray(u, dtype=np.float64)
-    b = _near(a, b)
+    b = _align_sign(a, b)
     theta = 2 * np.arctan2(_length(b - a), _length(b + a))
     whole = np.sinc(theta / np.pi)
     of_a = (1 - u) * np.sinc((1 - u) * theta / np.pi) / whole
@@ -77,7 +77,7 @@ def nlerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
     u: (...) in 0 … 1. It deviates from slerp by 0.033°, 0.27°, 0.92° for 30°, 60°, 90° between a and b.
     """
     u = np.asarray(u, dtype=np.float64)[..., None]
-    return normalize((1 - u) * a + u * _near(a, b))
+    return normalize((1 - u) * a + u * _align_sign(a, b))
 
 
 def rotation_vector(q: Floats) -> Floats:
@@ -89,9 +89,9 @@ def rotation_vector(q: Floats) -> Floats:
     xyz, w = q[..., :3], q[..., 3]
     sine = _length(xyz)
     sign = np.where(w < 0, -1.0, 1.0)
-    small = sine <= TINY * np.abs(w)
+    small = sine <= SMALL_SINE * np.abs(w)
     angle = np.where(small, 2.0, 2 * np.arctan2(sine, np.abs(w)))
-    return np.asarray(xyz * (sign * angle / np.where(small, np.maximum(np.abs(w), TINY), sine))[..., None])
+    return np.asarray(xyz * (sign * angle / np.where(small, np.maximum(np.abs(w), SMALL_SINE), sine))[..., None])
 
 
 def from_rotation_vector(vector: Floats) -> Floats:
@@ -178,7 +178,7 @@ def derivative(q: Floats, omega: Floats) -> Floats:
     return multiply(q, np.concatenate((omega, still), axis=-1)) / 2
 
 
-def _near(a: Floats, b: Floats) -> Floats:
+def _align_sign(a: Floats, b: Floats) -> Floats:
     """Return b (..., 4) with the sign of the same hemisphere as a."""
     return np.asarray(b * np.where(dot(a, b) < 0, -1.0, 1.0)[..., None])
 

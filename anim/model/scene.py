@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import FormatError, ShapeError
 from anim.model.skeleton import Skeleton
 
-SUM_TOLERANCE = 1e-3  # error of a vertex's sum of skin weights from 1, above rounding
+WEIGHT_SUM_TOLERANCE = 1e-3  # error of a vertex's sum of skin weights from 1, above rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +74,7 @@ class Mesh:
         where = f"mesh '{self.name}'" if self.name else ""
         if len(self.weights) and self.weights.size and self.weights.min() < 0:
             raise FormatError(f"a skin weight is negative ({self.weights.min():g})", where=where)
-        if self.weights.size and (off := np.abs(self.weights.sum(axis=1) - 1)).max() > SUM_TOLERANCE:
+        if self.weights.size and (off := np.abs(self.weights.sum(axis=1) - 1)).max() > WEIGHT_SUM_TOLERANCE:
             v = int(off.argmax())
             raise ShapeError(f"skin weights of vertex {v} add up to {self.weights[v].sum():g} (expected 1)")
         if self.faces.size and int(self.faces.max()) >= len(self.positions):

@@ -14,7 +14,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError, ShapeError
 
 PATHS = ("translation", "rotation", "scale", "weights")
-WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}  # components per key; of weights and pointers they vary
+NUM_COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}  # components per key; of weights and pointers they vary
 
 
 class Interpolation(StrEnum):
@@ -85,7 +85,7 @@ class Track:
         times, values = arrays.as_key_times(self.times), arrays.as_floats(self.values, "K C", name="values")
         set_field(self, "times", times)
         set_field(self, "values", values)
-        shape = (len(times), WIDTHS.get(self.path, int(values.shape[1])))
+        shape = (len(times), NUM_COMPONENTS.get(self.path, int(values.shape[1])))
         if values.shape != shape:
             raise ShapeError(f"values have shape {values.shape} (expected {shape})")
         cubic = self.interpolation is Interpolation.CUBICSPLINE

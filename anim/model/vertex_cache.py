@@ -95,7 +95,7 @@ class VertexCache:
         chunks = list(self.chunks())
         positions = np.concatenate([each.positions for each in chunks])
         return FrameChunk(
-            0, positions, _joined(each.normals for each in chunks), _joined(each.tangents for each in chunks)
+            0, positions, _concatenate(each.normals for each in chunks), _concatenate(each.tangents for each in chunks)
         )
 
     def __repr__(self) -> str:
@@ -124,7 +124,7 @@ def from_arrays(
     )
 
 
-def _joined(parts: Iterable[AnyArray | None]) -> AnyArray | None:
+def _concatenate(parts: Iterable[AnyArray | None]) -> AnyArray | None:
     """All parts in one array, None if one is missing."""
     listed = list(parts)
     there = [each for each in listed if each is not None]

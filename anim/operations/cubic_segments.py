@@ -12,8 +12,8 @@ from anim.maths import quaternion
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling.times import distinct_float32
 
-JUMP = 1e-6  # shortest duration of a jump, to avoid denormal times near 0 s
-SAME = 1e-9  # of the largest value; smaller differences between segments are no jumps
+JUMP_S = 1e-6  # shortest duration of a jump, to avoid denormal times near 0 s
+JUMP_TOLERANCE = 1e-9  # of the largest value; smaller differences between segments are no jumps
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +42,14 @@ def to_cubicspline(track: Track, pieces: CubicSegments) -> Track:
     in float32. Segments too short for float32 times are removed; unused tangents at both ends are 0.
     """
     if track.kind is ValueKind.ROTATION:
-        pieces = _aligned(pieces)
+        pieces = _align_signs(pieces)
     times = np.append(pieces.start, pieces.end[-1])
     values = np.concatenate((pieces.value0, pieces.value1[-1:]))
     before = np.concatenate((np.zeros_like(pieces.slope1[:1]), pieces.slope1))
     after = np.concatenate((pieces.slope0, np.zeros_like(pieces.slope0[:1])))
-    jumps = _jumps(pieces)
+    jumps = _find_jumps(pieces)
     if len(jumps):
-        times, values, before, after = _with_jumps(jumps, pieces, times, values, before, after)
+        times, values, before, after = _insert_jump_keys(jumps, pieces, times, values, before, after)
     kept = distinct_float32(times)
     in_tangents = before[kept]
     return replace(
@@ -84,7 +84,7 @@ def with_keys(track: Track, times: Floats, values: Floats, interpolation: Interp
     )
 
 
-def _aligned(pieces: CubicSegments) -> CubicSegments:
+def _align_signs(pieces: CubicSegments) -> CubicSegments:
     """Quaternion segments with aligned signs: each starts in the hemisphere of the previous end."""
     inside = np.where(quaternion.dot(pieces.value0, pieces.value1) < 0, -1.0, 1.0)
     between = np.where(quaternion.dot(pieces.value1[:-1], pieces.value0[1:]) < 0, -1.0, 1.0)
@@ -100,20 +100,20 @@ def _aligned(pieces: CubicSegments) -> CubicSegments:
     )
 
 
-def _jumps(pieces: CubicSegments) -> list[int]:
+def _find_jumps(pieces: CubicSegments) -> list[int]:
     """Indices of the segments with a start value other than the previous end value."""
     size = max(float(np.abs(pieces.value0).max()), float(np.abs(pieces.value1).max()), 1e-30)
     off = np.abs(pieces.value1[:-1] - pieces.value0[1:]).max(axis=1)
-    return [int(i) + 1 for i in np.flatnonzero(off > SAME * size)]
+    return [int(i) + 1 for i in np.flatnonzero(off > JUMP_TOLERANCE * size)]
 
 
-def _with_jumps(
+def _insert_jump_keys(
     jumps: list[int], pieces: CubicSegments, times: Floats, values: Floats, before: Floats, after: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Keys with one more just before each jump, as the end of the previous segment."""
     at = np.array(jumps)
     early = times[at].astype(np.float32)
-    early = np.minimum(np.nextafter(early, np.float32(-np.inf)).astype(np.float64), times[at] - JUMP)
+    early = np.minimum(np.nextafter(early, np.float32(-np.inf)).astype(np.float64), times[at] - JUMP_S)
     still = np.zeros((len(at), values.shape[1]))
     arriving = before[at].copy()
     before[at] = 0.0

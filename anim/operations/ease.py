@@ -19,10 +19,10 @@ from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
 from anim.sampling import segment
 
 TOLERANCE = 1e-3  # of a segment's range
-ANGLE_TOLERANCE = math.radians(0.05)
+ANGLE_TOLERANCE_RAD = math.radians(0.05)
 OUTPUTS = ("cubicspline", "linear")
 MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
-EDGE = 1e-6  # s; a segment that starts less than this before `start` counts as inside
+EDGE_TOLERANCE_S = 1e-6  # s; a segment that starts less than this before `start` counts as inside
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Tolerances:
     """Tolerances for non-cubic easings: fraction of a segment's range, and radians for rotations."""
 
     fraction: float = TOLERANCE
-    angle: float = ANGLE_TOLERANCE
+    angle: float = ANGLE_TOLERANCE_RAD
 
 
 def ease(
@@ -73,7 +73,7 @@ class _Job:
     interpolation: str
 
     def eased(self, track: Track) -> Track:
-        inside = (track.times[:-1] >= self.start - EDGE) & (track.times[1:] <= self.end + EDGE)
+        inside = (track.times[:-1] >= self.start - EDGE_TOLERANCE_S) & (track.times[1:] <= self.end + EDGE_TOLERANCE_S)
         if track.interpolation is Interpolation.STEP or not inside.any() or self.easing.name == "linear":
             return track
         if self.easing.stepped:

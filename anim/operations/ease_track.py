@@ -11,13 +11,13 @@ from anim.arrays import Bools, Floats, Ints
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.easing.table import EASINGS
 from anim.curves.fitting.easing_fit import fit_segments
-from anim.curves.fitting.rotation_fit import ANGLE_STEP, RotationFit, rotation_segments_for
+from anim.curves.fitting.rotation_fit import ANGLE_STEP_RAD, RotationFit, rotation_segments_for
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track, ValueKind
-from anim.operations.cubic_segments import JUMP, CubicSegments, join_segments
+from anim.operations.cubic_segments import JUMP_S, CubicSegments, join_segments
 from anim.sampling import segment
 
-JOINT = 1e-12  # of an easing; u this near to a knot between two cubics is at the knot
+KNOT_TOLERANCE = 1e-12  # of an easing; u this near to a knot between two cubics is at the knot
 LINE = (CubicSegment(0, 1, 0, 1, 1, 1),)
 
 
@@ -35,7 +35,7 @@ def ease_segments(
         if track.kind is ValueKind.ROTATION:
             parts += _rotation_segments(track, which, each, angle_tolerance)
         else:
-            parts.append(_moves(track, which, fit_segments(each, tolerance=tolerance)))
+            parts.append(_vector_segments(track, which, fit_segments(each, tolerance=tolerance)))
     return _in_order(join_segments(parts))
 
 
@@ -49,14 +49,14 @@ def ease_steps(track: Track, inside: Bools, easing: Easing, *, angle_tolerance: 
     parts = []
     for k in range(len(track.times) - 1):
         if not inside[k]:
-            parts.append(_unchanged(track, k, angle_tolerance))
+            parts.append(_source_segment(track, k, angle_tolerance))
             continue
         at = track.times[k] + (track.times[k + 1] - track.times[k]) * levels[:, :2]
         values = segment.evaluate(track, np.full(len(levels), k), levels[:, 2])
         parts.append(_constant_segments(at[:, 0], at[:, 1], values, values))
     if inside[-1]:
         end = track.times[-1:]
-        parts.append(_constant_segments(end if inside.all() else end - JUMP, end, values[-1:], track.values[-1:]))
+        parts.append(_constant_segments(end if inside.all() else end - JUMP_S, end, values[-1:], track.values[-1:]))
         parts[-2].end[-1] = parts[-1].start[0]
     return join_segments(parts) if not inside.all() else _without_last_start(join_segments(parts))
 
@@ -91,7 +91,7 @@ class EasedTrack:
 def slope(cubics: tuple[CubicSegment, ...], u: Floats, *, before: bool) -> Floats:
     """Return the slope of an easing given as cubics, just before or just after u (F,)."""
     start, end, value0, value1, slope0, slope1 = _columns(cubics).T
-    shifted = u - JOINT if before else u + JOINT
+    shifted = u - KNOT_TOLERANCE if before else u + KNOT_TOLERANCE
     at = np.clip(np.searchsorted(start, shifted, side="right") - 1, 0, len(cubics) - 1)
     length = (end - start)[at]
     inside = np.clip((u - start[at]) / length, 0.0, 1.0)
@@ -103,7 +103,7 @@ def _columns(cubics: Sequence[CubicSegment]) -> Floats:
     return np.array([(p.start, p.end, p.value0, p.value1, p.slope0, p.slope1) for p in cubics])
 
 
-def _moves(track: Track, left: Ints, cubics: Sequence[CubicSegment]) -> CubicSegments:
+def _vector_segments(track: Track, left: Ints, cubics: Sequence[CubicSegment]) -> CubicSegments:
     """The segments left → left + 1 (S,) of a vector track, each composed of these cubics."""
     duration = (track.times[left + 1] - track.times[left])[:, None]
     start, way = track.values[left][:, None], (track.values[left + 1] - track.values[left])[:, None]
@@ -121,7 +121,7 @@ def _rotation_segments(track: Track, left: Ints, easing: Easing, tolerance: floa
     q = quaternion.normalize(track.values)
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(q[left]), q[left + 1]))
     angle = np.sqrt((turn * turn).sum(axis=1))
-    shared = np.ceil(angle / ANGLE_STEP)
+    shared = np.ceil(angle / ANGLE_STEP_RAD)
     parts = []
     for group in (np.flatnonzero(shared == each) for each in sorted(set(shared.tolist()))):
         fitted = rotation_segments_for(easing, float(angle[group].max()), tolerance)
@@ -148,12 +148,12 @@ def _in_order(pieces: CubicSegments) -> CubicSegments:
     return CubicSegments(*(getattr(pieces, each.name)[order] for each in fields(CubicSegments)))
 
 
-def _unchanged(track: Track, k: int, angle_tolerance: float) -> CubicSegments:
+def _source_segment(track: Track, k: int, angle_tolerance: float) -> CubicSegments:
     if track.interpolation is Interpolation.LINEAR:
         here = np.array([k])
         if track.kind is ValueKind.ROTATION:
             return _rotation_segments(track, here, EASINGS["linear"], angle_tolerance)[0]
-        return _moves(track, here, LINE)
+        return _vector_segments(track, here, LINE)
     assert track.in_tangents is not None
     assert track.out_tangents is not None
     a, b = slice(k, k + 1), slice(k + 1, k + 2)

@@ -13,16 +13,18 @@ from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
-SPARSE = 6  # fewest keys in a blend; sparser tracks get more
-FPS = 30.0  # of the added keys
-SHORTEST = 1e-5  # s, between two keys
+MIN_BLEND_KEYS = 6  # fewest keys in a blend; sparser tracks get more
+BLEND_FPS = 30.0  # of the added keys
+MIN_INTERVAL_S = 1e-5  # s, between two keys
 
 
 def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
     """Return the clip with its first pose appended as a frame: for a loop that lacks its last frame."""
     end = clip.end + 1 / fps
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
-    return Clip(clip.name, tuple(_extended(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks)))
+    return Clip(
+        clip.name, tuple(_append_first_key(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks))
+    )
 
 
 def open_tracks(clip: Clip) -> frozenset[int]:
@@ -49,10 +51,10 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> C
     if not 0 < blend <= clip.end - clip.start:
         raise RangeError(f"blend is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)")
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
-    return Clip(clip.name, tuple(_closed(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
+    return Clip(clip.name, tuple(_close(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
-def _extended(track: Track, clip: Clip, end: float) -> Track:
+def _append_first_key(track: Track, clip: Clip, end: float) -> Track:
     if len(track.times) == 1 or track.times[-1] < clip.end - 1e-6:
         return track
     first = sample(track, np.array([clip.start]))
@@ -67,14 +69,14 @@ def _extended(track: Track, clip: Clip, end: float) -> Track:
     return replace(track, times=times, values=values, in_tangents=arriving, out_tangents=leaving)
 
 
-def _closed(track: Track, clip: Clip, blend: float) -> Track:
+def _close(track: Track, clip: Clip, blend: float) -> Track:
     if len(track.times) == 1:
         return track
     ends = np.array([clip.start, clip.end])
     first, last = sample(track, ends)
     if track.interpolation is Interpolation.STEP:
         return replace(track, values=np.concatenate((track.values[:-1], first[None])))
-    if len(track.times) > 2 and track.times[-2] > clip.end - SHORTEST:
+    if len(track.times) > 2 and track.times[-2] > clip.end - MIN_INTERVAL_S:
         track = _without_last_jump(track)
         last = track.values[-1]
     gap = _closing_offset(track, first, last)
@@ -84,11 +86,13 @@ def _closed(track: Track, clip: Clip, blend: float) -> Track:
         return track
     times = _times(track, clip.end - blend, clip.end)
     if track.in_tangents is not None:
-        return _bent_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
+        return _correct_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
     last_piece = float(times[-1] - times[-2])
-    before_last = _closing_offset(track, _stepped_back(track, first, speed, last_piece), sample(track, times[-2:-1])[0])
+    before_last = _closing_offset(
+        track, _extrapolate_back(track, first, speed, last_piece), sample(track, times[-2:-1])[0]
+    )
     slope = _end_slope(gap, before_last, blend, last_piece)
-    return _bent_lines(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
+    return _correct_linear(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
 
 
 def _without_last_jump(track: Track) -> Track:
@@ -109,7 +113,7 @@ def _closing_offset(track: Track, first: Floats, last: Floats) -> Floats:
     return first - last
 
 
-def _stepped_back(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
+def _extrapolate_back(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
     """Return the value some seconds before `value` at constant speed."""
     if track.kind is ValueKind.ROTATION:
         return quaternion.multiply(value, quaternion.from_rotation_vector(-seconds * speed))
@@ -148,8 +152,8 @@ class _Correction:
         return (times > self.start)[:, None]
 
 
-def _bent_lines(track: Track, times: Floats, correction: _Correction) -> Track:
-    values = _bent(track, sample(track, times), correction.value(times))
+def _correct_linear(track: Track, times: Floats, correction: _Correction) -> Track:
+    values = _add_correction(track, sample(track, times), correction.value(times))
     return replace(track, times=times, values=values)
 
 
@@ -158,22 +162,22 @@ def _times(track: Track, start: float, end: float) -> Floats:
     keys = track.times
     inside = keys[(keys > start) & (keys < end)]
     more = np.array([start, end])
-    if len(inside) < SPARSE or end - inside[-1] > (end - start) / SPARSE:
-        more = np.linspace(start, end, max(2 * SPARSE, round((end - start) * FPS) + 1))
-    more = more[np.abs(more[:, None] - keys).min(axis=1) > SHORTEST]
+    if len(inside) < MIN_BLEND_KEYS or end - inside[-1] > (end - start) / MIN_BLEND_KEYS:
+        more = np.linspace(start, end, max(2 * MIN_BLEND_KEYS, round((end - start) * BLEND_FPS) + 1))
+    more = more[np.abs(more[:, None] - keys).min(axis=1) > MIN_INTERVAL_S]
     return np.sort(np.concatenate((keys, more)))
 
 
-def _bent(track: Track, values: Floats, added: Floats) -> Floats:
+def _add_correction(track: Track, values: Floats, added: Floats) -> Floats:
     if track.kind is not ValueKind.ROTATION:
         return values + added
     return quaternion.align_signs(quaternion.multiply(values, quaternion.from_rotation_vector(added)))
 
 
-def _bent_spline(track: Track, times: Floats, correction: _Correction) -> Track:
+def _correct_spline(track: Track, times: Floats, correction: _Correction) -> Track:
     before = rates(track, times, before=True) + correction.slope(times)
     after = rates(track, times, before=False) + correction.slope(times)
-    values = _bent(track, sample(track, times), correction.value(times))
+    values = _add_correction(track, sample(track, times), correction.value(times))
     if track.kind is ValueKind.ROTATION:
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0

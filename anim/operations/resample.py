@@ -15,7 +15,7 @@ from anim.sampling.batch import Batch, batches
 from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"
-UNIT = 1e-6  # of a squared length: error by rounding to float32
+UNIT_TOLERANCE = 1e-6  # of a squared length: error by rounding to float32
 INTERPOLATIONS = (KEEP, "step", "linear", "cubicspline")
 
 
@@ -41,10 +41,10 @@ def resample(
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
-    values = _sampled([clip.tracks[i] for i in goals], times)
-    new = [_kept(t, _goal(t, interpolation)) if i in chosen else t for i, t in enumerate(clip.tracks)]
+    values = _sample_tracks([clip.tracks[i] for i in goals], times)
+    new = [_keep_keys(t, _goal(t, interpolation)) if i in chosen else t for i, t in enumerate(clip.tracks)]
     for (i, goal), sampled in zip(goals.items(), values, strict=True):
-        new[i] = _keyed(clip.tracks[i], goal, times, sampled)
+        new[i] = _build_track(clip.tracks[i], goal, times, sampled)
     return Clip(clip.name, tuple(new))
 
 
@@ -54,7 +54,7 @@ def _goal(track: Track, interpolation: str) -> Interpolation:
     return track.interpolation if interpolation == KEEP else Interpolation(interpolation.upper())
 
 
-def _kept(track: Track, goal: Interpolation) -> Track:
+def _keep_keys(track: Track, goal: Interpolation) -> Track:
     """A track with its keys unchanged, in the requested interpolation if that needs no tangents."""
     if goal is track.interpolation or goal is Interpolation.CUBICSPLINE or _is_sampled(track):
         return track
@@ -76,27 +76,27 @@ def _is_constant(track: Track) -> bool:
     return same and not track.in_tangents[1:].any() and not track.out_tangents[:-1].any()
 
 
-def _sampled(tracks: list[Track], times: Floats) -> list[Floats]:
+def _sample_tracks(tracks: list[Track], times: Floats) -> list[Floats]:
     """Values (F, C) of each track at `times`, rotations sign-continuous; tracks of one time axis form a batch."""
     found: dict[int, Floats] = {}
     for batch in batches(tracks):
         values = batch.sample(times)
         if batch.kind is ValueKind.ROTATION:
-            values = quaternion.align_signs(_with_keys(batch, times, values))
+            values = quaternion.align_signs(_restore_unit_keys(batch, times, values))
         found.update((id(track), values[:, g]) for g, track in enumerate(batch.tracks))
     return [found[id(track)] for track in tracks]
 
 
-def _with_keys(batch: Batch, times: Floats, values: Floats) -> Floats:
+def _restore_unit_keys(batch: Batch, times: Floats, values: Floats) -> Floats:
     """Sampled rotations with unit keys restored bit for bit, since normalization changes the last bits."""
     at = np.minimum(np.searchsorted(batch.times, times), len(batch.times) - 1)
     own = batch.values[at]
-    unit = np.abs(quaternion.dot(own, own) - 1) < UNIT
+    unit = np.abs(quaternion.dot(own, own) - 1) < UNIT_TOLERANCE
     exact = (batch.times[at] == times)[:, None] & unit
     return np.where(exact[..., None], own, values)
 
 
-def _keyed(track: Track, goal: Interpolation, times: Floats, values: Floats) -> Track:
+def _build_track(track: Track, goal: Interpolation, times: Floats, values: Floats) -> Track:
     tangents: tuple[Floats | None, Floats | None] = (None, None)
     if goal is Interpolation.CUBICSPLINE and len(times) > 1:
         tangents = _tangents(track, times, values)

@@ -13,7 +13,7 @@ from anim.errors import RangeError
 from anim.model import Clip, Interpolation, Track
 
 NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
-JUMP = 1e-6  # s; duration of the final value of a reversed STEP track
+JUMP_S = 1e-6  # s; duration of the final value of a reversed STEP track
 
 
 def retime(
@@ -41,7 +41,7 @@ def retime(
         raise RangeError("speed and duration exclude each other")
     factor = _factor(clip, speed, duration)
     start, end = clip.start, clip.start + (clip.end - clip.start) * factor
-    offset = _checked_offset(offset, start)
+    offset = _resolve_offset(offset, start)
     steps: list[Callable[[Track], Track]] = []
     if factor != 1:
         steps.append(lambda track: scale_time(track, start, factor))
@@ -76,7 +76,7 @@ def reverse_track(track: Track, start: float, end: float) -> Track:
     """
     times = start + end - track.times[::-1]
     if track.interpolation is Interpolation.STEP:
-        return _reversed_step(track, times, start)
+        return _reverse_step(track, times, start)
     values = track.values[::-1]
     if track.in_tangents is None or track.out_tangents is None:
         return replace(track, times=times, values=values)
@@ -91,9 +91,9 @@ def ping_pong_track(track: Track, start: float, end: float) -> Track:
         return track
     back = shift_time(reverse_track(track, start, end), end - start)
     if track.interpolation is not Interpolation.STEP:
-        return _joined(track, back, drop_first=bool(track.times[-1] == end))
+        return _concatenate(track, back, drop_first=bool(track.times[-1] == end))
     first_of_back = int(np.searchsorted(back.times, max(end, float(track.times[-1])), side="right"))
-    return _joined(track, _without_start(back, first_of_back), drop_first=False)
+    return _concatenate(track, _without_start(back, first_of_back), drop_first=False)
 
 
 def _all(steps: list[Callable[[Track], Track]], track: Track) -> Track:
@@ -117,7 +117,7 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     return duration / own
 
 
-def _checked_offset(offset: float, start: float) -> float:
+def _resolve_offset(offset: float, start: float) -> float:
     """The offset, adjusted for a start at 0 s if the new start is within NEAR_ZERO_S of it."""
     if offset < 0 and abs(start + offset) < NEAR_ZERO_S:
         return -start
@@ -129,16 +129,16 @@ def _checked_offset(offset: float, start: float) -> float:
     return offset
 
 
-def _reversed_step(track: Track, times: Floats, start: float) -> Track:
+def _reverse_step(track: Track, times: Floats, start: float) -> Track:
     values = np.concatenate((track.values[-2::-1], track.values[:1]))
     if len(track.times) > 1 and (track.values[-1] != track.values[-2]).any():
-        shown = start if times[0] - start > JUMP else float(times[0])
-        times = np.concatenate(([shown, max(float(times[0]), shown + JUMP)], times[1:]))
+        shown = start if times[0] - start > JUMP_S else float(times[0])
+        times = np.concatenate(([shown, max(float(times[0]), shown + JUMP_S)], times[1:]))
         values = np.concatenate((track.values[-1:], values))
     return replace(track, times=times, values=values)
 
 
-def _joined(track: Track, back: Track, *, drop_first: bool) -> Track:
+def _concatenate(track: Track, back: Track, *, drop_first: bool) -> Track:
     """Two tracks concatenated; equal end and start times become one key with the tangents of both sides."""
     skip = 1 if drop_first else 0
     times = np.concatenate((track.times, back.times[skip:]))

@@ -8,19 +8,26 @@ from dataclasses import replace
 import numpy as np
 
 from anim.curves.tangents.rule import TangentRule
-from anim.curves.tangents.table import CLOSED, DEFAULT, apply_rotation_tangents, apply_tangents, check_closed, parse
+from anim.curves.tangents.table import (
+    DEFAULT_RULE,
+    LOOP_TOLERANCE_RAD,
+    apply_rotation_tangents,
+    apply_tangents,
+    check_closed,
+    parse,
+)
 from anim.errors import AnimError, RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 
-SMALLEST = 1e-3  # lower limit of a vector track's largest value, for the comparison of its ends
-NEAR = 1e-6  # of the clip's end: differences of float32 times by rounding
+MIN_VECTOR_RANGE = 1e-3  # lower limit of a vector track's largest value, for the comparison of its ends
+END_TOLERANCE_FRACTION = 1e-6  # of the clip's end: differences of float32 times by rounding
 
 
 def spline(
     clip: Clip,
     *,
-    tangents: TangentRule | str = DEFAULT,
+    tangents: TangentRule | str = DEFAULT_RULE,
     cyclic: bool = False,
     root: int = -1,
     tracks: frozenset[int] | None = None,
@@ -44,7 +51,7 @@ def spline(
     for i in sorted(chosen):
         track = new[i]
         try:
-            new[i] = _splined(track, rule, cyclic=cyclic and _spans(track, clip))
+            new[i] = _apply_rule(track, rule, cyclic=cyclic and _spans(track, clip))
             travels = track.node == root and track.path == "translation"
             if (cyclic or rule.loop) and new[i] is not track and not travels:
                 _check_closed(track)
@@ -73,7 +80,7 @@ def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
 
 def _spans(track: Track, clip: Clip) -> bool:
     """Whether a track has keys at both ends of its clip, within the resolution of float32 times."""
-    near = NEAR * max(clip.end, 1.0)
+    near = END_TOLERANCE_FRACTION * max(clip.end, 1.0)
     return bool(track.times[0] <= clip.start + near and track.times[-1] >= clip.end - near)
 
 
@@ -83,11 +90,11 @@ def _check_closed(track: Track) -> None:
         check_closed(quaternion.normalize(track.values[[0, -1]]))
         return
     gap = float(np.abs(track.values[-1] - track.values[0]).max())
-    if gap > CLOSED * max(float(np.abs(track.values).max()), SMALLEST):
+    if gap > LOOP_TOLERANCE_RAD * max(float(np.abs(track.values).max()), MIN_VECTOR_RANGE):
         raise RangeError(f"the loop is open: its last value is {gap:.3g} from its first (expected the same value)")
 
 
-def _splined(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
+def _apply_rule(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
     if track.interpolation is Interpolation.STEP or track.kind is ValueKind.DISCRETE or len(track.times) == 1:
         return track
     make = apply_rotation_tangents if track.kind is ValueKind.ROTATION else apply_tangents

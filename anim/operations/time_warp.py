@@ -24,9 +24,9 @@ from anim.sampling.times import distinct_float32
 from anim.sampling.track import sample
 
 TOLERANCE = 1e-3  # of a track's range, if no cubic is exact
-ANGLE_TOLERANCE = math.radians(0.05)
-HALVINGS = 60  # of the search for the time at which the map reaches a key
-SNAP = 1e-10  # s; error of the search for a key's time
+ANGLE_TOLERANCE_RAD = math.radians(0.05)
+MAX_HALVINGS = 60  # of the search for the time at which the map reaches a key
+SNAP_TOLERANCE_S = 1e-10  # s; error of the search for a key's time
 MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
 
 
@@ -37,7 +37,7 @@ def warp(
     start: float | None = None,
     end: float | None = None,
     tolerance: float = TOLERANCE,
-    angle_tolerance: float = ANGLE_TOLERANCE,
+    angle_tolerance: float = ANGLE_TOLERANCE_RAD,
     interpolation: str = "cubicspline",
     tracks: frozenset[int] | None = None,
 ) -> Clip:
@@ -72,12 +72,12 @@ def warp(
             if track.kind is ValueKind.ROTATION
             else adaptive_keys.float32_tolerance(track, tolerance * _extent(track))
         )
-        times = _map(track, easing, first, last, allowed)
+        times = _build_map(track, easing, first, last, allowed)
         key = (id(track.times), times.cubics)
         if key not in corners:
             reached = times.reaching(track.times)
             corners[key] = reached[distinct_float32(reached)]
-        new.append(_warped(track, times, corners[key], allowed, interpolation))
+        new.append(_warp_track(track, times, corners[key], allowed, interpolation))
     return Clip(clip.name, tuple(new))
 
 
@@ -110,7 +110,7 @@ class TimeMap:
         """Return the new times of the old times `keys` (K,), and the ends of the map's segments."""
         found = [keys[(keys <= self.start) | (keys >= self.end)], np.array([self.start, self.end])]
         duration = self.end - self.start
-        for low, high in _monotone(self.cubics):
+        for low, high in _monotonic_intervals(self.cubics):
             ends = self.start + duration * np.array([low, high])
             found.append(ends)
             a, b = self.start + duration * self.value(np.array([low, high]))
@@ -120,7 +120,7 @@ class TimeMap:
         return unique_sorted(np.concatenate(found))
 
 
-def _map(track: Track, easing: Easing, start: float, end: float, allowed: float) -> TimeMap:
+def _build_map(track: Track, easing: Easing, start: float, end: float, allowed: float) -> TimeMap:
     """The map for one track: a non-cubic easing is approximated so that its error is at most half of `allowed`."""
     if track.interpolation is Interpolation.STEP:
         return TimeMap(fit_segments(easing, tolerance=TOLERANCE), easing.value, start, end)
@@ -135,13 +135,13 @@ def _moves(track: Track) -> bool:
     return bool(changes) or (track.in_tangents is not None and segment.max_rate_per_second(track) > 0)
 
 
-def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float, interpolation: str) -> Track:
+def _warp_track(track: Track, times: TimeMap, corners: Floats, allowed: float, interpolation: str) -> Track:
     old = times.old(corners)
     inside = (old >= track.times[0] - 1e-9) & (old <= track.times[-1] + 1e-9)
     corners = corners[inside | np.append(inside[1:], False) | np.insert(inside[:-1], 0, False)]
     if track.interpolation is Interpolation.STEP:
         values = sample(track, times.old(np.append((corners[:-1] + corners[1:]) / 2, corners[-1])))
-        return _without_repeats(with_keys(track, corners, values, Interpolation.STEP))
+        return _remove_repeats(with_keys(track, corners, values, Interpolation.STEP))
     motion = _motion(track, times)
     if interpolation == "linear":
         keys = adaptive_keys.linear_keys(motion, corners, tolerance=allowed / 2)
@@ -151,11 +151,11 @@ def _warped(track: Track, times: TimeMap, corners: Floats, allowed: float, inter
 
 def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
     def values(at: Floats) -> Floats:
-        return sample(track, _snapped(times.old(at), track.times))
+        return sample(track, _snap_to_keys(times.old(at), track.times))
 
     def changes(at: Floats, before: bool) -> Floats:
         tempo = times.speed(at, before=before)
-        old = _snapped(times.old(at), track.times)
+        old = _snap_to_keys(times.old(at), track.times)
         # forward, just before in new time is just before in old time; in reverse it is just after
         forward, back = rates(track, old, before=before), rates(track, old, before=not before)
         return np.asarray(np.where((tempo >= 0)[:, None], forward, back) * tempo[:, None])
@@ -163,13 +163,13 @@ def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
     return adaptive_keys.TrackFunction(values, changes, track.kind is ValueKind.ROTATION)
 
 
-def _snapped(times: Floats, keys: Floats) -> Floats:
+def _snap_to_keys(times: Floats, keys: Floats) -> Floats:
     """Times, those within rounding of a key moved to the key, where one-sided derivatives differ."""
-    near = keys[np.clip(np.searchsorted(keys, times - SNAP), 0, len(keys) - 1)]
-    return np.where(np.abs(near - times) <= SNAP, near, times)
+    near = keys[np.clip(np.searchsorted(keys, times - SNAP_TOLERANCE_S), 0, len(keys) - 1)]
+    return np.where(np.abs(near - times) <= SNAP_TOLERANCE_S, near, times)
 
 
-def _without_repeats(track: Track) -> Track:
+def _remove_repeats(track: Track) -> Track:
     """The STEP track without redundant keys, except for the first and the last."""
     changed = np.concatenate(([True], (np.diff(track.values, axis=0) != 0).any(axis=1)))
     changed[-1] = True
@@ -181,7 +181,7 @@ def _extent(track: Track) -> float:
     return extent or 1.0
 
 
-def _monotone(cubics: Sequence[CubicSegment]) -> list[tuple[float, float]]:
+def _monotonic_intervals(cubics: Sequence[CubicSegment]) -> list[tuple[float, float]]:
     """Monotonic intervals of u of the easing, in order."""
     parts: list[tuple[float, float]] = []
     for p in cubics:
@@ -199,7 +199,7 @@ def _monotone(cubics: Sequence[CubicSegment]) -> list[tuple[float, float]]:
 def _inverse(value: Callable[[Floats], Floats], low: float, high: float, shares: Floats, *, rising: bool) -> Floats:
     """The u at which the easing, monotonic between low and high, has the values `shares`."""
     a, b = np.full(len(shares), low), np.full(len(shares), high)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         middle = (a + b) / 2
         below = (value(middle) < shares) == rising
         a, b = np.where(below, middle, a), np.where(below, b, middle)

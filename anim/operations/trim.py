@@ -16,7 +16,7 @@ from anim.operations.retime import shift_time
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
-ANGLE_TOLERANCE = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
+ANGLE_TOLERANCE_RAD = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
 
 
 def trim(
@@ -38,19 +38,19 @@ def trim(
     """
     chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     if (start is not None or end is not None) and clip.end > clip.start:
-        clip = _cut(clip, start, end, chosen)
+        clip = _trim_clip(clip, start, end, chosen)
     first = min((float(clip.tracks[i].times[0]) for i in chosen), default=0.0)
     if not rebase or first == 0:
         return clip
     return Clip(clip.name, tuple(shift_time(t, -first) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
-def _cut(clip: Clip, start: float | None, end: float | None, chosen: frozenset[int]) -> Clip:
+def _trim_clip(clip: Clip, start: float | None, end: float | None, chosen: frozenset[int]) -> Clip:
     first = clip.start if start is None else max(float(np.float32(start)), clip.start)
     last = clip.end if end is None else min(float(np.float32(end)), clip.end)
     if not last > first:
         raise RangeError(_nothing_left(clip, start, end))
-    new = [_trimmed(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
+    new = [_trim_track(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
     return Clip(clip.name, tuple(new))
 
 
@@ -63,10 +63,10 @@ def _nothing_left(clip: Clip, start: float | None, end: float | None) -> str:
     return f"nothing is left from {start or 0.0:g} s to {end or 0.0:g} s (expected an end after the start; {has})"
 
 
-def _trimmed(track: Track, start: float, end: float) -> Track:
+def _trim_track(track: Track, start: float, end: float) -> Track:
     inner = (track.times > start) & (track.times < end)
     if len(track.times) == 1 or not (inner.any() or _changes(track, start, end)):
-        return _single(track, start)
+        return _single_key(track, start)
     if track.interpolation is Interpolation.CUBICSPLINE:
         return _cut_spline(track, start, end, inner)
     times = np.concatenate(([start], track.times[inner], [end]))
@@ -83,7 +83,7 @@ def _changes(track: Track, start: float, end: float) -> bool:
     return moving or bool((ends[0] != ends[1]).any())
 
 
-def _single(track: Track, start: float) -> Track:
+def _single_key(track: Track, start: float) -> Track:
     values = sample(track, np.array([start]))
     linear = Interpolation.LINEAR if track.interpolation is Interpolation.CUBICSPLINE else track.interpolation
     return replace(
@@ -94,7 +94,7 @@ def _single(track: Track, start: float) -> Track:
 def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Track:
     times = np.concatenate(([start], track.times[inner], [end]))
     if track.kind is ValueKind.ROTATION:
-        times = _with_cuts(track, times)
+        times = _insert_cut_times(track, times)
     values = sample(track, times)
     before, after = rates(track, times, before=True), rates(track, times, before=False)
     if track.kind is ValueKind.ROTATION:
@@ -106,7 +106,7 @@ def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[
     return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)
 
 
-def _with_cuts(track: Track, times: Floats) -> Floats:
+def _insert_cut_times(track: Track, times: Floats) -> Floats:
     """The times with more in the cut segments at both ends, in which a rotation's cubic is normalized anew."""
     motion = adaptive_keys.TrackFunction(
         lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
@@ -114,7 +114,7 @@ def _with_cuts(track: Track, times: Floats) -> Floats:
     parts = [times]
     for piece in (times[:2], times[-2:]):
         if not np.isin(piece, track.times).all():
-            parts.append(adaptive_keys.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE).times)
+            parts.append(adaptive_keys.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE_RAD).times)
     return np.unique(np.concatenate(parts))
 
 

@@ -12,7 +12,7 @@ from anim.model import Track
 from anim.sampling.alike import Rule, Tangents, TrackGroup, rule, stack_values
 from anim.sampling.track import KeyInterval, interpolate
 
-KEYS_AT_ONCE = 4096  # of one group: temporary arrays fit into the processor's cache
+MAX_GROUP_KEYS = 4096  # of one group: temporary arrays fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class ConcatenatedTracks(TrackGroup):
 def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
     """Return the tracks grouped by `alike.rule`, each group concatenated in their order.
 
-    A group of over KEYS_AT_ONCE keys is split between its tracks.
+    A group of over MAX_GROUP_KEYS keys is split between its tracks.
     """
     groups: dict[Rule, list[list[int]]] = {}
     room: dict[Rule, int] = {}
@@ -59,7 +59,7 @@ def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
         left = room.get(key, 0)
         if left <= 0:
             groups.setdefault(key, []).append([])
-            left = KEYS_AT_ONCE
+            left = MAX_GROUP_KEYS
         groups[key][-1].append(i)
         room[key] = left - len(track.times)
     parts = [numbers for group in groups.values() for numbers in group]

@@ -20,8 +20,8 @@ from anim.sampling.batch import Batch
 from anim.sampling.pose import PoseSampler, Sampler
 from anim.sampling.track import KeyInterval
 
-SHORT_OF_THREE = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
-SHORT_OF_RAW = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this dot product on the chord, not normalized
+THREE_NLERP_DOT = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
+BABYLON_LERP_DOT = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this dot product on the chord, not normalized
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +62,10 @@ def sampler(player: str) -> Sampler:
     chosen = PLAYERS[player]
     if chosen.between is None:
         return Batch.sample
-    return lambda batch, at, place: _sampled(chosen, batch, at, place)
+    return lambda batch, at, place: _sample_batch(chosen, batch, at, place)
 
 
-def _sampled(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) -> Floats:
+def _sample_batch(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) -> Floats:
     """Values (F, G, C) of tracks on one time axis; players differ in LINEAR and STEP rotations only."""
     if player.between is None or batch.kind is not ValueKind.ROTATION:
         return batch.sample(at, place)
@@ -84,21 +84,21 @@ def _sampled(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) 
 
 def _chord(a: Floats, b: Floats, u: Floats) -> Floats:
     """Normalized chord on the shorter side, of keys as stored."""
-    return quaternion.normalize(a + u * (_near(a, b) - a))
+    return quaternion.normalize(a + u * (_align_sign(a, b) - a))
 
 
-def _as_three(a: Floats, b: Floats, u: Floats) -> Floats:
+def _three_slerp(a: Floats, b: Floats, u: Floats) -> Floats:
     """Interpolation by three.js: slerp of keys as stored, for near keys the normalized chord."""
-    return _slerped(a, b, u, SHORT_OF_THREE, quaternion.normalize)
+    return _slerp_stored(a, b, u, THREE_NLERP_DOT, quaternion.normalize)
 
 
-def _as_stored(a: Floats, b: Floats, u: Floats) -> Floats:
-    return _slerped(a, b, u, SHORT_OF_RAW, lambda chord: chord)
+def _babylon_slerp(a: Floats, b: Floats, u: Floats) -> Floats:
+    return _slerp_stored(a, b, u, BABYLON_LERP_DOT, lambda chord: chord)
 
 
-def _slerped(a: Floats, b: Floats, u: Floats, short: float, finish: Callable[[Floats], Floats]) -> Floats:
+def _slerp_stored(a: Floats, b: Floats, u: Floats, short: float, finish: Callable[[Floats], Floats]) -> Floats:
     """Shoemake's formula on keys of any length; from the dot product `short` on the chord; equal keys as stored."""
-    b = _near(a, b)
+    b = _align_sign(a, b)
     dot = (a * b).sum(axis=-1, keepdims=True)
     is_short = dot >= short
     theta = np.arccos(np.where(is_short, 0.0, dot))
@@ -107,15 +107,15 @@ def _slerped(a: Floats, b: Floats, u: Floats, short: float, finish: Callable[[Fl
     return np.where((a == b).all(axis=-1, keepdims=True), a, np.where(is_short, chord, arc))
 
 
-def _near(a: Floats, b: Floats) -> Floats:
+def _align_sign(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.where((a * b).sum(axis=-1, keepdims=True) < 0, -b, b))
 
 
 PLAYERS = {
     "spec": PlayerModel("as glTF says: slerp of normalized keys"),
     "three": PlayerModel(
-        "three.js: slerp of keys as stored, normalized only where they are near each other", _as_three, False
+        "three.js: slerp of keys as stored, normalized only where they are near each other", _three_slerp, False
     ),
-    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _as_stored, False),
+    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _babylon_slerp, False),
     "nlerp": PlayerModel("Unity (glTFast), Blender: component by component, then normalized", _chord, True),
 }

@@ -14,7 +14,9 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 
-SLIVER = 1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
+MIN_INTERVAL_FRAMES = (
+    1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
+)
 MAX_FRAMES = 10_000_000
 
 
@@ -30,7 +32,7 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     frames = (end - start) * fps
     if frames > MAX_FRAMES:
         raise RangeError(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
-    sliver = max(SLIVER, 2 * float(np.spacing(np.float32(end))) * fps)
+    sliver = max(MIN_INTERVAL_FRAMES, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)
     times = start + np.arange(whole, dtype=np.float64) / fps
     return arrays.freeze(np.append(times, end)) if whole else arrays.freeze(np.array([start], np.float64))

@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track, ValueKind
 
-VANISHING = 1e-9  # a quaternion whose largest component is below this has no direction
+MIN_QUATERNION_COMPONENT = 1e-9  # a quaternion whose largest component is below this has no direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,5 +82,5 @@ def interpolate(
 
 def _unit(rotations: Floats, instead: Floats) -> Floats:
     """The rotations at unit length; where a spline passes through zero, the left key's instead."""
-    lost = (np.abs(rotations).max(axis=-1) < VANISHING)[..., None]
+    lost = (np.abs(rotations).max(axis=-1) < MIN_QUATERNION_COMPONENT)[..., None]
     return quaternion.normalize(np.where(lost, instead, rotations))

@@ -35,7 +35,7 @@ from cli.io import cache_files, documents, scenes
 from cli.options import common, mesh_selection
 from cli.options.skinning_methods import Method
 
-EXTENSIONS = (".png", *image_file.MOVING)
+EXTENSIONS = (".png", *image_file.ANIMATED_FORMATS)
 FRAMES, FPS = 8, 24.0
 MAX_FRAMES = 3000
 
@@ -154,7 +154,7 @@ def command(
         if is_moving:
             times = filmstrip.film_times(rows)
             pictures = filmstrip.animate_frames(rows, extent, title=title, look=look)
-            drawn = image_file.moving(pictures, ending, fps=fps or when.fps or _rate(times))
+            drawn = image_file.animation(pictures, ending, fps=fps or when.fps or _rate(times))
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, extent, title=title, look=look))
     documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from anim.curves.tangents.table import DEFAULT, TANGENT_FACTORIES, TANGENTS, parse
+from anim.curves.tangents.table import DEFAULT_RULE, TANGENT_FACTORIES, TANGENTS, parse
 from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.recommendations import closing_command
@@ -29,7 +29,7 @@ def command(
     *,
     tangents: Annotated[
         str, typer.Option("--tangents", metavar="NAME", help="The rule for the slope at each key; see --list.")
-    ] = DEFAULT,
+    ] = DEFAULT_RULE,
     list_rules: Annotated[bool, typer.Option("--list", help="Show all tangent rules.")] = False,
     cyclic: Annotated[
         bool,

@@ -13,10 +13,10 @@ from anim.errors import RangeError
 
 JUMPS = ("jump-start", "jump-end", "jump-both", "jump-none")
 MAX_STEPS = 10_000  # above the frame count of one easing on any display
-THIRD = 1e-12  # distance of handles from 1/3 and 2/3 below which the Bézier is a cubic of time
-SOLVED = 4e-16  # a step, or a relative error, below this is rounding
-SOLVER_ROUNDS = 60  # bisection alone takes 46; Newton's method about 3
-TABLE = 128  # start values of the solver
+HANDLE_TOLERANCE = 1e-12  # distance of handles from 1/3 and 2/3 below which the Bézier is a cubic of time
+SOLVER_TOLERANCE = 4e-16  # a step, or a relative error, below this is rounding
+MAX_SOLVER_ITERATIONS = 60  # bisection alone takes 46; Newton's method about 3
+NUM_START_VALUES = 128  # start values of the solver
 
 
 def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") -> Easing:
@@ -38,7 +38,7 @@ def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") 
         return _slope(_parameter(u, x1, x2), (x1, y1), (x2, y2))
 
     exact = None
-    if max(abs(x1 - 1 / 3), abs(x2 - 2 / 3)) < THIRD:
+    if max(abs(x1 - 1 / 3), abs(x2 - 2 / 3)) < HANDLE_TOLERANCE:
         exact = (CubicSegment(0, 1, 0, 1, 3 * y1, 3 * (1 - y2)),)
     elif x1 == y1 and x2 == y2:
         exact = (CubicSegment(0, 1, 0, 1, 1, 1),)
@@ -78,12 +78,12 @@ def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
 def _parameter(u: Floats, x1: float, x2: float) -> Floats:
     """Return s (any shape) with x(s) = u: Newton's method with bisection as a safeguard (x never decreases)."""
     goal = np.asarray(u, dtype=np.float64).ravel()
-    grid = np.linspace(0, 1, TABLE + 1)
+    grid = np.linspace(0, 1, NUM_START_VALUES + 1)
     table = _bernstein(grid, x1, x2)
-    at = np.clip(np.searchsorted(table, goal, side="right") - 1, 0, TABLE - 1)
+    at = np.clip(np.searchsorted(table, goal, side="right") - 1, 0, NUM_START_VALUES - 1)
     low, high, solution = grid[at], grid[at + 1], np.interp(goal, table, grid)
     open_ones = np.arange(goal.size)
-    for _ in range(SOLVER_ROUNDS):
+    for _ in range(MAX_SOLVER_ITERATIONS):
         s, least, most = solution[open_ones], low[open_ones], high[open_ones]
         off, rate = _bernstein(s, x1, x2) - goal[open_ones], _bernstein_slope(s, x1, x2)
         least, most = np.where(off <= 0, s, least), np.where(off >= 0, s, most)
@@ -91,7 +91,9 @@ def _parameter(u: Floats, x1: float, x2: float) -> Floats:
         inside = (rate > 0) & (step >= least) & (step <= most)
         following = np.where(off == 0, s, np.where(inside, step, (least + most) / 2))
         solution[open_ones], low[open_ones], high[open_ones] = following, least, most
-        open_ones = open_ones[(np.abs(following - s) > SOLVED) & (np.abs(off) > SOLVED * goal[open_ones])]
+        open_ones = open_ones[
+            (np.abs(following - s) > SOLVER_TOLERANCE) & (np.abs(off) > SOLVER_TOLERANCE * goal[open_ones])
+        ]
         if not open_ones.size:
             break
     return solution.reshape(np.shape(u))

@@ -14,7 +14,7 @@ from anim.maths import hermite
 Function: TypeAlias = Callable[[Floats], Floats]
 
 EXTENT_SAMPLES = 4097  # finds an extremum of curvature c with an error below c · 8e-9
-ROUNDING = 1e-9  # smaller overshoots are rounding
+OVERSHOOT_TOLERANCE = 1e-9  # smaller overshoots are rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Easing:
         """Least and greatest value, sampled: (0, 1) unless it overshoots."""
         values = self.value(np.linspace(0, 1, EXTENT_SAMPLES))
         low, high = float(values.min()), float(values.max())
-        return (low if low < -ROUNDING else 0.0), (high if high > 1 + ROUNDING else 1.0)
+        return (low if low < -OVERSHOOT_TOLERANCE else 0.0), (high if high > 1 + OVERSHOOT_TOLERANCE else 1.0)
 
     @property
     def overshoots(self) -> bool:

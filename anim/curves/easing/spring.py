@@ -8,9 +8,9 @@ from anim.arrays import Floats
 from anim.curves.easing.function import Easing, format_call
 from anim.errors import RangeError
 
-SETTLED = 1e-3  # distance from 1 below which the spring has settled
+SETTLING_TOLERANCE = 1e-3  # distance from 1 below which the spring has settled
 MIN_DAMPING_RATIO = 0.005  # 200 oscillations until it settles, the limit for keys
-CRITICAL_SETTLING = 9.233413476451586  # the root of (1 + x) e^−x = SETTLED
+CRITICAL_SETTLING = 9.233413476451586  # the root of (1 + x) e^−x = SETTLING_TOLERANCE
 
 
 def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
@@ -45,17 +45,17 @@ def settle_time(stiffness: float, damping: float) -> float:
             help=f"a damping of {2 * omega * MIN_DAMPING_RATIO:.3g} or more",
         )
     if ratio > 1:
-        return _settle_creeping(stiffness, damping)
-    swinging = -np.log(SETTLED * np.sqrt(1 - ratio * ratio)) if ratio < 1 else np.inf
+        return _settle_overdamped(stiffness, damping)
+    swinging = -np.log(SETTLING_TOLERANCE * np.sqrt(1 - ratio * ratio)) if ratio < 1 else np.inf
     return float(min(swinging, CRITICAL_SETTLING) / decay)
 
 
-def _settle_creeping(stiffness: float, damping: float) -> float:
+def _settle_overdamped(stiffness: float, damping: float) -> float:
     """Return the settling time of an over-damped spring by bisection: its distance decreases monotonically."""
     low, high = 0.0, 2 * CRITICAL_SETTLING * damping / stiffness
     for _ in range(60):
         middle = (low + high) / 2
-        if 1 - float(_position(np.array(middle), stiffness, damping)) > SETTLED:
+        if 1 - float(_position(np.array(middle), stiffness, damping)) > SETTLING_TOLERANCE:
             low = middle
         else:
             high = middle
@@ -66,18 +66,20 @@ def _position(t: Floats, stiffness: float, damping: float) -> Floats:
     """Return x(t), from 0 at rest to 1: x″ + c x′ + k x = k."""
     decay, gap = damping / 2, damping * damping / 4 - stiffness
     if gap <= 0:
-        return np.asarray(1 - np.exp(-decay * t) * np.cos(np.sqrt(-gap) * t) - decay * _swing(t, stiffness, damping))
+        return np.asarray(
+            1 - np.exp(-decay * t) * np.cos(np.sqrt(-gap) * t) - decay * _oscillation(t, stiffness, damping)
+        )
     beta = np.sqrt(gap)
     slow = stiffness / (decay + beta)
     even = (np.exp(-slow * t) + np.exp(-(decay + beta) * t)) / 2
-    return np.asarray(1 - even - decay * _swing(t, stiffness, damping))
+    return np.asarray(1 - even - decay * _oscillation(t, stiffness, damping))
 
 
 def _speed(t: Floats, stiffness: float, damping: float) -> Floats:
-    return stiffness * _swing(t, stiffness, damping)
+    return stiffness * _oscillation(t, stiffness, damping)
 
 
-def _swing(t: Floats, stiffness: float, damping: float) -> Floats:
+def _oscillation(t: Floats, stiffness: float, damping: float) -> Floats:
     """Return e^(−ct/2) sin(ωt) / ω, ω² = k − c²/4, and its limits where ω is 0 (t e^(−ct/2)) or imaginary (sinh)."""
     decay, gap = damping / 2, damping * damping / 4 - stiffness
     if gap <= 0:

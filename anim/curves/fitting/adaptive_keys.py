@@ -16,8 +16,8 @@ SAMPLES = np.array(
     [0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97]
 )  # of a segment; errors can vanish at ½ alone
 MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, slerp and quaternion splines are inaccurate
-SHORTEST = 1e-5  # s; float32 times below a minute have a finer resolution
-LEVELS = 24  # greatest number of halvings of a segment
+MIN_SEGMENT_S = 1e-5  # s; float32 times below a minute have a finer resolution
+MAX_HALVINGS = 24  # greatest number of halvings of a segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +88,8 @@ Between = Callable[[TrackFunction, Floats, Floats], Floats]  # starts, ends (P,)
 def _bisect(motion: TrackFunction, corners: Floats, tolerance: float, between: Between) -> Floats:
     done = [corners]
     start, end = corners[:-1], corners[1:]
-    for _ in range(LEVELS):
-        wide = end - start > SHORTEST
+    for _ in range(MAX_HALVINGS):
+        wide = end - start > MIN_SEGMENT_S
         start, end = start[wide], end[wide]
         if not len(start):
             break

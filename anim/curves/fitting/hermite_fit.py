@@ -14,9 +14,9 @@ from anim.maths import hermite
 SAMPLES = (
     1 - np.cos(np.pi * np.arange(1, 40) / 40)
 ) / 2  # of each segment, denser towards its ends, where roots are steep
-SAFETY = 1.01  # the greatest error is less than 1 % above the greatest sample
-NUDGE = 1e-12  # the slope at a breakpoint is evaluated at this distance inside the segment
-VERTICAL = 1e4  # steeper slopes are replaced by a least squares fit
+SAMPLING_SAFETY_FACTOR = 1.01  # the greatest error is less than 1 % above the greatest sample
+BREAKPOINT_OFFSET = 1e-12  # the slope at a breakpoint is evaluated at this distance inside the segment
+MAX_SLOPE = 1e4  # steeper slopes are replaced by a least squares fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +40,11 @@ def fit_end_slopes(path: FitTarget, a: Floats, b: Floats) -> tuple[Floats, Float
     They are the path's own, from inside the segment. If one is vertical, both are those of the least squared error:
     keeping the other one would make the segment thirty times shorter, to avoid an invisible kink.
     """
-    rate0, rate1 = path.rate(_nudged(a, path, NUDGE)), path.rate(_nudged(b, path, -NUDGE))
-    free = np.maximum(np.abs(rate0), np.abs(rate1)) > VERTICAL
+    rate0, rate1 = (
+        path.rate(_offset_breakpoints(a, path, BREAKPOINT_OFFSET)),
+        path.rate(_offset_breakpoints(b, path, -BREAKPOINT_OFFSET)),
+    )
+    free = np.maximum(np.abs(rate0), np.abs(rate1)) > MAX_SLOPE
     if not free.any():
         return rate0, rate1
     best0, best1 = _free_slopes(path, a, b)
@@ -55,7 +58,7 @@ def fit_errors(path: FitTarget, a: Floats, b: Floats, rates: tuple[Floats, Float
     """
     u = a[:, None] + (b - a)[:, None] * SAMPLES
     fitted = _segments(path, a, b, *(rates or fit_end_slopes(path, a, b)))
-    return np.asarray(path.distance(fitted, path.point(u)).max(axis=1) * SAFETY)
+    return np.asarray(path.distance(fitted, path.point(u)).max(axis=1) * SAMPLING_SAFETY_FACTOR)
 
 
 def _segments(path: FitTarget, a: Floats, b: Floats, rate0: Floats, rate1: Floats) -> Floats:
@@ -82,6 +85,6 @@ def _product(x: Floats, y: Floats) -> Floats:
     return np.asarray((x * y).sum(axis=(1, 2)))
 
 
-def _nudged(u: Floats, path: FitTarget, by: float) -> Floats:
+def _offset_breakpoints(u: Floats, path: FitTarget, by: float) -> Floats:
     at_break: Bools = np.isin(u, path.breakpoints)
     return np.where(at_break, u + by, u)

@@ -15,7 +15,7 @@ from anim.errors import RangeError
 from anim.maths import quaternion as quat
 
 MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, the chord of unit quaternions gets short
-ANGLE_STEP = np.pi / 32  # fits are shared by angles up to the next multiple
+ANGLE_STEP_RAD = np.pi / 32  # fits are shared by angles up to the next multiple
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> Ro
     turn = quat.rotation_vector(quat.multiply(quat.conjugate(q0), q1))
     angle = float(np.sqrt(turn @ turn))
     ends, rate0, rate1, error = fit_rotation_segments(
-        easing, float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP, tolerance
+        easing, float(np.ceil(angle / ANGLE_STEP_RAD)) * ANGLE_STEP_RAD, tolerance
     )
     if angle > 0:
         error = _error(easing, angle, ends, rate0, rate1)
@@ -74,7 +74,7 @@ class RotationFit:
 
 def rotation_segments_for(easing: Easing, angle: float, tolerance: float) -> RotationFit:
     """Return the fewest cubics for a rotation by `angle` radians; angles are rounded up to multiples of π/32."""
-    rounded = float(np.ceil(angle / ANGLE_STEP)) * ANGLE_STEP
+    rounded = float(np.ceil(angle / ANGLE_STEP_RAD)) * ANGLE_STEP_RAD
     return RotationFit(*fit_rotation_segments(easing, rounded, tolerance))
 
 

@@ -14,11 +14,11 @@ from anim.errors import RangeError
 Errors: TypeAlias = Callable[[Floats, Floats], Floats]  # errors (B,) of the segments from a (B,) to b (B,)
 
 MIN_TOLERANCE = 1e-7  # of the range: resolution of float32 values
-SHORTEST = 1e-6  # of the range; shorter segments would have equal float32 key times
-CANDIDATES = 16  # ends evaluated at once
-REFINEMENTS = 4  # rounds of CANDIDATES: an end is found to 16⁻⁴ of the remainder
-EVEN_ROUNDS = 6  # halvings of the tolerance at a constant number of segments
-EVEN_LIMIT = 64  # with more segments a short last one doesn't matter
+MIN_SEGMENT_LENGTH = 1e-6  # of the range; shorter segments would have equal float32 key times
+NUM_CANDIDATES = 16  # ends evaluated at once
+NUM_REFINEMENTS = 4  # rounds of NUM_CANDIDATES: an end is found to 16⁻⁴ of the remainder
+NUM_EQUALIZING_ROUNDS = 6  # halvings of the tolerance at a constant number of segments
+MAX_EQUALIZED_SEGMENTS = 64  # with more segments a short last one doesn't matter
 
 
 def subdivide(errors: Errors, edges: tuple[float, ...], tolerance: float) -> tuple[float, ...]:
@@ -33,21 +33,21 @@ def subdivide(errors: Errors, edges: tuple[float, ...], tolerance: float) -> tup
         raise RangeError(f"tolerance is {tolerance:g} (expected {MIN_TOLERANCE:g} or more)")
     ends = list(edges[:1])
     for start, end in pairwise(edges):
-        ends += _evened(errors, start, end, tolerance)
+        ends += _equalize_errors(errors, start, end, tolerance)
     return tuple(ends)
 
 
-def _evened(errors: Errors, start: float, end: float, tolerance: float) -> list[float]:
+def _equalize_errors(errors: Errors, start: float, end: float, tolerance: float) -> list[float]:
     """Return the ends of the fewest segments from start to end, at nearly the least tolerance for their number."""
-    best = _greedy(errors, start, end, tolerance, limit=None)
+    best = _subdivide_greedily(errors, start, end, tolerance, limit=None)
     assert best is not None
     count = len(best)
-    if not 1 < count <= EVEN_LIMIT:
+    if not 1 < count <= MAX_EQUALIZED_SEGMENTS:
         return best
     low, high = tolerance * ((count - 1) / count) ** 4 / 2, tolerance
-    for _ in range(EVEN_ROUNDS):
+    for _ in range(NUM_EQUALIZING_ROUNDS):
         middle = (low + high) / 2
-        ends = _greedy(errors, start, end, middle, limit=count)
+        ends = _subdivide_greedily(errors, start, end, middle, limit=count)
         if ends is None:
             low = middle
         else:
@@ -55,31 +55,33 @@ def _evened(errors: Errors, start: float, end: float, tolerance: float) -> list[
     return best
 
 
-def _greedy(errors: Errors, start: float, end: float, tolerance: float, *, limit: int | None) -> list[float] | None:
+def _subdivide_greedily(
+    errors: Errors, start: float, end: float, tolerance: float, *, limit: int | None
+) -> list[float] | None:
     """Return the ends of segments of maximal length within the tolerance, or None for more than `limit`."""
     ends: list[float] = []
     while start < end:
         if limit is not None and len(ends) == limit:
             return None
-        start = _longest(errors, start, end, tolerance)
+        start = _find_longest(errors, start, end, tolerance)
         ends.append(start)
     return ends
 
 
-def _longest(errors: Errors, start: float, end: float, tolerance: float) -> float:
+def _find_longest(errors: Errors, start: float, end: float, tolerance: float) -> float:
     """Return the last candidate end up to which all candidates are within the tolerance."""
     low, high, rounds = start, end, 0
-    while rounds < REFINEMENTS or low == start:
-        ends = np.linspace(low, high, CANDIDATES + 1)[1:]
-        good = errors(np.full(CANDIDATES, start), ends) <= tolerance
-        bad = int(np.argmin(good)) if not good.all() else CANDIDATES
-        if bad == CANDIDATES:
+    while rounds < NUM_REFINEMENTS or low == start:
+        ends = np.linspace(low, high, NUM_CANDIDATES + 1)[1:]
+        good = errors(np.full(NUM_CANDIDATES, start), ends) <= tolerance
+        bad = int(np.argmin(good)) if not good.all() else NUM_CANDIDATES
+        if bad == NUM_CANDIDATES:
             low = high
             break
         low, high, rounds = float(ends[bad - 1]) if bad else low, float(ends[bad]), rounds + 1
-        if high - start <= SHORTEST:
-            low = start + SHORTEST
+        if high - start <= MIN_SEGMENT_LENGTH:
+            low = start + MIN_SEGMENT_LENGTH
             break
-    if low >= end or end - start <= 2 * SHORTEST:
+    if low >= end or end - start <= 2 * MIN_SEGMENT_LENGTH:
         return end
-    return min(low, end - SHORTEST)
+    return min(low, end - MIN_SEGMENT_LENGTH)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.tangents.rule import SplineKeys, extended
+from anim.curves.tangents.rule import SplineKeys, extend_loop
 
 
 def natural(times: Floats, values: Floats) -> SplineKeys:
@@ -42,13 +42,13 @@ def bspline(times: Floats, values: Floats) -> SplineKeys:
     Source: Schoenberg 1967 (variation diminishing spline); scipy's BSpline.
     """
     knots = np.concatenate((times[:1].repeat(3), times, times[-1:].repeat(3)))
-    return _approximated(knots, times, values, times, values)
+    return _fit_bspline(knots, times, values, times, values)
 
 
 def cyclic_bspline(times: Floats, values: Floats) -> SplineKeys:
     """Return the periodic form of `bspline`: both ends are approximated too, and meet each other."""
-    more_times, more_values = extended(times, values, 3)
-    keys = _approximated(more_times, more_times, more_values, times, values)
+    more_times, more_values = extend_loop(times, values, 3)
+    keys = _fit_bspline(more_times, more_times, more_values, times, values)
     keys.values[-1] = keys.values[0] + (values[-1] - values[0])
     keys.out_tangents[-1] = keys.out_tangents[0]
     return keys
@@ -64,7 +64,7 @@ def _cubic(times: Floats, values: Floats, *, ends: str) -> SplineKeys:
     return SplineKeys(values, slopes, slopes)
 
 
-def _approximated(knots: Floats, lines_t: Floats, lines_v: Floats, times: Floats, values: Floats) -> SplineKeys:
+def _fit_bspline(knots: Floats, lines_t: Floats, lines_v: Floats, times: Floats, values: Floats) -> SplineKeys:
     """Return the B-spline on `knots`, with control points on the lines through lines_t, lines_v, sampled at `times`."""
     from scipy.interpolate import BSpline
 

@@ -11,7 +11,7 @@ from anim.arrays import Floats
 from anim.curves.tangents.rule import TangentRule, local_rule
 from anim.errors import RangeError
 
-SHORTEST_KNOT = 1e-9  # of the longest interval: separates repeated points in the centripetal parameter
+MIN_KNOT_RATIO = 1e-9  # of the longest interval: separates repeated points in the centripetal parameter
 
 
 def bessel(times: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -46,7 +46,7 @@ def centripetal(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     knots = np.sqrt(np.sqrt((steps * steps).sum(axis=1)))
     if not knots.any():
         return flat(times, values)
-    knots = np.maximum(knots, SHORTEST_KNOT * knots.max())
+    knots = np.maximum(knots, MIN_KNOT_RATIO * knots.max())
     slopes = _parabola_slopes(np.append(0.0, np.cumsum(knots)), values)
     rates = (knots / np.diff(times))[:, None]
     return slopes * np.concatenate((rates[:1], rates)), slopes * np.concatenate((rates, rates[-1:]))

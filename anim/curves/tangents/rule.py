@@ -53,17 +53,17 @@ def local_rule(name: str, slopes: Slopes) -> TangentRule:
         return SplineKeys(values, *slopes(times, values))
 
     def cyclic_keys(times: Floats, values: Floats) -> SplineKeys:
-        before, after = slopes(*extended(times, values, 2))
+        before, after = slopes(*extend_loop(times, values, 2))
         return SplineKeys(values, before[2:-2], after[2:-2])
 
     return TangentRule(name, open_keys, cyclic_keys)
 
 
-def extended(times: Floats, values: Floats, count: int) -> tuple[Floats, Floats]:
+def extend_loop(times: Floats, values: Floats, count: int) -> tuple[Floats, Floats]:
     """Return times (K + 2·count,) and values (K + 2·count, C) with `count` more keys of the loop before and after.
 
     The last key is the first one of the next cycle; the difference of their values is the displacement per cycle.
-    extended([0, 1, 3], [[0], [5], [0]], 1) → [−2, 0, 1, 3, 4], [[5], [0], [5], [0], [5]]
+    extend_loop([0, 1, 3], [[0], [5], [0]], 1) → [−2, 0, 1, 3, 4], [[5], [0], [5], [0], [5]]
     """
     laps, at = np.divmod(np.arange(-count, len(times) + count), len(times) - 1)
     return (

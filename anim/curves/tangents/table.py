@@ -14,7 +14,7 @@ from anim.curves.tangents.rule import SplineKeys, TangentRule, local_rule
 from anim.errors import RangeError, ShapeError
 from anim.maths import quaternion as quat
 
-CLOSED = 1e-3  # rad between first and last key of a closed loop
+LOOP_TOLERANCE_RAD = 1e-3  # rad between first and last key of a closed loop
 
 TANGENTS: dict[str, TangentRule] = {
     rule.name: rule
@@ -37,7 +37,7 @@ TANGENT_FACTORIES: dict[str, Factory[TangentRule]] = {
     "tcb": Factory("tcb(tension, continuity, bias)", lambda args: local.tcb(*numbers(args, 3))),
 }
 
-DEFAULT = "time-aware"
+DEFAULT_RULE = "time-aware"
 
 
 def parse(text: str) -> TangentRule:
@@ -58,8 +58,8 @@ def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cy
     Raises RangeError or ShapeError for arrays that are not valid keys.
     keys 0, 1, 2 s with 0, 1, 0 by time-aware → out-tangents 2, 0, (0), in-tangents (0), 0, −2
     """
-    t, v = _checked(times, arrays.as_floats(values, "K C", name="values"))
-    return _bounded(_keys(t, v, rule, cyclic))
+    t, v = _check_keys(times, arrays.as_floats(values, "K C", name="values"))
+    return _clear_end_tangents(_keys(t, v, rule, cyclic))
 
 
 def apply_rotation_tangents(
@@ -74,14 +74,14 @@ def apply_rotation_tangents(
     Raises RangeError for an open loop under a C2 rule, or a quaternion of length 0.
     Source: notes/algorithms.md C4, rotations (b).
     """
-    t, checked = _checked(times, arrays.as_floats(rotations, "K 4", name="rotations"))
+    t, checked = _check_keys(times, arrays.as_floats(rotations, "K 4", name="rotations"))
     q = quat.align_signs(quat.normalize(checked))
     if rule.smooth:
-        return _bounded(_component_keys(t, q, rule, rule.loop or (cyclic and rule.cyclic is not rule.open)))
+        return _clear_end_tangents(_component_keys(t, q, rule, rule.loop or (cyclic and rule.cyclic is not rule.open)))
     turns = quat.rotation_vector(quat.multiply(quat.conjugate(q[:-1]), q[1:]))
     rolled_out = np.concatenate((np.zeros((1, 3)), np.cumsum(turns, axis=0)))
     rates = _keys(t, rolled_out, rule, cyclic)
-    return _bounded(
+    return _clear_end_tangents(
         SplineKeys(q, quat.derivative(q, rates.in_tangents), quat.derivative(q, rates.out_tangents), rates.departure)
     )
 
@@ -89,13 +89,13 @@ def apply_rotation_tangents(
 def check_closed(rotations: Floats) -> None:
     """Raise RangeError if unit quaternions (K, 4) of a loop start and end in different rotations."""
     turn = float(quat.angle_between(rotations[0], rotations[-1]))
-    if turn > CLOSED:
+    if turn > LOOP_TOLERANCE_RAD:
         raise RangeError(
             f"the loop is open: its last key is {np.degrees(turn):.3g}° from its first (expected the same rotation)"
         )
 
 
-def _checked(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
+def _check_keys(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
     t = arrays.as_key_times(times)
     if len(t) != len(values):
         raise ShapeError(f"{len(values)} values for {len(t)} times (expected as many)")
@@ -124,7 +124,7 @@ def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -
     return SplineKeys(unit, rates, rates, float(quat.angle_between(unit, q[:count]).max()))
 
 
-def _bounded(keys: SplineKeys) -> SplineKeys:
+def _clear_end_tangents(keys: SplineKeys) -> SplineKeys:
     """Return the keys with the unused tangents, before the first and after the last key, set to 0."""
     before, after = keys.in_tangents.copy(), keys.out_tangents.copy()
     before[0], after[-1] = 0.0, 0.0

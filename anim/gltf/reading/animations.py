@@ -11,7 +11,7 @@ from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading.accessors import FLOAT, Accessors
 from anim.gltf.validation import channel_targets
 from anim.model import AccessorFormat, Interpolation, Track
-from anim.model.track import WIDTHS
+from anim.model.track import NUM_COMPONENTS
 
 INTERPOLATIONS = {name.value: name for name in Interpolation}
 TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
@@ -102,7 +102,7 @@ class Reader:
         fractions = path in ("rotation", "weights") and component_type in FRACTIONS and normalized
         if component_type != FLOAT and not fractions:
             raise FormatError(f"output accessor has component type {component_type} (expected {FLOAT}, or normalized)")
-        return WIDTHS[path] if path != "weights" else self._target_count(node)
+        return NUM_COMPONENTS[path] if path != "weights" else self._target_count(node)
 
     def _target_count(self, node: int | None) -> int:
         count = channel_targets.target_count(self._json, node) if node is not None else 0

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.sampling.players import PLAYERS, SHORT_OF_RAW, SHORT_OF_THREE
+from anim.sampling.players import BABYLON_LERP_DOT, PLAYERS, THREE_NLERP_DOT
 
 GLTF = "spec"  # the player that normalizes keys first; arcs between them are of unit length
 
@@ -40,11 +40,11 @@ def _both_arcs(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
 
 
 def _as_three(a: Floats, b: Floats) -> tuple[Floats, Bools]:
-    return _both_arcs(a, b, SHORT_OF_THREE)
+    return _both_arcs(a, b, THREE_NLERP_DOT)
 
 
 def _as_stored(a: Floats, b: Floats) -> tuple[Floats, Bools]:
-    theta, line = _both_arcs(a, b, SHORT_OF_RAW)
+    theta, line = _both_arcs(a, b, BABYLON_LERP_DOT)
     return theta, np.zeros(line.shape, np.bool_)
 
 

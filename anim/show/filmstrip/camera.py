@@ -10,10 +10,10 @@ import numpy as np
 from anim.arrays import Floats
 
 AZIMUTH, ELEVATION = 35.0, 14.0  # degrees: from the front (+Z) toward +X, and from above
-FIELD = 24.0  # degrees, vertical field of view: a long focal length keeps proportions
-MARGIN = 0.06  # share of the picture that stays free on each side
-NARROWEST, WIDEST = 0.62, 1.78  # width by height of a picture
-SMALLEST = 1e-6  # m
+FIELD_OF_VIEW_DEG = 24.0  # degrees, vertical field of view: a long focal length keeps proportions
+MARGIN_FRACTION = 0.06  # share of the picture that stays free on each side
+MIN_ASPECT, MAX_ASPECT = 0.62, 1.78  # width by height of a picture
+MIN_DEPTH_M = 1e-6  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Camera:
     def project(self, points: Floats) -> Floats:
         """Return x and y in pixels and nearness (1 / distance) of points (..., 3)."""
         seen = (points - self.eye) @ self.axes.T
-        near = 1 / np.maximum(-seen[..., 2], SMALLEST)
+        near = 1 / np.maximum(-seen[..., 2], MIN_DEPTH_M)
         x = self.width / 2 + self.scale * seen[..., 0] * near
         y = self.height / 2 - self.scale * seen[..., 1] * near
         return np.stack((x, y, near), axis=-1)
@@ -56,14 +56,14 @@ def fit_camera(points: Floats, *, height: int, azimuth: float = AZIMUTH, elevati
     if not len(seen):
         seen = np.zeros((1, 3))
     middle = (seen.max(axis=0) + seen.min(axis=0)) / 2
-    reach = np.maximum(np.ptp(seen, axis=0), SMALLEST)
-    aspect = float(np.clip(reach[0] / reach[1], NARROWEST, WIDEST))
-    slope = math.tan(math.radians(FIELD) / 2) * (1 - 2 * MARGIN)
+    reach = np.maximum(np.ptp(seen, axis=0), MIN_DEPTH_M)
+    aspect = float(np.clip(reach[0] / reach[1], MIN_ASPECT, MAX_ASPECT))
+    slope = math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * (1 - 2 * MARGIN_FRACTION)
     x, far_x = _fit(seen[:, 0], seen[:, 2], slope * aspect)
     y, far_y = _fit(seen[:, 1], seen[:, 2], slope)
     away = max(far_x, far_y, float(middle[2] + reach.max() * 1e-3))
     width = max(round(height * aspect / 2) * 2, 2)
-    scale = height / 2 / math.tan(math.radians(FIELD) / 2)
+    scale = height / 2 / math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2)
     return Camera(np.array([x, y, away]) @ axes, axes, scale, width, height)
 
 

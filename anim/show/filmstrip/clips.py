@@ -26,10 +26,10 @@ from anim.show.filmstrip.surface import Surface
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
-AROUND = 48  # frames of the whole motion for the framing of the camera
+NUM_FRAMING_FRAMES = 48  # frames of the whole motion for the framing of the camera
 MAX_FRAMES = 3000
-THICKER = 1.9  # width relative to the sticks in files
-WIDEST = 1.5  # relative to the median width, so that links to distant helper joints don't hide others
+STICK_SCALE = 1.9  # width relative to the sticks in files
+MAX_STICK_RATIO = 1.5  # relative to the median width, so that links to distant helper joints don't hide others
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ def of_document(
     found: list[FilmstripClip] = []
     for number, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
-        times, path = when.times(start, end), _spread(start, end)
+        times, path = when.times(start, end), _framing_times(start, end)
         if not len(times):
             continue
         for method in methods or ("lbs",):
@@ -155,7 +155,7 @@ def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
     start, end = float(cache.times[0]), float(cache.times[-1])
     when.check(start, end)
     chosen = resample.resample_frames(cache, when.times(start, end))
-    whole = resample.resample_frames(cache, _spread(start, end))
+    whole = resample.resample_frames(cache, _framing_times(start, end))
     return [FilmstripClip(-1, "", "", chosen, whole, palette.face_colors(cache))]
 
 
@@ -198,7 +198,7 @@ def build_strips(
                 shot.clip,
             )
         )
-        points += [_places(each, way) for each in (shot.path, shot.cache)]
+        points += [_framing_points(each, way) for each in (shot.path, shot.cache)]
     ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
     return found, Extent(np.concatenate(points), ground)
 
@@ -236,16 +236,16 @@ def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
     mesh, skin = stick_mesh(scene.skeleton, _ends(scene.skeleton))
     if not len(mesh.positions):
         raise NotFoundError("has neither a mesh nor joints to draw")
-    return Scene(scene.skeleton, (MeshInstance(0, _thicker(mesh), skin, np.zeros(0)),))
+    return Scene(scene.skeleton, (MeshInstance(0, _widen_sticks(mesh), skin, np.zeros(0)),))
 
 
-def _thicker(mesh: Mesh) -> Mesh:
+def _widen_sticks(mesh: Mesh) -> Mesh:
     """Sticks of 24 corners (start, ring, ring, end, ring, ring, …) with wider rings, for small pictures."""
     bodies = mesh.positions.reshape(-1, 24, 3).copy()
     ring = np.array([1, 2, 4, 5, 7, 8, 10, 11, 13, 14, 16, 17, 19, 20, 22, 23])
     middle = (bodies[:, [1]] + bodies[:, [13]]) / 2  # opposite corners of the ring
     radius = np.linalg.norm(bodies[:, [1]] - middle, axis=-1, keepdims=True)
-    wanted = THICKER * np.minimum(radius, WIDEST * np.median(radius))
+    wanted = STICK_SCALE * np.minimum(radius, MAX_STICK_RATIO * np.median(radius))
     bodies[:, ring] = middle + wanted / radius * (bodies[:, ring] - middle)
     return replace(mesh, positions=bodies.reshape(-1, 3))
 
@@ -262,11 +262,11 @@ def _factors(document: Document) -> list[tuple[float, float, float]]:
     return [(1.0, 1.0, 1.0) if each.texture is not None else each.factor[:3] for each in materials]
 
 
-def _spread(start: float, end: float) -> Floats:
-    return np.linspace(start, end, AROUND) if end > start else np.array([start])
+def _framing_times(start: float, end: float) -> Floats:
+    return np.linspace(start, end, NUM_FRAMING_FRAMES) if end > start else np.array([start])
 
 
-def _places(cache: VertexCache, way: root_path.RootPath | None) -> AnyArray:
+def _framing_points(cache: VertexCache, way: root_path.RootPath | None) -> AnyArray:
     """Vertices of all frames relative to the camera; of long motions a subset of frames."""
     step = max(1, -(-cache.frame_count * cache.vertex_count // MAX_POINTS))
     found = []

@@ -14,21 +14,21 @@ from anim.errors import RangeError
 from anim.show.filmstrip import captions, heat_map
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, fit_camera
 from anim.show.filmstrip.captions import FAINT, LINE
-from anim.show.filmstrip.renderer import SceneView, mark_spacing, moved, render_frame, setup_view, to_srgb
+from anim.show.filmstrip.renderer import SceneView, mark_spacing, render_frame, setup_view, to_srgb, translate_view
 from anim.show.filmstrip.root_path import RootPath
 from anim.show.filmstrip.surface import Surface
 from anim.show.filmstrip.surface_pattern import Checker, SurfaceMarks, edges
 
 HEIGHT = 240  # pixels of a frame
 GAP, EDGE = 3, 12  # pixels between frames, and around all
-APART = 10  # pixels between clips
+CLIP_SPACING_PX = 10  # pixels between clips
 WIDEST_TIME = "00.00 s"
 MAX_WIDTH = 1600  # pixels; frames beyond are wrapped into another line
-PAPER = (247, 247, 248)  # sRGB
-INSIDE = 8  # pixels from the left of a frame to its text
-LOW = captions.LINE + 3  # pixels from the bottom of a frame to the top of its text
+BACKGROUND = (247, 247, 248)  # sRGB
+TEXT_INSET_PX = 8  # pixels from the left of a frame to its text
+TEXT_HEIGHT_PX = captions.LINE + 3  # pixels from the bottom of a frame to the top of its text
 MAX_POINTS = 2_000_000  # for the framing of the camera
-CLOSED = 1e-3  # of the displacement of vertices; the greatest loop gap of a closed loop
+LOOP_TOLERANCE = 1e-3  # of the displacement of vertices; the greatest loop gap of a closed loop
 MAX_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
 
 Image = NDArray[np.uint8]
@@ -85,21 +85,23 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     Rows of one clip are wrapped together, so that methods can be compared at the same times.
     Raises RangeError for pictures of less than 32 or more than 4096 pixels.
     """
-    scenery = _scenery(extent, look)
+    scenery = _setup_scene(extent, look)
     width, height = scenery.camera.width, scenery.camera.height
     most, header = _max_extent(rows), _header_height(rows, title)
     clips = [list(each) for _, each in groupby(rows, key=lambda row: row.clip)]
     per_line, pitch = _grid(width)
     columns = max(_columns(row, per_line)[0] for row in rows)
     across = max(columns * pitch - GAP, _header_width(rows, title))
-    sheet = _paper(header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP, across + 2 * EDGE)
+    sheet = _blank_image(
+        header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP, across + 2 * EDGE
+    )
     captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
     top = header
     for clip in clips:
         words = captions.wrap_text(clip[0].heading, across) if clip[0].heading else []
         for i, line in enumerate(words):
-            captions.write(sheet, line, EDGE, top + APART + i * LINE)
-        begin = top + len(words) * LINE + (APART if words else 0)
+            captions.write(sheet, line, EDGE, top + CLIP_SPACING_PX + i * LINE)
+        begin = top + len(words) * LINE + (CLIP_SPACING_PX if words else 0)
         for r, row in enumerate(clip):
             _draw_row(sheet, row, _frames(row, scenery, most, look), begin, (r, len(clip)), per_line, (width, height))
         top += _clip_height(clip, per_line, height)
@@ -108,7 +110,7 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
 
 def _clip_height(clip: Sequence[Strip], per_line: int, height: int) -> int:
     lines = max(_columns(row, per_line)[1] for row in clip)
-    heading = LINE + APART if clip[0].heading else 0
+    heading = LINE + CLIP_SPACING_PX if clip[0].heading else 0
     return heading + lines * len(clip) * (height + _footer(clip[0]))
 
 
@@ -148,7 +150,7 @@ def _draw_row(
             middle = x + (width - captions.width(words)) // 2
             captions.write(sheet, words, middle, y + height + GAP + i * LINE, color=FAINT)
         if row.label and f % columns == 0:
-            captions.write(sheet, row.label, x + INSIDE, y + height - LOW)
+            captions.write(sheet, row.label, x + TEXT_INSET_PX, y + height - TEXT_HEIGHT_PX)
 
 
 def _render_moment(row: Strip, frame: int) -> list[str]:
@@ -166,20 +168,20 @@ def animate_frames(
 
     Raises RangeError for more than MAX_PIXELS.
     """
-    scenery = _scenery(extent, look)
+    scenery = _setup_scene(extent, look)
     width, height = scenery.camera.width, scenery.camera.height
     per_line, pitch = _grid(width)
     names = [captions.wrap_text(" ".join(filter(None, (row.heading, row.label))), pitch - GAP) for row in rows]
     name_lines = max(len(lines) for lines in names) if any(lines != [""] for lines in names) else 0
     columns = min(len(rows), per_line)
-    header, cell = _header_height(rows, title), name_lines * LINE + height + APART
+    header, cell = _header_height(rows, title), name_lines * LINE + height + CLIP_SPACING_PX
     across = max(columns * pitch - GAP, _header_width(rows, title)) + 2 * EDGE
-    tall = header + -(-len(rows) // columns) * cell - APART + LINE + EDGE
+    tall = header + -(-len(rows) // columns) * cell - CLIP_SPACING_PX + LINE + EDGE
     times, most = film_times(rows), _max_extent(rows)
     _check_size(tall, across, len(times))
     frames = [_repeat_last(_frames(row, scenery, most, look)) for row in rows]
     for time, *pictures in zip(times, *frames, strict=False):
-        sheet = _paper(tall, across)
+        sheet = _blank_image(tall, across)
         captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
         for r, picture in enumerate(pictures):
             top, left = header + r // columns * cell, EDGE + r % columns * pitch
@@ -216,14 +218,14 @@ def _is_loop(rows: Sequence[Strip]) -> bool:
         return False
     for row in rows:
         moved = [float(np.abs(each - row.positions[0]).max(initial=0)) for each in row.positions]
-        if max(moved) == 0 or moved[-1] > CLOSED * max(moved):
+        if max(moved) == 0 or moved[-1] > LOOP_TOLERANCE * max(moved):
             return False
     return True
 
 
-def _paper(height: int, width: int) -> Image:
+def _blank_image(height: int, width: int) -> Image:
     _check_size(height, width, 1)
-    return np.full((height, width, 3), PAPER, np.uint8)
+    return np.full((height, width, 3), BACKGROUND, np.uint8)
 
 
 def _check_size(height: int, width: int, frames: int) -> None:
@@ -235,7 +237,7 @@ def _check_size(height: int, width: int, frames: int) -> None:
         )
 
 
-def _scenery(extent: Extent, look: ViewOptions) -> SceneView:
+def _setup_scene(extent: Extent, look: ViewOptions) -> SceneView:
     if not 32 <= look.height <= 4096:
         raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
     points = np.asarray(extent.points, np.float64).reshape(-1, 3)
@@ -253,7 +255,7 @@ def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> I
         if row.root_path is not None:
             place = row.root_path.at(row.times[f])
             seen[:, [0, 2]] -= place
-            now = moved(scenery, place, row.root_path.milestones(row.times[f], mark_spacing(scenery)))
+            now = translate_view(scenery, place, row.root_path.milestones(row.times[f], mark_spacing(scenery)))
         picture = render_frame(now, seen, row.faces, colors, marks, row.surface, tinted=row.distances is None)
         yield to_srgb(picture)
 

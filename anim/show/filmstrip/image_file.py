@@ -13,8 +13,8 @@ from anim.show.filmstrip.filmstrip import Image
 
 COMPRESSION_LEVEL = 9
 WEBP_QUALITY = 88
-MOVING = {".webp": "WEBP", ".gif": "GIF", ".apng": "PNG"}
-TICK = {".gif": 10}  # ms, resolution of frame durations; 1 for other formats
+ANIMATED_FORMATS = {".webp": "WEBP", ".gif": "GIF", ".apng": "PNG"}
+TIME_RESOLUTION_MS = {".gif": 10}  # ms, resolution of frame durations; 1 for other formats
 MAX_FPS = {".gif": 50}  # most programs play faster files at a tenth of the speed; 1000 for other formats
 
 
@@ -30,7 +30,7 @@ def png(image: Image) -> bytes:
     return out.getvalue()
 
 
-def moving(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
+def animation(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
     """Return the bytes of a looped film. ending: one of MOVING.
 
     Raises RangeError for more frames per second than the format supports.
@@ -44,17 +44,17 @@ def moving(images: Iterable[Image], ending: str, *, fps: float) -> bytes:
     about: dict[str, Any] = {
         "save_all": True,
         "append_images": others,
-        "duration": durations(1 + len(others), ending, fps=fps),
+        "duration": durations_ms(1 + len(others), ending, fps=fps),
         "loop": 0,
     }
     if ending == ".webp":
         about |= {"quality": WEBP_QUALITY, "method": 4}
-    first.save(out, MOVING[ending], **about)
+    first.save(out, ANIMATED_FORMATS[ending], **about)
     return out.getvalue()
 
 
-def durations(frames: int, ending: str, *, fps: float) -> list[int]:
+def durations_ms(frames: int, ending: str, *, fps: float) -> list[int]:
     """Return frame durations in ms, multiples of the format's resolution with the exact sum."""
-    tick = TICK.get(ending, 1)
+    tick = TIME_RESOLUTION_MS.get(ending, 1)
     ends = np.rint(np.arange(frames + 1) * 1000 / fps / tick) * tick
     return [round(each) for each in np.diff(ends).tolist()]

@@ -9,9 +9,9 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 
-BATCH = 1 << 20  # rows of triangles drawn at a time
-EDGE = 1e-9  # pixels; tolerance of the inside test, to avoid gaps between adjacent triangles
-FLAT = 1e-12  # pixels²; triangles of less area are seen edge-on
+MAX_BATCH_ROWS = 1 << 20  # rows of triangles drawn at a time
+EDGE_TOLERANCE_PX = 1e-9  # pixels; tolerance of the inside test, to avoid gaps between adjacent triangles
+MIN_AREA_PX2 = 1e-12  # pixels²; triangles of less area are seen edge-on
 
 # (triangles (S,), columns (S,), rows (S,) of pixels) → whether each is drawn there (S,)
 AlphaTest: TypeAlias = Callable[[Ints, Ints, Ints], Bools]
@@ -36,7 +36,7 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
     start = 0
     while start < len(chosen):
         done = int(ends[start - 1]) if start else 0
-        stop = max(int(np.searchsorted(ends, done + BATCH, side="right")), start + 1)
+        stop = max(int(np.searchsorted(ends, done + MAX_BATCH_ROWS, side="right")), start + 1)
         some = slice(start, stop)
         which = np.repeat(np.arange(start, stop), rows[some])
         line = first[which] + np.arange(len(which)) - np.repeat(ends[some] - rows[some] - done, rows[some])
@@ -49,7 +49,7 @@ def _planes(corners: Floats) -> tuple[Floats, Floats, Ints]:
     """Coefficients of x, y and 1 for barycentric weights (T, 3, 3) and nearness (T, 3) of non-degenerate triangles."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
-    chosen: Ints = np.flatnonzero((np.abs(area) > FLAT) & np.isfinite(corners).all(axis=(1, 2)))
+    chosen: Ints = np.flatnonzero((np.abs(area) > MIN_AREA_PX2) & np.isfinite(corners).all(axis=(1, 2)))
     a, b, c, over = a[chosen], b[chosen], c[chosen], 1 / area[chosen]
     two = np.stack(((c[:, 1] - a[:, 1]) * over, (a[:, 0] - c[:, 0]) * over), axis=1)
     three = np.stack(((a[:, 1] - b[:, 1]) * over, (b[:, 0] - a[:, 0]) * over), axis=1)
@@ -83,9 +83,9 @@ def _draw(
         cut = -rest / np.where(slope == 0, 1.0, slope)
         low = np.where(slope > 0, np.maximum(low, cut), low)
         high = np.where(slope < 0, np.minimum(high, cut), high)
-        high = np.where((slope == 0) & (rest < -EDGE), -np.inf, high)
-    first = np.clip(np.ceil(low - 0.5 - EDGE), 0, width).astype(np.int64)
-    last = np.clip(np.floor(high - 0.5 + EDGE), -1, width - 1).astype(np.int64)
+        high = np.where((slope == 0) & (rest < -EDGE_TOLERANCE_PX), -np.inf, high)
+    first = np.clip(np.ceil(low - 0.5 - EDGE_TOLERANCE_PX), 0, width).astype(np.int64)
+    last = np.clip(np.floor(high - 0.5 + EDGE_TOLERANCE_PX), -1, width - 1).astype(np.int64)
     counts = np.maximum(last - first + 1, 0)
     row = np.repeat(np.arange(len(which)), counts)
     x = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)

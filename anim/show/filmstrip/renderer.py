@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from anim.show.filmstrip.surface import Surface
 
 SAMPLES = 3  # across and down in each pixel
-BAND = 1 << 22  # samples drawn at a time, approximately: 60 bytes each
+MAX_BAND_SAMPLES = 1 << 22  # samples drawn at a time, approximately: 60 bytes each
 # Linear light.
 SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
 LINE, SHADOW = np.array([0.52, 0.53, 0.55]), np.array([0.16, 0.17, 0.20])
 KEY, FILL = np.array([-0.45, 0.80, 0.55]), np.array([0.75, 0.25, 0.30])  # directions of lights, in the camera's frame
 KEY_LIGHT, FILL_LIGHT, FROM_ABOVE, FROM_BELOW = 0.72, 0.14, 0.34, 0.16
 SHADOW_DEPTH = 0.55  # fraction of light removed by the shadow
-STEEPER = 0.5  # scale of the horizontal direction of the shadow light, for short shadows
+SHADOW_LIGHT_SCALE = 0.5  # scale of the horizontal direction of the shadow light, for short shadows
 SHADOW_BLUR = 0.012  # of the picture's height
 CELLS = 7.0  # squares of the grid across the motion, about
 GRID_DEPTH = 0.38
 DOT, DOT_DEPTH = 0.08, 0.75  # radius of marks on the ground relative to their spacing, and their darkness
-FADED = 1.6  # radii of the motion; distance from its center at which the grid ends
+GRID_RADIUS = 1.6  # radii of the motion; distance from its center at which the grid ends
 GAMMA = 2.2
 
 
@@ -56,7 +56,7 @@ def setup_view(camera: Camera, points: Floats, ground: float) -> SceneView:
     return SceneView(camera, ground, middle, reach, _background(camera, ground, middle, reach, np.zeros(2)))
 
 
-def moved(stage: SceneView, place: Floats, milestones: Floats) -> SceneView:
+def translate_view(stage: SceneView, place: Floats, milestones: Floats) -> SceneView:
     """Return the view of a camera translated by `place` (2,), m in x and z from its initial position.
 
     milestones: (M, 2) m of x and z, shown as dots on the ground.
@@ -66,14 +66,14 @@ def moved(stage: SceneView, place: Floats, milestones: Floats) -> SceneView:
     spots = np.zeros((len(milestones), 3))
     spots[:, 1] = ground
     spots[:, [0, 2]] = milestones - place
-    for spot in spots[np.linalg.norm(milestones - place - stage.middle, axis=1) < FADED * stage.reach]:
+    for spot in spots[np.linalg.norm(milestones - place - stage.middle, axis=1) < GRID_RADIUS * stage.reach]:
         _draw_dot(background, camera, spot, DOT * mark_spacing(stage))
     return replace(stage, background=background)
 
 
 def mark_spacing(stage: SceneView) -> float:
     """Return the distance in m between marks along the root path of a followed figure."""
-    return nice(stage.reach / 2)
+    return round_down(stage.reach / 2)
 
 
 def render_frame(
@@ -95,7 +95,7 @@ def render_frame(
     corners = _enlarge(camera, SAMPLES).project(positions)[faces]
     painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
     picture: Floats = stage.background * (1 - _shadow(stage, positions, faces, surface)[..., None] * (1 - SHADOW))
-    rows = max(BAND // (camera.width * SAMPLES**2), 1)
+    rows = max(MAX_BAND_SAMPLES // (camera.width * SAMPLES**2), 1)
     for top in range(0, camera.height, rows):
         _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted, marks, surface, tinted=tinted)
     return picture
@@ -162,8 +162,8 @@ def _background(camera: Camera, ground: float, middle: Floats, reach: float, pla
     is_ground = (down > 1e-6) & (height > 0)
     far = height / np.where(is_ground, down, 1)
     places = camera.eye[[0, 2]] + rays[..., [0, 2]] * far[..., None]
-    fade = np.clip(1.25 - np.linalg.norm(places - middle, axis=-1) / (FADED * reach), 0, 1)
-    step = nice(2 * reach / CELLS)
+    fade = np.clip(1.25 - np.linalg.norm(places - middle, axis=-1) / (GRID_RADIUS * reach), 0, 1)
+    step = round_down(2 * reach / CELLS)
     line = np.maximum(*(_lines(places[..., i] + place[i], step) for i in (0, 1)))
     line = np.where(is_ground, line * fade * GRID_DEPTH, 0)[..., None]
     picture: Floats = image * (1 - line) + LINE * line
@@ -191,7 +191,7 @@ def _lines(places: Floats, step: float) -> Floats:
     return found
 
 
-def nice(length: float) -> float:
+def round_down(length: float) -> float:
     """Return the greatest of …, 1, 2, 5, 10, … below a length."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(factor * power for factor in (1, 2, 5) if factor * power <= length * 1.0001)
@@ -202,7 +202,7 @@ def _shadow(stage: SceneView, positions: Floats, faces: Ints, surface: Surface |
     camera = stage.camera
     if camera.eye[1] <= stage.ground:
         return np.zeros((camera.height, camera.width))
-    light = KEY / np.linalg.norm(KEY) @ camera.axes * (STEEPER, 1, STEEPER)
+    light = KEY / np.linalg.norm(KEY) @ camera.axes * (SHADOW_LIGHT_SCALE, 1, SHADOW_LIGHT_SCALE)
     light[1] = max(light[1], 0.6)
     above = np.maximum(positions[:, 1] - stage.ground, 0)
     fallen = positions - (above / light[1])[:, None] * light

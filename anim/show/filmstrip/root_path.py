@@ -9,8 +9,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import VertexCache
 
-FAR = 1.0  # diagonals of the figure; a static camera covers shorter paths
-SMOOTH = 5  # frames before and after in the running mean, so that the camera doesn't sway with each step
+MIN_PATH_PER_DIAGONAL = 1.0  # diagonals of the figure; a static camera covers shorter paths
+SMOOTHING_FRAMES = 5  # frames before and after in the running mean, so that the camera doesn't sway with each step
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class RootPath:
 
 def travels(cache: VertexCache) -> bool:
     """Return whether a figure travels from its start by more than its own size."""
-    return _extent(_centers(cache)) > FAR * _size(cache)
+    return _extent(_centers(cache)) > MIN_PATH_PER_DIAGONAL * _size(cache)
 
 
 def root_path(cache: VertexCache) -> RootPath:
     """Return the path of the mean of all vertices on the ground, smoothed over steps."""
     centers = _centers(cache)
-    smooth = _smoothed(centers)
+    smooth = _smooth(centers)
     return RootPath(cache.times, smooth - smooth[0], smooth[0])
 
 
@@ -69,9 +69,9 @@ def _extent(places: Floats) -> float:
     return float(np.linalg.norm(np.ptp(places, axis=0)))
 
 
-def _smoothed(places: Floats) -> Floats:
+def _smooth(places: Floats) -> Floats:
     """Running mean (P, 2) that preserves both ends and straight lines."""
-    half = min(SMOOTH, len(places) - 1)
+    half = min(SMOOTHING_FRAMES, len(places) - 1)
     before, after = 2 * places[0] - places[half:0:-1], 2 * places[-1] - places[-2 : -half - 2 : -1]
     padded = np.concatenate((before, places, after))
     total = np.cumsum(np.concatenate((np.zeros((1, 2)), padded)), axis=0)

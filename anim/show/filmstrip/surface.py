@@ -13,7 +13,7 @@ from anim.show.filmstrip.rasterizer import AlphaTest
 from anim.show.filmstrip.surface_pattern import barycentric
 from anim.show.filmstrip.texture import TextureSampler
 
-SAMPLES_AT_A_TIME = 1 << 18
+MAX_BATCH_SAMPLES = 1 << 18
 COVERAGE = (np.array([[0, 7, 3], [6, 5, 2], [4, 1, 8]]) + 0.5) / 9  # least alpha of each of 3 × 3 samples
 OPAQUE = -1.0  # cutoff below every alpha
 
@@ -74,8 +74,8 @@ class Surface:
     def _rgba(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
         """Product of texture and vertex colors, with the full alpha."""
         result = np.empty((len(faces), 4))
-        for start in range(0, len(faces), SAMPLES_AT_A_TIME):
-            some = slice(start, start + SAMPLES_AT_A_TIME)
+        for start in range(0, len(faces), MAX_BATCH_SAMPLES):
+            some = slice(start, start + MAX_BATCH_SAMPLES)
             result[some] = self._of_some(corners[faces[some]], samples[some], faces[some])
         return result
 

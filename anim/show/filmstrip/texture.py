@@ -17,7 +17,7 @@ from anim.show.filmstrip.renderer import GAMMA
 
 MAX_SIDE = 1024  # texels; larger images are reduced, since frames have a few hundred pixels
 MAX_PIXELS = 1 << 27  # of an image in the file
-BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # errors of decoders
+DECODER_ERRORS = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # errors of decoders
 FORMATS = ("PNG", "JPEG", "WEBP")
 LINEAR = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)  # linear light of each byte, the inverse of `to_srgb`
 
@@ -73,7 +73,7 @@ def decode_image(data: Bytes) -> Texels:
             return np.array(pixels)
     except Image.UnidentifiedImageError:
         raise FormatError(f"is no PNG, JPEG or WebP that can be decoded (starts with {data[:8].tobytes()!r})") from None
-    except (*BROKEN, Image.DecompressionBombError) as error:
+    except (*DECODER_ERRORS, Image.DecompressionBombError) as error:
         raise FormatError(f"can't be decoded ({str(error).lower()})") from None
 
 

@@ -37,7 +37,7 @@ LIMIT = 24  # easings on one sheet
 PER_ROW = 4
 POINTS = 301
 DOTS = 20  # steps of even time
-STEEPEST = 8.0  # slopes above are clipped: circ and vertical Béziers have infinite ones
+MAX_SLOPE = 8.0  # slopes above are clipped: circ and vertical Béziers have infinite ones
 TOLERANCE = 1e-3  # of the range, for the number of cubics
 
 CELL, MARGIN, LEFT, RIGHT = 2.75, 0.25, 0.5, 0.2  # inches
@@ -73,7 +73,7 @@ def easing_plot(easings: Sequence[Easing], *, kind: str) -> bytes:
 def _slopes(easing: Easing) -> Floats:
     """f′ (POINTS,), NaN at breakpoints, clipped at STEEPEST."""
     u = _grid(easing)
-    slope = np.clip(easing.derivative(u), -STEEPEST, STEEPEST)
+    slope = np.clip(easing.derivative(u), -MAX_SLOPE, MAX_SLOPE)
     slope[np.isin(u, _jumps(easing))] = np.nan
     return slope
 
@@ -137,9 +137,9 @@ class _Cell:
         axes.spines["bottom"].set_visible(False)
         low, high = self.easing.extent
         if high > 1:
-            _over(axes, float(u[f.argmax()]), high, f"+{format_number(100 * (high - 1))} %", 4)
+            _write_overshoot(axes, float(u[f.argmax()]), high, f"+{format_number(100 * (high - 1))} %", 4)
         if low < 0:
-            _over(axes, float(u[f.argmin()]), low, f"{format_number(100 * low)} %", -10)
+            _write_overshoot(axes, float(u[f.argmin()]), low, f"{format_number(100 * low)} %", -10)
 
     def _slope(self, axes: Axes, slopes: Floats, steep: tuple[float, float]) -> str:
         from matplotlib.ticker import MaxNLocator
@@ -176,7 +176,7 @@ class _Cell:
         axes.set_yticks([])
 
 
-def _over(axes: Axes, u: float, value: float, words: str, points: int) -> None:
+def _write_overshoot(axes: Axes, u: float, value: float, words: str, points: int) -> None:
     """Write the size of an overshoot `points` above its top or below its bottom."""
     side = {"xytext": (0, points), "textcoords": "offset points", "ha": "center", "annotation_clip": False}
     axes.annotate(words, (u, value), color=COLORS[0], fontsize=SMALL, **side)

@@ -18,8 +18,8 @@ MARGIN, LEFT, RIGHT, MOST_RIGHT, HEAD, FOOT = 0.2, 0.62, 0.3, 1.5, 0.36, 0.46
 TOP, TALL = 0.62, 1.7
 THIN = 1.1
 TOP_PADDING_FRACTION = 0.06  # of the scale, above
-GAP = 0.12  # of the height, between names
-LONGEST = 22  # letters of a joint's name; longer ones are cut to their end
+NAME_SPACING = 0.12  # of the height, between names
+MAX_NAME_LETTERS = 22  # letters of a joint's name; longer ones are cut to their end
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"))  # least value in m, factor, name
 
 
@@ -33,7 +33,7 @@ def error_plot(
     limit: m, drawn as a line. note: text for the head of the sheet.
     Raises RangeError for another kind, UnsupportedError where matplotlib is not installed.
     """
-    shown = changed_tracks(profiles)[:LIMIT]
+    shown = differing_curves(profiles)[:LIMIT]
     with style(kind):
         columns = 1 if len(shown) < 2 else 2
         width = WIDE if columns == 1 else COLUMN
@@ -50,7 +50,7 @@ def error_plot(
         return sheet.render(kind)
 
 
-def changed_tracks(profiles: Sequence[ErrorCurve]) -> list[ErrorCurve]:
+def differing_curves(profiles: Sequence[ErrorCurve]) -> list[ErrorCurve]:
     """Return the error curves that are not 0 everywhere."""
     return [each for each in profiles if each.error.any()]
 
@@ -83,7 +83,7 @@ def _draw(axes: Axes, profile: ErrorCurve, names: Sequence[str], factor: float, 
     for i in reversed(range(len(profile.joints))):  # the worst is drawn last
         axes.plot(times, factor * profile.joints[i].error, color=COLORS[i], linewidth=THIN)
         axes.annotate(
-            names[i], (1, 1 - i * GAP), xycoords="axes fraction", xytext=(6, 0), textcoords="offset points",
+            names[i], (1, 1 - i * NAME_SPACING), xycoords="axes fraction", xytext=(6, 0), textcoords="offset points",
             va="top", fontsize=SMALL, color=COLORS[i], annotation_clip=False,
         )  # fmt: skip
     if limit is not None and factor * limit <= high:
@@ -96,4 +96,4 @@ def _span(times: Floats) -> tuple[float, float]:
 
 
 def _tail(name: str) -> str:
-    return name if len(name) <= LONGEST else "…" + name[1 - LONGEST :]
+    return name if len(name) <= MAX_NAME_LETTERS else "…" + name[1 - MAX_NAME_LETTERS :]

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 LABEL = 8.0  # points
 BEHIND, PALE, THIN = 4.5, 0.25, 1.1  # width and opacity of a first file's lines, width of the second's
-COLORED = 6  # components in color; the others are in the background
+MAX_COLORED = 6  # components in color; the others are in the background
 TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px between keys, least values for each kind of mark
-FAR = 4.0  # times the widest range; values further apart are drawn relative to their first key
-GAP = 12.5  # px between names of components
+MAX_RANGE_RATIO = 4.0  # times the widest range; values further apart are drawn relative to their first key
+NAME_SPACING_PX = 12.5  # px between names of components
 ROUND, ROUND_ANGLES = (1.0, 2.0, 2.5, 5.0, 10.0), (1.0, 1.5, 3.0, 4.5, 9.0, 10.0)  # steps of ticks
 DEGREES = 180 / math.pi
 UNITS = ((1e6, "µm", 1e-4), (1e3, "mm", 5e-2))  # factor, name, and the length in m below which it is used
@@ -191,7 +191,7 @@ def _curve(each: PlotTrack, track: Track) -> RotationCurve:
 def _colored(each: PlotTrack) -> list[int]:
     """Indices of the components with the largest range."""
     ranges = np.ptp(_curve(each, each.track).keys, axis=0)
-    return sorted(np.argsort(-ranges, kind="stable")[:COLORED].tolist())
+    return sorted(np.argsort(-ranges, kind="stable")[:MAX_COLORED].tolist())
 
 
 def _color(each: PlotTrack, component: int) -> str:
@@ -207,7 +207,7 @@ def _origin(each: PlotTrack, curve: RotationCurve) -> Floats:
     """Origin (C,) of the drawn values: 0, or the first key if curves are too far apart to show their motion."""
     values = curve.keys
     width = float(np.ptp(values, axis=0).max())
-    far = values.shape[1] <= COLORED and float(values.max() - values.min()) > FAR * width > 0
+    far = values.shape[1] <= MAX_COLORED and float(values.max() - values.min()) > MAX_RANGE_RATIO * width > 0
     return values[0] if far and each.track.kind is not ValueKind.ROTATION else np.zeros(values.shape[1])
 
 
@@ -283,7 +283,7 @@ def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
     """Write names of components at the right ends of their curves; of equal ones the first is on top."""
     colored = _colored(each)
     low, high = axes.get_ylim()
-    gap = GAP / _size(axes)[1] * (high - low)
+    gap = NAME_SPACING_PX / _size(axes)[1] * (high - low)
     upwards = colored[::-1]
     places = separate_labels([float(last[c]) for c in upwards], gap, low + gap / 2, high - gap / 2)
     beside = {"xycoords": ("axes fraction", "data"), "xytext": (6, 0), "textcoords": "offset points", "va": "center"}

@@ -13,8 +13,8 @@ from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import derivatives
 from anim.sampling.track import sample
 
-POINTS = 800  # of a line: one for each pixel of a wide panel
-MOST, LEAST = 40, 2  # points of one piece
+NUM_LINE_POINTS = 800  # of a line: one for each pixel of a wide panel
+MAX_SEGMENT_POINTS, MIN_SEGMENT_POINTS = 40, 2  # points of one piece
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def angle_line(track: Track, start: Floats) -> Polyline:
 def difference_line(track: Track, other: Track) -> Polyline:
     """Return the difference (P, 1) of two tracks of one target, rad for rotations, over the time of both."""
     start, end = min(track.times[0], other.times[0]), max(track.times[-1], other.times[-1])
-    keys = np.concatenate((track.times, other.times, np.linspace(start, end, POINTS)))
+    keys = np.concatenate((track.times, other.times, np.linspace(start, end, NUM_LINE_POINTS)))
     times = unique_sorted(keys)
     a, b = sample(track, times), sample(other, times)
     off = quaternion.angle_between(a, b) if track.kind is ValueKind.ROTATION else lengths(a - b)
@@ -98,7 +98,9 @@ def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
     real = np.asarray(steps > PAIR + 2 * FLOAT32 * track.times[1:])
     chosen = np.flatnonzero(real) if pieces_only else np.arange(len(steps))
     straight = track.interpolation is Interpolation.LINEAR and (pieces_only or track.kind is not ValueKind.ROTATION)
-    count = LEAST if straight else int(np.clip(POINTS // max(len(chosen), 1), 4, MOST))
+    count = (
+        MIN_SEGMENT_POINTS if straight else int(np.clip(NUM_LINE_POINTS // max(len(chosen), 1), 4, MAX_SEGMENT_POINTS))
+    )
     shares = np.linspace(0, 1, count)
     times = track.times[chosen][:, None] + steps[chosen][:, None] * shares
     times[:, -1] = track.times[chosen + 1]

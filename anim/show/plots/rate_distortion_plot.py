@@ -17,9 +17,9 @@ WIDTH, HEIGHT = 8.4, 4.8  # inches
 LEFT, RIGHT, TOP, BOTTOM = 0.75, 0.45, 1.05, 0.62
 PADDING_PER_RANGE = 0.08  # of the logarithm of the bytes, on both sides
 ABOVE = 0.13, 0.17  # inches from the panel to the lowest label above it, and between lines
-APART = 1.5  # inches; labels of marks nearer than this are on different lines
+MIN_LABEL_DISTANCE_IN = 1.5  # inches; labels of marks nearer than this are on different lines
 TICKS = (1, 2, 3, 5)
-CLOSE = 4.0  # times the least value; axes of smaller range have evenly spaced ticks
+MIN_LOG_RATIO = 4.0  # times the least value; axes of smaller range have evenly spaced ticks
 UNITS = ((1e6, "MB"), (1e3, "kB"), (1, "B"))
 
 
@@ -69,7 +69,7 @@ def _scale(axes: Axes, counts: Sequence[int]) -> None:
     decades = range(int(np.floor(np.log10(first))), int(np.ceil(np.log10(last))) + 1)
     ticks = [step * 10.0**decade for decade in decades for step in TICKS]
     ticks = [tick for tick in ticks if first <= tick <= last]
-    if last < CLOSE * first:
+    if last < MIN_LOG_RATIO * first:
         ticks = [tick for tick in MaxNLocator(7).tick_values(first, last) if first <= tick <= last]
     elif len(ticks) > 9:
         ticks = [tick for tick in ticks if f"{tick:e}"[0] in "1"]
@@ -97,7 +97,9 @@ def _draw_marks(sheet: Figure, axes: Axes, marks: dict[str, int]) -> None:
     width = WIDTH - LEFT - RIGHT
     names = list(marks)
     places = [LEFT + width * (np.log10(max(marks[name], 1)) - first) / (last - first) for name in names]
-    words = separate_labels(places, APART, LEFT + APART / 2, WIDTH - RIGHT - APART / 2)
+    words = separate_labels(
+        places, MIN_LABEL_DISTANCE_IN, LEFT + MIN_LABEL_DISTANCE_IN / 2, WIDTH - RIGHT - MIN_LABEL_DISTANCE_IN / 2
+    )
     for name, place, at in zip(names, places, words, strict=True):
         axes.axvline(marks[name], color=HAIR if name == "floor" else SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
         sheet.line((place, at), (TOP, TOP - ABOVE[0] + 0.04), color=HAIR, linewidth=0.8)

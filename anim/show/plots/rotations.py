@@ -14,7 +14,7 @@ from anim.show.plots import polylines
 from anim.show.plots.polylines import Polyline
 
 FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the twelve orders of Euler angles
-FLOAT32 = 1e-6  # rad from lock, below which float32 rotations can't separate first and third angle
+FLOAT32_GIMBAL_TOLERANCE_RAD = 1e-6  # rad from lock, below which float32 rotations can't separate first and third angle
 NEAR_LOCK_DEG = 5.0  # rates of angles are amplified 23 times there
 FULL_TURN_DEG = 360.0
 
@@ -48,7 +48,7 @@ def degrees(q: Floats, *, view: str, rest: Floats) -> Floats:
     unit = quaternion.normalize(q)
     if view == FROM_REST:
         return _continuous(quaternion.multiply(quaternion.conjugate(rest), unit))
-    return np.degrees(euler.unwrap(unit, order=view, lock=FLOAT32))
+    return np.degrees(euler.unwrap(unit, order=view, lock=FLOAT32_GIMBAL_TOLERANCE_RAD))
 
 
 def gimbal_distance_line(track: Track, *, order: str) -> Polyline:

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 LIMIT = 6  # rules in one plot, the number of distinguishable colors
 SEGMENT_POINTS = 129  # points of one segment
-FINE = 2049  # points of one segment in the search for its extremum
-LENS = 0.04  # of the range; smaller overshoots are also shown magnified
-VISIBLE = 1e-6  # of the range; smaller overshoots are rounding
+EXTREMUM_POINTS = 2049  # points of one segment in the search for its extremum
+LENS_FRACTION = 0.04  # of the range; smaller overshoots are also shown magnified
+OVERSHOOT_TOLERANCE = 1e-6  # of the range; smaller overshoots are rounding
 WITHOUT_RULE = {"linear": Interpolation.LINEAR, "step": Interpolation.STEP}
 
 CURVE, SPEED, ACROSS = 2.9, 0.85, 6.1  # inches
@@ -69,7 +69,7 @@ def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, k
         for i, curve in enumerate(curves):
             _entry(sheet, curve, COLORS[i], x + ACROSS + 0.35, TOP + 0.12 + i * ENTRY)
         widest = max(curves, key=lambda curve: abs(curve.worst))
-        if 0 < abs(widest.worst) < LENS * float(np.ptp(v)):
+        if 0 < abs(widest.worst) < LENS_FRACTION * float(np.ptp(v)):
             _lens(sheet, curves, widest, x + ACROSS + 0.85, TOP + ENTRY * len(curves) + 0.25)
         return sheet.render(kind)
 
@@ -99,20 +99,27 @@ def _curve(times: Floats, values: Floats, name: str) -> _Curve:
     points = _points(track, k, u)
     low, high = np.minimum(values[k], values[k + 1]), np.maximum(values[k], values[k + 1])
     bounds = np.clip(points[:, 0], low, high)
-    worst = _worst(track, values)
+    worst = _find_overshoot(track, values)
     at = times[k] + u * (times[k + 1] - times[k])
     return _Curve(
-        track_name(name), track, _broken(at), _broken(points), _broken(bounds), worst, departure, at_keys(track)
+        track_name(name),
+        track,
+        _insert_breaks(at),
+        _insert_breaks(points),
+        _insert_breaks(bounds),
+        worst,
+        departure,
+        at_keys(track),
     )
 
 
-def _worst(track: Track, values: Floats) -> float:
+def _find_overshoot(track: Track, values: Floats) -> float:
     """Greatest distance from the range of the two neighboring keys, signed; 0 for rounding errors."""
-    k = np.repeat(np.arange(len(values) - 1), FINE)
-    found = _points(track, k, np.tile(np.linspace(0, 1, FINE), len(values) - 1))[:, 0]
+    k = np.repeat(np.arange(len(values) - 1), EXTREMUM_POINTS)
+    found = _points(track, k, np.tile(np.linspace(0, 1, EXTREMUM_POINTS), len(values) - 1))[:, 0]
     off = found - np.clip(found, np.minimum(values[k], values[k + 1]), np.maximum(values[k], values[k + 1]))
     worst = float(off[np.abs(off).argmax()])
-    return worst if abs(worst) > VISIBLE * float(np.ptp(values)) else 0.0
+    return worst if abs(worst) > OVERSHOOT_TOLERANCE * float(np.ptp(values)) else 0.0
 
 
 def track_name(name: str) -> str:
@@ -143,7 +150,7 @@ def _points(track: Track, k: arrays.Ints, u: Floats) -> Floats:
     return np.stack((value, speed, hermite.second_derivative(u, *piece) / h**2), axis=1)
 
 
-def _broken(points: Floats) -> Floats:
+def _insert_breaks(points: Floats) -> Floats:
     """Points (P, ...) with a NaN after every segment."""
     pieces = points.reshape(-1, SEGMENT_POINTS, *points.shape[1:])
     gap = np.full((len(pieces), 1, *points.shape[1:]), np.nan)

@@ -101,13 +101,13 @@ def _cell(sheet: Figure, each: PlotTrack, x: float, y: float, width: float, slac
 
 def _title(sheet: Figure, each: PlotTrack, x: float, y: float, caption: str, *, many_clips: bool) -> None:
     x += 0.14 + sheet.text(x, y, _tail(each.target, 36), fontsize=TITLE, weight="bold")
-    words = [_what(each) + caption, _keys(each)]
+    words = [_quantity(each) + caption, _keys(each)]
     if many_clips:
         words.insert(0, _tail(each.clip, 24))
     sheet.text(x, y, "  ·  ".join(word for word in words if word), fontsize=SMALL, color=SOFT)
 
 
-def _what(each: PlotTrack) -> str:
+def _quantity(each: PlotTrack) -> str:
     """Quantity and unit of the values: "rotation from rest, °", "Euler angles ZXY, °", "scale, factor"."""
     if not each.is_in_degrees:
         return WORDS.get(each.track.path, each.track.path)

@@ -22,8 +22,8 @@ from anim.show.plots.rotations import COMPONENTS, FROM_REST
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 CONSTANT_TOLERANCE = 2e-5  # of the largest value; smaller changes are rounding of the exporter
 COLORS = ("color", "Color", "ColorFactor", "emissiveFactor", "attenuationColor")  # ends of pointers that name colors
-SLOWEST = 8.0  # fps; lower rates are intervals of single poses, not frames
-REGULAR = 0.98  # least fraction of keys on a frame grid for showing frames
+MIN_FPS = 8.0  # fps; lower rates are intervals of single poses, not frames
+MIN_GRID_FRACTION = 0.98  # least fraction of keys on a frame grid for showing frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,10 @@ def _select(document: Document, selection: Selection, view: str) -> list[PlotTra
         for i in sorted(selection.chosen_tracks(clip, skeleton)):
             track = _align(clip.tracks[i])
             labels = _labels(track, targets, view)
-            name, target = _plot_track(reader.clip_name(clip.name, number)), _plot_track(_target(track, skeleton))
+            name, target = (
+                _printable_name(reader.clip_name(clip.name, number)),
+                _printable_name(_target(track, skeleton)),
+            )
             rest = IDENTITY if track.node is None else skeleton.rotation[track.node]
             found.append(PlotTrack(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
     return found
@@ -145,7 +148,7 @@ def _scale(track: Track, signs: Floats) -> Track:
 
 def _rate(clip: Clip) -> float | None:
     estimated = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
-    if estimated is None or estimated.regular < REGULAR or estimated.fps < SLOWEST:
+    if estimated is None or estimated.regular < MIN_GRID_FRACTION or estimated.fps < MIN_FPS:
         return None
     return estimated.fps
 
@@ -185,9 +188,9 @@ def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[s
     names, count = targets.get(whole[1], ()), track.values.shape[1]
     if whole[2] is not None:
         number = int(whole[2])
-        return (_plot_track(names[number]) if number < len(names) else f"target {number}",)
+        return (_printable_name(names[number]) if number < len(names) else f"target {number}",)
     if len(names) == count:
-        return _shorten([_plot_track(name) for name in names])
+        return _shorten([_printable_name(name) for name in names])
     return tuple(f"target {i}" for i in range(count))
 
 
@@ -211,7 +214,7 @@ def _target_names(owner: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
 
 
-def _plot_track(name: str) -> str:
+def _printable_name(name: str) -> str:
     """A name without control characters, which are invalid in XML."""
     return "".join(c if c.isprintable() else "�" for c in name)
 

@@ -19,7 +19,7 @@ ALL = [*TRACKS.values(), SINGLE, WEIGHTS, *TRACKS.values()]
 
 @pytest.mark.parametrize("limit", [1, 5, 4096])
 def test_each_track_is_sampled_at_its_own_times_as_it_is_alone(limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "KEYS_AT_ONCE", limit)
+    monkeypatch.setattr(module, "MAX_GROUP_KEYS", limit)
     rng = np.random.default_rng(3)
     at = np.column_stack((rng.uniform(-1, 4, (len(ALL), 5)), np.full(len(ALL), 1.25)))  # before, after, and on a key
     seen = []

@@ -108,7 +108,7 @@ def test_a_quaternion_of_another_length_is_needed() -> None:
 
 @pytest.mark.parametrize("limit", [1, 4096])
 def test_many_rotations_against_a_loop(limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "KEYS_AT_ONCE", limit)
+    monkeypatch.setattr(module, "MAX_GROUP_KEYS", limit)
     rng = np.random.default_rng(5)
     tracks = [_turning(rng, int(keys)) for keys in rng.integers(1, 12, 20)]
     found = of(*tracks)

@@ -156,7 +156,7 @@ def test_a_loop_shows_its_first_frame_once(back: bool, frames: int) -> None:
 
 def test_pictures_are_drawn_in_bands_where_they_are_large(monkeypatch: pytest.MonkeyPatch) -> None:
     _, once = strip("biped", count=2)
-    monkeypatch.setattr(renderer, "BAND", 5000)
+    monkeypatch.setattr(renderer, "MAX_BAND_SAMPLES", 5000)
     _, bands = strip("biped", count=2)
     assert np.abs(once.astype(int) - bands).max() <= 1
 

@@ -13,7 +13,7 @@ from anim.errors import RangeError
 from anim.show.filmstrip import heat_map, image_file
 from anim.show.filmstrip.camera import fit_camera
 from anim.show.filmstrip.rasterizer import visible_faces
-from anim.show.filmstrip.renderer import nice
+from anim.show.filmstrip.renderer import round_down
 
 RANDOM = np.random.default_rng(8)
 
@@ -105,13 +105,13 @@ def test_heat_gets_darker_and_ends_at_the_farthest() -> None:
 
 @pytest.mark.parametrize(("length", "step"), [(1.0, 1.0), (0.99, 0.5), (19, 10), (5.1, 5), (0.0021, 0.002)])
 def test_steps_of_the_grid_are_round(length: float, step: float) -> None:
-    assert nice(length) == pytest.approx(step)
+    assert round_down(length) == pytest.approx(step)
 
 
 @pytest.mark.parametrize(("ending", "tick"), [(".gif", 10), (".webp", 1), (".apng", 1)])
 @pytest.mark.parametrize("fps", [7.0, 15, 24, 29.97, 50])
 def test_films_take_as_long_as_they_should(ending: str, tick: int, fps: float) -> None:
-    found = image_file.durations(31, ending, fps=fps)
+    found = image_file.durations_ms(31, ending, fps=fps)
     assert abs(sum(found) - 31_000 / fps) <= tick / 2
     assert all(each > 0 and each % tick == 0 for each in found)
     assert max(found) - min(found) <= tick
@@ -120,5 +120,5 @@ def test_films_take_as_long_as_they_should(ending: str, tick: int, fps: float) -
 def test_gifs_can_t_be_as_quick_as_others() -> None:
     picture = np.zeros((8, 8, 3), np.uint8)
     with pytest.raises(RangeError, match=r"60 frames per second are too many for \.gif \(limit 50\)"):
-        image_file.moving([picture], ".gif", fps=60)
-    assert image_file.moving([picture, picture + 9], ".webp", fps=60)
+        image_file.animation([picture], ".gif", fps=60)
+    assert image_file.animation([picture, picture + 9], ".webp", fps=60)
