@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anim import units
-from anim.arrays import Floats
+from anim.arrays import Floats, as_floats
 from anim.asset import Asset, PathName, as_asset
 from anim.caches import cache_file
 from anim.caches.options import WriteOptions
 from anim.caches.transforms import bounds, up_axis, vertex_order
-from anim.errors import AnimError, RangeError
+from anim.errors import AnimError, RangeError, check_number
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
@@ -269,7 +269,7 @@ def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
     if fps is not None and times is not None:
         raise RangeError("fps and times exclude each other")
     if times is not None:
-        return np.atleast_1d(np.asarray(times, np.float64))
+        return as_floats(np.atleast_1d(np.asarray(times)), "F", name="times")
     if fps is not None:
         return frame_times(clip.start, clip.end, fps=fps)
     return np.unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
@@ -278,6 +278,7 @@ def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
 def _meters(value: Length, name: str, scale: Callable[[], float], *, at_least: float | None = None) -> float:
     if isinstance(value, str):
         return units.parse_length(value, name, scale)
+    check_number(value, name)
     if not np.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
         raise RangeError(f"{name} is {value} (expected metres above 0, or a length like '0.5mm' or '0.1%')")
     return float(value)

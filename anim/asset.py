@@ -126,6 +126,8 @@ def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
         raise ShapeError(f"asset is {type(asset).__name__} (expected an Asset)", help="save(result.asset, path)")
     unchanged = asset.source.bytes_of(asset.document) if asset.source is not None else None
     if not isinstance(path, str | os.PathLike):
+        if not hasattr(path, "write"):
+            raise ShapeError(f"path is {path!r} (expected a path or a binary file)")
         for piece in glb_chunks(asset.document, unchanged):
             path.write(piece.data)
         return

@@ -12,6 +12,7 @@ AnimError
 from __future__ import annotations
 
 import errno
+import numbers
 from typing import Self
 
 _NO_MEMORY = (
@@ -90,6 +91,12 @@ def check_type(value: object, expected: type, name: str, *, help: str = "") -> N
     if not isinstance(value, expected):
         got = "None" if value is None else type(value).__name__
         raise ShapeError(f"{name} is {got} (expected {expected.__name__})", help=help)
+
+
+def check_number(value: object, name: str) -> None:
+    """Raise ShapeError unless `value`, named `name`, is a real number."""
+    if not isinstance(value, numbers.Real):
+        raise ShapeError(f"{name} is {value!r} (expected a number)")
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:

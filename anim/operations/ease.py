@@ -12,10 +12,11 @@ from anim.curves.easing import table
 from anim.curves.easing.function import Easing
 from anim.curves.fitting import adaptive_keys
 from anim.curves.fitting.easing_fit import fit_linear, fit_segments
-from anim.errors import RangeError
+from anim.errors import RangeError, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.cubic_segments import to_cubicspline, to_step, with_keys
 from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
+from anim.operations.selection import track_indices
 from anim.sampling import segment
 
 TOLERANCE = 1e-3  # of a segment's range
@@ -56,11 +57,12 @@ def ease(
     tracks: indices of the tracks to ease, None for all. Raises RangeError for another interpolation.
     (keys 0, 1 s: 0, 1; quad-in) → keys 0, 1 s with in tangent 2 at 1 s
     """
+    chosen = track_indices(clip, tracks)
     if interpolation not in OUTPUTS:
         raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
     easing = table.parse(easing) if isinstance(easing, str) else easing
+    check_type(easing, Easing, "easing", help="anim.EASINGS has their names")
     job = _Job(easing, start, end, tolerances, interpolation)
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(clip.name, tuple(job.eased(t) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.errors import RangeError
+from anim.errors import RangeError, check_number
 from anim.maths import hermite, quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.operations.selection import track_indices
 from anim.sampling.derivatives import rates
+from anim.sampling.times import check_fps
 from anim.sampling.track import sample
 
 MIN_BLEND_KEYS = 6  # fewest keys in a blend; sparser tracks get more
@@ -20,8 +22,9 @@ MIN_INTERVAL_S = 1e-5  # s, between two keys
 
 def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
     """Return the clip with its first pose appended as a frame: for a loop that lacks its last frame."""
+    chosen = track_indices(clip, tracks)
+    check_fps(fps)
     end = clip.end + 1 / fps
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(
         clip.name, tuple(_append_first_key(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks))
     )
@@ -48,9 +51,10 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> C
     Tracks not in `tracks` keep their end, for example of a traveling root.
     Raises RangeError unless 0 < blend ≤ the clip's duration.
     """
+    chosen = track_indices(clip, tracks)
+    check_number(blend, "blend")
     if not 0 < blend <= clip.end - clip.start:
         raise RangeError(f"blend is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)")
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(clip.name, tuple(_close(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 

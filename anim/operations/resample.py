@@ -10,6 +10,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.operations.selection import track_indices
 from anim.sampling import derivatives
 from anim.sampling.batch import Batch, batches
 from anim.sampling.times import frame_times, key_times
@@ -35,10 +36,10 @@ def resample(
     tracks: indices of the tracks to resample, None for all.
     (keys 0, 1 s; fps 4) → keys 0, 0.25, 0.5, 0.75, 1 s
     """
+    chosen = track_indices(clip, tracks)
     if interpolation not in INTERPOLATIONS:
         raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
     times = key_times(frame_times(clip.start, clip.end, fps=fps))
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
     values = _sample_tracks([clip.tracks[i] for i in goals], times)

@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import RangeError, check_number
 from anim.model import Clip, Interpolation, Track
+from anim.operations.selection import track_indices
 
 NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
 JUMP_S = 1e-6  # s; duration of the final value of a reversed STEP track
@@ -37,6 +38,7 @@ def retime(
     Raises RangeError for values out of range.
     (keys 0, 1 s; speed 0.25) → keys 0, 4 s
     """
+    chosen = track_indices(clip, tracks)
     if speed is not None and duration is not None:
         raise RangeError("speed and duration exclude each other")
     factor = _factor(clip, speed, duration)
@@ -51,7 +53,6 @@ def retime(
         steps.append(lambda track: ping_pong_track(track, start, end))
     if offset:
         steps.append(lambda track: shift_time(track, offset))
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     return Clip(clip.name, tuple(_all(steps, t) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
@@ -104,11 +105,13 @@ def _all(steps: list[Callable[[Track], Track]], track: Track) -> Track:
 
 def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if speed is not None:
+        check_number(speed, "speed")
         if not (math.isfinite(speed) and speed > 0):
             raise RangeError(f"speed is {speed:g} (expected a number above 0)", help="to play it backwards, reverse it")
         return 1 / speed
     if duration is None:
         return 1.0
+    check_number(duration, "duration")
     if not (math.isfinite(duration) and duration > 0):
         raise RangeError(f"duration is {duration:g} s (expected a number above 0)")
     own = clip.end - clip.start

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from anim.errors import NotFoundError
+import numpy as np
+
+from anim.errors import NotFoundError, RangeError, ShapeError, check_type
 from anim.model import Clip, Skeleton
 
 
@@ -33,12 +35,30 @@ class Selection:
 
     def chosen_tracks(self, clip: Clip, skeleton: Skeleton) -> frozenset[int]:
         """Return the indices of the selected tracks of `clip`; pointers only without a selection of nodes and paths."""
+        check_type(clip, Clip, "clip")
+        check_type(skeleton, Skeleton, "skeleton")
         nodes = set(self.chosen_nodes(skeleton)) if self.nodes else None
         return frozenset(
             i
             for i, track in enumerate(clip.tracks)
             if (nodes is None or track.node in nodes) and (not self.paths or track.path in self.paths)
         )
+
+
+def track_indices(clip: Clip, tracks: Collection[int] | None) -> frozenset[int]:
+    """Return the indices of the tracks to change, all for None.
+
+    Raises ShapeError for another type of clip or index, RangeError for an index without a track.
+    """
+    check_type(clip, Clip, "clip", help="asset.map_clips(...) changes the clips of an asset, asset.clips[0] is one")
+    count = len(clip.tracks)
+    if tracks is None:
+        return frozenset(range(count))
+    if not isinstance(tracks, Collection) or not all(isinstance(i, int | np.integer) for i in tracks):
+        raise ShapeError(f"tracks is {tracks!r} (expected indices)", help="ops.select_tracks gives those of some nodes")
+    if strange := [i for i in tracks if not 0 <= i < count]:
+        raise RangeError(f"there is no track {strange[0]} (the clip has {count}, from 0 on)")
+    return frozenset(tracks)
 
 
 def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:

@@ -19,6 +19,7 @@ from anim.curves.tangents.table import (
 from anim.errors import AnimError, RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.operations.selection import track_indices
 
 MIN_VECTOR_RANGE = 1e-3  # lower limit of a vector track's largest value, for the comparison of its ends
 END_TOLERANCE_FRACTION = 1e-6  # of the clip's end: differences of float32 times by rounding
@@ -45,8 +46,8 @@ def spline(
     Raises RangeError if the rule can't be used, and for a loop with a track of different first and last value.
     (keys 0, 1, 2 s: 0, 1, 0; time-aware) → tangents 2, 0, −2
     """
+    chosen = track_indices(clip, tracks)
     rule = parse(tangents) if isinstance(tangents, str) else tangents
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     new = list(clip.tracks)
     for i in sorted(chosen):
         track = new[i]

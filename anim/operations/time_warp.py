@@ -14,10 +14,11 @@ from anim.curves.easing import table
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.fitting import adaptive_keys
 from anim.curves.fitting.easing_fit import fit_segments
-from anim.errors import RangeError
+from anim.errors import RangeError, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.cubic_segments import with_keys
 from anim.operations.ease_track import slope
+from anim.operations.selection import track_indices
 from anim.sampling import segment
 from anim.sampling.derivatives import rates
 from anim.sampling.times import distinct_float32
@@ -51,14 +52,15 @@ def warp(
     with interpolation "linear" LINEAR, within the same.
     Raises RangeError for an empty range, or an easing that jumps.
     """
+    chosen = track_indices(clip, tracks)
     easing = table.parse(easing) if isinstance(easing, str) else easing
+    check_type(easing, Easing, "easing", help="anim.EASINGS has their names")
     first = clip.start if start is None else start
     last = clip.end if end is None else end
     if easing.stepped:
         raise RangeError(f"'{easing.name}' jumps, and time can't")
     if not last > first:
         raise RangeError(f"the range from {first:g} s to {last:g} s is empty")
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
     new = []
     corners: dict[
         tuple[int, tuple[CubicSegment, ...]], Floats

@@ -9,10 +9,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.curves.fitting import adaptive_keys
-from anim.errors import RangeError
+from anim.errors import RangeError, check_number
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.retime import shift_time
+from anim.operations.selection import track_indices
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 
@@ -36,7 +37,10 @@ def trim(
     rebase: shift the part to start at 0 s. Raises RangeError for an empty part.
     (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
     """
-    chosen = tracks if tracks is not None else frozenset(range(len(clip.tracks)))
+    chosen = track_indices(clip, tracks)
+    for name, time in (("start", start), ("end", end)):
+        if time is not None:
+            check_number(time, name)
     if (start is not None or end is not None) and clip.end > clip.start:
         clip = _trim_clip(clip, start, end, chosen)
     first = min((float(clip.tracks[i].times[0]) for i in chosen), default=0.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import RangeError, check_type
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, ValueKind
 from anim.sampling.batch import Batch
@@ -51,6 +51,7 @@ def parse_pair(player: str) -> tuple[str, str]:
 
     Raises RangeError for a name that is not in PLAYERS.
     """
+    check_type(player, str, "player")
     names = player.split(",")
     if len(names) > 2 or any(name not in PLAYERS for name in names):
         raise RangeError(f"players are '{player}' (expected one or two of {', '.join(PLAYERS)}, with a comma between)")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import RangeError, check_type
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
 from anim.sampling.pose import sample_pose, world_matrices
@@ -44,6 +44,8 @@ def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") 
     space: "local", in the parent's space, or "world". Raises RangeError for another.
     Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.
     """
+    check_type(skeleton, Skeleton, "skeleton")
+    check_type(clip, Clip, "clip")
     if space not in SPACES:
         raise RangeError(f"space is '{space}' (expected local or world)")
     local = sample_pose(skeleton, clip, at)

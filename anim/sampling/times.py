@@ -12,12 +12,19 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import RangeError
+from anim.errors import RangeError, check_number
 
 MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
 )
 MAX_FRAMES = 10_000_000
+
+
+def check_fps(fps: float) -> None:
+    """Raise ShapeError or RangeError unless `fps` is a number above 0."""
+    check_number(fps, "fps")
+    if not (math.isfinite(fps) and fps > 0):
+        raise RangeError(f"fps is {fps:g} (expected a number above 0)")
 
 
 def frame_times(start: float, end: float, *, fps: float) -> Floats:
@@ -27,8 +34,9 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     frame_times(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
     frame_times(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
     """
-    if not (math.isfinite(fps) and fps > 0):
-        raise RangeError(f"fps is {fps:g} (expected a number above 0)")
+    check_number(start, "start")
+    check_number(end, "end")
+    check_fps(fps)
     frames = (end - start) * fps
     if frames > MAX_FRAMES:
         raise RangeError(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")

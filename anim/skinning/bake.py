@@ -10,7 +10,7 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import NotFoundError, RangeError, UnsupportedError
+from anim.errors import NotFoundError, RangeError, ShapeError, UnsupportedError, check_number, check_type
 from anim.model import Clip, MeshInstance, MeshPart, PrimitiveRange, Scene, VertexCache
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh, Make, bind_mesh
@@ -86,6 +86,8 @@ def prepare_bake(
     Raises RangeError for a parameter out of its range, NotFoundError where nothing is left to bake, UnsupportedError
     for tangents of a mesh without any.
     """
+    check_type(scene, Scene, "scene", help="anim.bake takes an asset")
+    _check_indices(nodes, threads)
     _check(method, blend, space, bulge_clamp=bulge_clamp)
     chosen = bakeable_instances(scene, rigid=rigid, nodes=nodes)
     if not chosen:
@@ -136,6 +138,7 @@ class Baker:
         Nothing is computed before frames are asked for, and then a chunk at a time: memory doesn't grow with F.
         progress: called with the number of frames done, after each chunk.
         """
+        check_type(clip, Clip, "clip")
         seconds = arrays.as_key_times(times)
         wanted = (self.normals, self.handedness is not None)
         stream = ChunkPipeline(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads)
@@ -193,6 +196,8 @@ def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:
 def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -> None:
     if method not in SKINNING_METHODS:
         raise RangeError(f"method is '{method}' (expected one of {', '.join(SKINNING_METHODS)})")
+    if blend is not None:
+        check_number(blend, "blend")
     if blend is not None and not 0 <= blend <= 1:
         raise RangeError(f"blend is {blend:g} (expected 0 … 1)")
     if method == "lbs" and (blend is not None or bulge_clamp):
@@ -200,6 +205,13 @@ def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -
         raise RangeError(f"{what} needs another method than lbs (expected dqs or cor)")
     if space not in SPACES:
         raise RangeError(f"space is '{space}' (expected one of {', '.join(SPACES)})")
+
+
+def _check_indices(nodes: Sequence[int] | None, threads: int | None) -> None:
+    if isinstance(nodes, str) or not all(isinstance(node, int | np.integer) for node in nodes or ()):
+        raise ShapeError(f"nodes is {nodes!r} (expected indices)", help="anim.bake takes names as `meshes`")
+    if threads is not None and threads < 0:
+        raise RangeError(f"threads is {threads} (expected 1 or more, or None)")
 
 
 def _hint(scene: Scene, *, rigid: bool) -> str:

@@ -43,8 +43,10 @@ def replace_clips(
     node's morph targets; NotFoundError for an unknown animation or node.
     replace_clips(document, {0: clip}): the first animation becomes `clip`
     """
+    check_type(document, Document, "document")
     if not clips:
         return document
+    check_type(clips, Mapping, "clips", help="clips by index: {0: clip}")
     count = len(json_array(document.json, "animations"))
     clips = {_check_index(number, count): clip for number, clip in clips.items()}
     for clip in clips.values():

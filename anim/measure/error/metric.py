@@ -23,7 +23,7 @@ from anim.measure.error.surface import diagonal, has_vertices, surfaces
 from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PoseSampler
-from anim.sampling.times import frame_times
+from anim.sampling.times import check_fps, frame_times
 
 NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
 SLACK = 1.001  # a bound this close to what was found is as good as found
@@ -208,6 +208,7 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     The grid has 0 s on it, and begins with the last frame before the first key: that shows what all earlier ones do.
     Frames that only rounding keeps apart from a key are that key.
     """
+    check_fps(fps)
     end = max((clip.end for clip in clips), default=0.0)
     keys = key_and_mid_times(*clips)
     frames = frame_times(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
