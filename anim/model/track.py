@@ -96,7 +96,7 @@ class Track:
             set_field(self, "out_tangents", _tangents(self.out_tangents, shape, "out tangents"))
 
     def __eq__(self, other: object) -> bool:
-        """Whether the other track has the same keys, target and storage."""
+        """Return whether the other track has the same keys, target and storage."""
         if not isinstance(other, Track):
             return NotImplemented
         if self is other:

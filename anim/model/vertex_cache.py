@@ -87,7 +87,7 @@ class VertexCache:
 
     @property
     def has_tangents(self) -> bool:
-        """Whether every chunk has tangents."""
+        """Return whether every chunk has tangents."""
         return self.handedness is not None
 
     def load_all(self) -> FrameChunk:

@@ -80,7 +80,7 @@ def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
 
 
 def _spans(track: Track, clip: Clip) -> bool:
-    """Whether a track has keys at both ends of its clip, within the resolution of float32 times."""
+    """Return whether a track has keys at both ends of its clip, within the resolution of float32 times."""
     near = END_TOLERANCE_FRACTION * max(clip.end, 1.0)
     return bool(track.times[0] <= clip.start + near and track.times[-1] >= clip.end - near)
 

@@ -81,7 +81,7 @@ def _trim_track(track: Track, start: float, end: float) -> Track:
 
 
 def _changes(track: Track, start: float, end: float) -> bool:
-    """Whether a track without a key in between has different end values or a non-zero speed there."""
+    """Return whether a track without a key in between has different end values or a non-zero speed there."""
     ends = sample(track, np.array([start, end]))
     moving = track.interpolation is not Interpolation.STEP and bool(rates(track, np.array([start]), before=False).any())
     return moving or bool((ends[0] != ends[1]).any())

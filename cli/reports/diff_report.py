@@ -58,7 +58,7 @@ class DiffReport:
 
     @property
     def are_strangers(self) -> bool:
-        """Whether both files have names and none in common: nodes and clips are matched by order alone."""
+        """Return whether both files have names and none in common: nodes and clips are matched by order alone."""
         return self.are_named and not self.clips_by_name and not self.nodes_by_name
 
 

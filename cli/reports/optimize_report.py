@@ -50,7 +50,7 @@ class OptimizeReport:
 
     @property
     def unchanged(self) -> bool:
-        """Whether the output is the input."""
+        """Return whether the output is the input."""
         return self.after is self.before
 
     @property
@@ -65,7 +65,7 @@ class OptimizeReport:
 
     @property
     def optimized_before(self) -> bool:
-        """Whether the input has the marker of an earlier optimization."""
+        """Return whether the input has the marker of an earlier optimization."""
         extras = self.before.json["asset"].get("extras", {})
         return isinstance(extras, dict) and KEY in extras
 

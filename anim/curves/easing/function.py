@@ -58,12 +58,12 @@ class Easing:
 
     @property
     def overshoots(self) -> bool:
-        """Whether values leave 0 … 1."""
+        """Return whether values leave 0 … 1."""
         return self.extent != (0.0, 1.0)
 
     @property
     def stepped(self) -> bool:
-        """Whether it is piecewise constant, so that a STEP sampler is its exact form."""
+        """Return whether it is piecewise constant, so that a STEP sampler is its exact form."""
         return self.exact is not None and all(p.value0 == p.value1 and p.slope0 == p.slope1 == 0 for p in self.exact)
 
 

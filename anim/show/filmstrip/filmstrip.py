@@ -213,7 +213,7 @@ def _repeat_last(frames: Iterator[Image]) -> Iterator[Image]:
 
 
 def _is_loop(rows: Sequence[Strip]) -> bool:
-    """Whether all rows are moving closed loops of equal duration."""
+    """Return whether all rows are moving closed loops of equal duration."""
     if len({len(row.times) for row in rows}) > 1:
         return False
     for row in rows:

@@ -100,5 +100,5 @@ class MaterialReader:
 
 
 def _is_black(colors: Floats) -> bool:
-    """Whether most vertices are black: masks of a game, which would hide the texture."""
+    """Return whether most vertices are black: masks of a game, which would hide the texture."""
     return bool(np.median(colors[:, :3].max(axis=1)) == 0)

@@ -48,7 +48,7 @@ class PlotTrack:
 
     @property
     def is_in_degrees(self) -> bool:
-        """Whether a rotation is drawn as angles, not as the components of its quaternion."""
+        """Return whether a rotation is drawn as angles, not as the components of its quaternion."""
         return self.track.kind is ValueKind.ROTATION and self.view != COMPONENTS
 
     @property
