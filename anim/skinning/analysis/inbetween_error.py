@@ -13,9 +13,9 @@ from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
 
-MIN_GAP_S = 0.05  # s; frames closer than this are as close as most clips are made
-MAX_SAMPLES = 16  # gaps that are looked into, the widest
-PARTS = 8  # of a gap, with frames between them: an eased motion is on the straight way half-way, and far off elsewhere
+MIN_INTERVAL_S = 0.05  # shorter intervals are as short as in most clips
+MAX_INTERVALS = 16  # the longest, which are sampled
+PARTS = 8  # an eased motion is straight at half of an interval, and far from it elsewhere
 
 
 class InbetweenError(NamedTuple):
@@ -32,8 +32,8 @@ def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
     off as it jumps. Elsewhere it may be some percent more.
     """
     gaps = np.diff(times)
-    chosen = np.sort(np.argsort(-gaps, kind="stable")[:MAX_SAMPLES])
-    chosen = chosen[gaps[chosen] > MIN_GAP_S]
+    chosen = np.sort(np.argsort(-gaps, kind="stable")[:MAX_INTERVALS])
+    chosen = chosen[gaps[chosen] > MIN_INTERVAL_S]
     most = InbetweenError(0.0, 0.0)
     if not len(chosen):
         return most

@@ -9,7 +9,7 @@ import pytest
 
 from anim.model import Clip, Mesh, MeshInstance, Scene
 from anim.sampling.times import frame_times
-from anim.skinning.analysis.inbetween_error import MAX_SAMPLES, inbetween_error
+from anim.skinning.analysis.inbetween_error import MAX_INTERVALS, inbetween_error
 from anim.skinning.bake import Baker, prepare_bake
 from tests.anim.skinning.methods.test_linear_blend import moving
 from tests.anim.skinning.scenes import random_scene
@@ -65,7 +65,7 @@ def test_the_widest_gaps_are_looked_into() -> None:
     """Many gaps, of which one is twice as wide; against every middle of the whole, as one bake."""
     of = random_scene(3)
     played, made = moving(of, 5), prepare_bake(of)
-    times = np.delete(np.linspace(0, 8, 4 * MAX_SAMPLES), 30)
+    times = np.delete(np.linspace(0, 8, 4 * MAX_INTERVALS), 30)
     found = inbetween_error(made, played, times)
     middles = (times[1:] + times[:-1]) / 2
     frames = made.bake(played, times=times).load_all().positions
