@@ -10,11 +10,11 @@ from anim.model import Mesh, Skeleton, Skin
 from anim.sampling import rest_pose, world_matrices
 
 NAME = "sticks"
-SHOULDER = 0.18  # fraction of a stick's length from the joint to its widest point
-SLIMNESS = 0.07  # radius / length
-MIN_LENGTH = 1e-4  # fraction of the skeleton's size; shorter sticks are omitted
+WIDEST_FRACTION = 0.18  # fraction of a stick's length from the joint to its widest point
+RADIUS_PER_LENGTH = 0.07  # radius / length
+MIN_LENGTH_FRACTION = 1e-4  # fraction of the skeleton's size; shorter sticks are omitted
 MAX_RADIUS, MIN_RADIUS = 0.02, 0.004  # fractions of the skeleton's size
-KNOB = 0.02  # fraction of the size: stick length of a joint without children
+END_LENGTH_FRACTION = 0.02  # fraction of the size: stick length of a joint without children
 
 
 def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[Mesh, Skin]:
@@ -48,10 +48,10 @@ def _lines(skeleton: Skeleton, places: Floats, ends: frozenset[int], size: float
     parents = skeleton.parents.tolist()
     bare = set(range(len(parents))) - ends
     for node, parent in enumerate(parents):
-        if parent >= 0 and np.linalg.norm(places[node] - places[parent]) > MIN_LENGTH * size:
+        if parent >= 0 and np.linalg.norm(places[node] - places[parent]) > MIN_LENGTH_FRACTION * size:
             lines.append((places[parent], places[node], parent))
             bare.discard(parent)
-    return lines + [(places[node], places[node] + [0, KNOB * size, 0], node) for node in sorted(bare)]
+    return lines + [(places[node], places[node] + [0, END_LENGTH_FRACTION * size, 0], node) for node in sorted(bare)]
 
 
 def _bipyramid(start: Floats, end: Floats, size: float) -> Floats:
@@ -61,9 +61,9 @@ def _bipyramid(start: Floats, end: Floats, size: float) -> Floats:
     ahead = along / length
     side = np.cross(ahead, (1.0, 0, 0) if abs(ahead[0]) < 0.7 else (0, 0, 1.0))
     side /= np.linalg.norm(side)
-    radius = min(np.clip(SLIMNESS * length, MIN_RADIUS * size, MAX_RADIUS * size), length / 2)
+    radius = min(np.clip(RADIUS_PER_LENGTH * length, MIN_RADIUS * size, MAX_RADIUS * size), length / 2)
     ring = [radius * v for v in (side, np.cross(ahead, side), -side, -np.cross(ahead, side))]
-    middle = start + SHOULDER * along
+    middle = start + WIDEST_FRACTION * along
     triangles = []
     for i in range(4):
         a, b = middle + ring[i], middle + ring[(i + 1) % 4]

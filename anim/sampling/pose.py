@@ -11,7 +11,7 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Floats
 from anim.errors import NotFoundError
-from anim.maths import matrix
+from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.batch import Batch, lazy_batches
 from anim.sampling.track import KeyInterval, find_interval
@@ -84,6 +84,17 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return world_from_node (N, F, 3, 4), in the memory order of the computation."""
     return matrix.accumulate_world(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
+
+
+def world_rotations(skeleton: Skeleton, local: Floats) -> dict[int, Floats]:
+    """Return the world rotation (F, 4) of every node from local ones (F, N, 4), without scale."""
+    world: dict[int, Floats] = {}
+    for level in skeleton.levels():
+        for node in level.tolist():
+            parent = int(skeleton.parents[node])
+            own = local[:, node]
+            world[node] = own if parent < 0 else quaternion.multiply(world[parent], own)
+    return world
 
 
 def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:

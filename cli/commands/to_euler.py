@@ -11,7 +11,7 @@ import typer
 
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.euler.motion import Convention, EulerMotion, Unit
-from anim.exchange.euler.rotation_order import BEST, USUAL, OrderRules, parse
+from anim.exchange.euler.rotation_order import AUTO, DEFAULT_ORDER, OrderRules, parse
 from anim.exchange.euler.to_bvh_motion import to_bvh
 from anim.exchange.euler.to_euler import to_euler as curves_of
 from anim.exchange.formats.registry import TRACK_FORMATS, TrackFormat, of_path
@@ -45,7 +45,7 @@ def command(
             metavar="ORDER",
             help="Of the axes as written: XYZ …, auto (each joint's farthest from lock), or 'hips=ZXY,*arm=YZX,auto'.",
         ),
-    ] = USUAL,
+    ] = DEFAULT_ORDER,
     axes: Annotated[
         AxesConvention, typer.Option("--axes", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
     ] = AxesConvention.INTRINSIC,
@@ -86,7 +86,7 @@ def command(
     _check(kind, unit, axes, scale, limit)
     if output != documents.PIPE and not dry_run:
         documents.check_file(output)
-    convention = Convention(USUAL if orders.otherwise == BEST else orders.otherwise, axes, unit)
+    convention = Convention(DEFAULT_ORDER if orders.otherwise == AUTO else orders.otherwise, axes, unit)
     with documents.source(input, voice) as source:
         chosen = _only(reader.clips(source.document), clip)
         motion, words, num_bound = _motion(

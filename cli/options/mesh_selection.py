@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from anim.exchange.retarget.ground_contact import at_or_below
+from anim.exchange.retarget.ground_contact import with_descendants
 from anim.model import Scene
 from anim.operations.selection import match_names
 
@@ -49,6 +49,6 @@ def visible_meshes(scene: Scene, globs: list[str] | None, hidden: list[str] | No
     found = match_names(hidden, [*names, *meshes], "mesh or node")
     above = {i for i in found if i < len(names)}
     gone = {scene.instances[i - len(names)].node for i in found if i >= len(names)}
-    gone.update(at_or_below(scene.skeleton, above).tolist())
+    gone.update(with_descendants(scene.skeleton, above).tolist())
     kept = [each.node for each in scene.instances] if chosen is None else chosen
     return [node for node in kept if node not in gone]

@@ -9,7 +9,7 @@ from math import degrees
 from typing import Any
 
 from anim.exchange.euler.from_euler import ImportedMotion
-from anim.exchange.euler.gimbal import NEAR, GimbalStats
+from anim.exchange.euler.gimbal import NEAR_LOCK_RAD, GimbalStats
 from anim.exchange.euler.motion import EulerMotion
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
@@ -22,7 +22,7 @@ WORDS = {
     Measure.JOINTS: "the path is scaled by the distances of the matched joints at rest",
     Measure.EXTENT: "the path is scaled by the sizes of both figures at rest",
 }
-NEAR_DEG = round(degrees(NEAR))
+NEAR_DEG = round(degrees(NEAR_LOCK_RAD))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from anim.errors import NotFoundError
 from anim.exchange.retarget import aliases
-from anim.exchange.retarget.apply import apply_to_character, to_match
+from anim.exchange.retarget.apply import apply_to_character, matchable_nodes
 from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks
 from anim.exchange.retarget.retarget import GroundMode
 from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
@@ -84,7 +84,7 @@ def put_on_character(
 
 def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
     """Report the names that can be paired, if details are requested."""
-    moving, moved = to_match(made.converted, scene, nested=made.motion.nested)
+    moving, moved = matchable_nodes(made.converted, scene, nested=made.motion.nested)
     for what, skeleton, nodes in (
         ("motion", made.converted.skeleton, moving),
         ("character", scene.skeleton, moved),

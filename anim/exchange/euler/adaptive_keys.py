@@ -13,13 +13,13 @@ from anim.errors import RangeError
 from anim.maths import quaternion
 
 MAX_ANGLE_RAD = np.radians(120)  # per segment; above 180° slerp takes the other arc
-MAX_TRAVEL = np.radians(360)  # sum over all axes per segment before sampling, so that no rotation is between samples
-ROUNDING = 1e-4  # fraction of a segment's length that float32 times may add or remove
+MAX_TRAVEL_RAD = np.radians(360)  # sum over all axes per segment before sampling, so that samples miss no rotation
+TIME_ROUNDING_FRACTION = 1e-4  # fraction of a segment's length that float32 times may add or remove
 SAMPLES = np.arange(1, 16) / 16
-SAFETY = 1.02  # the greatest error is between samples
+SAFETY_FACTOR = 1.02  # the greatest error is between samples
 MAX_SUBDIVISIONS = 64  # segments that one segment is split into at a time
 MAX_KEYS = 2_000_000
-ROUNDS = 40
+MAX_ROUNDS = 40
 
 Travel: TypeAlias = Callable[[Floats, Floats], Floats]
 
@@ -36,7 +36,7 @@ class SampledPath:
 
     value: Callable[[Floats, bool], Floats]
     travel: Travel
-    turns: bool
+    is_rotation: bool
 
 
 def adaptive_keys(path: SampledPath, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
@@ -56,11 +56,11 @@ def adaptive_keys(path: SampledPath, knots: Floats, *, tolerance: float) -> tupl
     jumps = np.flatnonzero((_distance(path, arriving, values[1:]) > 1e-7) & (earlier > times[:-1]))
     times = np.insert(times, jumps + 1, earlier[jumps])
     values = np.insert(values, jumps + 1, arriving[jumps], axis=0)
-    return times, quaternion.align_signs(values) if path.turns else values
+    return times, quaternion.align_signs(values) if path.is_rotation else values
 
 
 def _follow_path(path: SampledPath, knots: Floats, tolerance: float) -> Floats:
-    starts, _ = _split_interval(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL))
+    starts, _ = _split_interval(knots[:-1], knots[1:], np.ceil(path.travel(knots[:-1], knots[1:]) / MAX_TRAVEL_RAD))
     return refine_keys(np.append(starts, knots[-1]), lambda a, b: _required_keys(path, a, b, tolerance))
 
 
@@ -72,9 +72,9 @@ def refine_keys(times: Floats, wanted: Callable[[Floats, Floats], Ints]) -> Floa
     Raises RangeError for over two million keys.
     """
     found, a, b = [times], times[:-1], times[1:]
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         pieces = wanted(a, b)
-        middle = _as_stored((a + b) / 2)
+        middle = _round_to_float32((a + b) / 2)
         again: Bools = (pieces > 1) & (middle > a) & (middle < b)
         if not again.any():
             break
@@ -93,14 +93,14 @@ def _required_keys(path: SampledPath, a: Floats, b: Floats, tolerance: float) ->
     values = path.value(at, False)
     values[:, -1] = path.value(b, True)
     start, end = values[:, :1], values[:, -1:]
-    if path.turns:
+    if path.is_rotation:
         chord = quaternion.slerp(start, end, SAMPLES[None])
         steps = quaternion.angle_between(values[:, 1:], values[:, :-1]).sum(axis=1)
-        turns = np.ceil(steps / MAX_ANGLE_RAD - ROUNDING)
+        turns = np.ceil(steps / MAX_ANGLE_RAD - TIME_ROUNDING_FRACTION)
     else:
         chord = start + (end - start) * SAMPLES[None, :, None]
         turns = np.ones(len(a))
-    error = _distance(path, chord, values[:, 1:-1]).max(axis=1) * SAFETY
+    error = _distance(path, chord, values[:, 1:-1]).max(axis=1) * SAFETY_FACTOR
     bent = np.ceil(np.sqrt(error / tolerance) - 1e-9)
     pieces: Ints = np.clip(np.where(turns > 1, turns, bent), 1, MAX_SUBDIVISIONS).astype(np.int64)
     return pieces
@@ -115,16 +115,16 @@ def _split_interval(a: Floats, b: Floats, pieces: Ints | Floats) -> tuple[Floats
     piece = np.repeat(np.arange(len(a)), counts)
     step = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
     length = (b - a)[piece] / counts[piece]
-    starts = np.where(step == 0, a[piece], _as_stored(a[piece] + step * length))
+    starts = np.where(step == 0, a[piece], _round_to_float32(a[piece] + step * length))
     last = step == counts[piece] - 1
-    ends = np.where(last, b[piece], _as_stored(a[piece] + (step + 1) * length))
+    ends = np.where(last, b[piece], _round_to_float32(a[piece] + (step + 1) * length))
     some = ends > starts
     return starts[some], ends[some]
 
 
-def _as_stored(times: Floats) -> Floats:
+def _round_to_float32(times: Floats) -> Floats:
     return np.asarray(times.astype(np.float32).astype(np.float64))
 
 
 def _distance(path: SampledPath, p: Floats, q: Floats) -> Floats:
-    return quaternion.angle_between(p, q) if path.turns else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))
+    return quaternion.angle_between(p, q) if path.is_rotation else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))

@@ -1,7 +1,8 @@
-"""Detect baked curves (one key per frame), and convert key times to glTF's float32."""
+"""Detect baked curves (one key per frame), and convert key times to glTF's: float32, not negative."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from enum import StrEnum
 
@@ -11,9 +12,9 @@ from anim.arrays import Floats, Ints
 from anim.exchange.euler.curve import Curve, Mode
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 
-MIN_RATE = 10.0  # keys per second
-MIN_KEYS = 4
-EVEN = 0.01  # fraction by which steps may differ
+MIN_BAKED_KEYS_PER_S = 10.0  # keys per second
+MIN_BAKED_KEYS = 4
+STEP_TOLERANCE = 0.01  # fraction by which steps may differ
 
 
 class KeyPlacement(StrEnum):
@@ -40,6 +41,17 @@ def is_baked(motion: EulerMotion, node: EulerNode, keys: KeyPlacement) -> bool:
 def curves_of(node: EulerNode) -> list[Curve]:
     """Return all curves of a node."""
     return [c for c in (*node.rotation, *node.moves.values(), *node.scales.values()) if c is not None]
+
+
+def shift_to_zero(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
+    """Return the shift in seconds of all keys to times ≥ 0, and a note if it is not 0.
+
+    shift_to_zero([-0.5, 0, 1]) → 0.5, ("the first key is at -0.5 s: all are moved by 0.5 s, to begin at 0",)
+    """
+    first = min(times, default=0.0)
+    if first >= 0:
+        return 0.0, ()
+    return -first, (f"the first key is at {first:.6g} s: all are moved by {-first:.6g} s, to begin at 0",)
 
 
 class Float32Times:
@@ -70,8 +82,8 @@ class Float32Times:
 
 
 def _is_dense(curve: Curve, first: Curve) -> bool:
-    if len(curve.times) < MIN_KEYS or (curve.modes[:-1] != Mode.LINEAR).any():
+    if len(curve.times) < MIN_BAKED_KEYS or (curve.modes[:-1] != Mode.LINEAR).any():
         return False
     steps = np.diff(curve.times)
-    even = np.ptp(steps) < EVEN * steps.mean()
-    return bool(even and steps.mean() <= 1.001 / MIN_RATE and np.array_equal(curve.times, first.times))
+    even = np.ptp(steps) < STEP_TOLERANCE * steps.mean()
+    return bool(even and steps.mean() <= 1.001 / MIN_BAKED_KEYS_PER_S and np.array_equal(curve.times, first.times))

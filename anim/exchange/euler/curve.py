@@ -87,7 +87,7 @@ class Curve:
 
     def weights(self, left: Ints, right: Ints) -> tuple[Floats, Floats]:
         """Return the handle lengths after keys `left` and before keys `right`, as fractions of the segment."""
-        third = np.full(len(self.times), weighted_bezier.PLAIN)
+        third = np.full(len(self.times), weighted_bezier.DEFAULT_WEIGHT)
         leaving = third if self.out_weights is None else self.out_weights
         arriving = third if self.in_weights is None else self.in_weights
         return leaving[left], arriving[right]

@@ -130,7 +130,7 @@ def _track(
     stepped = bool(changing) and all((curve.modes[:-1] == Mode.STEP).all() for curve in changing)
     if stepped or tolerance is None:
         values = path.value(knots, False)
-        values = quaternion.align_signs(values) if path.turns else values
+        values = quaternion.align_signs(values) if path.is_rotation else values
         return Track(number, name, Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
     times, values = placing.adaptive_keys(path, knots, tolerance=tolerance)
     return Track(number, name, Interpolation.LINEAR, axes.shared(times), values)

@@ -13,10 +13,10 @@ from anim.maths.euler import ORDERS, AxesConvention
 from anim.model import Clip, Interpolation, Track
 from anim.sampling.track import sample
 
-NEAR = np.radians(5.0)  # from lock: rates are amplified 23 times there
-MANY, BETWEEN = 500, 29  # sufficient keys; samples per interval with fewer keys
-SAME = 1e-9  # rad; smaller differences are ignored: the first counts
-CELLS = 200_000  # quaternions evaluated together
+NEAR_LOCK_RAD = np.radians(5.0)  # from lock: rates are amplified 23 times there
+SUFFICIENT_KEYS, SAMPLES_PER_INTERVAL = 500, 29  # sufficient keys; samples per interval with fewer keys
+ANGLE_TOLERANCE_RAD = 1e-9  # rad; smaller differences are ignored: the first counts
+MAX_BATCH_QUATERNIONS = 200_000  # quaternions evaluated together
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +71,10 @@ def _can_lock(motion: EulerMotion, node: int) -> bool:
 
 
 def _check_times(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
-    """Node, times and rotations of its angles: at the track's keys, or with BETWEEN more per interval."""
-    if len(track.times) > MANY or track.interpolation is Interpolation.STEP or len(track.times) == 1:
+    """Node, times and rotations of its angles: at the track's keys, or with SAMPLES_PER_INTERVAL more per interval."""
+    if len(track.times) > SUFFICIENT_KEYS or track.interpolation is Interpolation.STEP or len(track.times) == 1:
         return node, track.times, _stats_of_angles(motion.nodes[node].pivots, track.values)
-    shares = np.arange(BETWEEN + 1) / (BETWEEN + 1)
+    shares = np.arange(SAMPLES_PER_INTERVAL + 1) / (SAMPLES_PER_INTERVAL + 1)
     pieces = track.times[:-1, None] + np.diff(track.times)[:, None] * shares
     at = np.append(pieces.ravel(), track.times[-1])
     return node, at, _stats_of_angles(motion.nodes[node].pivots, sample(track, at))
@@ -94,7 +94,7 @@ def _stack_angles(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats
         groups.setdefault(id(track[1]), []).append(track)
     stacked = []
     for group in groups.values():
-        count = max(CELLS // len(group[0][1]), 1)
+        count = max(MAX_BATCH_QUATERNIONS // len(group[0][1]), 1)
         for start in range(0, len(group), count):
             part = group[start : start + count]
             stacked.append((part[0][1], [node for node, _, _ in part], np.stack([v for _, _, v in part], axis=1)))
@@ -105,7 +105,7 @@ def _row(
     motion: EulerMotion, node: int, times: Floats, distance: Floats, best: str, best_nearest: float
 ) -> GimbalStats:
     about = motion.nodes[node]
-    least = int((distance <= distance.min() + SAME).argmax())
+    least = int((distance <= distance.min() + ANGLE_TOLERANCE_RAD).argmax())
     spans = np.zeros(len(times))  # each key covers half the interval to its neighbors
     spans[1:] += np.diff(times) / 2
     spans[:-1] += np.diff(times) / 2
@@ -116,7 +116,7 @@ def _row(
         str(about.frame),
         float(np.degrees(distance[least])),
         float(times[least]),
-        float(spans[distance < NEAR].sum()),
+        float(spans[distance < NEAR_LOCK_RAD].sum()),
         float(np.sqrt((1 + sine) / (1 - sine))),
         f"{about.order[0]} and {about.order[2]}" if about.order[0] != about.order[2] else f"both {about.order[0]}",
         best if about.frame == AxesConvention.INTRINSIC else best[::-1],

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.exchange.euler import adaptive_keys
-from anim.exchange.euler.adaptive_keys import MAX_ANGLE_RAD, MAX_SUBDIVISIONS, SAFETY
+from anim.exchange.euler.adaptive_keys import MAX_ANGLE_RAD, MAX_SUBDIVISIONS, SAFETY_FACTOR
 from anim.maths import quaternion
 
 SAMPLES = np.arange(1, 8) / 8
@@ -44,6 +44,6 @@ def _intervals_to_split(motion: Motion, a: Floats, b: Floats, tolerance: float, 
         error = np.maximum(error, quaternion.angle_between(straight, q[:, 1:-1]).max(axis=1))
         turned = quaternion.angle_between(q[:, 1:], q[:, :-1]).sum(axis=1)
         turns = np.maximum(turns, np.ceil(turned / MAX_ANGLE_RAD - 1e-4))
-    bent = np.ceil(np.sqrt(error * SAFETY / tolerance) - 1e-9)
+    bent = np.ceil(np.sqrt(error * SAFETY_FACTOR / tolerance) - 1e-9)
     pieces: Ints = np.clip(np.maximum(turns, bent), 1, MAX_SUBDIVISIONS).astype(np.int64)
     return pieces

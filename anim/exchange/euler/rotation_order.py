@@ -14,9 +14,9 @@ from anim.errors import NotFoundError, RangeError
 from anim.maths import euler
 from anim.maths.euler import ORDERS, AxesConvention
 
-BEST = "auto"
-USUAL = "ZXY"  # the order of most recorders
-CANDIDATES = (USUAL, *(order for order in ORDERS if not euler.is_proper(order) and order != USUAL))
+AUTO = "auto"
+DEFAULT_ORDER = "ZXY"  # the order of most recorders
+CANDIDATES = (DEFAULT_ORDER, *(order for order in ORDERS if not euler.is_proper(order) and order != DEFAULT_ORDER))
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,20 +27,20 @@ class OrderRules:
     farthest from gimbal lock.
     """
 
-    otherwise: str = USUAL
+    otherwise: str = DEFAULT_ORDER
     rules: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_one(self) -> bool:
         """True if all nodes have the same order."""
-        return not self.rules and self.otherwise != BEST
+        return not self.rules and self.otherwise != AUTO
 
     def of(self, name: str, q: Floats, frame: AxesConvention = AxesConvention.INTRINSIC) -> str:
         """Return the order for a node and its rotations (..., 4)."""
         order = next((order for glob, order in self.rules if fnmatchcase(name, glob)), self.otherwise)
-        if order != BEST:
+        if order != AUTO:
             return order
-        found = _best(q.reshape(-1, 4))
+        found = _choose_order(q.reshape(-1, 4))
         return found if frame == AxesConvention.INTRINSIC else found[::-1]
 
     def check(self, names: Sequence[str]) -> None:
@@ -60,18 +60,18 @@ def parse(text: str) -> OrderRules:
     rules, otherwise = [], list[str]()
     for item in text.split(","):
         glob, named, order = item.strip().rpartition("=")
-        checked = BEST if order.strip().casefold() == BEST else euler.check_order(order.strip())
+        checked = AUTO if order.strip().casefold() == AUTO else euler.check_order(order.strip())
         if named:
             rules.append((glob.strip(), checked))
         else:
             otherwise.append(checked)
     if len(otherwise) > 1:
         raise RangeError(f"order is '{text}' (expected one for all nodes, and NAME=ORDER for others)")
-    return OrderRules(otherwise[0] if otherwise else USUAL, tuple(rules))
+    return OrderRules(otherwise[0] if otherwise else DEFAULT_ORDER, tuple(rules))
 
 
-def _best(q: Floats) -> str:
+def _choose_order(q: Floats) -> str:
     """The intrinsic order farthest from lock; the usual one if no other is better."""
     nearest = {order: float(euler.gimbal_distance(q, order=order).min()) for order in CANDIDATES}
     best = max(CANDIDATES, key=lambda order: nearest[order])
-    return USUAL if nearest[best] <= nearest[USUAL] + np.radians(1.0) else best
+    return DEFAULT_ORDER if nearest[best] <= nearest[DEFAULT_ORDER] + np.radians(1.0) else best

@@ -11,20 +11,20 @@ from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, linear
 from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
 from anim.exchange.euler.rotation_order import OrderRules
-from anim.exchange.euler.to_euler import FILE_LOCK
+from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD
 from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
-from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Clip, Skeleton
 from anim.sampling import rest_pose, sample_pose, world_matrices
+from anim.sampling.pose import world_rotations
 
-EVEN = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
+GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 MAX_FRAMES = 10_000_000
-ROUNDING = 2e-7  # relative rounding error of float32 times
+TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
 CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
 BRACES = "{}"
-END = "_end"  # a static leaf of this name marks the end of its parent
+END_NAME_SUFFIX = "_end"  # a static leaf of this name marks the end of its parent
 
 
 def to_bvh(
@@ -53,7 +53,11 @@ def to_bvh(
     shown, times = _frames(clip, fps)
     figure = _Skeleton(skeleton, clip, chosen, times)
     nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
-    notes = skipped_note(_lost_tracks(skeleton, clip, chosen)) + _renamed(skeleton, names, chosen) + _shift_start(clip)
+    notes = (
+        skipped_note(_unsupported_tracks(skeleton, clip, chosen))
+        + _rename_nodes(skeleton, names, chosen)
+        + _shift_start(clip)
+    )
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 
@@ -90,7 +94,7 @@ def _node(
     moved = parent < 0 or bool(np.abs(path - offset).max() > CONSTANT_TOLERANCE * figure.size)
     end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
     order = orders.of(name, turn)
-    angles = euler.unwrap(turn, order=order, frame=AxesConvention.INTRINSIC, lock=FILE_LOCK)
+    angles = euler.unwrap(turn, order=order, frame=AxesConvention.INTRINSIC, lock=LOCK_TOLERANCE_RAD)
     return EulerNode(
         name,
         figure.numbers.get(parent, -1),
@@ -118,16 +122,16 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     if fps is not None:
         if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
             raise RangeError(f"fps is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
-        shown = np.arange(int(np.ceil((end - start) * fps - EVEN)) + 1) / fps
+        shown = np.arange(int(np.ceil((end - start) * fps - GRID_TOLERANCE_FRAMES)) + 1) / fps
     else:
         step = (end - start) / max(len(keys) - 1, 1)
         shown = np.asarray(np.arange(len(keys)) * step, np.float64)
-        if np.abs(keys - start - shown).max() > EVEN * step + ROUNDING * end:
+        if np.abs(keys - start - shown).max() > GRID_TOLERANCE_FRAMES * step + TIME_ROUNDING_FRACTION * end:
             raise RangeError("keys stand on no even grid, as a BVH needs", help="give --fps")
         return shown, keys
     at = start + shown
-    nearest = keys[np.clip(np.searchsorted(keys, at - ROUNDING * at), 0, len(keys) - 1)]
-    return shown, np.where(np.abs(nearest - at) <= ROUNDING * at, nearest, at)
+    nearest = keys[np.clip(np.searchsorted(keys, at - TIME_ROUNDING_FRACTION * at), 0, len(keys) - 1)]
+    return shown, np.where(np.abs(nearest - at) <= TIME_ROUNDING_FRACTION * at, nearest, at)
 
 
 def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
@@ -149,7 +153,7 @@ def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> l
 def _is_end(skeleton: Skeleton, clip: Clip, node: int, among: Collection[int]) -> bool:
     parent = int(skeleton.parents[node])
     leaf = not (skeleton.parents == node).any()
-    named = parent >= 0 and skeleton.names[node].casefold().endswith(END)
+    named = parent >= 0 and skeleton.names[node].casefold().endswith(END_NAME_SUFFIX)
     return named and leaf and parent in among and all(track.node != node for track in clip.tracks)
 
 
@@ -158,7 +162,7 @@ def _names(skeleton: Skeleton) -> list[str]:
     return unique([name.translate(str.maketrans(BRACES, "()")) for name in labels(skeleton)])
 
 
-def _renamed(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:
+def _rename_nodes(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:
     changed = [names[node] for node in sorted(chosen) if set(skeleton.names[node]) & set(BRACES)]
     return (f"braces in names became parentheses: {', '.join(changed)}",) if changed else ()
 
@@ -167,7 +171,7 @@ def _shift_start(clip: Clip) -> tuple[str, ...]:
     return (f"the first key is at {clip.start:.6g} s: a BVH begins there, at 0",) if clip.start > 0 else ()
 
 
-def _lost_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
+def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
     """Descriptions of the tracks that a BVH of the chosen nodes cannot represent."""
     carrying = set(chosen)
     for node in chosen:

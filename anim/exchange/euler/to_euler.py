@@ -20,10 +20,10 @@ from anim.sampling import frame_times
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
 
-FILE_LOCK = 1e-6  # rad; uncertainty of a lock in a file's float32 quaternions
-BETWEEN = np.array((0.25, 0.5, 0.75))
+LOCK_TOLERANCE_RAD = 1e-6  # rad; uncertainty of a lock in a file's float32 quaternions
+ERROR_FRACTIONS = np.array((0.25, 0.5, 0.75))
 MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
-ROUNDS, MOST_PIECES, MAX_KEYS = 24, 32, 500_000
+MAX_ROUNDS, MAX_SUBDIVISIONS, MAX_KEYS = 24, 32, 500_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,12 +132,12 @@ def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, .
     """The three curves of a rotation, and their error between keys."""
     stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
     times = track.times if asked.frames is None or stepped else asked.frames
-    for _ in range(ROUNDS):
-        angles = euler.unwrap(sample(track, times), order=order, frame=frame, lock=FILE_LOCK)
+    for _ in range(MAX_ROUNDS):
+        angles = euler.unwrap(sample(track, times), order=order, frame=frame, lock=LOCK_TOLERANCE_RAD)
         if stepped or len(times) == 1:
             mode = Mode.STEP if stepped else Mode.LINEAR
             return _curves(times, angles, mode), 0.0
-        errors = _between(track, times, angles, order, frame)
+        errors = _interval_errors(track, times, angles, order, frame)
         if tolerance is None or errors.max() <= tolerance:
             break
         finer = _refine(times, errors, tolerance)
@@ -147,9 +147,9 @@ def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, .
     return _curves(times, angles, Mode.LINEAR), float(errors.max())
 
 
-def _between(track: Track, times: Floats, angles: Floats, order: str, frame: AxesConvention) -> Floats:
+def _interval_errors(track: Track, times: Floats, angles: Floats, order: str, frame: AxesConvention) -> Floats:
     """Error of linear curves in each interval (K − 1,), rad; 0 at a jump without a float32 time inside."""
-    u = BETWEEN[:, None]
+    u = ERROR_FRACTIONS[:, None]
     at = times[:-1] + (times[1:] - times[:-1]) * u
     straight = angles[:-1] + (angles[1:] - angles[:-1]) * u[..., None]
     true = sample(track, at.ravel()).reshape(*at.shape, 4)
@@ -159,7 +159,7 @@ def _between(track: Track, times: Floats, angles: Floats, order: str, frame: Axe
 
 
 def _refine(times: Floats, errors: Floats, tolerance: float) -> Floats:
-    pieces = np.clip(np.ceil(np.sqrt(errors / tolerance)), 1, MOST_PIECES).astype(np.int64)
+    pieces = np.clip(np.ceil(np.sqrt(errors / tolerance)), 1, MAX_SUBDIVISIONS).astype(np.int64)
     new = [
         times[k] + (times[k + 1] - times[k]) * np.arange(1, pieces[k]) / pieces[k] for k in np.flatnonzero(pieces > 1)
     ]

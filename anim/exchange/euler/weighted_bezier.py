@@ -6,8 +6,8 @@ import numpy as np
 
 from anim.arrays import Floats
 
-PLAIN = 1 / 3  # of a segment; with both handles of this length the cubic equals `maths.hermite`
-ROUNDS = 60  # bracket halvings at worst; usually six steps
+DEFAULT_WEIGHT = 1 / 3  # of a segment; with both handles of this length the cubic equals `maths.hermite`
+MAX_ITERATIONS = 60  # bracket halvings at worst; usually six steps
 
 
 def evaluate(
@@ -31,7 +31,7 @@ def parameter(share: Floats, leaving: Floats, arriving: Floats) -> Floats:
     """
     share, leaving, arriving = np.broadcast_arrays(share, leaving, arriving)
     low, high, u = np.zeros(share.shape), np.ones(share.shape), share.astype(np.float64)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         v = 1 - u
         off = 3 * leaving * u * v * v + 3 * (1 - arriving) * u * u * v + u**3 - share
         low, high = np.where(off <= 0, u, low), np.where(off >= 0, u, high)

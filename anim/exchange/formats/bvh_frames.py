@@ -9,13 +9,13 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.formats.bvh_hierarchy import fail
-from anim.exchange.formats.text import GROUPED, LIMIT
+from anim.exchange.formats.text import DIGIT_SEPARATOR, MAX_NUMBER
 from anim.exchange.formats.text import parse_number as number_of
 
 RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100,
          120, 144, 150, 200, 240, 250, 300, 480, 500, 1000)  # fmt: skip
-SNAP = 1e-3  # fraction of a frame; a frame time has few digits
-ROUNDED = 1e-7  # fraction of a frame; rounding error of nine digits
+RATE_TOLERANCE_FRAMES = 1e-3  # fraction of a frame; a frame time has few digits
+ROUNDING_FRAMES = 1e-7  # fraction of a frame; rounding error of nine digits
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 
 
@@ -35,7 +35,7 @@ def read_frames(lines: list[str], start: int, column: int, channels: int) -> Bvh
     is a truncated file. Raises FormatError with the line.
     """
     claimed, seconds, body = _head(lines, start, column)
-    numbers = _numbers(lines, body)
+    numbers = _parse_rows(lines, body)
     if not channels:
         fail(start + 1, "no joint has a channel: there is no motion")
     _check_columns(lines, body, len(numbers), channels, claimed)
@@ -48,7 +48,7 @@ def read_frames(lines: list[str], start: int, column: int, channels: int) -> Bvh
             fail(len(lines), f"the file holds {len(rows)} of {claimed} claimed frames (truncated?)")
         notes.append(f"Frames says {claimed}, the file holds {len(rows)}: all of them are read")
     fps = _snap_rate(seconds)
-    if abs(fps * seconds - 1) > ROUNDED:
+    if abs(fps * seconds - 1) > ROUNDING_FRAMES:
         notes.append(f"frame time {seconds:g} s is taken for 1/{fps:g} s")
     return BvhFrames(rows, fps, tuple(notes))
 
@@ -78,11 +78,12 @@ def _find(lines: list[str], start: int, pattern: str, expected: str) -> tuple[in
     return number, match[1]
 
 
-def _numbers(lines: list[str], body: int) -> Floats:
+def _parse_rows(lines: list[str], body: int) -> Floats:
     words = " ".join(lines[body:])
     try:
         numbers: Floats = np.array([*map(float, words.split())], np.float64)
-        if GROUPED not in words and (not len(numbers) or np.abs(numbers).max() <= LIMIT):  # also rejects NaN
+        is_valid = not len(numbers) or np.abs(numbers).max() <= MAX_NUMBER  # False for NaN
+        if is_valid and DIGIT_SEPARATOR not in words:
             return numbers
     except ValueError:
         pass
@@ -112,4 +113,4 @@ def _check_columns(lines: list[str], body: int, count: int, channels: int, claim
 def _snap_rate(seconds: float) -> float:
     """Frames per second: a standard rate if the frame time equals one within its digits."""
     rate = min(RATES, key=lambda rate: abs(rate * seconds - 1))
-    return rate if abs(rate * seconds - 1) < SNAP else 1 / seconds
+    return rate if abs(rate * seconds - 1) < RATE_TOLERANCE_FRAMES else 1 / seconds

@@ -9,7 +9,7 @@ from anim.errors import UnsupportedError
 from anim.exchange.euler.curve import evaluate
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 
-DIGITS = 6  # decimals of degrees and of the file's unit of length
+DECIMALS = 6  # decimals of degrees and of the file's unit of length
 
 
 def write(motion: EulerMotion) -> bytes:
@@ -39,8 +39,8 @@ def write(motion: EulerMotion) -> bytes:
             waiting += [(child, depth + 1) for child in reversed(below)]
     step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1 / 30
     lines += ["MOTION", f"Frames: {len(times)}", f"Frame Time: {step:.9f}".rstrip("0")]
-    rows = np.round(np.stack(columns, axis=-1), DIGITS) + 0.0
-    pattern = " ".join([f"%.{DIGITS}f"] * rows.shape[1])
+    rows = np.round(np.stack(columns, axis=-1), DECIMALS) + 0.0
+    pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1])
     lines += [pattern % tuple(row) for row in rows.tolist()]
     return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
 
@@ -59,7 +59,7 @@ def _frame_times(motion: EulerMotion) -> Floats:
 def _open_joint(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
     """The lines of a node before its children; complete for an End Site and for a joint without children."""
     tab = "\t" * depth
-    offset = f"OFFSET {_numbers(node.translation)}"
+    offset = f"OFFSET {_format_vector(node.translation)}"
     if node.end:
         return [f"{tab}End Site", f"{tab}{{", f"{tab}\t{offset}", f"{tab}}}"]
     positions = [f"{axis}position" for axis in "XYZ"] if _has_position(node) else []
@@ -84,6 +84,6 @@ def _columns(node: EulerNode, times: Floats, with_position: bool) -> list[Floats
     return columns
 
 
-def _numbers(vector: Floats) -> str:
-    rounded = (np.round(vector, DIGITS) + 0.0).tolist()
-    return " ".join(str(int(x)) if x == int(x) else f"{x:.{DIGITS}f}" for x in rounded)
+def _format_vector(vector: Floats) -> str:
+    rounded = (np.round(vector, DECIMALS) + 0.0).tolist()
+    return " ".join(str(int(x)) if x == int(x) else f"{x:.{DECIMALS}f}" for x in rounded)

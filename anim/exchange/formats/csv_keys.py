@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.euler.curve import MODES, Curve, Mode
-from anim.exchange.euler.weighted_bezier import PLAIN
+from anim.exchange.euler.weighted_bezier import DEFAULT_WEIGHT
 from anim.exchange.formats.text import check_times, error_at, parse_cell
 
 KeyRow = tuple[int, dict[str, str]]  # line, cells by column
@@ -47,7 +47,7 @@ def _handles(rows: list[KeyRow], key: str, otherwise: float) -> Floats:
 def _weights(rows: list[KeyRow], key: str) -> Floats | None:
     if not any(row.get(key) for _, row in rows):
         return None
-    weights = _handles(rows, key, PLAIN)
+    weights = _handles(rows, key, DEFAULT_WEIGHT)
     for (line, _), weight in zip(rows, weights.tolist(), strict=True):
         if not 0 <= weight <= 1:
             raise error_at(line, f"{key} is {weight:g} (expected a share of the time between two keys, 0 … 1)")

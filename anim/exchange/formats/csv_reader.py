@@ -35,13 +35,13 @@ from functools import partial
 import numpy as np
 
 from anim.errors import FormatError
+from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import PartialConvention, merge_strict, parse_convention, require_complete
 from anim.exchange.euler.curve import MODES, Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import Convention, EulerMotion
-from anim.exchange.euler.start_time import shift_to_zero
 from anim.exchange.formats.csv_keys import KeyRow, curve_from_rows
 from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
-from anim.exchange.formats.node_builder import KINDS, MAX_UNIT, NodeBuilder, build_nodes, check_nodes
+from anim.exchange.formats.node_builder import KINDS, MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
 from anim.exchange.formats.text import check_times, decode_text, error_at, parse_cell, parse_number
 
 __all__ = ["read", "write"]
@@ -70,7 +70,7 @@ class _File:
             return 1.0
         line = self.lines["meters_per_unit"]
         unit = parse_cell(self.words["meters_per_unit"], line, "meters_per_unit")
-        if not 0 < unit < MAX_UNIT:
+        if not 0 < unit < MAX_UNIT_M:
             raise error_at(line, f"meters_per_unit is {unit:g} (expected a number above 0)")
         return unit
 

@@ -16,7 +16,7 @@ from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
 
 KEY_COLUMNS = ("node", "channel", "time", "value")
 EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
-DIGITS = 9  # decimals
+DECIMALS = 9  # decimals
 
 Column = tuple[str, str, Curve]  # node, channel, its curve in the unit to write
 
@@ -75,4 +75,4 @@ def _write_keys(rows: Any, columns: list[Column]) -> None:
 
 
 def _text(value: float) -> str:
-    return f"{round(value, DIGITS) + 0.0:.12g}"
+    return f"{round(value, DECIMALS) + 0.0:.12g}"

@@ -41,6 +41,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import FormatError
+from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import (
     PartialConvention,
     fill_from,
@@ -50,10 +51,9 @@ from anim.exchange.euler.convention import (
 )
 from anim.exchange.euler.curve import HANDLES, MODES, WEIGHTS, Curve, Mode
 from anim.exchange.euler.motion import OFFSETS, Convention, EulerMotion, Pivots
-from anim.exchange.euler.start_time import shift_to_zero
 from anim.exchange.formats.json_writer import SCHEMA, write
-from anim.exchange.formats.node_builder import MAX_UNIT, NodeBuilder, build_nodes, check_nodes
-from anim.exchange.formats.text import LIMIT
+from anim.exchange.formats.node_builder import MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
+from anim.exchange.formats.text import MAX_NUMBER
 from anim.gltf.io import json_text
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
@@ -102,7 +102,7 @@ def read(data: bytes, options: PartialConvention) -> EulerMotion:
         names.add(draft.name)
         drafts.append(draft)
     unit = content.get("meters_per_unit", 1.0)
-    if type(unit) not in (int, float) or not 0 < unit < MAX_UNIT:
+    if type(unit) not in (int, float) or not 0 < unit < MAX_UNIT_M:
         raise FormatError(f"meters_per_unit is {unit!r} (expected a number above 0)")
     finished_nodes, nested = build_nodes(drafts, float(unit))
     return EulerMotion(finished_nodes, nested=nested, notes=notes)
@@ -115,7 +115,7 @@ def _times(nodes: list[Any]) -> Iterator[float]:
         for about in curves.values() if isinstance(curves, dict) else ():
             times = about.get("times") if isinstance(about, dict) else None
             if isinstance(times, list):
-                yield from (time for time in times if type(time) in (int, float) and abs(time) <= LIMIT)
+                yield from (time for time in times if type(time) in (int, float) and abs(time) <= MAX_NUMBER)
 
 
 def _node_builder(node: Any, said: PartialConvention, later: float, where: str) -> NodeBuilder:
@@ -127,9 +127,9 @@ def _node_builder(node: Any, said: PartialConvention, later: float, where: str) 
         raise FormatError(f"parent is {parent!r} (expected a name)", where=where)
     convention = require_complete(fill_from(parse_convention(node, where), said))
     draft = NodeBuilder(node["name"], convention, parent)
-    draft.translation = _numbers(node, "translation", (3,), np.zeros(3), where)
-    draft.angles = _numbers(node, "rotation", (3,), np.zeros(3), where)
-    draft.scale = _numbers(node, "scale", (3,), np.ones(3), where)
+    draft.translation = _parse_array(node, "translation", (3,), np.zeros(3), where)
+    draft.angles = _parse_array(node, "rotation", (3,), np.zeros(3), where)
+    draft.scale = _parse_array(node, "scale", (3,), np.ones(3), where)
     if any(key in node for key in (*OFFSETS, *PIVOT_ROTATION_KEYS)):
         draft.pivots = _pivots(node, convention, where)
     curves = node.get("curves", {})
@@ -149,7 +149,7 @@ def _node_builder(node: Any, said: PartialConvention, later: float, where: str) 
 def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivots:
     turns = {}
     for key in PIVOT_ROTATION_KEYS:
-        given = _numbers(node, key, (3, 4), np.zeros(3), where)
+        given = _parse_array(node, key, (3, 4), np.zeros(3), where)
         if len(given) == 4:
             if not given.any():
                 raise FormatError(f"{key} is zero (expected a unit quaternion)", where=where)
@@ -158,7 +158,7 @@ def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivo
             turns[key] = euler.to_quaternion(
                 given * convention.unit.radians, order="XYZ", frame=AxesConvention.EXTRINSIC
             )
-    offsets = {key: _numbers(node, key, (3,), np.zeros(3), where) for key in OFFSETS}
+    offsets = {key: _parse_array(node, key, (3,), np.zeros(3), where) for key in OFFSETS}
     return Pivots(**turns, **offsets)
 
 
@@ -166,11 +166,11 @@ def _curve(about: Any, later: float, where: str) -> Curve:
     if not isinstance(about, dict) or not about.keys() >= {"times", "values"}:
         raise FormatError("expected an object with times and values")
     _check_keys(about, CURVE_KEYS, where)
-    times = _numbers(about, "times", None, np.zeros(0), where)
+    times = _parse_array(about, "times", None, np.zeros(0), where)
     count = len(times)
     for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
         raise FormatError(f"times not increasing at key {k} ({times[k]:g} s after {times[k - 1]:g} s)")
-    values = _numbers(about, "values", (count,), np.zeros(0), where)
+    values = _parse_array(about, "values", (count,), np.zeros(0), where)
     given = about.get("interpolation", "linear")
     words = given if isinstance(given, list) else [given] * count
     if len(words) != count or not all(isinstance(word, str) and word in MODES for word in words):
@@ -183,8 +183,8 @@ def _curve(about: Any, later: float, where: str) -> Curve:
         for i, key in enumerate(("in_tangents", "out_tangents")):
             if key not in about:
                 raise FormatError(f"a cubic curve lacks {key}")
-            tangents[i] = _numbers(about, key, (count,), np.zeros(0), where)
-    weights = [_numbers(about, key, (count,), np.zeros(0), where) if key in about else None for key in WEIGHTS]
+            tangents[i] = _parse_array(about, key, (count,), np.zeros(0), where)
+    weights = [_parse_array(about, key, (count,), np.zeros(0), where) if key in about else None for key in WEIGHTS]
     return Curve(times + later, values, modes, *tangents, *weights)
 
 
@@ -197,7 +197,7 @@ def _check_keys(about: Mapping[str, Any], known: Sequence[str], where: str) -> N
             raise FormatError(f"unknown key '{key}'", where=where, help=help)
 
 
-def _numbers(
+def _parse_array(
     about: Mapping[str, Any], key: str, lengths: tuple[int, ...] | None, default: Floats, where: str
 ) -> Floats:
     if key not in about:
@@ -207,6 +207,6 @@ def _numbers(
     if not good or (lengths is not None and len(given) not in lengths):
         count = "" if lengths is None else " or ".join(map(str, lengths)) + " "
         raise FormatError(f"{key} is not a list of {count}numbers", where=where)
-    if not all(-LIMIT <= x <= LIMIT for x in given):
-        raise FormatError(f"{key} holds a number beyond {LIMIT:g}", where=where)
+    if not all(-MAX_NUMBER <= x <= MAX_NUMBER for x in given):
+        raise FormatError(f"{key} holds a number beyond {MAX_NUMBER:g}", where=where)
     return np.array(given, np.float64)

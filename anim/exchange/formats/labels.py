@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from anim.model import Skeleton, Track
 
-LISTED = 3  # names in a note
+MAX_LISTED_NAMES = 3  # names in a note
 
 
 def unique(names: Sequence[str]) -> list[str]:
@@ -39,5 +39,5 @@ def label_of(track: Track, names: Sequence[str]) -> str:
 
 def skipped_note(what: Sequence[str]) -> tuple[str, ...]:
     """Return one note: "left out: weights of 'head', scale of 'arm' and 3 more"; none if empty."""
-    more = f" and {len(what) - LISTED} more" if len(what) > LISTED else ""
-    return (f"left out: {', '.join(what[:LISTED])}{more}",) if what else ()
+    more = f" and {len(what) - MAX_LISTED_NAMES} more" if len(what) > MAX_LISTED_NAMES else ""
+    return (f"left out: {', '.join(what[:MAX_LISTED_NAMES])}{more}",) if what else ()

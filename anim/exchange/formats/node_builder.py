@@ -13,7 +13,7 @@ from anim.exchange.euler.convention import axis_index
 from anim.exchange.euler.curve import Curve
 from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerNode, Pivots
 
-MAX_UNIT = 1e9  # m; limit of a file's unit of length
+MAX_UNIT_M = 1e9  # m; limit of a file's unit of length
 KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
 
 

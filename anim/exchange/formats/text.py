@@ -9,8 +9,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import FormatError
 
-GROUPED = "_"  # valid in Python (1_000), but not in these formats
-LIMIT = 1e15  # greatest number accepted: products of lengths in float32 do not overflow
+DIGIT_SEPARATOR = "_"  # valid in Python (1_000), but not in these formats
+MAX_NUMBER = 1e15  # greatest number accepted: products of lengths in float32 do not overflow
 
 
 def error_at(line: int, problem: str) -> FormatError:
@@ -43,9 +43,9 @@ def parse_number(text: str) -> float | None:
         value = float(text)
     except ValueError:
         return None
-    if GROUPED in text:
+    if DIGIT_SEPARATOR in text:
         return None
-    return value if math.isfinite(value) and abs(value) <= LIMIT else None
+    return value if math.isfinite(value) and abs(value) <= MAX_NUMBER else None
 
 
 def parse_cell(text: str, line: int, what: str) -> float:

@@ -10,10 +10,9 @@ from anim.errors import NotFoundError
 from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
 from anim.exchange.retarget.ground_contact import has_feet
-from anim.exchange.retarget.joint_matching import JointMatch, match_joints
+from anim.exchange.retarget.joint_matching import JointMatch, match_joints, match_same_hierarchy
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.retarget import GroundMode, retarget
-from anim.exchange.retarget.same_hierarchy import is_same_hierarchy
 from anim.exchange.retarget.up_axis import up_axis
 from anim.model import Clip, Scene
 
@@ -53,21 +52,21 @@ def apply_to_character(
 
     Joints are those of the character's skins, then nodes without mesh in their tree; all its nodes if it has no skins,
     or if the motion has the character's own hierarchy.
-    See `is_same_hierarchy`, `match_joints` and `retarget`.
+    See `match_same_hierarchy`, `match_joints` and `retarget`.
     stated: the character's nodes by role, if its file states them (`vrm_humanoid.read_vrm_roles`).
     nested: False for a motion without hierarchy: its curves are bound directly to the nodes.
     Raises NotFoundError without any matched joint, or without joints.
     """
     joints = _skin_joints(target)
-    moving, moved = to_match(source, target, nested=nested)
+    moving, moved = matchable_nodes(source, target, nested=nested)
     matching = match_joints(
         source.skeleton.names,
         target.skeleton.names,
         aliases=aliases,
         of_source=moving,
         of_target=moved,
-        others=_others(target, joints) if nested else [],
-        same=is_same_hierarchy(source.skeleton, target.skeleton, moving) if nested else {},
+        others=_other_nodes(target, joints) if nested else [],
+        same=match_same_hierarchy(source.skeleton, target.skeleton, moving) if nested else {},
         stated=stated,
     )
     if not target.skeleton.names:
@@ -103,7 +102,7 @@ def apply_to_character(
     return CharacterClip(Clip(source.clip.name, tuple(tracks)), matching, 1.0, (0.0, 0.0))
 
 
-def to_match(source: ImportedMotion, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
+def matchable_nodes(source: ImportedMotion, target: Scene, *, nested: bool) -> tuple[list[int], list[int]]:
     """Return the matchable nodes of the motion, parents first, and those of the character.
 
     nested: as for `apply_to_character`.
@@ -128,7 +127,7 @@ def _parents_first(source: ImportedMotion) -> list[int]:
     return [int(n) for level in source.skeleton.levels() for n in level if int(n) not in source.ends]
 
 
-def _others(target: Scene, joints: Set[int]) -> list[int]:
+def _other_nodes(target: Scene, joints: Set[int]) -> list[int]:
     """Nodes without mesh below the parents of topmost joints: limbs missing in a skin of head or armor."""
     parents = target.skeleton.parents
     holders = {each.node for each in target.instances}

@@ -12,9 +12,9 @@ from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, Skin, Track
 from anim.sampling import rest_pose, world_matrices
 
-MIN_DISTANCE = 1e-3  # minimum offset of a joint from its bind position, as a fraction of the joints' size
-MIN_ANGLE = np.radians(1)
-SAME_SCALE = 0.01  # fraction by which two scales may differ; matrices of joints with another scale are ignored
+MIN_OFFSET_FRACTION = 1e-3  # minimum offset of a joint from its bind position, as a fraction of the joints' size
+MIN_ANGLE_RAD = np.radians(1)
+SCALE_TOLERANCE = 0.01  # fraction by which two scales may differ; matrices of joints with another scale are ignored
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose
     world = world_matrices(skeleton, rest_pose(skeleton))[0]
     bound: dict[int, Floats] = {}
     for holder, skin in skins:
-        for node, place in _bound(skeleton, world, (holder, skin), bound).items():
+        for node, place in _bind_matrices(skeleton, world, (holder, skin), bound).items():
             bound.setdefault(node, place)
     if not any(_differs(bound[node], world[node], _size(world, bound)) for node in bound):
         return BindPose(skeleton, 0)
-    return _resting(skeleton, world, bound)
+    return _set_rest(skeleton, world, bound)
 
 
 def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
@@ -58,25 +58,27 @@ def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
     return Clip(clip.name, tuple(tracks))
 
 
-def _bound(skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]) -> dict[int, Floats]:
+def _bind_matrices(
+    skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]
+) -> dict[int, Floats]:
     """World bind matrices (3, 4) by joint of a skin."""
     joints, inverse = held[1].joints, held[1].inverse_bind
     in_mesh = matrix.inverse(inverse)
     moves = matrix.multiply(world[joints], inverse)
     volumes = np.abs(np.linalg.det(moves[:, :, :3]))
     usual = float(np.median(volumes))
-    sound = np.flatnonzero(np.abs(volumes - usual) <= 3 * SAME_SCALE * usual)
+    sound = np.flatnonzero(np.abs(volumes - usual) <= 3 * SCALE_TOLERANCE * usual)
     if not usual > 0 or not len(sound):
         return {}
     shared = [j for j in sound.tolist() if int(joints[j]) in known]
     if shared:
         placed = matrix.multiply(known[int(joints[shared[0]])], inverse[shared[0]])
     else:
-        placed = _place_joints(skeleton, world, held[0], joints[sound], in_mesh[sound], usual)
+        placed = _world_from_mesh(skeleton, world, held[0], joints[sound], in_mesh[sound], usual)
     return {int(joints[j]): matrix.multiply(placed, in_mesh[j]) for j in sound.tolist()}
 
 
-def _place_joints(
+def _world_from_mesh(
     skeleton: Skeleton, world: Floats, holder: int, joints: Ints, in_mesh: Floats, volume: float
 ) -> Floats:
     """world_from_mesh (3, 4) when the skin was bound, with the scale that gives `volume`.
@@ -93,16 +95,16 @@ def _place_joints(
 
 
 def _differs(bound: Floats, world: Floats, size: float) -> bool:
-    far = float(np.linalg.norm(bound[:, 3] - world[:, 3])) > MIN_DISTANCE * size
+    far = float(np.linalg.norm(bound[:, 3] - world[:, 3])) > MIN_OFFSET_FRACTION * size
     one, two = (matrix.decompose(each)[1] for each in (bound, world))
-    return far or bool(quaternion.angle_between(one, two) > MIN_ANGLE)
+    return far or bool(quaternion.angle_between(one, two) > MIN_ANGLE_RAD)
 
 
 def _size(world: Floats, joints: dict[int, Floats]) -> float:
     return float(np.ptp(world[[*joints], :, 3], axis=0).max())
 
 
-def _resting(skeleton: Skeleton, world: Floats, bound: dict[int, Floats]) -> BindPose:
+def _set_rest(skeleton: Skeleton, world: Floats, bound: dict[int, Floats]) -> BindPose:
     """The skeleton with joints in the bind pose, and the count of moved joints."""
     parts = {path: getattr(skeleton, path).copy() for path in ("translation", "rotation", "scale")}
     found, size = world.copy(), _size(world, bound)

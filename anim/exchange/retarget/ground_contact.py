@@ -13,11 +13,11 @@ from anim.maths import matrix
 from anim.model import MeshInstance, Scene, Skeleton
 from anim.sampling import rest_pose, world_matrices
 
-SOLE_FRACTION = 5.0  # percentile of a foot's lowest height, taken as its ground
-DOWN = 0.03  # fraction of the height; maximum height of the lowest foot above its ground during contact
-STANDS, LEAVES = 0.015, 0.04  # fractions of the height: clearance up to the first is noise, from the second on none
-UNEVEN = 0.04  # fraction of the height; maximum height of a foot's ground above the lowest ground: floors are uneven
-WINDOW, STEP = 0.1, 1 / 120  # s
+SOLE_PERCENTILE = 5.0  # percentile of a foot's lowest height, taken as its ground
+MAX_CONTACT_FRACTION = 0.03  # fraction of the height; of the lowest foot above its ground during contact
+NOISE_FRACTION, CLEAR_FRACTION = 0.015, 0.04  # of the height: clearance below is noise, above is none
+MAX_UNEVEN_FRACTION = 0.04  # fraction of the height; of a foot's ground above the lowest ground: floors are uneven
+WINDOW_S, STEP_S = 0.1, 1 / 120  # s
 FEET = ("foot", "toe")  # suffixes of roles
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
@@ -51,12 +51,13 @@ def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]
     skin there, the joints themselves.
     """
     world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
-    below = {int(node) for node in at_or_below(scene.skeleton, {node for role, node in roles if role.endswith(FEET)})}
+    feet = {node for role, node in roles if role.endswith(FEET)}
+    below = {int(node) for node in with_descendants(scene.skeleton, feet)}
     nodes, points, lowest = list[int](), list[Floats](), [float(positions[sorted(below), 1].min())]
     for instance in scene.instances:
         if instance.skin is None or not instance.mesh.joints.shape[1]:
             continue
-        placed, holder = _offset_path(instance, world)
+        placed, holder = _rest_vertices(instance, world)
         lowest.append(float(placed[:, 1].min()))
         for node in sorted(below):
             mine = placed[holder == node]
@@ -72,7 +73,7 @@ def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]
     )
 
 
-def at_or_below(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
+def with_descendants(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
     """Return the indices of `nodes` and of all their descendants, in order."""
     found: list[int] = []
     for node in range(len(skeleton)):
@@ -96,39 +97,40 @@ def ground_offset(
     target: heights (F, P) of the target's soles; floor: of its rest pose.
     """
     height = float(np.median(np.ptp(source, axis=1))) or 1.0
-    clearance = _clearance(source, feet, UNEVEN * height)
-    down = clearance <= DOWN * height
+    clearance = _clearance(source, feet, MAX_UNEVEN_FRACTION * height)
+    down = clearance <= MAX_CONTACT_FRACTION * height
     above = target.min(axis=1) - floor - scale * clearance
-    noise = np.minimum(clearance, height * np.interp(clearance / height, (STANDS, LEAVES), (STANDS, 0.0)))
+    fraction = np.interp(clearance / height, (NOISE_FRACTION, CLEAR_FRACTION), (NOISE_FRACTION, 0.0))
+    noise = np.minimum(clearance, height * fraction)
     return _smooth(times, np.interp(times, times[down], above[down]) + scale * noise)
 
 
 def _clearance(source: Floats, feet: Sequence[Ints], uneven: float) -> Floats:
     """Clearance (F,) of the source: its lowest node above the ground, or a foot above its own ground."""
     lowest = source.min(axis=1)
-    ground = float(np.percentile(lowest, SOLE_FRACTION))
+    ground = float(np.percentile(lowest, SOLE_PERCENTILE))
     clearance = lowest - ground
     for foot in feet:
         own = source[:, foot].min(axis=1)
-        under = float(np.percentile(own, SOLE_FRACTION))
+        under = float(np.percentile(own, SOLE_PERCENTILE))
         if abs(under - ground) <= uneven:
             clearance = np.minimum(clearance, own - under)
     return np.asarray(np.maximum(clearance, 0.0))
 
 
 def _smooth(times: Floats, values: Floats) -> Floats:
-    """Values (F,) smoothed by a Hann window of WINDOW seconds, ends repeated."""
-    count = int(np.ceil((times[-1] - times[0]) / STEP)) + 1
+    """Values (F,) smoothed by a Hann window of WINDOW_S, ends repeated."""
+    count = int(np.ceil((times[-1] - times[0]) / STEP_S)) + 1
     if count < 3:
         return values
-    half = round(WINDOW / STEP / 2)
-    grid = times[0] + STEP * np.arange(-half, count + half)
+    half = round(WINDOW_S / STEP_S / 2)
+    grid = times[0] + STEP_S * np.arange(-half, count + half)
     window = np.hanning(2 * half + 3)[1:-1]
     even = np.convolve(np.interp(grid, times, values), window / window.sum(), mode="valid")
     return np.interp(times, grid[half : half + len(even)], even)
 
 
-def _offset_path(instance: MeshInstance, world: Floats) -> tuple[Floats, Ints]:
+def _rest_vertices(instance: MeshInstance, world: Floats) -> tuple[Floats, Ints]:
     """Vertices (V, 3) of a skinned mesh at rest, and the node (V,) with each one's greatest weight."""
     assert instance.skin is not None
     mesh, skin = instance.mesh, instance.skin

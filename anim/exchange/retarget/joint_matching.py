@@ -9,8 +9,10 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from anim.errors import NotFoundError
+from anim.exchange.formats.labels import labels
 from anim.exchange.retarget.joint_names import normalize_names
 from anim.exchange.retarget.joint_roles import joint_roles
+from anim.model import Skeleton
 
 MatchReason: TypeAlias = Callable[[int], int | None]  # from a source node to its target node, None without one
 
@@ -42,7 +44,7 @@ def match_joints(
     """Return pairs of nodes with equivalent names, each node in one pair at most.
 
     In this order: aliases (source name → target name; "" for none), `same` (source → target node, see
-    `is_same_hierarchy`), the joint that the target's file states (`stated`, target node by role), the same name, the
+    `match_same_hierarchy`), the joint that the target's file states (`stated`, target node by role), the same name, the
     same name without namespace, prefix, suffix, case, separators and spelling of sides, then the same body role
     (`joint_roles`).
     of_source, of_target: candidate nodes, the most certain first. others: nodes of the target for source nodes without
@@ -93,6 +95,24 @@ def match_joints(
         shared,
         {role: ordered[node] for role, node in shared.items()},
     )
+
+
+def match_same_hierarchy(source: Skeleton, target: Skeleton, chosen: Sequence[int]) -> dict[int, int]:
+    """Return the target node of each chosen source node, by name; empty for different hierarchies.
+
+    They agree if every chosen node, and its parent, if any, has the label (see `labels`) of a target node and its
+    parent: as in a file exported from this character. Nodes that are no joints, and those with repeated names, then
+    have their partners too.
+    """
+    found: dict[int, int] = {}
+    by_label = {label: node for node, label in enumerate(labels(target))}
+    for node in chosen:
+        other, parent = by_label.get(source.names[node], -1), int(source.parents[node])
+        other_parent = -1 if other < 0 else int(target.parents[other])
+        if other < 0 or (parent >= 0 and by_label.get(source.names[parent], -1) != other_parent):
+            return {}
+        found[node] = other
+    return found
 
 
 def _match_by_name(

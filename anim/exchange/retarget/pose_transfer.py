@@ -9,19 +9,17 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
-from anim.exchange.retarget.anchors import NONE, Pair, find_anchors, matched_ancestor, placing_order
-from anim.exchange.retarget.joint_matching import JointMatch
-from anim.exchange.retarget.rest_alignment import RestAlignment, align_rests, with_offset
+from anim.exchange.retarget.anchors import NONE, Pair, ancestors, evaluation_order, find_anchors
+from anim.exchange.retarget.joint_matching import JointMatch, match_same_hierarchy
+from anim.exchange.retarget.rest_alignment import RestAlignment, align_rests, floor_offset
 from anim.exchange.retarget.rest_pose import UP, RestPose, rest_corrections
-from anim.exchange.retarget.same_hierarchy import is_same_hierarchy
-from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling import rest_pose, world_matrices
 from anim.sampling import sample_pose as posed
-from anim.sampling.pose import local_by_node, world_by_node
+from anim.sampling.pose import local_by_node, world_by_node, world_rotations
 
-FLAT = 1e-9  # of a unit cube's volume; a smaller scale flattens an axis
+MIN_SCALE_VOLUME = 1e-9  # of a unit cube's volume; a smaller scale flattens an axis
 NUM_HEIGHT_SAMPLES = 64  # times at which the height of the motion is sampled
 
 
@@ -70,7 +68,7 @@ class PoseTransfer:
         rotations = self._rotations(world_rotations(self.source, motion.rotation))
         scales = {b: self._scale(a, b, motion.scale[:, a]) for a, b in self.pairs.items()}
         still = rest_pose(self.target)
-        local = local_by_node(self.target, _with_joint(still, len(times), rotations, scales))
+        local = local_by_node(self.target, _override_rest(still, len(times), rotations, scales))
         world = self._place(local, of_source, motion, lowered)
         return TargetMotion(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, of_source, world)
 
@@ -103,7 +101,7 @@ class PoseTransfer:
                 if lowered is not None and node in self.lifted:
                     place = place - lowered[:, None] * [0, 1, 0]
                 still = local[node, :, :, 3]
-                local[node, :, :, 3] = place if parent < 0 else _descends(world[parent], place, still)
+                local[node, :, :, 3] = place if parent < 0 else _to_parent_space(world[parent], place, still)
             world[node] = local[node] if parent < 0 else matrix.multiply(world[parent], local[node])
         return world
 
@@ -132,7 +130,7 @@ class PoseTransfer:
 
         Rotations of unmatched nodes between the two are ignored: the target has no joint there.
         """
-        between = matched_ancestor(self.source, a)
+        between = ancestors(self.source, a)
         if anchor not in between:
             return np.asarray(of_source[a, :, :, 3] - of_source[anchor, :, :, 3])
         inside = motion.translation[:, a]
@@ -160,11 +158,11 @@ def build_transfer(
         )
     still = rest_pose(source) if bind_time is None else posed(source, clip, np.array([bind_time]))
     of_source, at_rest = _rest_pose(source, still), _rest_pose(target, rest_pose(target))
-    of_one_tree = not matching.unmatched and bool(is_same_hierarchy(source, target, [*matching.pairs]))
+    of_one_tree = not matching.unmatched and bool(match_same_hierarchy(source, target, [*matching.pairs]))
     aligned = align_rests(of_source, at_rest, matching, of_one_tree=of_one_tree)
     chosen = find_anchors(source, target, matching.pairs)
-    order = placing_order(target, chosen, matching.pairs)
-    top_of_source, top = _topmost(source, matching)
+    order = evaluation_order(target, chosen, matching.pairs)
+    top_of_source, top = _find_topmost(source, matching)
     return PoseTransfer(
         source=source,
         clip=clip,
@@ -177,7 +175,7 @@ def build_transfer(
         anchors=chosen,
         order=tuple(order),
         top=top,
-        lifted=_lift_root(chosen, top),
+        lifted=_lifted_nodes(chosen, top),
         origin=_origin(source, clip, at_rest, top_of_source),
     )
 
@@ -195,17 +193,17 @@ def _rest_pose(skeleton: Skeleton, still: Pose) -> RestPose:
     )
 
 
-def _descends(parent: Floats, place: Floats, still: Floats) -> Floats:
+def _to_parent_space(parent: Floats, place: Floats, still: Floats) -> Floats:
     """World positions (F, 3) in a parent's space; rest values (F, 3) along axes flattened by its scale."""
     linear, beyond = parent[:, :, :3], place - matrix.apply(parent, still[:, None])[:, 0]
     largest = np.sqrt((linear * linear).sum(axis=-2)).max(axis=-1)
-    flat = np.abs(np.linalg.det(linear)) <= FLAT * largest**3
+    flat = np.abs(np.linalg.det(linear)) <= MIN_SCALE_VOLUME * largest**3
     back = np.empty_like(linear)
-    back[~flat], back[flat] = np.linalg.inv(linear[~flat]), np.linalg.pinv(linear[flat], rcond=FLAT)
+    back[~flat], back[flat] = np.linalg.inv(linear[~flat]), np.linalg.pinv(linear[flat], rcond=MIN_SCALE_VOLUME)
     return np.asarray(still + (back @ beyond[..., None])[..., 0])
 
 
-def _with_joint(still: Pose, frames: int, rotations: Mapping[int, Floats], scales: Mapping[int, Floats]) -> Pose:
+def _override_rest(still: Pose, frames: int, rotations: Mapping[int, Floats], scales: Mapping[int, Floats]) -> Pose:
     """A rest pose for many frames, with other rotations and scales of some nodes."""
     rotation, scale = np.repeat(still.rotation, frames, axis=0), np.repeat(still.scale, frames, axis=0)
     for node, values in rotations.items():
@@ -241,10 +239,10 @@ def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
     at_rest = world_matrices(source, rest_pose(source))[0, :, :, 3]
     looks = np.linspace(clip.start, clip.end, NUM_HEIGHT_SAMPLES)
     heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
-    return at_rest + with_offset(at_rest, target.positions, heights, top) * UP
+    return at_rest + floor_offset(at_rest, target.positions, heights, top) * UP
 
 
-def _lift_root(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
+def _lifted_nodes(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
     """The topmost joint and nodes with an anchor above it: moved by the floor, unlike the anchors."""
     chain, node = [-1], top
     while (node := chosen.get(node, NONE)[1]) >= 0:
@@ -252,7 +250,7 @@ def _lift_root(chosen: Mapping[int, Pair], top: int) -> frozenset[int]:
     return frozenset(node for node, (_, anchor) in chosen.items() if anchor in chain and node not in chain)
 
 
-def _topmost(source: Skeleton, matching: JointMatch) -> tuple[int, int]:
+def _find_topmost(source: Skeleton, matching: JointMatch) -> tuple[int, int]:
     """The hips, or the matched source node nearest to the root, and its partner."""
     if "hips" in matching.source_roles:
         return matching.source_roles["hips"], matching.target_roles["hips"]

@@ -13,9 +13,9 @@ from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.rest_pose import RestPose, facing_rotation
 from anim.exchange.retarget.similarity import fit_similarity
 
-ALIKE = 1e-3  # fraction of the radius; joints that differ less between two rest poses have the same build
-MAX_SCALE_RATIO = 0.5  # minimum fraction of the source's joints that must be matched to measure the size
-HANGING = 0.1  # of the size; minimum depth of the lowest joint below 0 for a rest pose that hangs from its origin
+BUILD_TOLERANCE = 1e-3  # fraction of the radius; joints that differ less between two rest poses have the same build
+MIN_MATCHED_FRACTION = 0.5  # minimum fraction of the source's joints that must be matched to measure the size
+MIN_HANGING_FRACTION = 0.1  # of the size; minimum depth of the lowest joint below 0 for a hanging rest pose
 
 
 class Measure(StrEnum):
@@ -47,17 +47,17 @@ def align_rests(source: RestPose, target: RestPose, matching: JointMatch, *, of_
     For equal builds (up to a similarity transform) it is exact. Otherwise a rotation about the vertical, see
     `facing_rotation`, and the ratio of leg lengths. Without matched legs, the spread of the matched joints around their
     mean; with few matches, the largest extents of both skeletons.
-    of_one_tree: True if nodes are matched by equal names and parents, see `is_same_hierarchy`. Collinear joints, or a
-    single one, always fit: there it decides.
+    of_one_tree: True if nodes are matched by equal names and parents, see `match_same_hierarchy`. Collinear joints, or
+    a single one, always fit: there it decides.
     """
     pairs = np.array([*matching.pairs.items()], np.int64)
     found = fit_similarity(source.positions[pairs[:, 0]], target.positions[pairs[:, 1]])
-    if found.error <= ALIKE and (found.unique or of_one_tree):
+    if found.error <= BUILD_TOLERANCE and (found.unique or of_one_tree):
         return RestAlignment(found.rotation, found.scale, Measure.BUILD)
-    one, other = _legs(source, matching.source_roles), _legs(target, matching.target_roles)
+    one, other = _leg_length(source, matching.source_roles), _leg_length(target, matching.target_roles)
     measure = Measure.LEGS
     if not one > 0 or not other > 0:
-        most = len(pairs) > 1 and len(pairs) >= MAX_SCALE_RATIO * (len(pairs) + len(matching.unmatched))
+        most = len(pairs) > 1 and len(pairs) >= MIN_MATCHED_FRACTION * (len(pairs) + len(matching.unmatched))
         measure = Measure.JOINTS if most else Measure.EXTENT
     if measure is Measure.JOINTS:
         one, other = _spread(source.positions[pairs[:, 0]]), _spread(target.positions[pairs[:, 1]])
@@ -66,27 +66,27 @@ def align_rests(source: RestPose, target: RestPose, matching: JointMatch, *, of_
     return RestAlignment(facing_rotation(source, target, matching), (other or 1.0) / (one or 1.0), measure)
 
 
-def with_offset(source: Floats, target: Floats, heights: Floats, node: int) -> float:
+def floor_offset(source: Floats, target: Floats, heights: Floats, node: int) -> float:
     """Return the upward offset of the source's rest pose to the floor, in metres: 0 if it is there.
 
     A BVH's root mostly rests at the origin with its feet below; only the motion lifts it. That is detected if the
     source hangs, the target does not, and the motion is nearer to standing.
     source, target: positions (N, 3) at rest. heights: (F,) of the source's `node`, which carries the path.
     """
-    hanging = _hangs(source)
-    if not hanging or _hangs(target):
+    hanging = _depth_below_floor(source)
+    if not hanging or _depth_below_floor(target):
         return 0.0
     above_rest = float(np.median(heights)) - float(source[node, 1])
     return hanging if 2 * above_rest > hanging else 0.0
 
 
-def _hangs(positions: Floats) -> float:
+def _depth_below_floor(positions: Floats) -> float:
     """Depth of the lowest node below 0; 0 if small."""
     lowest = -float(positions[:, 1].min())
-    return lowest if lowest > HANGING * float(np.ptp(positions, axis=0).max()) else 0.0
+    return lowest if lowest > MIN_HANGING_FRACTION * float(np.ptp(positions, axis=0).max()) else 0.0
 
 
-def _legs(pose: RestPose, roles: Mapping[str, int]) -> float:
+def _leg_length(pose: RestPose, roles: Mapping[str, int]) -> float:
     """Mean length of the completely matched legs, 0 without any."""
     legs = []
     for side in ("left", "right"):

@@ -14,7 +14,7 @@ from anim.exchange.retarget.joint_roles import PERSON
 from anim.maths import quaternion
 
 UP = np.array((0.0, 1.0, 0.0))
-SNAP = np.radians(30)  # angles nearer to a multiple of 90° are snapped: rest poses are made along axes
+SNAP_ANGLE_RAD = np.radians(30)  # angles nearer to a multiple of 90° are snapped: rest poses are made along axes
 LIMBS = {"upper_arm": "lower_arm", "lower_arm": "hand", "upper_leg": "lower_leg", "lower_leg": "foot"}
 
 
@@ -51,7 +51,7 @@ def facing_rotation(source: RestPose, target: RestPose, matching: JointMatch) ->
     if not np.isfinite(angle):
         angle = 0.0
     quarter = np.pi / 2 * np.rint(angle / (np.pi / 2))
-    if abs(angle - quarter) < SNAP:
+    if abs(angle - quarter) < SNAP_ANGLE_RAD:
         angle = float(quarter)
     return quaternion.from_rotation_vector(UP * angle)
 
@@ -75,7 +75,7 @@ def rest_corrections(source: RestPose, target: RestPose, matching: JointMatch, t
         elif person and node in _up_rotation(matching):
             found[node] = IDENTITY
         else:
-            above = _matched_above(target, node, found)
+            above = _matched_parent(target, node, found)
             found[node] = found[above] if above >= 0 else IDENTITY
     return found
 
@@ -113,8 +113,8 @@ def _up_rotation(matching: JointMatch) -> set[int]:
 
 def _chain_ends(source: RestPose, target: RestPose, matching: JointMatch) -> LimbEnds:
     """Joints with exactly one matched joint next below in both skeletons."""
-    below_source = _next_below(source, set(matching.pairs))
-    below_target = _next_below(target, set(matching.pairs.values()))
+    below_source = _matched_child(source, set(matching.pairs))
+    below_target = _matched_child(target, set(matching.pairs.values()))
     ends: LimbEnds = {}
     for a, node in matching.pairs.items():
         children = below_source.get(a, [])
@@ -123,14 +123,14 @@ def _chain_ends(source: RestPose, target: RestPose, matching: JointMatch) -> Lim
     return ends
 
 
-def _next_below(pose: RestPose, nodes: set[int]) -> dict[int, list[int]]:
+def _matched_child(pose: RestPose, nodes: set[int]) -> dict[int, list[int]]:
     below: dict[int, list[int]] = {}
     for node in sorted(nodes):
-        below.setdefault(_matched_above(pose, node, dict.fromkeys(nodes)), []).append(node)
+        below.setdefault(_matched_parent(pose, node, dict.fromkeys(nodes)), []).append(node)
     return below
 
 
-def _matched_above(pose: RestPose, node: int, nodes: Mapping[int, object]) -> int:
+def _matched_parent(pose: RestPose, node: int, nodes: Mapping[int, object]) -> int:
     above = pose.parents[node]
     while above >= 0 and above not in nodes:
         above = pose.parents[above]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.retarget.anchors import matched_ancestor
+from anim.exchange.retarget.anchors import ancestors
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.maths import matrix, quaternion
@@ -44,7 +44,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
     tracks = {(track.node, track.path): track for track in done.clip.tracks}
     for node in below:
         parent = int(skeleton.parents[node])
-        top = next((up for up in matched_ancestor(skeleton, node) if up in known), -1)
+        top = next((up for up in ancestors(skeleton, node) if up in known), -1)
         carried = world[parent]
         if top >= 0:  # world matrix of the parent after its matched joint is restored
             carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
@@ -54,7 +54,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
 
 
 def _between(skeleton: Skeleton, node: int, known: set[int]) -> Iterator[int]:
-    for up in matched_ancestor(skeleton, node):
+    for up in ancestors(skeleton, node):
         if up in known:
             return
         yield up

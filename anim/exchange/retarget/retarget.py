@@ -12,7 +12,7 @@ from anim.arrays import Floats, unique_sorted
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.euler import refinement
 from anim.exchange.euler.from_euler import ImportedMotion
-from anim.exchange.retarget.ground_contact import at_or_below, find_soles, ground_offset, has_feet
+from anim.exchange.retarget.ground_contact import find_soles, ground_offset, has_feet, with_descendants
 from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.pose_transfer import PoseTransfer, TargetMotion, build_transfer
 from anim.exchange.retarget.rest_alignment import Measure
@@ -21,9 +21,9 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import rest_pose, world_matrices
 
-MAX_STEP_S = 86_400.0  # limit of a motion sampled for contacts, 30 times a second and more
+MAX_CONTACT_DURATION_S = 86_400.0  # limit of a motion sampled for contacts, 30 times a second and more
 CONSTANT_TOLERANCE = 1e-7  # rad, factor, and fraction of the target's size: rounding of a constant
-CONTACT_STEP = 1 / 30  # s, maximum step between times at which soles are sampled
+CONTACT_STEP_S = 1 / 30  # s, maximum step between times at which soles are sampled
 
 
 class GroundMode(StrEnum):
@@ -55,7 +55,7 @@ class _RequiredKeys:
     """
 
     times: Floats
-    found: TargetMotion
+    motion: TargetMotion
     before: Floats
     knots: Floats
     inside: TargetMotion | None
@@ -63,7 +63,7 @@ class _RequiredKeys:
 
     def track(self, node: int, path: str, tolerance: float) -> Track:
         """Return a STEP track if the value is constant between all knots of the source, else LINEAR."""
-        values = _of(self.found, node, path)
+        values = _of(self.motion, node, path)
         if self.inside is not None and is_step(_of(self.inside, node, path), tolerance=tolerance):
             at = np.isin(self.times, self.knots)
             return as_step(node, path, self.times[at], values[at])
@@ -95,7 +95,7 @@ def retarget(
     """
     if not matching.pairs:
         raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
-    if floor == GroundMode.CONTACT and source.clip.end - source.clip.start > MAX_STEP_S:
+    if floor == GroundMode.CONTACT and source.clip.end - source.clip.start > MAX_CONTACT_DURATION_S:
         seconds = source.clip.end - source.clip.start
         raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
     follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, bind_time=bind_time)
@@ -104,14 +104,14 @@ def retarget(
     times = unique_sorted(np.concatenate((knots, before)))
     looked_at, lowered = times, np.zeros(len(times))
     if floor == GroundMode.CONTACT and not follow.aligned.alike and has_feet(matching.target_roles):
-        looked_at = times if source.tolerance is None else _limit_distance(times, CONTACT_STEP)
-        lowered = _is_above_ground(follow, target, matching, looked_at)
+        looked_at = times if source.tolerance is None else _limit_step(times, CONTACT_STEP_S)
+        lowered = _height_above_floor(follow, target, matching, looked_at)
 
     def at(when: Floats) -> TargetMotion:
         return follow.at(when, np.interp(when, looked_at, lowered))
 
     if source.tolerance is not None:
-        lengths = _lengths(follow)
+        lengths = _metres_per_unit(follow)
         times = refinement.refine_linear(
             times, lambda when: _rotations_and_paths(at(when), lengths, size), tolerance=source.tolerance, size=size
         )
@@ -128,23 +128,23 @@ def _times(clip: Clip) -> tuple[Floats, Floats]:
     return unique_sorted(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
 
 
-def _limit_distance(times: Floats, step: float) -> Floats:
+def _limit_step(times: Floats, step: float) -> Floats:
     """Times with added ones between them so that no interval exceeds `step`."""
     grid = np.arange(times[0], times[-1], step)
     return unique_sorted(np.concatenate((times, grid)))
 
 
-def _is_above_ground(follow: PoseTransfer, target: Scene, matching: JointMatch, times: Floats) -> Floats:
+def _height_above_floor(follow: PoseTransfer, target: Scene, matching: JointMatch, times: Floats) -> Floats:
     """Height (F,) of the target above the floor with heights scaled only, in metres."""
     found = follow.at(times)
     feet = find_soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
     roles = matching.source_roles
-    of_source = [at_or_below(follow.source, {roles[f]}) for f in ("left_foot", "right_foot") if f in roles]
+    of_source = [with_descendants(follow.source, {roles[f]}) for f in ("left_foot", "right_foot") if f in roles]
     heights, world = found.source[:, :, 1, 3].T, found.world.transpose(1, 0, 2, 3)
     return ground_offset(times, heights, of_source, feet.heights(world), feet.floor, follow.aligned.scale)
 
 
-def _lengths(follow: PoseTransfer) -> dict[int, float]:
+def _metres_per_unit(follow: PoseTransfer) -> dict[int, float]:
     """Metres per unit of the parent space of each matched target node, at rest."""
     skeleton = follow.target
     world = world_matrices(skeleton, rest_pose(skeleton))[0]
@@ -163,7 +163,7 @@ def _rotations_and_paths(
 def _tracks(follow: PoseTransfer, wanted: _RequiredKeys, size: float) -> list[Track]:
     """Tracks of the matched nodes; none for constant rest values without a track in the source."""
     moved = {(track.node, track.path) for track in follow.clip.tracks}
-    lengths, still, found = _lengths(follow), follow.target, wanted.found
+    lengths, still, found = _metres_per_unit(follow), follow.target, wanted.motion
     tracks = []
     for a, b in sorted(follow.pairs.items(), key=lambda pair: pair[1]):
         rotation = quaternion.align_signs(found.rotations[b])

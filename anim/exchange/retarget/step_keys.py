@@ -8,7 +8,7 @@ from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
 
-ROUNDING = 1e-11  # relative; rounding of constant float64 values
+ROUNDING_TOLERANCE = 1e-11  # relative; rounding of constant float64 values
 
 
 def just_before(times: Floats) -> Floats:
@@ -30,7 +30,7 @@ def is_step(values: Floats, *, tolerance: float) -> bool:
 
 def as_step(node: int, path: str, times: Floats, values: Floats) -> Track:
     """Return a STEP track of values (K, C) at times (K,) without unchanged inner keys."""
-    kept = np.concatenate(([True], _distance(values[1:], values[:-1]) > ROUNDING))
+    kept = np.concatenate(([True], _distance(values[1:], values[:-1]) > ROUNDING_TOLERANCE))
     kept[-1] = True
     return Track(node, path, Interpolation.STEP, times[kept], values[kept])
 
@@ -45,7 +45,7 @@ def as_linear(node: int, path: str, times: Floats, values: Floats, *, before: Fl
     kept[[0, -1]] = True
     times, values = times[kept], values[kept]
     if thin and len(times) > 2:
-        changes = _distance(values[1:], values[:-1]) > ROUNDING
+        changes = _distance(values[1:], values[:-1]) > ROUNDING_TOLERANCE
         kept = np.concatenate(([True], changes[1:] | changes[:-1], [True]))
         times, values = times[kept], values[kept]
     return Track(node, path, Interpolation.LINEAR, times, values)
@@ -55,7 +55,7 @@ def _jumps(times: Floats, values: Floats) -> Bools:
     """True (K,) for keys with more than twice the speed after them as before."""
     seconds, far = np.diff(times), _distance(values[1:], values[:-1])
     jumps = np.ones(len(times), np.bool_)
-    jumps[1:-1] = far[1:] > ROUNDING + 2 * far[:-1] * seconds[1:] / seconds[:-1]
+    jumps[1:-1] = far[1:] > ROUNDING_TOLERANCE + 2 * far[:-1] * seconds[1:] / seconds[:-1]
     return jumps
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from anim.model import Skeleton
 from anim.sampling import rest_pose, world_matrices
 
-CLEAR = 0.8  # fraction of the length along the axis; 37°
-BELOW = ("left_foot", "right_foot")
+MIN_AXIS_FRACTION = 0.8  # fraction of the length along the axis; 37°
+FEET = ("left_foot", "right_foot")
 
 
 def up_axis(skeleton: Skeleton, roles: Mapping[str, int]) -> str:
@@ -20,10 +20,10 @@ def up_axis(skeleton: Skeleton, roles: Mapping[str, int]) -> str:
     animal's back points forward, its legs still point down.
     """
     places = world_matrices(skeleton, rest_pose(skeleton))[0, :, :3, 3]
-    feet = [places[roles[role]] for role in BELOW if role in roles]
+    feet = [places[roles[role]] for role in FEET if role in roles]
     if "hips" not in roles or not (feet or "head" in roles):
         return ""
     hips = places[roles["hips"]]
     way = np.abs(hips - np.mean(feet, axis=0) if feet else places[roles["head"]] - hips)
     axis = int(way.argmax())
-    return "XYZ"[axis] if way[axis] > CLEAR * np.linalg.norm(way) else ""
+    return "XYZ"[axis] if way[axis] > MIN_AXIS_FRACTION * np.linalg.norm(way) else ""

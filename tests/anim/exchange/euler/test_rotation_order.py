@@ -7,7 +7,7 @@ import pytest
 
 from anim.arrays import Floats
 from anim.errors import NotFoundError, RangeError
-from anim.exchange.euler.rotation_order import BEST, CANDIDATES, OrderRules, parse
+from anim.exchange.euler.rotation_order import AUTO, CANDIDATES, OrderRules, parse
 from anim.maths import euler
 from anim.maths.euler import AxesConvention
 
@@ -45,7 +45,7 @@ def test_a_name_that_is_not_there_is_refused() -> None:
 @pytest.mark.parametrize("axis", range(3))
 def test_auto_keeps_the_widest_swing_out_of_the_middle(axis: int) -> None:
     """A middle angle of 90° is lock: the axis that swings by 89° must stand first or last."""
-    order = OrderRules(BEST).of("a", _swing(axis, 89))
+    order = OrderRules(AUTO).of("a", _swing(axis, 89))
     assert order[1] != "XYZ"[axis]
     assert np.degrees(euler.gimbal_distance(_swing(axis, 89), order=order).min()) > 85
 
@@ -54,11 +54,11 @@ def test_auto_is_the_best_of_six_by_trying() -> None:
     random = np.random.default_rng(5)
     turns = euler.to_quaternion(random.uniform(-1.2, 1.2, (60, 3)), order="YXZ")
     nearest = {order: euler.gimbal_distance(turns, order=order).min() for order in CANDIDATES}
-    found = OrderRules(BEST).of("a", turns)
+    found = OrderRules(AUTO).of("a", turns)
     assert nearest[found] >= max(nearest.values()) - np.radians(1.0)
-    extrinsic = OrderRules(BEST).of("a", turns, AxesConvention.EXTRINSIC)
+    extrinsic = OrderRules(AUTO).of("a", turns, AxesConvention.EXTRINSIC)
     assert extrinsic == found[::-1]
 
 
 def test_auto_keeps_the_usual_where_nothing_turns() -> None:
-    assert OrderRules(BEST).of("a", NONE) == "ZXY"
+    assert OrderRules(AUTO).of("a", NONE) == "ZXY"

@@ -14,11 +14,11 @@ from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 from anim.exchange.retarget.apply import apply_to_character
 from anim.exchange.retarget.retarget import GroundMode
-from anim.exchange.retarget.world_rotations import world_rotations
 from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Interpolation, Scene, Track
 from anim.sampling import frame_times, sample_pose, world_matrices
+from anim.sampling.pose import world_rotations
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
 from tests.anim.exchange.figures import tail
