@@ -27,7 +27,7 @@ def save(cache: VertexCache, path: str, options: WriteOptions = DEFAULTS) -> Wri
     takes = CACHE_FORMATS[ending].takes
     for each in fields(options):
         if each.name not in takes and getattr(options, each.name) != getattr(DEFAULTS, each.name):
-            raise RangeError(f"{each.name} means nothing to {ending}")
+            raise RangeError(f"{each.name} does not apply to {ending}")
     place = links.resolve_links(Path(path))
     staged = AtomicOutputs(place.parent, place.name)
     try:

@@ -109,5 +109,5 @@ def writer_for(ending: str) -> Write:
 def _of(ending: str) -> CacheFormat:
     found = CACHE_FORMATS.get(ending.lower())
     if found is None:
-        raise UnsupportedError(f"no cache format is called '{ending}' (expected {', '.join(CACHE_FORMATS)})")
+        raise UnsupportedError(f"unsupported cache format '{ending}' (expected {', '.join(CACHE_FORMATS)})")
     return found

@@ -59,12 +59,11 @@ def _trim_clip(clip: Clip, start: float | None, end: float | None, chosen: froze
 
 
 def _nothing_left(clip: Clip, start: float | None, end: float | None) -> str:
-    has = f"the clip has {clip.start:g} s to {clip.end:g} s"
     if start is not None and start >= clip.end:
-        return f"nothing is left from {start:g} s on ({has})"
+        return f"start {start:g} s is at or after the clip's end ({clip.end:.4g} s)"
     if end is not None and end <= clip.start:
-        return f"nothing is left up to {end:g} s ({has})"
-    return f"nothing is left from {start or 0.0:g} s to {end or 0.0:g} s (expected an end after the start; {has})"
+        return f"end {end:g} s is at or before the clip's start ({clip.start:.4g} s)"
+    return f"end {end or 0.0:g} s must be after start {start or 0.0:g} s"
 
 
 def _trim_track(track: Track, start: float, end: float) -> Track:

@@ -79,7 +79,7 @@ def command(
     caches.write_options(ending, given | {"max_error": max_error})
     with cache_files.load(input, ReadOptions(input_fps)) as loaded:
         if input_fps and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
-            raise UsageError(f"--input-fps means nothing to {loaded.ending}, which says when its frames are")
+            raise UsageError(f"--input-fps does not apply to {loaded.ending}, which stores its frame times")
         if loaded.ending == ".glb":
             announce_compiling(voice)
         cache = _changed(loaded.cache, at, fps, up, vertex_order)

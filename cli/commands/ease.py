@@ -81,7 +81,9 @@ def command(
         units.parse_angle(angle_tolerance, "--angle-tolerance"),
     )
     if per is Per.RANGE and easing.stepped:
-        raise UsageError(f"'{easing.name}' jumps, and time can't", help="--per segment makes STEP keys of it")
+        raise UsageError(
+            f"'{easing.name}' is discontinuous; a time warp must be continuous", help="--per segment writes STEP keys"
+        )
     tolerances = by_segment.Tolerances(share, angle)
 
     def change(each: Clip, tracks: frozenset[int], _: object) -> Clip:
@@ -134,8 +136,8 @@ def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[st
     dense = {i: step for i, step in steps.items() if step < DENSE}
     if per is Per.SEGMENT and dense:
         yield (
-            f"{_labels(before, dense)}: most keys are {1000 * min(dense.values()):.0f} ms apart; easing each such "
-            "piece makes the motion stutter (--per range eases the whole clip once)"
+            f"{_labels(before, dense)}: median key interval {1000 * min(dense.values()):.0f} ms; easing every "
+            "interval makes the motion stutter (ease the whole clip once with --per range)"
         )
     if easing.overshoots:
         beyond = {i: {t.path for t in tracks} & {"scale", "weights"} for i, tracks in changed.items()}
@@ -143,8 +145,8 @@ def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[st
         if beyond:
             low, high = easing.extent
             yield (
-                f"{_labels(before, beyond)}: '{easing.name}' runs to {100 * low:.0f} … {100 * high:.0f} % of each "
-                f"piece, so values of {' and '.join(sorted(set.union(*beyond.values())))} leave the range of their keys"
+                f"{_labels(before, beyond)}: '{easing.name}' reaches {100 * low:.0f} … {100 * high:.0f} % of each "
+                f"key interval: {' and '.join(sorted(set.union(*beyond.values())))} values exceed their keys' range"
             )
 
 

@@ -120,7 +120,7 @@ def command(
     _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
     if onto is None and (alias, fail_unmatched, bind_time, replace, floor) != (*[None] * 4, GroundMode.CONTACT):
         words = "--alias, --fail-unmatched, --floor, --replace and --bind-time"
-        raise UsageError(f"{words} are about a character (--onto names it)")
+        raise UsageError(f"{words} require --onto (the character)")
     stated = PartialConvention(_order(order), axes, unit)
     with documents.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = registry.of_path(source) or registry.of_content(data.tobytes())
@@ -190,7 +190,7 @@ def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -
     if scale is not None:
         return (
             scale,
-            f"{scale:g} m per unit (--scale): the skeleton measures {text.format_length(height * scale)}",
+            f"{scale:g} m per unit (--scale): skeleton height {text.format_length(height * scale)}",
             False,
         )
     if known and height < TALL:
@@ -198,10 +198,10 @@ def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -
     if known:
         return (
             1.0,
-            f"the skeleton measures {text.format_length(height)} (--scale 0.01 if its unit is centimeters)",
+            f"skeleton height {text.format_length(height)} (--scale 0.01 if its unit is centimeters)",
             True,
         )
     guess = guess_unit(height)
-    measures = f"the skeleton then measures {text.format_length(guess.height)}"
-    words = f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (--scale says otherwise)"
+    measures = f"skeleton height {text.format_length(guess.height)}"
+    words = f"{guess.scale:.4g} m per unit, guessed: {guess.unit}, {measures} (change with --scale)"
     return guess.scale, words, True

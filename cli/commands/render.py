@@ -126,7 +126,7 @@ def command(
         if isinstance(seen, VertexCache):
             given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide, "textures": textures}
             if unknown := next((name for name, value in given.items() if value), None):
-                raise UsageError(f"--{unknown} means nothing to a vertex cache")
+                raise UsageError(f"--{unknown} does not apply to a vertex cache")
             found = clips.of_cache(seen, when)
         else:
             names = reader.names(seen)
@@ -171,7 +171,7 @@ def _ending(output: str) -> str:
     documents.check_file(output)
     ending = PurePath(output).suffix.lower()
     if ending not in EXTENSIONS:
-        raise UsageError(f"{output}: no picture is called '{ending}' (expected {', '.join(EXTENSIONS)})")
+        raise UsageError(f"{output}: unsupported image format '{ending}' (expected {', '.join(EXTENSIONS)})")
     return ending
 
 

@@ -86,7 +86,7 @@ def check(path: str, ending: str | None = None, placeholders: Sequence[str] = ()
         )
     found = ending or own or (".npz" if path == documents.PIPE else "")
     if found not in CACHE_FORMATS:
-        raise UsageError(f"{path}: no cache format is called '{found}' (expected {', '.join(CACHE_FORMATS)})")
+        raise UsageError(f"{path}: unsupported cache format '{found}' (expected {', '.join(CACHE_FORMATS)})")
     return found
 
 

@@ -94,9 +94,9 @@ def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
     said: dict[str, Any] = {name: value for name, value in given.items() if value not in (None, False)}
     for name in said:
         if name not in takes:
-            raise UsageError(f"--{name.replace('_', '-')} means nothing to {ending}")
+            raise UsageError(f"--{name.replace('_', '-')} does not apply to {ending}")
     if "max_error" in said and str(said.get("layout", "")).startswith("flip"):
-        raise UsageError("--max-error means nothing to a flip-book, which has every frame as it is")
+        raise UsageError("--max-error does not apply to a flip-book, which stores every frame exactly")
     if "rest_mesh" in said:
         said["rest_mesh"] = "" if said["rest_mesh"] == "none" else f".{said['rest_mesh']}"
     plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}
@@ -112,4 +112,6 @@ def check_supported(ending: str, **wanted: bool) -> None:
     """Raise UsageError for requested normals or tangents that the format can't store."""
     for what, is_wanted in wanted.items():
         if is_wanted and what not in CACHE_FORMATS[ending].holds:
-            raise UsageError(f"--{what} means nothing to {ending}", help=f"{', '.join(formats_with(what))} keep {what}")
+            raise UsageError(
+                f"--{what} does not apply to {ending}", help=f"{', '.join(formats_with(what))} keep {what}"
+            )

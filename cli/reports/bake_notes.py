@@ -38,8 +38,8 @@ def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: R
         names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
         more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
         voice.info(
-            f"note: {names}{more}: uneven scale, where tools define {method} differently; here each joint stretches "
-            "the mesh about its own place, then turns it"
+            f"note: {names}{more}: non-uniform scale, for which tools define {method} differently; here each joint "
+            "scales the mesh about its origin before rotating it"
         )
 
 
@@ -49,7 +49,7 @@ def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) ->
     lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if id(each) not in kept]
     if lost:
         count = sum(len(each.mesh.positions) for each in lost)
-        voice.warn(f"{count} vertices that only nodes move are left out; --rigid takes them in")
+        voice.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")
 
 
 def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, voice: Reporter) -> None:
@@ -61,8 +61,8 @@ def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, vo
     seen = [(missed, name) for name, missed in found if missed.distance > SHOWN * diagonal]
     if seen:
         missed, name = max(seen)
-        others = f" ({len(seen)} clips have such places)" if len(seen) > 1 else ""
+        others = f" ({len(seen)} clips are affected)" if len(seen) > 1 else ""
         voice.warn(
-            f"between frames a vertex is {text.format_length(missed.distance)} or more off the straight way, at "
-            f"{missed.time:.3g} s of {name}{others}; --fps puts more frames there"
+            f"linear interpolation between frames: error of {text.format_length(missed.distance)} or more at "
+            f"{missed.time:.3g} s of {name}{others} (reduce with --fps)"
         )

@@ -128,7 +128,17 @@ def _gimbal_line(rows: tuple[GimbalStats, ...]) -> str:
 
 
 def _gimbal_table(rows: tuple[GimbalStats, ...]) -> str:
-    header = ("joint", "order", "nearest", "at", f"time < {NEAR_DEG}°", "condition", "aligns", "best order", "keeps")
+    header = (
+        "joint",
+        "order",
+        "nearest",
+        "at",
+        f"time < {NEAR_DEG}°",
+        "condition",
+        "locked axes",
+        "best order",
+        "margin",
+    )
     cells: list[tuple[tables.Cell, ...]] = [
         (
             row.node,

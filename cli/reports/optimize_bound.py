@@ -10,7 +10,7 @@ from anim.optimization.request import Request
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from cli.text import format_length
 
-NOT_PROVEN = "not proven between the times looked at"
+NOT_PROVEN = "bound not proven between samples"
 
 
 def summary(verdicts: Iterable[Verification], request: Request, scale: float) -> str:
@@ -25,8 +25,8 @@ def summary(verdicts: Iterable[Verification], request: Request, scale: float) ->
     if len(proven) < len(moved):
         return f", {NOT_PROVEN}"
     if max(proven) <= request.bounds.max_error:
-        return ", proven for every time"
-    return f", proven for every time: at most {format_length(_rounded_up(max(proven)))}"
+        return ", bound holds at all times"
+    return f", at all times at most {format_length(_rounded_up(max(proven)))}"
 
 
 def of_clip(verdict: Verification, request: Request) -> str:

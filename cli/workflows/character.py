@@ -65,8 +65,9 @@ def put_on_character(
     left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
     if casting.fail_unmatched is not None and len(left) > casting.fail_unmatched:
         raise CheckError(
-            f"{len(left)} joints without a partner (limit {casting.fail_unmatched}): {from_euler_report.listed(left)}",
-            help="name partners in an --alias file; an empty target leaves a joint out",
+            f"{len(left)} joints could not be matched (limit {casting.fail_unmatched}): "
+            f"{from_euler_report.listed(left)}",
+            help="pair joints in an --alias file; an empty target skips a joint",
         )
     made = replace(made, onto=done, character=scene.skeleton)
     if casting.replaced is not None:

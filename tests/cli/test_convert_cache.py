@@ -140,12 +140,12 @@ def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["a.abc"], "no cache format is called '.abc'"),
-        (["a.npz", "--max-error", "1mm"], "--max-error means nothing to .npz"),
-        (["a.mdd", "--preset", "unity"], "--preset means nothing to .mdd"),
+        (["a.abc"], "unsupported cache format '.abc'"),
+        (["a.npz", "--max-error", "1mm"], "--max-error does not apply to .npz"),
+        (["a.mdd", "--preset", "unity"], "--preset does not apply to .mdd"),
         (["a.glb", "--max-error", "1parsec"], "expected a length"),
         (["a.png", "--preset", "godot"], "cuts 16-bit PNG"),
-        (["a.mdd", "--input-fps", "9"], "--input-fps means nothing to .npz"),
+        (["a.mdd", "--input-fps", "9"], "--input-fps does not apply to .npz"),
         (["a.npz", "--at", "9"], "no frame at 9 s"),
         (["a.npz", "--at", "0", "--fps", "9"], "exclude each other"),
         (["a.npz", "--fps", "0"], "--fps is 0 (expected a number above 0)"),

@@ -92,7 +92,7 @@ def test_scale_and_up(call: Call) -> None:
 
 def test_a_giant_is_told(call: Call) -> None:
     giant = b"#node,hips,,0,95,0\n#node,head,hips,0,80,0\n" + CURVES.replace(b"door", b"head")
-    assert "scale: the skeleton measures 80 m (--scale 0.01" in call("from-euler", "-", "-", *XYZ, stdin=giant).err
+    assert "scale: skeleton height 80 m (--scale 0.01" in call("from-euler", "-", "-", *XYZ, stdin=giant).err
 
 
 def test_csv_keys_follow_the_motion(call: Call) -> None:
@@ -250,7 +250,7 @@ def test_strangers_are_listed_where_all_is_to_be_said(call: Call, asset: Find) -
 def test_too_many_strangers_fail(call: Call, asset: Find, fixture: Fixture) -> None:
     source, character = asset("bvh/cmu_01_01.bvh"), fixture("biped")
     run = call("from-euler", source, "-", "--onto", character, "--fail-unmatched", "9")
-    assert "10 joints without a partner (limit 9)" in refusal(run, 6)
+    assert "10 joints could not be matched (limit 9)" in refusal(run, 6)
     assert call("from-euler", source, "-", "--onto", character, "--fail-unmatched", "10").code == 0
 
 
@@ -292,15 +292,15 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         ),
         ((), b"\x89PNG\r\n", 3, "stdin: starts with"),
         (XYZ, SMALL, 2, "a BVH says the order of every joint itself"),
-        ((), CURVES, 2, "nobody says the order"),
+        ((), CURVES, 2, "rotation order not specified"),
         (XYZ, CURVES.replace(b"1,90", b"1,9O"), 3, "stdin: line 3: door.rx is '9O'"),
         (XYZ, CURVES.replace(b"door.rz", b"door.rq"), 3, "stdin: line 1: "),
         (("--angle-tolerance", "0"), SMALL, 2, "--angle-tolerance is '0'"),
         (("--angle-tolerance", "1mm"), SMALL, 2, "--angle-tolerance is '1mm'"),
         (("--scale", "0"), SMALL, 2, "--scale is 0"),
-        (("--fail-unmatched", "0"), SMALL, 2, "are about a character (--onto names it)"),
-        (("--bind-time", "0"), SMALL, 2, "are about a character (--onto names it)"),
-        (("--replace", "walk"), SMALL, 2, "are about a character (--onto names it)"),
+        (("--fail-unmatched", "0"), SMALL, 2, "require --onto (the character)"),
+        (("--bind-time", "0"), SMALL, 2, "require --onto (the character)"),
+        (("--replace", "walk"), SMALL, 2, "require --onto (the character)"),
         (("--format", "json"), SMALL, 2, "both want stdout"),
         (("--onto", "-"), SMALL, 2, "SOURCE and --onto can't both be stdin"),
         ((*XYZ, "--bvh-position", "add"), CURVES, 2, "--bvh-position is about BVH"),

@@ -22,9 +22,9 @@ def _verdict(certified: float | None, error: float = 9e-4) -> Verification:
 @pytest.mark.parametrize(
     ("certified", "words"),
     [
-        ((9.1e-4, 9.9e-4), ", proven for every time"),
-        ((9.1e-4, 1.01e-3), ", proven for every time: at most 1.1 mm"),
-        ((9.1e-4, None), ", not proven between the times looked at"),
+        ((9.1e-4, 9.9e-4), ", bound holds at all times"),
+        ((9.1e-4, 1.01e-3), ", at all times at most 1.1 mm"),
+        ((9.1e-4, None), ", bound not proven between samples"),
     ],
 )
 def test_of_all_clips(certified: tuple[float | None, ...], words: str) -> None:
@@ -45,7 +45,7 @@ def test_where_nothing_moved_nothing_is_said() -> None:
         (9.1e-4, ", at most 0.91 mm at any time"),
         (1.2345e-2, ", at most 1.3 cm at any time"),
         (0.0, ", at most 0 mm at any time"),
-        (None, ", not proven between the times looked at"),
+        (None, ", bound not proven between samples"),
     ],
 )
 def test_of_a_clip(certified: float | None, words: str) -> None:
@@ -56,5 +56,5 @@ def test_of_a_clip(certified: float | None, words: str) -> None:
 
 def test_why_not() -> None:
     assert optimize_bound.why_not(_verdict(1e-4), REQUEST) is None
-    assert optimize_bound.why_not(_verdict(None), REQUEST) == "not proven between the times looked at"
+    assert optimize_bound.why_not(_verdict(None), REQUEST) == "bound not proven between samples"
     assert optimize_bound.why_not(_verdict(None), KEYS) == "only the source's keys count"

@@ -128,7 +128,7 @@ def test_words(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert all(("p99 " in line and "mean " in line) is ("no vertex moved" not in line) for line in lines)
     assert any("p99 " in line for line in lines)
     assert all(("at any time" in line) is ("no vertex moved" not in line) for line in lines)
-    assert ", proven for every time, " in run.err.splitlines()[0]
+    assert ", bound holds at all times, " in run.err.splitlines()[0]
     keys = call("optimize", fixture("noop"), tmp_path / "keys.glb", "--reference", "keys", "-v", *FAST).err
     assert "any time" not in keys
     assert "proven" not in keys

@@ -143,7 +143,7 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
         (["missing.glb", "out.png"], 3, "missing.glb"),
         (["biped.glb", "out.png", "--compare", "missing.glb"], 3, "missing.glb"),
         (["-", "out.png", "--compare", "-"], 2, "can't both be stdin"),
-        (["--ease", "smoth", "out.png"], 2, "no ease is called 'smoth'"),
+        (["--ease", "smoth", "out.png"], 2, "unknown easing 'smoth' (did you mean 'smoothstep'"),
         (["--ease", "linear", "in.glb", "out.png"], 2, "2 files are named (expected OUT)"),
         (["--ease", "linear", "--through", "0,1", "out.png"], 2, "exclude each other"),
         (["--ease", "linear", "--clip", "x", "out.png"], 2, "read no file"),

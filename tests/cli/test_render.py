@@ -109,7 +109,7 @@ def test_every_fixture(name: str, fixture: Fixture, call: Call) -> None:
 @pytest.mark.parametrize(
     ("args", "code", "words"),
     [
-        (["a.jpg"], 2, "no picture is called '.jpg'"),
+        (["a.jpg"], 2, "unsupported image format '.jpg'"),
         (["a.png", "--clip", "no"], 5, "no clip matches 'no'"),
         (["a.png", "--method", "foo"], 2, "'foo' is none of lbs, dqs, cor"),
         (["a.png", "--at", "1", "--frames", "2"], 2, "--at excludes"),
@@ -128,7 +128,7 @@ def test_what_can_t_be_done(
 def test_a_cache_has_no_clips(call: Call, tmp_path: Path) -> None:
     (tmp_path / "a.npz").write_bytes(written(cache(), "a.npz")[0].files["a.npz"])
     line = refusal(call("render", tmp_path / "a.npz", tmp_path / "a.png", "--method", "dqs"), 2)
-    assert "means nothing to a vertex cache" in line
+    assert "does not apply to a vertex cache" in line
 
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"glTF"])

@@ -42,7 +42,7 @@ def test_rebase_says_which_clips_it_moves_apart(call: Call, fixture: Fixture) ->
 
 
 @pytest.mark.parametrize(
-    ("options", "words"), [([], "nothing to do"), (["--from", "8"], "nothing is left from 8 s on")]
+    ("options", "words"), [([], "nothing to do"), (["--from", "8"], "start 8 s is at or after the clip's end")]
 )
 def test_refusals(call: Call, fixture: Fixture, options: list[str], words: str) -> None:
     assert words in refusal(call("trim", fixture("biped"), *options), 2)

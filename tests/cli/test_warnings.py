@@ -44,7 +44,7 @@ WARNED = (  # command line, words of the warning, options that ask for the repor
     (("from-euler", "small.bvh", "out.glb"), "scale: 0.01 m per unit, guessed: centimeters", JSON),
     (("from-euler", "small.bvh", "out.glb"), "is taken for 1/30 s", JSON),
     (("to-euler", "late.glb", "out.bvh", "--clip", "walk"), "a BVH begins there, at 0", ()),
-    (("bake", "tube.glb", "out.npz", "--clip", "twist180"), "between frames a vertex is ", ()),
+    (("bake", "tube.glb", "out.npz", "--clip", "twist180"), "linear interpolation between frames: error of ", ()),
     (("convert-cache", "arm.glb", "out.npz"), "clip 'twist', one of 2", ()),
 )
 

@@ -19,6 +19,7 @@ from anim.errors import FormatError
 
 SCHEMA = 1
 KIND = "vertex animation texture"
+NOT_METADATA = "not vertex-animation-texture metadata"
 FORMATS = ("float", "half", "unorm16")
 
 
@@ -90,7 +91,7 @@ def parse(data: bytes) -> VatMetadata:
     try:
         content = json.loads(data)
         if not isinstance(content, dict) or content.get("kind") != KIND or content["preset"] not in PRESETS:
-            raise FormatError(f"JSON says of no {KIND}")
+            raise FormatError(NOT_METADATA)
         position, normal = content["position"], content["normal"]
         found = VatMetadata(
             content["preset"],
@@ -108,7 +109,7 @@ def parse(data: bytes) -> VatMetadata:
             str(content["up"]),
         )
     except (ValueError, KeyError, TypeError):
-        raise FormatError("JSON is damaged, or says of no vertex animation texture") from None
+        raise FormatError(NOT_METADATA) from None
     shapes_fit = len(found.offset) == len(found.scale) == 3 and found.format in FORMATS and found.times
     if not shapes_fit or not 0 < found.vertices <= found.width * found.rows:
         raise FormatError("JSON contradicts itself")

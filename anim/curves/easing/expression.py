@@ -25,7 +25,7 @@ class Factory(Generic[T]):
     make: Callable[[tuple[str, ...]], T]
 
 
-def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str) -> T:
+def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str, listing: str) -> T:
     """Return what `text` names: an entry of `ready`, or one made by `makers` with the arguments in parentheses.
 
     kind: type of the entries for messages, such as "ease". Case and spaces around names and arguments are ignored.
@@ -41,10 +41,10 @@ def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T
     if name not in makers:
         if name in ready:
             raise RangeError(f"{kind} '{name}' takes no arguments (got {inside!r})")
-        raise RangeError(f"no {kind} is called {call[1]!r}", help=_suggestion(call[1], [*ready, *makers]))
+        raise RangeError(f"unknown {kind} {call[1]!r}{_suggestion(call[1], [*ready, *makers])}", help=listing)
     maker = makers[name]
     if inside is None:
-        raise RangeError(f"{kind} '{name}' needs arguments", help=f"write {maker.usage}")
+        raise RangeError(f"{kind} '{name}' requires arguments", help=f"write {maker.usage}")
     try:
         return maker.make(tuple(part.strip() for part in inside.split(",")) if inside.strip() else ())
     except RangeError as error:
@@ -72,8 +72,8 @@ def _suggestion(name: str, known: list[str]) -> str:
     words = {word.lower() for word in WORD.findall(name)}
     same = [k for k in known if words in (set(k.split("-")), set(k.split("-")) | {"ease"})]
     family = [k for k in known if k.startswith(f"{name.lower()}-")]
-    near = get_close_matches(name.lower(), known, n=SUGGESTIONS, cutoff=0.6)
+    near = get_close_matches(name.lower(), known, n=SUGGESTIONS, cutoff=0.5)
     found = dict.fromkeys(same or (*family, *near))
     if not found:
-        return f"one of {', '.join(dict.fromkeys(known))}"
-    return f"did you mean {' or '.join(repr(k) for k in [*found][:SUGGESTIONS])}?"
+        return ""
+    return f" (did you mean {' or '.join(repr(k) for k in [*found][:SUGGESTIONS])}?)"

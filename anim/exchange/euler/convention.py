@@ -20,6 +20,7 @@ class PartialConvention:
 
 
 UNSPECIFIED = PartialConvention()
+NAMES = {"order": "rotation order", "frame": "axes convention", "unit": "angle unit"}
 
 
 def parse_convention(values: dict[str, Any], where: str) -> PartialConvention:
@@ -49,7 +50,7 @@ def merge_strict(file: PartialConvention, options: PartialConvention) -> Partial
     for name in ("order", "frame", "unit"):
         here, there = getattr(file, name), getattr(options, name)
         if here is not None and there is not None and here != there:
-            raise RangeError(f"the file says {name} {here}, the options say {there}")
+            raise RangeError(f"{NAMES[name]} is {here} in the file (got {there})")
     return fill_from(file, options)
 
 
@@ -59,8 +60,8 @@ def require_complete(said: PartialConvention) -> Convention:
         return Convention(said.order, said.frame, said.unit)
     missing = next(name for name in ("order", "frame", "unit") if getattr(said, name) is None)
     raise RangeError(
-        f"nobody says the {missing} of the angles",
-        help="give order, frame and unit; what FBX and Maya call XYZ is the order XYZ in the frame extrinsic",
+        f"{NAMES[missing]} not specified",
+        help="order, axes and unit are required; XYZ in FBX and Maya is order XYZ with extrinsic axes",
     )
 
 

@@ -19,11 +19,12 @@ def test_name_is_what_makes_it(name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message", "help"),
     [
-        ("quadin", "no ease is called 'quadin'", "'quad-in'"),
-        ("easeInOutQuad", "no ease is called", "did you mean 'quad-in-out'?"),
-        ("elastic", "no ease is called", "'elastic-in' or 'elastic-out'"),
-        ("qwxyz", "no ease is called", "one of linear, smoothstep"),
-        ("spring", "needs arguments", "write spring(stiffness, damping)"),
+        ("quadin", "unknown easing 'quadin' (did you mean 'quad-in'", "gltf-anim ease --list"),
+        ("easeInOutQuad", "unknown easing 'easeInOutQuad' (did you mean 'quad-in-out'?)", "ease --list"),
+        ("elastic", "(did you mean 'elastic-in' or 'elastic-out'", "ease --list"),
+        ("bounzy", "unknown easing 'bounzy' (did you mean 'bounce-in'", "ease --list"),
+        ("qwxyz", "unknown easing 'qwxyz'", "gltf-anim ease --list"),
+        ("spring", "requires arguments", "write spring(stiffness, damping)"),
         ("spring(1)", "number of arguments is 1 (expected 2)", "write spring"),
         ("spring(0, 1)", "expected finite and above 0", ""),
         ("spring(100, 0.01)", "hardly settles", "a damping of 0.1 or more"),
@@ -37,8 +38,8 @@ def test_name_is_what_makes_it(name: str) -> None:
         ("steps(3, jump-up)", "expected jump-start", ""),
         ("back(-1)", "overshoot is -1", ""),
         ("linear(1)", "takes no arguments", ""),
-        ("ease(", "can't read ease", ""),
-        ("", "can't read ease", ""),
+        ("ease(", "can't read easing", ""),
+        ("", "can't read easing", ""),
     ],
 )
 def test_refusals(text: str, message: str, help: str) -> None:

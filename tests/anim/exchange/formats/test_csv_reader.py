@@ -121,9 +121,9 @@ def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
 @pytest.mark.parametrize(
     ("stated", "problem"),
     [
-        (UNSPECIFIED, "nobody says the order"),
-        (PartialConvention("XYZ"), "nobody says the frame"),
-        (PartialConvention("XYZ", AxesConvention.INTRINSIC), "nobody says the unit"),
+        (UNSPECIFIED, "rotation order not specified"),
+        (PartialConvention("XYZ"), "axes convention not specified"),
+        (PartialConvention("XYZ", AxesConvention.INTRINSIC), "angle unit not specified"),
         (PartialConvention("XXZ", AxesConvention.INTRINSIC, Unit.DEG), "order is 'XXZ'"),
     ],
 )
@@ -151,7 +151,7 @@ def test_other_separators_are_named() -> None:
 
 
 def test_two_conventions_are_refused() -> None:
-    with pytest.raises(RangeError, match="the file says order ZXY, the options say XYZ"):
+    with pytest.raises(RangeError, match=r"rotation order is ZXY in the file \(got XYZ\)"):
         csv_reader.read(FRAMES.encode(), XYZ)
 
 
