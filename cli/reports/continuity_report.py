@@ -21,11 +21,11 @@ def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
     header = [
         tables.escape_control(f"smoothness of {clip_name(clip.name, clip.index)}"),
         "path",
-        "how",
-        "inner keys",
+        "interp",
+        "interior keys",
         "jump",
     ]
-    header += ["C0", "G1", "C1", "C2", "value jump", "speed jump", "acceleration jump", "loop seam"]
+    header += ["C0", "G1", "C1", "C2", "value jump", "speed jump", "acceleration jump", "loop gap"]
     moving = [track for track in tracks if not track.still]
     rows: list[list[Cell]] = [
         [

@@ -94,11 +94,17 @@ def _headline(name: str, file_bytes: int, facts: Facts) -> str:
 
 def _clips(clips: Sequence[ClipReport]) -> str:
     on_skin = all(clip.seam_measured_on == "skin" for clip in clips)
-    header = ["clip", "seconds", "fps", "T/R/S/W/P", "keys", "how", "bytes", "share"]
-    header += ["still", "at rest", "spare keys", "loop seam" if on_skin else "loop seam (nodes)", "root speed"]
+    header = ["clip", "seconds", "fps", "T/R/S/W/P", "keys", "interp", "bytes", "share"]
+    header += [
+        "constant",
+        "no-op",
+        "redundant",
+        "loop gap" if on_skin else "loop gap (nodes)",
+        "velocity gap",
+        "root speed",
+    ]
     rows: list[list[Cell]] = []
     for clip in clips:
-        seam = f"{format_length(clip.seam_m)} {format_speed(clip.seam_speed_m_per_s)}"
         root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > MIN_ROOT_DISTANCE_M else ""
         rows.append(
             [
@@ -113,7 +119,8 @@ def _clips(clips: Sequence[ClipReport]) -> str:
                 str(clip.constant_tracks or ""),
                 str(clip.no_effect_tracks or ""),
                 str(clip.redundant_keys or ""),
-                seam,
+                format_length(clip.seam_m),
+                format_speed(clip.seam_speed_m_per_s),
                 root_speed,
             ]
         )
@@ -128,8 +135,14 @@ def _rate(clip: ClipReport) -> str:
 
 
 def _tracks(clip: ClipReport) -> str:
-    header = [tables.escape_control(f"tracks of {clip_name(clip.name, clip.index)}"), "path", "how", "keys", "seconds"]
-    header += ["still", "at rest", "spare keys", "off unit", "sign flips", "widest step"]
+    header = [
+        tables.escape_control(f"tracks of {clip_name(clip.name, clip.index)}"),
+        "path",
+        "interp",
+        "keys",
+        "seconds",
+    ]
+    header += ["constant", "no-op", "redundant", "non-unit", "sign flips", "max step"]
     rows: list[list[Cell]] = [
         [
             track.target,
@@ -150,7 +163,7 @@ def _tracks(clip: ClipReport) -> str:
 
 
 def _skins(skins: Sequence[SkinReport]) -> str:
-    header = ["skin", "joints", "unused", "vertices", "influences (mean, most)", "sums off 1"]
+    header = ["skin", "joints", "unused", "vertices", "influences (mean, max)", "weight sums ≠ 1"]
     rows: list[list[Cell]] = []
     for skin in skins:
         influences = f"{skin.mean_influences:.2f}, {skin.most_influences}" if skin.mean_influences is not None else ""

@@ -37,10 +37,10 @@ def test_real_files(name: str, call: Call) -> None:
 def test_where_there_is_no_skin_it_says_so(call: Call, fixture: Fixture) -> None:
     path = fixture("arm")
     assert {clip["seam_measured_on"] for clip in only(call, path)["clips"]} == {"skin"}
-    assert "loop seam (nodes)" not in call("inspect", path).text
+    assert "loop gap (nodes)" not in call("inspect", path).text
     bare = _without_meshes(opened_fixture("arm"))
     assert {clip["seam_measured_on"] for clip in only(call, bare)["clips"]} == {"nodes"}
-    assert "loop seam (nodes)" in call("inspect", "-", stdin=bare).text
+    assert "loop gap (nodes)" in call("inspect", "-", stdin=bare).text
 
 
 def _without_meshes(document: Document) -> bytes:

@@ -71,8 +71,8 @@ class _Rule:
     advice: str
 
 
-def _times(words: str) -> Callable[[list[ClipReport], int], str]:
-    return lambda _, count: f"{count} × {words}"
+def _counted(one: str, many: str) -> Callable[[list[ClipReport], int], str]:
+    return lambda _, count: f"{count} {one if count == 1 else many}"
 
 
 def _late(clips: list[ClipReport], _: int) -> str:
@@ -81,7 +81,7 @@ def _late(clips: list[ClipReport], _: int) -> str:
 
 def _irregular(clips: list[ClipReport], _: int) -> str:
     least = min(clip.frame_rate_regular or 0.0 for clip in clips)
-    return f"only {math.floor(100 * least)} % of key times lie on a grid"
+    return f"only {math.floor(100 * least)} % of key times are on a frame grid"
 
 
 def _range(seconds: list[float]) -> str:
@@ -100,63 +100,69 @@ _CLIP_RULES: tuple[_Rule, ...] = (
         "non-unit-rotations",
         Severity.WARNING,
         lambda clip: clip.non_unit_rotations,
-        _times("a rotation key that is no unit quaternion"),
+        _counted("rotation key is not a unit quaternion", "rotation keys are not unit quaternions"),
         "normalize them where they are made, or: gltf-anim resample IN OUT --fps {fps}{clips}",
     ),
     _Rule(
         "wide-steps",
         Severity.WARNING,
         lambda clip: clip.wide_steps,
-        _times("a step of 170° or more from key to key"),
-        "players differ on which way is shorter; to put keys between: gltf-anim resample IN OUT --fps {finer}{clips}",
+        _counted("rotation of 170° or more between keys", "rotations of 170° or more between keys"),
+        "players may differ on the shorter arc; to add keys: gltf-anim resample IN OUT --fps {finer}{clips}",
     ),
     _Rule(
         "sign-flips",
         Severity.INFO,
         lambda clip: clip.sign_flips - clip.sign_flips_in_splines,
-        _times("a quaternion that changes sign from key to key"),
+        _counted("quaternion sign change between keys", "quaternion sign changes between keys"),
         "harmless for slerp; for players that blend components: gltf-anim resample IN OUT --fps {fps}{clips}",
     ),
     _Rule(
         "sign-flips-in-splines",
         Severity.WARNING,
         lambda clip: clip.sign_flips_in_splines,
-        _times("a quaternion that changes sign from key to key of a CUBICSPLINE track"),
-        "the spline turns the long way round there; to join the keys anew: gltf-anim spline IN OUT{clips}",
+        _counted(
+            "quaternion sign change between keys of a CUBICSPLINE track",
+            "quaternion sign changes between keys of CUBICSPLINE tracks",
+        ),
+        "the spline takes the long arc there; to compute new tangents: gltf-anim spline IN OUT{clips}",
     ),
     _Rule(
         "no-effect-tracks",
         Severity.INFO,
         lambda clip: clip.no_effect_tracks - (clip.no_effect_tracks == sum(clip.tracks.values())),  # one must stay
-        _times("a track that holds a node where it rests anyway"),
+        _counted("track equals the rest pose", "tracks equal the rest pose"),
         "unless players blend clips: gltf-anim optimize IN OUT --drop rest",
     ),
     _Rule(
         "constant-tracks",
         Severity.INFO,
         lambda clip: clip.repeating_tracks,
-        _times("a track of several keys that never changes"),
-        "one key says the same; where that saves bytes: gltf-anim optimize IN OUT",
+        _counted("constant track has several keys", "constant tracks have several keys"),
+        "one key is enough; to reduce them: gltf-anim optimize IN OUT",
     ),
     _Rule(
         "redundant-keys",
         Severity.INFO,
         lambda clip: clip.redundant_keys,
-        _times("a key that its neighbors give anyway"),
-        "what no vertex needs goes with: gltf-anim optimize IN OUT",
+        _counted(
+            "redundant key (interpolated exactly by its neighbors)",
+            "redundant keys (interpolated exactly by their neighbors)",
+        ),
+        "to remove those that no vertex needs: gltf-anim optimize IN OUT",
     ),
     _Rule(
         "late-start",
         Severity.INFO,
         lambda clip: clip.start_s > LATE_S,
         _late,
-        "if that is not meant: gltf-anim trim IN OUT --rebase",
+        "if unintended: gltf-anim trim IN OUT --rebase",
     ),
     _Rule(
         "irregular-keys",
         Severity.INFO,
         lambda clip: clip.frame_rate_regular is not None and clip.frame_rate_regular < IRREGULAR,
         _irregular,
-        "fine for sparse keys; for a grid: gltf-anim resample IN OUT --fps 30{clips}",
+        "normal for sparse keys; for a grid: gltf-anim resample IN OUT --fps 30{clips}",
     ),
 )
