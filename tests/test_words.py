@@ -28,10 +28,6 @@ PENDING = (  # packages whose docstrings are not rewritten yet
     "anim/measure/error",
     "anim/measure/inspect",
     "anim/measure/loops",
-    "anim/skinning",
-    "anim/skinning/analysis",
-    "anim/skinning/kernels",
-    "anim/skinning/methods",
 )
 OPENINGS = re.compile(r"(what|how|which|whose|whether)\b", re.IGNORECASE)
 

@@ -1,1 +1,1 @@
-"""Skinning methods that glTF can't play, baked to vertex caches; and how much linear blending loses."""
+"""Skinning methods beyond glTF's linear blending, baked to vertex caches, and analysis of collapse."""

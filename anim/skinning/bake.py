@@ -41,10 +41,10 @@ def bake(
     threads: int | None = None,
     progress: Callable[[int], None] = lambda frames: None,
 ) -> VertexCache:
-    """Return where the vertices of a scene are at `times` (F,) in seconds while a clip plays.
+    """Return the vertices of a scene at `times` (F,) in seconds of a clip.
 
-    Parameters as for `baker`, which is the thing to use for many clips; progress: called with the frames done.
-    bake(scene, clip, times=frame_times(0, 1, fps=30), method="dqs") → VertexCache of 31 frames
+    Parameters as for `prepare_bake`, which suits many clips better; progress: called with the number of frames done.
+    bake(scene, clip, times=grid(0, 1, fps=30), method="dqs") → VertexCache of 31 frames
     """
     made = prepare_bake(
         scene,
@@ -74,17 +74,15 @@ def prepare_bake(
     nodes: Sequence[int] | None = None,
     threads: int | None = None,
 ) -> Baker:
-    """Return what bakes clips of a scene: all that a method has to know of the meshes is found out here, once.
+    """Return a baker for clips of a scene; data of the meshes is prepared once.
 
-    method: one of SKINNING_METHODS. blend: share of the method, the rest is lbs; None for all of it.
-    bulge_clamp: pull what stands farther from its link than at rest back, as much as it is shared by two joints.
-    space: "world", where a skinned mesh's own node doesn't count, or "mesh", the space of the mesh's node.
-    normals: give unit normals too; of a mesh without them, those of its faces' mean. tangents: unit tangents too, with
-    their handedness as the file has it; all meshes must have them.
-    rigid: meshes that neither joints nor morph targets move, too. nodes: only meshes on these.
-    threads: None for one per core; the result doesn't depend on it.
-    Raises RangeError for a parameter out of its range, NotFoundError where nothing is left to bake, UnsupportedError
-    for tangents of a mesh without any.
+    method: one of SKINNING_METHODS. blend: fraction of the method, the rest is lbs; None for all of it. bulge_clamp:
+    pull vertices back that are farther from their bone than at rest, weighted by their blend of two joints. space:
+    "world", where a skinned mesh's own node doesn't count, or "mesh", the space of the mesh's node. normals: bake unit
+    normals too; of a mesh without them, those of its faces' mean. tangents: unit tangents too, with the handedness in
+    the file; all meshes must have them. rigid: meshes without skin and morph targets, too. nodes: only meshes on these.
+    threads: None for one per core; the result doesn't depend on it. Raises RangeError for a parameter out of its range,
+    NotFoundError if nothing is left to bake, UnsupportedError for tangents of a mesh without any.
     """
     check_type(scene, Scene, "scene", help="anim.bake takes an asset")
     _check_indices(nodes, threads)
@@ -98,14 +96,14 @@ def prepare_bake(
         bind_mesh(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
-    still = PosePlayback(scene.skeleton, Clip("", ())).at(np.zeros(1))
+    rest = PosePlayback(scene.skeleton, Clip("", ())).at(np.zeros(1))
     return Baker(
         scene,
         layers,
         int(starts[-1]),
         np.concatenate([each.rig.faces + each.at for each in layers]),
         tuple(_parts(scene, layers)),
-        np.concatenate([each.at_rest(still) for each in layers]),
+        np.concatenate([each.at_rest(rest) for each in layers]),
         normals,
         _handedness(chosen) if tangents else None,
         threads or _cpu_count(),
@@ -116,9 +114,9 @@ def prepare_bake(
 class Baker:
     """Meshes of a scene, ready to be baked with any clip.
 
-    layers: in the order of their vertices, of which there are `vertices`. faces: (T, 3) of all of them.
-    rest: (V, 3) m, where vertices are in the scene's rest pose. normals: whether they are baked too. handedness: (V,)
-    of tangents, None where those are not baked.
+    layers: in the order of their vertices; `vertices` is the total number. faces: (T, 3) of all of them.
+    rest: (V, 3) m, vertices in the scene's rest pose. normals: whether they are baked too. handedness: (V,)
+    of tangents, None without them.
     """
 
     scene: Scene
@@ -132,10 +130,10 @@ class Baker:
     threads: int
 
     def bake(self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda frames: None) -> VertexCache:
-        """Return where the vertices are at `times` (F,) in seconds while a clip plays.
+        """Return the vertices at `times` (F,) in seconds of a clip.
 
         Vertices come in the scene's order: nodes depth-first, primitives as in the file, vertices as in their accessor.
-        Nothing is computed before frames are asked for, and then a chunk at a time: memory doesn't grow with F.
+        Frames are computed on iteration, a chunk at a time: memory doesn't grow with F.
         progress: called with the number of frames done, after each chunk.
         """
         check_type(clip, Clip, "clip")
@@ -155,7 +153,7 @@ class Baker:
 
 
 def bakeable_instances(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[MeshInstance]:
-    """Return the mesh instances that have vertices and are baked: skinned or morphed ones, with `rigid` all."""
+    """Return the mesh instances with vertices to bake: skinned or morphed ones, all with `rigid`."""
     return [
         instance
         for instance in scene.instances
@@ -166,9 +164,9 @@ def bakeable_instances(scene: Scene, *, rigid: bool = False, nodes: Sequence[int
 
 
 def _handedness(chosen: Sequence[MeshInstance]) -> Floats:
-    """The signs (V,) that with normal and tangent give the bitangent; a mirrored joint does not change them.
+    """The signs (V,) for the bitangent of normal and tangent; a mirrored joint does not change them.
 
-    That is what players make of them (three.js: TANGENT.w as it is).
+    Players use them in this manner (three.js: unchanged TANGENT.w).
     """
     signs = []
     for instance in chosen:
@@ -180,7 +178,7 @@ def _handedness(chosen: Sequence[MeshInstance]) -> Floats:
 
 
 def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:
-    """What makes the skinner of a rig. A mesh on one joint alone needs no method: all give the same."""
+    """Factory of the skinner of a rig; all methods are equal on a mesh with a single joint."""
 
     def make(rig: SkinBinding, plain: bool) -> Skinner:
         if len(rig.nodes) == 1:

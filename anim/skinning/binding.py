@@ -1,4 +1,4 @@
-"""A mesh bound to joints, in the form that kernels read."""
+"""Skin binding of a mesh to joints, in the layout of kernels."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from anim.skinning.kernels.layout import FloatArray, Influences
 
 @dataclass(frozen=True, slots=True)
 class SkinBinding:
-    """V vertices, and the joints that each of them hangs on, strongest first, joints without weight left out.
+    """V vertices with their joint influences, strongest first, without influences of weight 0.
 
-    nodes: (J,) node numbers. bind: (J, 3, 4) joint_from_mesh at bind time. above: (J,) the nearest joint above, or −1.
-    points: (V, 3) m in mesh space. normals, tangents: (V, 3), or (0, 3) where they are not wanted.
-    start: (V + 1,); influences start[v] … start[v + 1] are vertex v's. joint: (E,) into nodes. weight: (E,).
-    most: how many influences a vertex has at most. faces: (T, 3).
+    nodes: (J,) node indices. bind: (J, 3, 4) joint_from_mesh at bind time. ancestors: (J,) the nearest joint above, or
+    −1. points: (V, 3) m in mesh space. normals, tangents: (V, 3), or (0, 3) if not requested. start: (V + 1,);
+    influences start[v] … start[v + 1] are vertex v's. joint: (E,) into nodes. weight: (E,). max_count: largest number
+    of influences of a vertex. faces: (T, 3).
     """
 
     nodes: Ints
@@ -37,15 +37,15 @@ class SkinBinding:
 
     @property
     def influences(self) -> Influences:
-        """What the vertices hang on, as kernels read it."""
+        """The vertices' influences in the layout of kernels."""
         return Influences(self.weight, self.joint, self.start, self.max_count)
 
 
 def bind_skin(instance: MeshInstance, parents: Ints, *, normals: bool = False, tangents: bool = False) -> SkinBinding:
-    """Return the rig of a mesh instance; one without a skin hangs on its own node, whole.
+    """Return the binding of a mesh instance; without a skin it is bound to its own node.
 
-    parents: (N,) of the skeleton. normals, tangents: keep the mesh's, if it has them.
-    Raises RangeError for a joint that the skin does not have, or a weight that is no number.
+    parents: (N,) of the skeleton. normals, tangents: include the mesh's, if it has them.
+    Raises RangeError for a joint that the skin does not have, or a weight that is not finite.
     """
     mesh, skin = instance.mesh, instance.skin
     if skin is None:
@@ -75,8 +75,9 @@ def bind_skin(instance: MeshInstance, parents: Ints, *, normals: bool = False, t
 
 
 def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], FloatArray]:
-    """Return start (V + 1,), joint (E,) and weight (E,) of joints and weights (V, I), strongest first, zeros left out.
+    """Return start (V + 1,), joint (E,) and weight (E,) of joints and weights (V, I), strongest first.
 
+    Zero weights are left out.
     influences([[4, 7]], [[0.25, 0.75]]) → [0, 2], [7, 4], [0.75, 0.25]
     """
     order = np.argsort(-weights, axis=1, kind="stable")
@@ -88,7 +89,7 @@ def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], 
 
 
 def ancestor_joints(nodes: Ints, parents: Ints) -> Ints:
-    """Return for each joint (J,) the number of the nearest joint above it, −1 where there is none."""
+    """Return for each joint (J,) the index of the nearest joint above it, −1 for none."""
     number = {node: i for i, node in enumerate(nodes.tolist())}
     found = []
     for node in nodes.tolist():

@@ -1,4 +1,4 @@
-"""One mesh instance on its way through a bake: which matrices move it, and in which columns its vertices go."""
+"""A bound mesh instance in a bake: its matrices, and its columns in the output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from anim.errors import AnimError, RangeError
 from anim.maths import matrix
 from anim.model import MeshInstance, Skeleton
 from anim.skinning.binding import SkinBinding, bind_skin
-from anim.skinning.kernels.layout import NOTHING, FloatArray, OutputSlice, VertexBlock
+from anim.skinning.kernels.layout import NO_OUTPUT, FloatArray, OutputSlice, VertexBlock
 from anim.skinning.methods.skinner import Skinner, fill_lanes
 from anim.skinning.pose_blocks import PoseBlock
 from anim.skinning.vertex_normals import SmoothNormals
@@ -25,8 +25,8 @@ Make: TypeAlias = Callable[[SkinBinding, bool], Skinner]
 class BoundMesh:
     """An instance, its rig and skinner, and its first column.
 
-    in_mesh_space: positions are wanted in the space of the instance's node. smooth: what makes normals of the faces
-    where they are wanted and the mesh has none. still: its vertices where no morph target counts.
+    in_mesh_space: whether positions are in the space of the instance's node. smooth: source of normals from faces
+    if the mesh has none. static_block: its vertices without morph targets.
     """
 
     instance: MeshInstance
@@ -35,33 +35,33 @@ class BoundMesh:
     at: int
     in_mesh_space: bool
     smooth: SmoothNormals | None
-    is_static: VertexBlock
+    static_block: VertexBlock
 
     @property
     def packed_size(self) -> int:
-        """How many bytes a frame takes that is packed, about: its matrices, and vertices where they are morphed."""
+        """Approximate bytes of a packed frame: its matrices, and vertices if they are morphed."""
         morphed = len(self.rig.points) if len(self.instance.mesh.targets) else 0
         return 96 * len(self.rig.nodes) + 36 * morphed
 
     def pack(self, frames: PoseBlock, block: slice) -> tuple[Any, VertexBlock]:
-        """Return what `place` needs for some of the frames."""
+        """Return the input of `skin` for some of the frames."""
         return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
 
     def skin(self, packed: tuple[Any, VertexBlock], block: slice, whole: OutputSlice, first: int, last: int) -> None:
-        """Write vertices first … last, for a block of frames, into the whole."""
+        """Write vertices first … last, for a block of frames, into the output."""
         parts, shape = packed
-        normals = whole.normals[block] if len(shape.normals) else NOTHING
-        tangents = whole.tangents[block] if len(shape.tangents) else NOTHING
+        normals = whole.normals[block] if len(shape.normals) else NO_OUTPUT
+        tangents = whole.tangents[block] if len(shape.tangents) else NO_OUTPUT
         self.skinner.skin(parts, shape, OutputSlice(self.at, whole.positions[block], normals, tangents), first, last)
 
     def finish(self, frames: PoseBlock, whole: OutputSlice) -> None:
-        """Bring what was placed in world space into the mesh's own, and make normals of the faces if need be."""
+        """Transform positions from world to mesh space, and compute normals from faces, if requested."""
         span = slice(self.at, self.at + len(self.rig.points))
         if self.in_mesh_space and self.instance.skin is not None:
             node = frames.world[self.instance.node]
             back = _inverse(node)
             whole.positions[:, span] = matrix.apply(back, whole.positions[:, span].astype(np.float64))
-            if len(self.rig.normals):  # by the inverse's inverse transpose, of rows
+            if len(self.rig.normals):  # the inverse transpose of the inverse, for row vectors
                 whole.normals[:, span] = _unit(whole.normals[:, span] @ node[..., :3])
             if len(self.rig.tangents):
                 whole.tangents[:, span] = _unit(whole.tangents[:, span] @ np.swapaxes(back[..., :3], -1, -2))
@@ -83,7 +83,7 @@ class BoundMesh:
         return placed
 
     def matrices(self, frames: PoseBlock, block: slice) -> Floats:
-        """Return world_from_mesh (n, J, 3, 4) of the joints; where there is no skin, of the node."""
+        """Return world_from_mesh (n, J, 3, 4) of the joints; without a skin, of the node."""
         if self.in_mesh_space and self.instance.skin is None:
             count = len(frames.times[block])
             return np.broadcast_to(np.eye(4)[:3], (count, 1, 3, 4))
@@ -97,14 +97,14 @@ class BoundMesh:
     def _shape(self, frames: PoseBlock, block: slice) -> VertexBlock:
         mesh, weights = self.instance.mesh, self._weights(frames, block)
         if not weights.any():
-            return self.is_static
+            return self.static_block
         points = _morph(self.rig.points, mesh.targets, weights)
         normals = _morph(self.rig.normals, mesh.normal_targets, weights)
         tangents = _morph(self.rig.tangents, mesh.tangent_targets, weights)
         return VertexBlock(_rows(points), _rows(normals), _rows(tangents))
 
     def _weights(self, frames: PoseBlock, block: slice) -> Floats:
-        """Morph weights (n, M), or (1, M) where no frame has its own."""
+        """Morph weights (n, M), or (1, M) if they are not animated."""
         animated = frames.weights.get(self.instance.node)
         return self.instance.weights[None] if animated is None else animated[block]
 
@@ -112,7 +112,10 @@ class BoundMesh:
 def bind_mesh(
     skeleton: Skeleton, instance: MeshInstance, make: Make, *, at: int, space: str, normals: bool, tangents: bool
 ) -> BoundMesh:
-    """Return the layer of an instance. make: gets its rig, and whether its points never change and are all it needs."""
+    """Return the layer of an instance.
+
+    make: called with its rig, and whether its points are constant and need no directions.
+    """
     name = instance.mesh.name or skeleton.names[instance.node] or f"node {instance.node}"
     try:
         bound = bind_skin(instance, skeleton.parents, normals=normals, tangents=tangents)
@@ -120,12 +123,12 @@ def bind_mesh(
         raise error.at(f"mesh '{name}'") from None
     smooth = SmoothNormals(bound.faces, len(bound.points)) if normals and instance.mesh.normals is None else None
     plain = not len(instance.mesh.targets) and not len(bound.normals) and not len(bound.tangents)
-    still = VertexBlock(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))
-    return BoundMesh(instance, bound, make(bound, plain), at, space == "mesh", smooth, still)
+    static_block = VertexBlock(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))
+    return BoundMesh(instance, bound, make(bound, plain), at, space == "mesh", smooth, static_block)
 
 
 def _morph(base: Floats, targets: Floats | None, weights: Floats) -> Floats:
-    """base (V, 3) and targets (M, V, 3) by weights (n, M) → (V, 3, n); targets that never count are not read."""
+    """base (V, 3) and targets (M, V, 3) by weights (n, M) → (V, 3, n); skips targets of weight 0."""
     if targets is None or not len(targets) or not len(base):
         return base[:, :, None]
     used = np.flatnonzero(weights.any(axis=0))
@@ -145,7 +148,7 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _inverse(world: Floats) -> Floats:
-    """Inverses (F, 3, 4) of a node's matrices. Raises RangeError where it is flat at some time."""
+    """Inverses (F, 3, 4) of a node's matrices. Raises RangeError if one is singular."""
     linear = world[..., :3]
     if not (np.abs(np.linalg.det(linear)) > 0).all():
         raise RangeError("mesh space is flat: the node of a mesh has scale 0 (expected space 'world')")

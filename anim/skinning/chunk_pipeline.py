@@ -1,4 +1,4 @@
-"""Chunks of frames out of layers: a pool of threads skins one chunk while the caller uses the one before."""
+"""Pipeline of frame chunks: a thread pool skins one chunk while the caller uses the previous one."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import Clip, FrameChunk, Skeleton
 from anim.skinning.bound_mesh import BoundMesh
-from anim.skinning.kernels.layout import LANES, NOTHING, OutputSlice
+from anim.skinning.kernels.layout import LANES, NO_OUTPUT, OutputSlice
 from anim.skinning.pose_blocks import PoseBlock, PosePlayback
 
-Job: TypeAlias = tuple[BoundMesh, Any, slice, int, int]  # a layer, what it packed, its block, first and last vertex
+Job: TypeAlias = tuple[BoundMesh, Any, slice, int, int]  # a layer, its packed data, its block, first and last vertex
 
-CHUNK_BYTES = 1 << 23  # of positions in a chunk, about; never less than LANES frames
-PACKED_BYTES = 1 << 22  # of matrices and morphed vertices that a chunk needs, about
-MAX_BLOCKS = 32  # of LANES frames in a chunk, for their poses take memory too
-MIN_VERTICES = 4096  # for which it is worth to wake a thread
+CHUNK_BYTES = 1 << 23  # approximate size of positions in a chunk; never less than LANES frames
+PACKED_BYTES = 1 << 22  # approximate size of a chunk's matrices and morphed vertices
+MAX_BLOCKS = 32  # of LANES frames in a chunk; their poses take memory too
+MIN_VERTICES = 4096  # per thread
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkPipeline:
-    """What is made: `vertices` columns by these layers. threads: how many work on it, without any change of a bit."""
+    """Skinning of `vertices` columns by layers. threads: number of workers, without effect on the result."""
 
     skeleton: Skeleton
     layers: Sequence[BoundMesh]
@@ -36,7 +36,7 @@ class ChunkPipeline:
     threads: int
 
     def chunks(self, clip: Clip, times: Floats, progress: Callable[[int], None]) -> Iterator[FrameChunk]:
-        """Yield the frames at `times` (F,) s in order. progress: called with how many the caller is done with.
+        """Yield the frames at `times` (F,) s in order. progress: called with the number of frames used.
 
         While the caller uses one chunk the next is skinned, and the poses of the one after it are sampled.
         """
@@ -60,41 +60,41 @@ class ChunkPipeline:
     def _start(self, frames: PoseBlock, pool: ThreadPoolExecutor) -> _PendingChunk:
         shape = (len(frames.times), self.vertices, 3)
         wanted = (True, self.normals, self.tangents)
-        whole = OutputSlice(0, *(np.empty(shape, np.float32) if each else NOTHING for each in wanted))
-        return _PendingChunk(frames, whole, [pool.submit(_submit, share, whole) for share in self._shares(frames)])
+        whole = OutputSlice(0, *(np.empty(shape, np.float32) if each else NO_OUTPUT for each in wanted))
+        return _PendingChunk(frames, whole, [pool.submit(_submit, jobs, whole) for jobs in self._thread_jobs(frames)])
 
-    def _shares(self, frames: PoseBlock) -> list[list[Job]]:
-        """Return what each thread has to do: vertices of large layers are divided, in blocks of frames."""
+    def _thread_jobs(self, frames: PoseBlock) -> list[list[Job]]:
+        """Return the jobs of each thread: vertices of large layers are divided, in blocks of frames."""
         shares: list[list[Job]] = [[] for _ in range(self.threads)]
         next_share = cycle(shares)
         for layer in self.layers:
             vertices = len(layer.rig.points)
-            pieces = min(-(-vertices // MIN_VERTICES), self.threads)
-            ends = [vertices * i // pieces for i in range(pieces + 1)]
+            num_parts = min(-(-vertices // MIN_VERTICES), self.threads)
+            ends = [vertices * i // num_parts for i in range(num_parts + 1)]
             for block in (slice(low, low + LANES) for low in range(0, len(frames.times), LANES)):
                 parts = layer.pack(frames, block)
                 for first, last in pairwise(ends):
                     next(next_share).append((layer, parts, block, first, last))
-        return [share for share in shares if share]
+        return [jobs for jobs in shares if jobs]
 
     def _finish(self, first: int, started: _PendingChunk) -> FrameChunk:
         for future in started.futures:
             future.result()
         for layer in self.layers:
-            layer.finish(started.frames, started.load_all)
-        _, positions, normals, tangents = started.load_all
+            layer.finish(started.frames, started.output)
+        _, positions, normals, tangents = started.output
         return FrameChunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
 
 
 @dataclass(frozen=True, slots=True)
 class _PendingChunk:
-    """A chunk that is being written."""
+    """A chunk in progress."""
 
     frames: PoseBlock
-    load_all: OutputSlice
+    output: OutputSlice
     futures: list[Future[None]]
 
 
-def _submit(share: list[Job], whole: OutputSlice) -> None:
-    for layer, parts, block, first, last in share:
+def _submit(jobs: list[Job], whole: OutputSlice) -> None:
+    for layer, parts, block, first, last in jobs:
         layer.skin(parts, block, whole, first, last)

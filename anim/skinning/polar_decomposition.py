@@ -1,4 +1,4 @@
-"""Skinning matrices taken apart into a rigid motion and a stretch, so that methods that only turn can use them."""
+"""Polar decomposition of skinning matrices into rigid motion and stretch, for methods that only rotate."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.skinning.binding import SkinBinding
 
-RIGID_TOLERANCE = 2e-6  # how far AᵀA may be from 1, or from a multiple of it: what float32 bind matrices leave behind
+RIGID_TOLERANCE = 2e-6  # of AᵀA from 1, or from a multiple of it: rounding of float32 bind matrices
 
 
 @dataclass(frozen=True, slots=True)
 class PolarDecomposition:
     """Joints' matrices as rotation (n, J, 4) xyzw and translation (n, J, 3), after a stretch and a scale.
 
-    stretch: (n, J, 3, 4), scale: (n, J); None where all are rigid and there is nothing to stretch.
+    scale_shear: (n, J, 3, 4), scale: (n, J); None if all are rigid.
     """
 
     rotation: Floats
@@ -28,36 +28,35 @@ class PolarDecomposition:
 
 
 def decompose(matrices: Floats, pivots: Floats) -> PolarDecomposition:
-    """Return affine matrices (n, J, 3, 4) as A p + t = R (S p + c o) + t′ − c R o, whatever c is.
+    """Return affine matrices (n, J, 3, 4) as A p + t = R (S p + c o) + t′ − c R o, for any c.
 
-    R is a rotation, o the joint's own place in bind space, `pivots` (J, 3), and t′ the place to which it goes. S is a
-    symmetric stretch about o; a mirrored joint has all three factors negative. `scale` is the joint's own, ∛det A.
-    A blend takes one c for all joints of a vertex (`carriers.scale_shares`). Where they all scale alike, that is their
-    scale: the blend is then the one without scale, made larger. A joint that alone grows or shears does so about its
-    own place, and doesn't drag what it shares with its neighbors.
-    split(2 · identity about (0, 1, 0)) → S p = 2 p − (0, 2, 0), c = 2, t′ = (0, 1, 0)
-    Source: polar decomposition, Shoemake & Duff 1992.
+    The factor R is a rotation, o the joint's own position in bind space, `pivots` (J, 3), and t′ its transformed
+    position. S is a symmetric stretch about o; a mirrored joint has all three factors negative. `scale` is the joint's
+    own, ∛det A. A blend takes one c for all joints of a vertex (`weighted_joints.scale_fractions`). If they all scale
+    equally, that is their scale: the blend is then the one without scale, enlarged. A joint that alone grows or shears
+    does so about its own position, and doesn't move vertices that it shares with its neighbors. decompose(2 · identity
+    about (0, 1, 0)) → S p = 2 p − (0, 2, 0), c = 2, t′ = (0, 1, 0) Source: polar decomposition, Shoemake & Duff 1992.
     """
     linear = matrices[..., :3]
     if _is_rotation(linear).all():
         return PolarDecomposition(quaternion.from_matrix(linear), matrices[..., 3])
-    return _has_shear(matrices, pivots)
+    return _decompose_sheared(matrices, pivots)
 
 
 def decompose_after(matrices: Floats, pivots: Floats, shape: Floats) -> PolarDecomposition:
-    """Return matrices (n, J, 3, 4) in the same parts where all joints' stretches begin with one, `shape` (3, 3).
+    """Return the decomposition of matrices (n, J, 3, 4) after a common stretch `shape` (3, 3).
 
     pivots: (J, 3) m, stretched by it.
     """
     bound = np.concatenate((matrices[..., :3] @ np.linalg.inv(shape), matrices[..., 3:]), axis=-1)
-    parts = _has_shear(bound, pivots)
+    parts = _decompose_sheared(bound, pivots)
     assert parts.scale_shear is not None
     whole = np.concatenate((parts.scale_shear[..., :3] @ shape, parts.scale_shear[..., 3:]), axis=-1)
     return replace(parts, scale_shear=whole)
 
 
 def joint_origins(rig: SkinBinding) -> Floats:
-    """Return where each joint (J, 3) stands in mesh space at bind time; the origin for one that has no such place."""
+    """Return the position of each joint (J, 3) in mesh space at bind time; the origin if undefined."""
     linear = rig.bind[..., :3]
     solvable = np.abs(np.linalg.det(linear)) > 0
     found = np.zeros((len(linear), 3))
@@ -66,7 +65,7 @@ def joint_origins(rig: SkinBinding) -> Floats:
 
 
 def _is_rotation(linear: Floats) -> Bools:
-    """Whether matrices (..., 3, 3) have no scale, shear or mirror; one that holds NaN has."""
+    """Return whether matrices (..., 3, 3) have no scale, shear or mirror; false for NaN."""
     x, y, z = np.ascontiguousarray(np.moveaxis(linear, (-1, -2), (0, 1)))  # by component: rows are fast
     unit = [_dot(each, each) - 1 for each in (x, y, z)]
     square = np.stack([*unit, _dot(x, y), _dot(y, z), _dot(z, x)])
@@ -78,29 +77,29 @@ def _dot(a: Sequence[Floats], b: Sequence[Floats]) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _has_shear(matrices: Floats, pivots: Floats) -> PolarDecomposition:
+def _decompose_sheared(matrices: Floats, pivots: Floats) -> PolarDecomposition:
     linear, moved = matrices[..., :3], matrices[..., 3]
-    turn, stretch = _polar(linear, np.swapaxes(linear, -1, -2) @ linear)
+    rotation, stretch = _polar(linear, np.swapaxes(linear, -1, -2) @ linear)
     whole = np.concatenate((stretch, -_times(stretch, pivots)[..., None]), axis=-1)
     scale = np.cbrt(np.linalg.det(linear))
-    return PolarDecomposition(quaternion.from_matrix(turn), _times(linear, pivots) + moved, whole, scale)
+    return PolarDecomposition(quaternion.from_matrix(rotation), _times(linear, pivots) + moved, whole, scale)
 
 
 def _polar(linear: Floats, square: Floats) -> tuple[Floats, Floats]:
-    """Rotation and stretch (..., 3, 3); the slow way only for matrices that are no rotation times a number."""
+    """Rotation and stretch (..., 3, 3); an SVD only for matrices that are no scaled rotation."""
     size = np.sqrt(np.trace(square, axis1=-2, axis2=-1) / 3)[..., None, None]
     sign = np.where(np.linalg.det(linear) < 0, -1.0, 1.0)[..., None, None]
     even = (np.abs(square - size**2 * np.eye(3)).max(axis=(-1, -2)) <= RIGID_TOLERANCE * size[..., 0, 0] ** 2) & (
         size[..., 0, 0] > 0
     )
-    turn = sign * linear / np.where(size > 0, size, 1)
+    rotation = sign * linear / np.where(size > 0, size, 1)
     stretch = sign * size * np.eye(3)
     if not even.all():
         u, factors, v = np.linalg.svd(linear[~even])
         flip = np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[:, None, None]
-        turn[~even] = flip * (u @ v)
+        rotation[~even] = flip * (u @ v)
         stretch[~even] = flip * (np.swapaxes(v, -1, -2) @ (factors[:, :, None] * v))
-    return turn, stretch
+    return rotation, stretch
 
 
 def _times(matrices: Floats, vectors: Floats) -> Floats:

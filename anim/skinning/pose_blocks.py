@@ -1,4 +1,4 @@
-"""Some frames of a whole scene: what skinning needs of a clip."""
+"""Blocks of frames of a scene: the input of skinning."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from anim.sampling.pose import PoseSampler, world_by_node
 
 @dataclass(frozen=True, slots=True)
 class PoseBlock:
-    """F frames at `times` (F,) s: world_from_node (N, F, 3, 4), and animated morph weights (F, M) by node number."""
+    """F frames at `times` (F,) s: world_from_node (N, F, 3, 4), and animated morph weights (F, M) by node."""
 
     times: Floats
     world: Floats
     weights: Mapping[int, Floats]
 
     def part(self, span: slice) -> PoseBlock:
-        """Return some of the frames, in the same memory."""
+        """Return some of the frames, as views."""
         weights = {node: values[span] for node, values in self.weights.items()}
         return PoseBlock(self.times[span], self.world[:, span], weights)
 
 
 class PosePlayback:
-    """A clip on a skeleton, to be asked for many stretches of time: its keys are put in order once."""
+    """Pose sampler of a clip on a skeleton, prepared once for many time spans."""
 
     def __init__(self, skeleton: Skeleton, clip: Clip) -> None:
         self._skeleton, self._poses = skeleton, PoseSampler(skeleton, clip)
@@ -39,5 +39,5 @@ class PosePlayback:
 
 
 def rest_block(skeleton: Skeleton) -> PoseBlock:
-    """Return one frame, of the nodes at rest."""
+    """Return one frame, of the rest pose."""
     return PosePlayback(skeleton, Clip("", ())).at(np.zeros(1))

@@ -1,4 +1,4 @@
-"""Joints that scale by different factors along different axes, where tools differ on all methods but lbs."""
+"""Joints with non-uniform scale or shear, where tools differ on all methods but lbs."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from anim.skinning.bound_mesh import BoundMesh
 from anim.skinning.pose_blocks import PosePlayback
 from anim.skinning.weighted_joints import bind_shape
 
-UNEVEN_SCALE = 1e-3  # by how much factors may differ, as a share; rounding in files leaves less
-AT_ONCE = 256  # frames
+UNEVEN_SCALE = 1e-3  # relative difference of scale factors; rounding in files leaves less
+CHUNK_FRAMES = 256  # frames
 
 
 def uneven_joints(made: Baker, clip: Clip, times: Floats) -> tuple[int, ...]:
-    """Return the nodes of joints with weight that scale unevenly, or shear, at any of `times` (F,) s, increasing.
+    """Return the joints with weight that scale unevenly, or shear, at any of `times` (F,) s, increasing.
 
-    A stretch that all bind matrices of a mesh have alike doesn't count: it is undone before joints move the mesh.
+    As node indices. A common stretch of all bind matrices of a mesh doesn't count: it is undone before joints move the
+    mesh.
     """
     playback = PosePlayback(made.scene.skeleton, clip)
     found: set[int] = set()
-    for first in range(0, len(times), AT_ONCE):
-        frames = playback.at(times[first : first + AT_ONCE])
+    for first in range(0, len(times), CHUNK_FRAMES):
+        frames = playback.at(times[first : first + CHUNK_FRAMES])
         for layer in made.layers:
             found |= _uneven(layer, layer.matrices(frames, slice(None)))
     return tuple(sorted(found))
 
 
 def _uneven(layer: BoundMesh, matrices: Floats) -> set[int]:
-    """matrices: (n, J, 3, 4) of a mesh's joints."""
+    """The same of one mesh. matrices: (n, J, 3, 4) of its joints."""
     used = np.unique(layer.rig.joint)
     linear, shape = matrices[:, used, :, :3], bind_shape(layer.rig)
     if shape is not None:

@@ -1,4 +1,4 @@
-"""Normals of moving vertices that have none of their own: the mean of their faces, by area."""
+"""Area-weighted vertex normals for meshes without normals."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from anim.skinning.kernels.layout import FloatArray
 
 @dataclass(frozen=True)
 class SmoothNormals:
-    """Unit normals (n, V, 3) of frames; a vertex without faces, or whose faces cancel out, gets 0.
+    """Unit normals (n, V, 3) of frames; 0 for a vertex without faces, or whose faces cancel out.
 
-    glTF wants flat shading where normals are missing. A cache has one normal a vertex, so that is what comes out
-    where no vertices are shared between faces, and the smooth look elsewhere.
+    glTF requires flat shading if normals are missing. A cache has one normal per vertex, so shading is flat only if no
+    vertices are shared between faces, and smooth elsewhere.
     """
 
     faces: Ints

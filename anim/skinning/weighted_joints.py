@@ -1,4 +1,4 @@
-"""The joints of a rig that carry weight, as methods that turn vertices read them."""
+"""The joints of a rig with weight, in the layout of rotation-based methods."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from anim.skinning.kernels.layout import FloatArray, Influences, ScaleShear, gro
 from anim.skinning.methods.skinner import lanes
 from anim.skinning.polar_decomposition import PolarDecomposition, decompose, decompose_after, joint_origins
 
-SCALE_TOLERANCE = 1e-4  # how far a bind matrix's stretch may be from a uniform one without being one
+SCALE_TOLERANCE = 1e-4  # deviation of a bind matrix's stretch from a uniform one
 
 
 @dataclass(frozen=True)
 class WeightedJoints:
-    """Joints with weight: another one may have any bind scale, and moves nothing.
+    """Joints with weight; others may have any bind scale, and move nothing.
 
-    used: (U,) their numbers in the rig, increasing. shape: (3, 3) bind_from_mesh, symmetric, None where it is 1: a mesh
-    bound with a non-uniform scale is stretched first. pivots: (U, 3) m, where the joints stand in bind space.
-    influences: by numbers into `used`. ruling: the same influences with
-    the shares by which their scales make up that of the vertex.
+    used: (U,) their indices in the rig, increasing. shape: (3, 3) bind_from_mesh, symmetric, None for 1: a mesh bound
+    with a non-uniform scale is stretched first. pivots: (U, 3) m, positions of the joints in bind space. influences: by
+    indices into `used`. scale_influences: the same influences with the fractions of their scales in that of the vertex.
     """
 
     rig: SkinBinding
@@ -30,40 +29,40 @@ class WeightedJoints:
     shape: Floats | None = field(init=False, repr=False)
     pivots: Floats = field(init=False, repr=False)
     influences: Influences = field(init=False, repr=False)
-    ruling: Influences = field(init=False, repr=False)
+    scale_influences: Influences = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         used = np.unique(self.rig.joint).astype(np.int64)
-        held = self.rig.influences._replace(joint=np.searchsorted(used, self.rig.joint).astype(np.int32))
+        influences = self.rig.influences._replace(joint=np.searchsorted(used, self.rig.joint).astype(np.int32))
         shape, places = bind_shape(self.rig), joint_origins(self.rig)[used]
         for name, value in (
             ("used", used),
             ("shape", shape),
             ("pivots", places if shape is None else places @ shape),
-            ("influences", group_influences(held)),
-            ("ruling", group_influences(held._replace(weight=scale_fractions(self.rig)))),
+            ("influences", group_influences(influences)),
+            ("scale_influences", group_influences(influences._replace(weight=scale_fractions(self.rig)))),
         ):
             object.__setattr__(self, name, value)
 
     def split(self, matrices: Floats) -> PolarDecomposition:
-        """Return the parts of matrices (n, J, 3, 4) of all of the rig's joints, for those with weight."""
+        """Return the decomposition of matrices (n, J, 3, 4) of all of the rig's joints, for those with weight."""
         mine = matrices if len(self.used) == matrices.shape[1] else matrices[:, self.used]
         return decompose(mine, self.pivots) if self.shape is None else decompose_after(mine, self.pivots, self.shape)
 
     def scale_shear(self, parts: PolarDecomposition) -> ScaleShear | None:
-        """Return stretches as kernels read them, None of rigid parts."""
+        """Return scale-shear in the layout of kernels, None for rigid parts."""
         if parts.scale_shear is None or parts.scale is None:
             return None
         rows = parts.scale_shear.reshape(*parts.scale.shape, 12)
         places = np.broadcast_to(self.pivots, (*parts.scale.shape, 3))
-        return ScaleShear(lanes(np.concatenate((rows, places), axis=-1)), lanes(parts.scale), self.ruling)
+        return ScaleShear(lanes(np.concatenate((rows, places), axis=-1)), lanes(parts.scale), self.scale_influences)
 
 
 def bind_shape(rig: SkinBinding) -> Floats | None:
-    """Return the symmetric matrix (3, 3) of determinant 1 by which bind matrices stretch the mesh, None for no stretch.
+    """Return the symmetric matrix (3, 3) of determinant 1 of the bind matrices' stretch, None for none.
 
     A bind matrix is a rotation after a stretch; this is the stretch without its scale, the mean over the joints by
-    their weight. Exporters leave it there where a mesh with a non-uniform scale was bound.
+    their weight. Exporters leave it there if a mesh with a non-uniform scale was bound.
     """
     linear = rig.bind[..., :3]
     _, factors, axes = np.linalg.svd(linear)
@@ -77,11 +76,11 @@ def bind_shape(rig: SkinBinding) -> Floats | None:
 
 
 def scale_fractions(rig: SkinBinding) -> FloatArray:
-    """Return the shares (E,) by which the scales of a vertex's joints make up the one scale of the vertex.
+    """Return the fractions (E,) of the joints' scales in the single scale of each vertex.
 
-    Two joints that blend are as far apart as the scale of the upper one makes them, so each pair takes that one's;
-    where none is above the other, the mean of both. Pairs count by the product of their weights. So nothing outside
-    of the vertex's own joints matters, and the shares change as smoothly as the weights.
+    The distance of two blended joints follows the scale of the upper one, so each pair takes that one's;
+    if neither is an ancestor of the other, the mean of both. Pairs count by the product of their weights. So only
+    the vertex's own joints matter, and the fractions change as smoothly as the weights.
     (hip 0.75, knee 0.25) → 1, 0
     """
     counts = np.diff(rig.start)
@@ -89,23 +88,23 @@ def scale_fractions(rig: SkinBinding) -> FloatArray:
     places = np.where(there, rig.start[:-1, None] + np.arange(rig.max_count), 0)
     joint = np.where(there, rig.joint[places] if len(rig.joint) else 0, 0)
     weight = np.where(there, rig.weight[places] if len(rig.joint) else 0, 0).astype(np.float64)
-    shares, above = np.zeros(weight.shape), is_ancestor(rig.ancestors)
+    fractions, above = np.zeros(weight.shape), is_ancestor(rig.ancestors)
     for i in range(rig.max_count):
         for k in range(i + 1, rig.max_count):
             first = 0.5 + (above[joint[:, i], joint[:, k]] - above[joint[:, k], joint[:, i]]) / 2
             amount = weight[:, i] * weight[:, k]
-            shares[:, i] += amount * first
-            shares[:, k] += amount * (1 - first)
-    alone = shares.sum(axis=1) == 0
-    shares[alone] = np.arange(rig.max_count) == 0
-    shares /= np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    return shares[there].astype(np.float32)
+            fractions[:, i] += amount * first
+            fractions[:, k] += amount * (1 - first)
+    alone = fractions.sum(axis=1) == 0
+    fractions[alone] = np.arange(rig.max_count) == 0
+    fractions /= np.maximum(fractions.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    return fractions[there].astype(np.float32)
 
 
 def is_ancestor(above: Ints) -> Floats:
-    """Return 1 where joint j hangs on joint i, anywhere below it (J, J), else 0. above: (J,), as in a rig.
+    """Return 1 if joint j is a descendant of joint i (J, J), else 0. above: (J,), as in a rig.
 
-    is_above([-1, 0]) → [[0, 1], [0, 0]]
+    is_ancestor([-1, 0]) → [[0, 1], [0, 0]]
     """
     found = np.zeros((len(above), len(above)))
     for j in range(len(above)):

@@ -10,7 +10,7 @@ from typing import Any
 
 from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
 from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed
-from anim.skinning.analysis.method_scores import BULGE, MethodScore
+from anim.skinning.analysis.method_scores import BULGE_RATIO, MethodScore
 from anim.skinning.analysis.recommendations import CollapseFinding, recommend
 from cli import tables
 from cli.text import plural
@@ -72,7 +72,7 @@ def as_json(seen: CollapseReport) -> str:
         "bulge_clamp": seen.clamped,
         "low_index": LOW_INDEX,
         "low_volume": MIN_VOLUME_FRACTION,
-        "bulge_ratio": BULGE,
+        "bulge_ratio": BULGE_RATIO,
         "skinned_meshes": seen.meshes,
         "clips": list(clips.values()),
         "advice": list(recommend(seen.found, clamped=seen.clamped)),

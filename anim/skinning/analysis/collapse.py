@@ -1,4 +1,4 @@
-"""How much linear blending loses in a clip, and how other methods fare: candy wrappers, volumes, bulges."""
+"""Collapse of linear blending in a clip, and scores of other methods: candy wrappers, volumes, bulges."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from anim.skinning.analysis.collapse_index import CollapsePoint, collapse_indice
 from anim.skinning.analysis.method_scores import MethodScore, bind_measures, score_method
 from anim.skinning.bake import prepare_bake
 
-LOW_INDEX = 0.7  # collapse index below which skin looks pinched: what a quarter turn between two joints makes
+LOW_INDEX = 0.7  # collapse index below which skin looks pinched: that of 90° between two joints
 
 
 @dataclass(frozen=True, slots=True)
 class MeshCollapse:
     """One skinned mesh in one clip.
 
-    indices: (F,) least collapse index of its vertices at each of `times` (F,) s. worst: where it is least of all.
-    low: share of vertices that are ever below 0.7. inverted: share that is ever turned inside out.
-    closed: share of faces that enclose a volume. methods: how each of them fared.
+    indices: (F,) smallest collapse index of its vertices at each of `times` (F,) s. worst: location of the minimum.
+    low: fraction of vertices that are ever below 0.7. inverted: fraction that is ever inside out.
+    closed: fraction of faces that enclose a volume. methods: score of each method.
     """
 
     mesh: str
@@ -45,21 +45,20 @@ def collapse(
     bulge_clamp: bool = False,
     nodes: Sequence[int] | None = None,
 ) -> tuple[MeshCollapse, ...]:
-    """Return what happens to each skinned mesh of a scene at `times` (F,) s while a clip plays.
+    """Return the collapse of each skinned mesh of a scene at `times` (F,) s of a clip.
 
-    The collapse index of a vertex belongs to linear blending; the methods are compared by the volume that they enclose
-    and by how far they stand off the links. bulge_clamp: with the clamp on methods other than lbs. nodes: only meshes
-    on these. For many clips make a `Comparison`.
-    collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707
-    Source: notes/algorithms.md E3.
+    The collapse index of a vertex belongs to linear blending; the methods are compared by enclosed volume and by
+    distance from the bones. bulge_clamp: with the clamp on methods other than lbs. nodes: only meshes on these. For
+    many clips create a `Comparison`. collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707 Source:
+    notes/algorithms.md E3.
     """
     return Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=nodes).of(clip, times=times)
 
 
 class Comparison:
-    """Methods side by side on one scene, ready for any clip. meshes: how many are looked at.
+    """Comparison of methods on one scene, for any clip. meshes: number of compared meshes.
 
-    Raises NotFoundError where there is no skinned mesh, RangeError for a bulge clamp where lbs is the only method.
+    Raises NotFoundError without a skinned mesh, RangeError for a bulge clamp if lbs is the only method.
     """
 
     def __init__(
@@ -87,7 +86,7 @@ class Comparison:
     def of(
         self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda methods: None
     ) -> tuple[MeshCollapse, ...]:
-        """Return what happens to each mesh while a clip plays. progress: called with the methods done."""
+        """Return the collapse of each mesh in a clip. progress: called with the number of methods done."""
         by_method = []
         for i, (method, made) in enumerate(self._bakers.items()):
             by_method.append(list(score_method(made, self._linear, method, self._subjects, clip, times)))

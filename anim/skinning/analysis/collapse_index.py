@@ -1,4 +1,4 @@
-"""The collapse index: how flat linear blending makes the space around a vertex."""
+"""Collapse index: volume loss of linear blending around a vertex."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from anim.skinning.methods.skinner import fill_lanes, lanes
 from anim.skinning.polar_decomposition import decompose, joint_origins
 from anim.skinning.pose_blocks import PosePlayback, rest_block
 
-TWIST = 0.7  # cosine between the axis of a turn and the link, above which the turn is a twist
+MIN_TWIST_COSINE = 0.7  # between rotation axis and bone, above which the rotation is a twist
 
 
 @dataclass(frozen=True, slots=True)
 class CollapsePoint:
-    """The vertex and time where linear blending is narrowest.
+    """The vertex and time of the smallest collapse index.
 
-    index: √ of the volume factor: 1 rigid, 0 flat or inside out; the radius of a twisted ring against that at rest.
+    index: √ of the volume factor: 1 rigid, 0 flat or inside out; radius of a twisted ring relative to rest.
     vertex: of the mesh. joint, other: names of its two strongest joints. time: s. angle: rad between the two then.
-    twist: whether they turn about the link between them, rather than bend.
+    twist: whether they rotate about the bone between them, rather than bend.
     """
 
     index: float
@@ -42,7 +42,7 @@ class CollapseIndices:
     """Collapse indices of one mesh in one clip.
 
     least: (V,) of each vertex at its worst time. by_frame: (F,) of the worst vertex. inverted: (V,) whether it is ever
-    turned inside out.
+    inside out.
     """
 
     least: Floats
@@ -52,7 +52,7 @@ class CollapseIndices:
 
 
 def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) -> CollapseIndices:
-    """Return the collapse indices of a skinned mesh at `times` (F,) s while a clip plays.
+    """Return the collapse indices of a skinned mesh at `times` (F,) s of a clip.
 
     √D with D = ±det(Σ w A) / Π |det A|^w, A the linear parts of the joints' matrices and w the skin weights: scales
     are divided out, and so is the mirroring of a vertex all of whose joints are mirrored at rest (the minus). Joints
@@ -62,9 +62,9 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
 
     rig = layer.rig
     playback = PosePlayback(scene.skeleton, clip)
-    held, sides = (
+    influences, sides = (
         group_influences(rig.influences),
-        _sides(rig, layer.matrices(rest_block(scene.skeleton), slice(None))[0]),
+        _mirror_signs(rig, layer.matrices(rest_block(scene.skeleton), slice(None))[0]),
     )
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
@@ -72,7 +72,7 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
     for first in range(0, len(times), LANES):
         matrices = layer.matrices(playback.at(times[first : first + LANES]), slice(None))
         factors: FloatArray = np.empty((len(rig.points), len(matrices)), np.float32)
-        volume_ratio(held, lanes(matrices), _logs(matrices), factors)
+        volume_ratio(influences, lanes(matrices), _log_volumes(matrices), factors)
         factors *= sides[:, None]
         factors[~np.isfinite(factors) | (np.diff(rig.start) == 0)[:, None]] = 1
         by_frame[first : first + LANES] = factors.min(axis=0, initial=1)
@@ -87,15 +87,15 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
     return CollapseIndices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
 
 
-def _sides(rig: SkinBinding, still: Floats) -> FloatArray:
-    """−1 for each vertex (V,) whose joints are all mirrored in matrices (J, 3, 4) at rest, 1 for the others."""
+def _mirror_signs(rig: SkinBinding, still: Floats) -> FloatArray:
+    """−1 for each vertex (V,) if all its joints are mirrored in matrices (J, 3, 4) at rest, else 1."""
     signs, size = np.sign(np.linalg.det(still[..., :3]))[rig.joint], len(rig.points)
     vertex = np.repeat(np.arange(size), np.diff(rig.start))
     mirrored, others = np.bincount(vertex, signs < 0, size), np.bincount(vertex, signs > 0, size)
     return np.where((mirrored > 0) & (others == 0), -1, 1).astype(np.float32)
 
 
-def _logs(matrices: Floats) -> FloatArray:
+def _log_volumes(matrices: Floats) -> FloatArray:
     """log |det A| (J, LANES); NaN for a flat joint."""
     sizes = np.abs(np.linalg.det(matrices[..., :3]))
     return fill_lanes(np.log(np.where(sizes > 0, sizes, np.nan)).T)
@@ -105,17 +105,17 @@ def _collapse_point(
     names: Skeleton, layer: BoundMesh, playback: PosePlayback, vertex: int, time: float, index: float
 ) -> CollapsePoint:
     rig = layer.rig
-    held = rig.joint[rig.start[vertex] : rig.start[vertex + 1]].tolist()
-    if not held:
+    influences = rig.joint[rig.start[vertex] : rig.start[vertex + 1]].tolist()
+    if not influences:
         return CollapsePoint(index, vertex, "", "", time, 0.0, False)
-    a, b = held[0], held[1] if len(held) > 1 else held[0]
+    a, b = influences[0], influences[1] if len(influences) > 1 else influences[0]
     matrices = layer.matrices(playback.at(np.array([time])), slice(None))
     places = joint_origins(rig)[[a, b]]
     first, second = decompose(matrices[:, [a, b]], places).rotation[0]
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(first), second))
     angle, link = float(np.linalg.norm(turn)), places[1] - places[0]
     along = abs(float(turn @ link))
-    is_twist = along > TWIST * angle * float(np.linalg.norm(link)) and along > 0
+    is_twist = along > MIN_TWIST_COSINE * angle * float(np.linalg.norm(link)) and along > 0
     return CollapsePoint(index, vertex, _name(names, rig.nodes[a]), _name(names, rig.nodes[b]), time, angle, is_twist)
 
 

@@ -1,4 +1,4 @@
-"""Which parts of a mesh enclose a volume, and how much it is."""
+"""Closed parts of a mesh, and their enclosed volume."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from anim.arrays import AnyArray, Bools, Floats, Ints
 
 
 def watertight_faces(points: Floats, faces: Ints) -> Bools:
-    """Return which faces (T,) belong to closed parts: after equal points count as one, every edge has two sides.
+    """Return the faces (T,) of closed parts: with equal points merged, every edge has two opposite faces.
 
-    Points are equal where they agree to trimesh's tolerance (1e-8 m). A part whose faces don't all turn the same way
-    has no volume and counts as open.
+    Points are equal if they agree to trimesh's tolerance (1e-8 m). A part with inconsistent winding has no volume and
+    counts as open.
     """
     import trimesh
 
@@ -36,9 +36,9 @@ def watertight_faces(points: Floats, faces: Ints) -> Bools:
 
 
 def volumes(positions: AnyArray, faces: Ints) -> Floats:
-    """Return the volume (F,) in m³ that closed faces (T, 3) enclose at positions (F, V, 3); negative inside out.
+    """Return the volume (F,) in m³ of closed faces (T, 3) at positions (F, V, 3); negative inside out.
 
-    A sixth of the sum of a · (b × c), about each frame's own middle, so that far from the origin no digits are lost.
+    A sixth of the sum of a · (b × c), about each frame's own center, so that far from the origin no digits are lost.
     """
     found = np.zeros(len(positions))
     for f, points in enumerate(positions):

@@ -1,6 +1,6 @@
-"""What frames don't show: where vertices are between them, while whoever plays them goes straight from one to the next.
+"""Inter-frame error of a bake: distance between the motion and linear interpolation of frames.
 
-Joints turn between keys, and vertices on them go in arcs: frames at keys far apart cut these short.
+Joints rotate between keys, and their vertices follow arcs: frames at keys far apart cut these short.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from anim.arrays import Floats
 from anim.model import Clip
 from anim.skinning.bake import Baker
 
-MIN_INTERVAL_S = 0.05  # shorter intervals are as short as in most clips
-MAX_INTERVALS = 16  # the longest, which are sampled
-PARTS = 8  # an eased motion is straight at half of an interval, and far from it elsewhere
+MIN_INTERVAL_S = 0.05  # frames closer than this are as dense as in most clips
+MAX_INTERVALS = 16  # the widest intervals only
+NUM_PARTS = 8  # samples per interval: an eased motion has no error half-way, but elsewhere
 
 
 class InbetweenError(NamedTuple):
-    """How far (m) a vertex is from its place on the way straight from the frame before to the next, and when (s)."""
+    """Largest distance (m) of a vertex from linear interpolation between frames, and its time (s)."""
 
     distance: float
     time: float
 
 
 def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
-    """Return the most that is missed between frames at `times` (F,) s, increasing, in the widest gaps.
+    """Return the largest inter-frame error between frames at `times` (F,) s, increasing.
 
-    Looked at: the ends of seven eighths of each gap, and the last moment before its end, where a STEP track is as far
-    off as it jumps. Elsewhere it may be some percent more.
+    Sampled in the widest intervals, at the ends of seven eighths of each, and just before its end, where a STEP track
+    has its full error. Elsewhere it may be some percent more.
     """
     gaps = np.diff(times)
     chosen = np.sort(np.argsort(-gaps, kind="stable")[:MAX_INTERVALS])
@@ -38,19 +38,19 @@ def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
     if not len(chosen):
         return most
     before, after = times[chosen], times[chosen + 1]
-    for part in range(1, PARTS + 1):
-        at = np.nextafter(after, before) if part == PARTS else before + (after - before) * (part / PARTS)
-        most = max(most, _missed(baker, clip, (before, at, after), part / PARTS))
+    for part in range(1, NUM_PARTS + 1):
+        at = np.nextafter(after, before) if part == NUM_PARTS else before + (after - before) * (part / NUM_PARTS)
+        most = max(most, _error_at(baker, clip, (before, at, after), part / NUM_PARTS))
     return most
 
 
-def _missed(baker: Baker, clip: Clip, times: tuple[Floats, Floats, Floats], share: float) -> InbetweenError:
-    """The most that is missed at the second of three times, that share of the way from the first to the third."""
+def _error_at(baker: Baker, clip: Clip, times: tuple[Floats, Floats, Floats], u: float) -> InbetweenError:
+    """The error at the second of three times, at fraction `u` from the first to the third."""
     most = InbetweenError(0.0, 0.0)
     three = (baker.bake(clip, times=each).chunks() for each in times)
     for low, here, high in zip(*three, strict=True):
-        off = here.positions - (low.positions * (1 - share) + high.positions * share)
-        squared = np.einsum("fvi,fvi->fv", off, off).max(axis=1)
+        error = here.positions - (low.positions * (1 - u) + high.positions * u)
+        squared = np.einsum("fvi,fvi->fv", error, error).max(axis=1)
         frame = int(squared.argmax())
         most = max(most, InbetweenError(float(np.sqrt(squared[frame])), float(times[1][here.first + frame])))
     return most

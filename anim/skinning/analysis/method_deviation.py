@@ -1,4 +1,4 @@
-"""How far a method places vertices from where linear blending, and so every player, has them."""
+"""Deviation of a method from linear blending, the result in every player."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from anim.skinning.bake import Baker, prepare_bake
 
 
 class Deviation(NamedTuple):
-    """The largest distance (m) of a vertex from its place by linear blending, and when (s). size: m, of the model."""
+    """Largest distance (m) of a vertex from its position by linear blending, and its time (s).
+
+    size: m, of the model.
+    """
 
     distance: float
     time: float
@@ -20,13 +23,13 @@ class Deviation(NamedTuple):
 
 
 def linear_baker(made: Baker, *, space: str) -> Baker:
-    """Return what bakes the same meshes by linear blending, positions only. space: as `made` has it."""
+    """Return a baker of the same meshes by linear blending, positions only. space: that of `made`."""
     nodes = sorted({layer.instance.node for layer in made.layers})
     return prepare_bake(made.scene, space=space, rigid=True, nodes=nodes, threads=made.threads)
 
 
 def deviation(made: Baker, linear: Baker, clip: Clip, times: Floats) -> Deviation:
-    """Return how far `made` is from `linear`, bakers of the same meshes, in the frames at `times` (F,)."""
+    """Return the deviation of `made` from `linear`, bakers of the same meshes, at `times` (F,)."""
     size = model_size(made)
     most = Deviation(0.0, 0.0, size)
     both = (each.bake(clip, times=times).chunks() for each in (made, linear))
@@ -44,5 +47,5 @@ def max_distance(positions: AnyArray, others: AnyArray) -> Floats:
 
 
 def model_size(made: Baker) -> float:
-    """Return the diagonal in metres of the box around all vertices at rest; infinity where they have no extent."""
+    """Return the diagonal in metres of the vertices' bounding box at rest; infinity for an extent of 0."""
     return float(np.linalg.norm(np.ptp(made.rest, axis=0))) or np.inf

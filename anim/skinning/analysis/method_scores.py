@@ -1,4 +1,4 @@
-"""How one method fares in a clip: what the mesh encloses, and how far it stands off its links."""
+"""Scores of one method in a clip: enclosed volume, and distance from the bones."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, clamp
 from anim.skinning.pose_blocks import PoseBlock, PosePlayback, rest_block
 from anim.skinning.weighted_joints import is_ancestor
 
-BULGE = 1.05  # distance from the links, against that in bind pose, above which a vertex bulges
-NEAR = 0.25  # of the middle distance: what lies nearer to a link has no ratio worth a word
+BULGE_RATIO = 1.05  # distance from the bones relative to bind pose, above which a vertex bulges
+MIN_DISTANCE_FRACTION = 0.25  # of the median distance: nearer vertices have no meaningful ratio
 
 
 @dataclass(frozen=True, slots=True)
 class MethodScore:
-    """How one method fared on one mesh.
+    """Score of one method on one mesh.
 
-    volume: (F,) enclosed against bind pose, None where no part of the mesh is closed.
-    bulge: greatest distance of a vertex between two joints from their links, against that in bind pose.
-    bulging: share of all vertices that are ever above 1.05. vertex, joint, time: where and when bulge is.
-    off, off_time: largest distance (m) of a vertex from where linear blending has it, and when (s). unusable: whether
-    that is more than the size of the model.
+    volume: (F,) enclosed, relative to bind pose; None without a closed part.
+    bulge: largest distance of a vertex between two joints from their bones, relative to bind pose.
+    bulging: fraction of all vertices that are ever above 1.05. vertex, joint, time: location of the bulge.
+    max_distance, max_distance_time: largest distance (m) of a vertex from linear blending, and its time (s). unusable:
+    whether that is more than the size of the model.
     """
 
     method: str
@@ -47,9 +47,9 @@ class MethodScore:
 
 @dataclass(frozen=True, slots=True)
 class BindMeasures:
-    """What of a mesh in bind pose later poses are held against.
+    """Measures of a mesh in bind pose, the reference for later poses.
 
-    faces: (C, 3) of closed parts. volume: m³ that they enclose, below 0 where the skeleton mirrors the mesh at rest.
+    faces: (C, 3) of closed parts. volume: m³ enclosed, below 0 if the skeleton mirrors the mesh at rest.
     watched: (W,) vertices whose bulge counts.
     """
 
@@ -61,7 +61,7 @@ class BindMeasures:
 
 
 def bind_measures(layer: BoundMesh, skeleton: Skeleton) -> BindMeasures:
-    """Return the measures of a mesh in bind pose, which a skeleton moves."""
+    """Return the measures of a mesh in bind pose under a skeleton."""
     rig = layer.rig
     faces = rig.faces[watertight_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
@@ -69,14 +69,14 @@ def bind_measures(layer: BoundMesh, skeleton: Skeleton) -> BindMeasures:
     of = bone_segments(rig)
     shared = of.fraction > 0
     middle = float(np.median(of.distance[shared])) if shared.any() else 0.0
-    watched = np.flatnonzero(shared & (of.distance > NEAR * middle))
+    watched = np.flatnonzero(shared & (of.distance > MIN_DISTANCE_FRACTION * middle))
     return BindMeasures(layer, faces if volume else faces[:0], volume, of, watched)
 
 
 def score_method(
     baker: Baker, linear: Baker, method: str, subjects: list[BindMeasures], clip: Clip, times: Floats
 ) -> Iterator[MethodScore]:
-    """Yield how each of the baker's meshes fares at `times` (F,) s while a clip plays. linear: the same by lbs."""
+    """Yield the score of each of the baker's meshes at `times` (F,) s of a clip. linear: the same by lbs."""
     seen = [_Extremes(each, len(times)) for each in subjects]
     playback, limit = PosePlayback(baker.scene.skeleton, clip), model_size(baker)
     chunks = baker.bake(clip, times=times).chunks()
@@ -86,11 +86,11 @@ def score_method(
         for each in seen:
             each.add(chunk, other, frames)
     for each in seen:
-        yield each.summed(method, baker.scene.skeleton, times, limit)
+        yield each.score(method, baker.scene.skeleton, times, limit)
 
 
 class _Extremes:
-    """What was seen of one mesh up to now."""
+    """Extreme values of one mesh over the frames so far."""
 
     def __init__(self, of: BindMeasures, frames: int) -> None:
         self._of = of
@@ -100,13 +100,13 @@ class _Extremes:
         self._off = np.zeros(frames)
 
     def add(self, chunk: FrameChunk, linear: FrameChunk, frames: PoseBlock) -> None:
-        """Look at some frames. linear: the same frames by linear blending."""
+        """Add some frames. linear: the same frames by linear blending."""
         of, rig = self._of, self._of.layer.rig
         matrices = of.layer.matrices(frames, slice(None))
         span = slice(of.layer.at, of.layer.at + len(rig.points))
         if chunk is not linear:
-            off = max_distance(chunk.positions[:, span], linear.positions[:, span])
-            self._off[chunk.first : chunk.first + len(off)] = off
+            distance = max_distance(chunk.positions[:, span], linear.positions[:, span])
+            self._off[chunk.first : chunk.first + len(distance)] = distance
         if len(of.faces):
             enclosed = volumes(chunk.positions[:, span], of.faces)
             unit = of.volume * np.abs(_common_volume(rig, matrices))
@@ -130,8 +130,8 @@ class _Extremes:
         self._when[most > self._bulge] = first + at[most > self._bulge]
         self._bulge = np.maximum(self._bulge, most)
 
-    def summed(self, method: str, skeleton: Skeleton, times: Floats, limit: float) -> MethodScore:
-        """Return what came of it. limit: m from linear blending above which a method is unusable."""
+    def score(self, method: str, skeleton: Skeleton, times: Floats, limit: float) -> MethodScore:
+        """Return the score. limit: m from linear blending above which a method is unusable."""
         of, rig = self._of, self._of.layer.rig
         volume = self._volume if len(of.faces) else None
         most_off = float(self._off.max(initial=0.0))
@@ -141,16 +141,16 @@ class _Extremes:
         most = int(self._bulge.argmax())
         vertex = int(of.watched[most])
         node = int(rig.nodes[rig.joint[rig.start[vertex]]])
-        bulging = float((self._bulge > BULGE).sum()) / len(rig.points)
+        bulging = float((self._bulge > BULGE_RATIO).sum()) / len(rig.points)
         where = (vertex, skeleton.names[node] or f"node {node}", float(times[self._when[most]]))
         return MethodScore(method, volume, float(self._bulge[most]), bulging, *where, *away)
 
 
 def _common_volume(rig: SkinBinding, matrices: Floats) -> Floats:
-    """How much larger (n,) matrices (n, J, 3, 4) make a volume: the rig's unit, or a scaled root; < 0 if it mirrors.
+    """Volume factor (n,) of matrices (n, J, 3, 4): the rig's unit, or a scaled root; < 0 if it mirrors.
 
-    The middle over joints with weight, each counted with all the weight that hangs on it or on joints below it, for
-    that is what its scale acts on. A few joints that grow or shrink don't count.
+    The weighted median over joints with weight, each with the weight of all joints in its subtree, because its scale
+    acts on them. A few joints that grow or shrink don't count.
     """
     own = np.bincount(rig.joint, rig.weight, minlength=len(rig.nodes))
     weight = np.where(own > 0, own + is_ancestor(rig.ancestors) @ own, 0)

@@ -1,4 +1,4 @@
-"""How methods stand against each other on meshes, and which of them did best."""
+"""Ranking of skinning methods over meshes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 from anim.skinning.analysis.collapse import MeshCollapse
 
-SAME_VOLUME_FRACTION = 0.02  # of the volume, 1 % of a ring's radius: less between two methods is not seen
-FINE = 2  # digits of a bulge that count
+SAME_VOLUME_FRACTION = 0.02  # of the volume, 1 % of a ring's radius: a smaller difference is invisible
+BULGE_DIGITS = 2  # decimals of a bulge in comparisons
 
 
 @dataclass(frozen=True, slots=True)
 class RankedMethod:
-    """What one method did to meshes at worst.
+    """Worst scores of one method over meshes.
 
-    volume: least against bind pose, None where no part is closed. bulge: greatest, against bind pose.
-    unusable: whether any is farther from linear blending than the model is large.
+    volume: smallest, relative to bind pose; None without a closed part. bulge: largest, relative to bind pose.
+    unusable: whether any deviation from linear blending exceeds the model's size.
     """
 
     method: str
@@ -26,7 +26,7 @@ class RankedMethod:
 
 
 def rank_methods(meshes: Sequence[MeshCollapse]) -> tuple[RankedMethod, ...]:
-    """Return how each method stands over all of the meshes (at least one), in the order in which it was measured."""
+    """Return the worst scores of each method over all meshes (at least one), in the order of measurement."""
     found = []
     for fared in zip(*(each.methods for each in meshes), strict=True):
         volumes = [float(each.volume.min()) for each in fared if each.volume is not None]
@@ -38,16 +38,16 @@ def rank_methods(meshes: Sequence[MeshCollapse]) -> tuple[RankedMethod, ...]:
 
 
 def best_method(found: Sequence[RankedMethod]) -> RankedMethod | None:
-    """Return the method other than lbs that did best; None where there is none that can be used.
+    """Return the best method other than lbs; None without a usable one.
 
-    The one that keeps most of the volume (what is above bind pose is no gain); of those within 2 % of it the one that
-    bulges least; of equal ones the first. Where nothing is closed, bulge alone decides.
+    The one that keeps most of the volume (more than in bind pose is no gain); of those within 2 % of it the one with
+    the smallest bulge; of equal ones the first. Without a closed part, bulge alone decides.
     """
     others = [each for each in found if each.method != "lbs" and not each.unusable]
-    most = max((_is_kept(each) for each in others), default=0.0)
-    near = [each for each in others if _is_kept(each) >= most - SAME_VOLUME_FRACTION]
-    return min(near, key=lambda each: round(each.bulge, FINE), default=None)
+    most = max((_kept_volume(each) for each in others), default=0.0)
+    near = [each for each in others if _kept_volume(each) >= most - SAME_VOLUME_FRACTION]
+    return min(near, key=lambda each: round(each.bulge, BULGE_DIGITS), default=None)
 
 
-def _is_kept(standing: RankedMethod) -> float:
+def _kept_volume(standing: RankedMethod) -> float:
     return 1.0 if standing.volume is None else min(standing.volume, 1.0)

@@ -1,6 +1,6 @@
-"""What to do about skin that collapses: in words and, where a command of ours does it, as its line.
+"""Recommendations against skin collapse: text, and command lines if a command helps.
 
-IN and OUT stand for the files.
+IN and OUT are placeholders for the files.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from anim.skinning.analysis.method_scores import MethodScore
 from anim.skinning.analysis.ranking import SAME_VOLUME_FRACTION, RankedMethod, best_method, rank_methods
 from anim.skinning.methods.registry import SKINNING_METHODS
 
-GOOD = 0.95  # of a ring's radius: what twist joints should leave
-MUCH = 1.25  # times the distance from the links of its joints at rest: a bulge that is seen
-MORE = 0.1  # than linear blending: else it is the motion that does it
-CLAMP = " --bulge-clamp"  # for methods other than lbs, the same in both commands
-SOME = 0.01  # share of vertices that has to bulge to be worth a word
+TWIST_RADIUS_FRACTION = 0.95  # of a ring's radius, kept by twist joints
+MIN_VISIBLE_BULGE = 1.25  # times the distance from the bones at rest
+MIN_BULGE_INCREASE = 0.1  # above linear blending: else the motion causes it
+CLAMP_OPTION = " --bulge-clamp"  # for methods other than lbs, the same in both commands
+MIN_BULGING_FRACTION = 0.01  # of the vertices, for a recommendation
 
 
 @dataclass(frozen=True, slots=True)
 class CollapseFinding:
-    """A mesh in a clip, by the clip's number and name."""
+    """A mesh in a clip, with the clip's index and name."""
 
     number: int
     clip: str
@@ -33,10 +33,10 @@ class CollapseFinding:
 
 
 def recommend(found: Sequence[CollapseFinding], *, clamped: bool = False) -> Iterator[str]:
-    """Yield what to do, a line each, the worst of all first; one line that all is well, or that there is no clip.
+    """Yield recommendations, a line each, the worst clip first; one line without a collapse or a clip.
 
-    Methods that were measured are recommended by what they did, others only to be measured. clamped: whether methods
-    other than lbs were measured with the bulge clamp.
+    Measured methods are recommended by their scores, others only for measurement. clamped: whether methods other than
+    lbs were measured with the bulge clamp.
     """
     yield from _unusable(found)
     pinched = sorted((each for each in found if is_collapsed(each.mesh)), key=lambda each: each.mesh.worst.index)
@@ -49,7 +49,7 @@ def recommend(found: Sequence[CollapseFinding], *, clamped: bool = False) -> Ite
 
 
 def _unusable(found: Sequence[CollapseFinding]) -> Iterator[str]:
-    """Of each method that loses the model, where it does most."""
+    """The largest deviation of each method that exceeds the model's size."""
     lost = [(fared.max_distance, fared, each) for each in found for fared in each.mesh.methods if fared.unusable]
     for method in dict.fromkeys(fared.method for _, fared, _ in lost):
         off, fared, each = max((one for one in lost if one[1].method == method), key=lambda one: one[0])
@@ -60,11 +60,11 @@ def _unusable(found: Sequence[CollapseFinding]) -> Iterator[str]:
 
 
 def twist_joints(angle: float) -> int:
-    """Return how many joints must share a twist by `angle` rad so that each leaves 95 % of the radius: cos(θ / 2n).
+    """Return the number of joints for a twist by `angle` rad with 95 % of the radius at each: cos(θ / 2n).
 
     twist_joints(π / 2) → 3
     """
-    return max(1, math.ceil(angle / (2 * math.acos(GOOD)) - 1e-9))
+    return max(1, math.ceil(angle / (2 * math.acos(TWIST_RADIUS_FRACTION)) - 1e-9))
 
 
 def _all_is_well(found: Sequence[CollapseFinding], *, clamped: bool) -> str:
@@ -77,13 +77,13 @@ def _all_is_well(found: Sequence[CollapseFinding], *, clamped: bool) -> str:
     if left is not None:
         return f"linear blending is good enough: {told}, {_percent(left)} or more of the volume is left"
     if any(each.closed for each in meshes):
-        line = _measuring(found, ["lbs"], clamped=clamped)
+        line = _collapse_command(found, ["lbs"], clamped=clamped)
         return f"{told}; to see what linear blending leaves of the volume: {line}"
     return f"linear blending is good enough: {told}"
 
 
 def _remaining_collapse(meshes: list[MeshCollapse]) -> float | None:
-    """The least volume of all by linear blending, against bind pose."""
+    """The smallest volume by linear blending, relative to bind pose."""
     volumes = [volume for each in meshes if (volume := linear_volume(each)) is not None]
     return min((float(each.min()) for each in volumes), default=None)
 
@@ -94,7 +94,7 @@ def _against_pinching(pinched: list[CollapseFinding], *, clamped: bool) -> Itera
     chosen = best_method(found)
     worse = chosen is not None and _keeps_less(found, chosen)
     yield _no_gain(found) if worse else _bake(found, chosen, pinched, clamped=clamped)
-    yield from _sharing_the_twist(pinched)
+    yield from _share_twist(pinched)
     if chosen is not None and not worse:
         yield from _against_bulging(pinched, chosen.method, clamped=clamped)
 
@@ -115,12 +115,12 @@ def _bake(
         return "no other method that was measured can be used"
     if chosen is None:
         others = _unmeasured(pinched)
-        line = _measuring(pinched, others, clamped=False)
+        line = _collapse_command(pinched, others, clamped=False)
         return f"bake it with another method; to see first what {' and '.join(others)} would keep: {line}"
     numbers = _numbers(pinched)
     clips, output = choose_option(numbers), "OUT" if len(numbers) == 1 else "'OUT-{clip}.glb'"
     keeps = f" ({_keeps(found)} of the volume)" if chosen.volume is not None else ""
-    method = f"--method {chosen.method}{CLAMP if clamped else ''}"
+    method = f"--method {chosen.method}{CLAMP_OPTION if clamped else ''}"
     return f"to bake it with {chosen.method}{keeps}: gltf-anim bake IN {output} {method}{clips}"
 
 
@@ -129,7 +129,7 @@ def _no_gain(found: Sequence[RankedMethod]) -> str:
 
 
 def _keeps_less(found: Sequence[RankedMethod], chosen: RankedMethod) -> bool:
-    """Whether even the best method loses volume that linear blending keeps."""
+    """Return whether even the best method loses volume that linear blending keeps."""
     linear = next((each.volume for each in found if each.method == "lbs"), None)
     return linear is not None and chosen.volume is not None and chosen.volume + SAME_VOLUME_FRACTION < min(linear, 1.0)
 
@@ -142,8 +142,8 @@ def _keeps(found: Sequence[RankedMethod]) -> str:
     )
 
 
-def _sharing_the_twist(pinched: list[CollapseFinding]) -> Iterator[str]:
-    """The worst twist, if any: bends have no use for twist joints."""
+def _share_twist(pinched: list[CollapseFinding]) -> Iterator[str]:
+    """The worst twist, if any; twist joints don't help bends."""
     worst = next((each.mesh.worst for each in pinched if each.mesh.worst.twist), None)
     if worst is not None and (count := twist_joints(worst.angle)) > 1:
         yield (
@@ -161,33 +161,33 @@ def _against_bulging(pinched: list[CollapseFinding], method: str, *, clamped: bo
         fared, each = max(swollen, key=lambda pair: pair[0].bulge)
         yield f"{method} bulges up to {fared.bulge:.2f}× at '{fared.joint}' ({each.clip}, {fared.time:.2f} s)"
         if not clamped:
-            yield f"to see what a clamp makes of the bulge: {_measuring([each], [], clamped=True)}"
+            yield f"to see what a clamp makes of the bulge: {_collapse_command([each], [], clamped=True)}"
         if others := _unmeasured([each]):
             names = " and ".join(others)
-            yield f"to see what {names} makes of it: {_measuring([each], others, clamped=clamped)}"
+            yield f"to see what {names} makes of it: {_collapse_command([each], others, clamped=clamped)}"
 
 
 def _swells(fared: MethodScore, linear: float) -> bool:
-    """Whether a method bulges so that it is seen, and more than linear blending does."""
-    return fared.bulge > max(MUCH, linear + MORE) and fared.bulging > SOME
+    """Return whether a method bulges visibly, and more than linear blending."""
+    return fared.bulge > max(MIN_VISIBLE_BULGE, linear + MIN_BULGE_INCREASE) and fared.bulging > MIN_BULGING_FRACTION
 
 
 def _unmeasured(found: Sequence[CollapseFinding]) -> list[str]:
-    """The methods whose effect is not known yet."""
+    """The methods without a score yet."""
     known = {"lbs", *(fared.method for each in found for fared in each.mesh.methods)}
     return [name for name in SKINNING_METHODS if name not in known]
 
 
-def _measuring(found: Sequence[CollapseFinding], others: Sequence[str], *, clamped: bool) -> str:
-    """The line that looks at these clips again: by the methods that were measured and can be used, and by others."""
+def _collapse_command(found: Sequence[CollapseFinding], others: Sequence[str], *, clamped: bool) -> str:
+    """The command line for these clips with the usable measured methods, and with others."""
     lost = {fared.method for each in found for fared in each.mesh.methods if fared.unusable}
     known = [fared.method for each in found for fared in each.mesh.methods if fared.method not in lost]
     methods = "".join(f" --method {name}" for name in dict.fromkeys([*known, *others]))
-    return f"gltf-anim collapse IN{methods}{CLAMP if clamped else ''}{choose_option(_numbers(found))}"
+    return f"gltf-anim collapse IN{methods}{CLAMP_OPTION if clamped else ''}{choose_option(_numbers(found))}"
 
 
 def _numbers(found: Sequence[CollapseFinding]) -> list[int]:
-    """The clips' numbers, each once."""
+    """The clips' indices, each once."""
     return sorted({each.number for each in found})
 
 

@@ -1,4 +1,4 @@
-"""Meshes whose skin weights don't add up to 1 in the file: they are taken as shares of their sum, and told."""
+"""Meshes with skin weights that don't add up to 1 in the file; they are normalized and reported."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from anim.model import MeshInstance
 
 @dataclass(frozen=True, slots=True)
 class WeightSums:
-    """Vertices of one mesh whose weights don't add up to 1 in the file. mesh: its name, or the number of its node.
+    """Vertices of one mesh with weights that don't add up to 1 in the file.
 
-    count: how many. none: how many of them have no weight at all.
+    mesh: its name, or its node's index. count: number of such vertices. none: number of them without any weight.
     least, most: the sums farthest below and above 1 among the others.
     """
 
@@ -23,7 +23,7 @@ class WeightSums:
     most: float
 
     def in_words(self) -> Iterator[str]:
-        """Yield what is off, and what is made of it, a line each."""
+        """Yield the deviation and its treatment, a line each."""
         start = f"mesh '{self.mesh}': skin weights of"
         if some := self.count - self.none:
             range_ = f"{self.least:.6g}" if self.least == self.most else f"{self.least:.6g} … {self.most:.6g}"
@@ -36,7 +36,7 @@ class WeightSums:
 def unnormalized_weights(instances: Iterable[MeshInstance]) -> list[WeightSums]:
     """Return the skinned meshes with vertices whose weights don't add up to 1, each mesh once.
 
-    Sums that only rounding moved off 1 don't count: 8 bits leave up to 4/255 of four weights.
+    Sums that differ from 1 only by rounding don't count: 8 bits leave up to 4/255 of four weights.
     """
     found: dict[int, WeightSums] = {}
     for instance in instances:

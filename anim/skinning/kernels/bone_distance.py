@@ -1,4 +1,4 @@
-"""Distance of vertices from the links between their joints, and a clamp of it."""
+"""Distance of vertices from the bones between their joints, and a clamp of it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ def squared_bone_distance(
     joints: FloatArray,
     squared: FloatArray,
 ) -> None:
-    """Write the squared distance (n, V) of vertices, columns `at` + v of positions, from the nearest of their links."""
+    """Write the squared distance (n, V) of vertices from the nearest of their bones.
+
+    Vertices are columns `at` + v of positions.
+    """
     for f in range(len(positions)):
         for v in range(squared.shape[1]):
             p = positions[f, at + v]
@@ -41,21 +44,21 @@ def clamp_to_bones(
     joints: FloatArray,
     scales: FloatArray,
     distance: FloatArray,
-    share: FloatArray,
+    weight: FloatArray,
     first: int,
     last: int,
 ) -> None:
-    """Move vertices first … last towards their nearest link where they are farther from it than at rest."""
+    """Move vertices first … last towards their nearest bone if they are farther from it than at rest."""
     for f in range(len(positions)):
         for v in range(first, last):
-            if share[v] == 0:
+            if weight[v] == 0:
                 continue
             p = positions[f, at + v]
             squared, x, y, z = _nearest(p, joints[f], joint, start[v], start[v + 1], link_start, tips)
             allowed = distance[v] * scales[f, joint[start[v]]]
             if squared <= allowed * allowed:
                 continue
-            pull = share[v] * (np.float32(1) - allowed / np.sqrt(squared))
+            pull = weight[v] * (np.float32(1) - allowed / np.sqrt(squared))
             p[0] += pull * (x - p[0])
             p[1] += pull * (y - p[1])
             p[2] += pull * (z - p[2])
@@ -65,7 +68,7 @@ def clamp_to_bones(
 def _nearest(
     p: FloatArray, joints: FloatArray, joint: NDArray[np.int32], begin: int, end: int, link_start: Ints, tips: Ints
 ) -> tuple[Any, Any, Any, Any]:
-    """Squared distance to the nearest link of influences begin … end, and the point on it."""
+    """Squared distance to the nearest bone of influences begin … end, and the point on it."""
     best = np.float32(np.inf)
     nx, ny, nz = p[0], p[1], p[2]
     for e in range(begin, end):

@@ -1,4 +1,4 @@
-"""Sums over the surface that make centers of rotation."""
+"""Surface integrals for centers of rotation."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def accumulate_centers(
 
 @jit
 def _find(keys: Ints, wanted: int) -> int:
-    """The first of increasing keys that is not below, by bisection: numba's own takes a second more to compile."""
+    """Index of the first key ≥ `wanted`, by bisection: numba's own takes a second more to compile."""
     low, high = 0, len(keys)
     while low < high:
         middle = (low + high) // 2

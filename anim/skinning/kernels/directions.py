@@ -1,4 +1,4 @@
-"""Normals and tangents of a vertex: along with a matrix, or with a stretch and a rotation."""
+"""Normals and tangents of a vertex: transformed by a matrix, or by scale-shear and rotation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from anim.skinning.kernels.layout import FloatArray, OptionalArray
 
 @inline
 def move_normal(normal: FloatArray, source: FloatArray, matrix: FloatArray) -> None:
-    """Set normal (3, L) to a vertex's own (3, m), moved by matrices (12, L)."""
+    """Set normal (3, L) to a vertex's own (3, m), transformed by matrices (12, L)."""
     load(normal, source)
     transform_normal(normal, matrix)
     make_unit(normal)
@@ -17,27 +17,27 @@ def move_normal(normal: FloatArray, source: FloatArray, matrix: FloatArray) -> N
 
 @inline
 def move_tangent(tangent: FloatArray, source: FloatArray, matrix: FloatArray) -> None:
-    """Set tangent (3, L) to a vertex's own (3, m), moved by matrices (12, L)."""
+    """Set tangent (3, L) to a vertex's own (3, m), transformed by matrices (12, L)."""
     load(tangent, source)
     transform_tangent(tangent, matrix)
     make_unit(tangent)
 
 
 @inline
-def rotate_normal(normal: FloatArray, source: FloatArray, stretch: OptionalArray, rotation: FloatArray) -> None:
-    """Set normal (3, L) to a vertex's own (3, m), after a stretch (12, L) if there is one, rotated by (4, L)."""
+def rotate_normal(normal: FloatArray, source: FloatArray, scale_shear: OptionalArray, rotation: FloatArray) -> None:
+    """Set normal (3, L) to a vertex's own (3, m), after scale-shear (12, L) if any, rotated by (4, L)."""
     load(normal, source)
-    if stretch is not None:
-        transform_normal(normal, stretch)
+    if scale_shear is not None:
+        transform_normal(normal, scale_shear)
     rotate(normal, rotation)
     make_unit(normal)
 
 
 @inline
-def rotate_tangent(tangent: FloatArray, source: FloatArray, stretch: OptionalArray, rotation: FloatArray) -> None:
-    """Set tangent (3, L) to a vertex's own (3, m), after a stretch (12, L) if there is one, rotated by (4, L)."""
+def rotate_tangent(tangent: FloatArray, source: FloatArray, scale_shear: OptionalArray, rotation: FloatArray) -> None:
+    """Set tangent (3, L) to a vertex's own (3, m), after scale-shear (12, L) if any, rotated by (4, L)."""
     load(tangent, source)
-    if stretch is not None:
-        transform_tangent(tangent, stretch)
+    if scale_shear is not None:
+        transform_tangent(tangent, scale_shear)
     rotate(tangent, rotation)
     make_unit(tangent)

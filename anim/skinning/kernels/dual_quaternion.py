@@ -1,4 +1,4 @@
-"""Skinning by blended dual quaternions."""
+"""Kernel of dual-quaternion skinning."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ def skin_dual_quaternion(
     tangents: OptionalArray,
     influences: Influences,
     duals: FloatArray,
-    stretches: ScaleShear | None,
+    scale_shears: ScaleShear | None,
     first: int,
     last: int,
     at: int,
     out: tuple[FloatArray, OptionalArray, OptionalArray],
 ) -> None:
-    """Write points moved by blended dual quaternions (J, 8, L); with stretches (J, 12, L).
+    """Write points moved by blended dual quaternions (J, 8, L); with scale_shears (J, 12, L).
 
-    After stretches the points get the vertex's scale times its pivot, and the dual quaternions that scale times their
-    last four. points (V, 3, m), normals and tangents the same or None; out: (n, all, 3) of each, columns at + v.
+    After scale_shears the points get the vertex's scale times its pivot, and the dual quaternions that scale times
+    their last four. points (V, 3, m), normals and tangents the same or None; out: (n, all, 3) of each, columns at + v.
     """
     tiles, signed = np.empty((3, TILE, 3, LANES), np.float32), np.empty((influences.max_count, LANES), np.float32)
     dual = np.empty((12, LANES), np.float32)
-    stretch: OptionalArray = None if stretches is None else np.empty((15, LANES), np.float32)
+    scale_shear: OptionalArray = None if scale_shears is None else np.empty((15, LANES), np.float32)
     scale = np.empty((1, LANES), np.float32)
     for low in range(first, last, TILE):
         count = min(TILE, last - low)
@@ -39,20 +39,20 @@ def skin_dual_quaternion(
             if influences.start[low + v] == influences.start[low + v + 1]:
                 tiles[:, v] = 0
                 continue
-            blend_quaternions(dual, duals, influences, low + v, 8 if stretches is None else 12, signed)
+            blend_quaternions(dual, duals, influences, low + v, 8 if scale_shears is None else 12, signed)
             point = tiles[0, v]
             load(point, points[low + v])
-            if stretches is not None:
-                blend(stretch, stretches.matrices, influences, low + v, 15)
-                blend(scale, stretches.scales, stretches.ruling, low + v, 1)
-                transform(point, stretch)
-                add_scaled(point, stretch[12:], scale)
+            if scale_shears is not None:
+                blend(scale_shear, scale_shears.matrices, influences, low + v, 15)
+                blend(scale, scale_shears.scales, scale_shears.scale_influences, low + v, 1)
+                transform(point, scale_shear)
+                add_scaled(point, scale_shear[12:], scale)
                 add_scaled(dual[4:8], dual[8:], scale)
             _move(point, dual)
             if normals is not None:
-                rotate_normal(tiles[1, v], normals[low + v], stretch, dual)
+                rotate_normal(tiles[1, v], normals[low + v], scale_shear, dual)
             if tangents is not None:
-                rotate_tangent(tiles[2, v], tangents[low + v], stretch, dual)
+                rotate_tangent(tiles[2, v], tangents[low + v], scale_shear, dual)
         store(tiles[0], count, at + low, out[0])
         if normals is not None:
             store(tiles[1], count, at + low, out[1])
@@ -62,7 +62,7 @@ def skin_dual_quaternion(
 
 @inline
 def _move(p: FloatArray, b: FloatArray) -> None:
-    """Move points by dual quaternions (8, L) of any length but 0."""
+    """Transform points by dual quaternions (8, L) of any length but 0."""
     for f in range(LANES):
         x, y, z, w = b[0, f], b[1, f], b[2, f], b[3, f]
         dx, dy, dz, dw = b[4, f], b[5, f], b[6, f], b[7, f]

@@ -17,15 +17,15 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def jit(function: Function) -> Function:
-    """Return a function that is compiled for the types of its arguments when it is first called with them.
+    """Return a function that is compiled for its argument types on the first call.
 
-    It runs without the GIL, divides as IEEE 754 says, and has no fast-math: the same numbers on every machine.
+    It runs without the GIL, divides by IEEE 754, and has no fast-math: equal numbers on every machine.
     """
     return cast(Function, numba.njit(nogil=True, error_model="numpy", cache=True)(function))
 
 
 def inline(function: Function) -> Function:
-    """Return a function that becomes part of each kernel that calls it."""
+    """Return a function that is inlined into each kernel that calls it."""
     return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 
 
@@ -35,9 +35,9 @@ def is_compiled() -> bool:
 
 
 def _cache_folder() -> str:
-    """The user's own folder for this version and these sources; "" where there is none, and numba chooses.
+    """The user's folder for this version and these sources; "" for numba's default.
 
-    Numba looks for changes in the file of a function and not in those of the functions that it calls.
+    Numba checks the file of a function for changes, but not those of its callees.
     """
     stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in Path(__file__).parent.glob("*.py")]
     sources = hashlib.sha256(repr(sorted(stamps)).encode()).hexdigest()[:12]
@@ -46,7 +46,7 @@ def _cache_folder() -> str:
 
 
 def _user_caches() -> Path | None:
-    """Where programs of this user keep what can be made again."""
+    """The user's folder for caches."""
     given = Path(os.getenv("LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME") or "")
     if given.is_absolute():  # the XDG standard ignores relative ones
         return given

@@ -1,4 +1,4 @@
-"""Steps of kernels on one vertex: points and normals (3, L), matrices (12, L) row by row, quaternions (4, L)."""
+"""Kernel steps on a vertex: points and normals (3, L), matrices (12, L) row-major, quaternions (4, L)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from anim.skinning.kernels.jit import inline
 from anim.skinning.kernels.layout import LANES, FloatArray
 
-TINY = np.float32(1e-30)
+MIN_LENGTH = np.float32(1e-30)
 ONE, TWO = np.float32(1), np.float32(2)
 
 
 @inline
 def load(row: FloatArray, source: FloatArray) -> None:
-    """Copy (3, m) into (3, L), the one column into all where m = 1."""
+    """Copy (3, m) into (3, L); a single column is repeated."""
     alone = source.shape[1] == 1
     for i in range(3):
         for f in range(LANES):
@@ -22,7 +22,7 @@ def load(row: FloatArray, source: FloatArray) -> None:
 
 @inline
 def add_scaled(p: FloatArray, q: FloatArray, scale: FloatArray) -> None:
-    """Add rows q times scale (1, L) to p, as many as p has."""
+    """Add rows q times scale (1, L) to all rows of p."""
     for i in range(p.shape[0]):
         for f in range(LANES):
             p[i, f] += scale[0, f] * q[i, f]
@@ -30,7 +30,7 @@ def add_scaled(p: FloatArray, q: FloatArray, scale: FloatArray) -> None:
 
 @inline
 def transform(p: FloatArray, m: FloatArray) -> None:
-    """Move points by matrices."""
+    """Transform points by matrices."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
         p[0, f] = m[0, f] * x + m[1, f] * y + m[2, f] * z + m[3, f]
@@ -40,7 +40,7 @@ def transform(p: FloatArray, m: FloatArray) -> None:
 
 @inline
 def transform_tangent(p: FloatArray, m: FloatArray) -> None:
-    """Move directions that lie in the surface."""
+    """Transform directions in the surface."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
         p[0, f] = m[0, f] * x + m[1, f] * y + m[2, f] * z
@@ -50,14 +50,17 @@ def transform_tangent(p: FloatArray, m: FloatArray) -> None:
 
 @inline
 def transform_normal(p: FloatArray, m: FloatArray) -> None:
-    """By the cofactors: the inverse transpose times the determinant, without a division; outside stays outside."""
+    """Transform normals by the cofactors, with the sign of the determinant.
+
+    That is the inverse transpose times |det|, without a division; outside stays outside.
+    """
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
         cx = m[5, f] * m[10, f] - m[6, f] * m[9, f]
         cy = m[6, f] * m[8, f] - m[4, f] * m[10, f]
         cz = m[4, f] * m[9, f] - m[5, f] * m[8, f]
         volume = m[0, f] * cx + m[1, f] * cy + m[2, f] * cz
-        way = -ONE if volume < 0 else ONE
+        sign = -ONE if volume < 0 else ONE
         nx = cx * x + cy * y + cz * z
         ny = (m[2, f] * m[9, f] - m[1, f] * m[10, f]) * x
         ny += (m[0, f] * m[10, f] - m[2, f] * m[8, f]) * y
@@ -65,9 +68,9 @@ def transform_normal(p: FloatArray, m: FloatArray) -> None:
         nz = (m[1, f] * m[6, f] - m[2, f] * m[5, f]) * x
         nz += (m[2, f] * m[4, f] - m[0, f] * m[6, f]) * y
         nz += (m[0, f] * m[5, f] - m[1, f] * m[4, f]) * z
-        p[0, f] = nx * way
-        p[1, f] = ny * way
-        p[2, f] = nz * way
+        p[0, f] = nx * sign
+        p[1, f] = ny * sign
+        p[2, f] = nz * sign
 
 
 @inline
@@ -87,10 +90,10 @@ def rotate(p: FloatArray, b: FloatArray) -> None:
 
 @inline
 def make_unit(p: FloatArray) -> None:
-    """Scale to length 1; what has none stays 0."""
+    """Scale to length 1; zero vectors stay 0."""
     for f in range(LANES):
         x, y, z = p[0, f], p[1, f], p[2, f]
-        scale = ONE / max(np.sqrt(x * x + y * y + z * z), TINY)
+        scale = ONE / max(np.sqrt(x * x + y * y + z * z), MIN_LENGTH)
         p[0, f] = x * scale
         p[1, f] = y * scale
         p[2, f] = z * scale
@@ -98,7 +101,10 @@ def make_unit(p: FloatArray) -> None:
 
 @inline
 def store(tile: FloatArray, count: int, at: int, out: FloatArray) -> None:
-    """Write `count` vertices of a tile into columns from `at` on of out (n, all, 3); frames beyond n are padding."""
+    """Write `count` vertices of a tile into columns from `at` of out (n, all, 3).
+
+    Frames beyond n are padding.
+    """
     for f in range(len(out)):
         frame = out[f]
         for v in range(count):

@@ -1,4 +1,4 @@
-"""What kernels are given: vertices, their influences, and where results go."""
+"""Arguments of kernels: vertices, their influences, and output arrays."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from anim.arrays import Ints
 
 FloatArray: TypeAlias = NDArray[np.float32]
-OptionalArray: TypeAlias = Any  # Singles, or None where it is not wanted: a kernel is compiled without it
+OptionalArray: TypeAlias = Any  # FloatArray, or None: a kernel is compiled without it
 
-GROUP = 4  # influences that `weighted_sum` takes at a time; vertices with fewer get some of weight 0
-LANES = 32  # frames that a kernel takes at a time; a constant, so that the compiler sees what lies where
+GROUP = 4  # influences per step of `weighted_sum`; vertices with fewer get some of weight 0
+LANES = 32  # frames per kernel step; a constant, so that the compiler knows the strides
 TILE = 32  # vertices between two transpositions to frame-major order
-CACHE_LINE_BYTES = 64  # bytes that memory hands out together: rows that start there are read a third faster
+CACHE_LINE_BYTES = 64  # rows aligned to it are read a third faster
 
 
 class VertexBlock(NamedTuple):
     """Vertices in mesh space for up to LANES frames, frames innermost, float32.
 
-    points: (V, 3, m) m, m = 1 where no frame differs, else LANES. normals, tangents: the same, (0, 3, 1) where not
-    wanted.
+    points: (V, 3, m) m; m = 1 if all frames are equal, else LANES. normals, tangents: the same, (0, 3, 1) if not
+    requested.
     """
 
     points: FloatArray
@@ -32,9 +32,9 @@ class VertexBlock(NamedTuple):
 
 
 class Influences(NamedTuple):
-    """Influences start[v] … start[v + 1] of vertex v, strongest first: weight (E,) and joint (E,); start (V + 1,).
+    """Influences start[v] … start[v + 1] of vertex v, strongest first: weight (E,), joint (E,).
 
-    most: how many a vertex has at most.
+    start: (V + 1,). max_count: largest number of influences of a vertex.
     """
 
     weight: FloatArray
@@ -44,9 +44,9 @@ class Influences(NamedTuple):
 
 
 class OutputSlice(NamedTuple):
-    """Where the results of n frames go: columns `at` … `at` + V of positions (n, all, 3).
+    """Output columns `at` … `at` + V of positions (n, all, 3) for n frames.
 
-    normals, tangents: the same, or (0, 0, 3) where not wanted.
+    normals, tangents: the same, or (0, 0, 3) if not requested.
     """
 
     at: int
@@ -56,28 +56,28 @@ class OutputSlice(NamedTuple):
 
 
 class ScaleShear(NamedTuple):
-    """What points go through before they are rotated: matrices (J, 15, L), a stretch (12, L) and the joint's place.
+    """Transforms before rotation: matrices (J, 15, L), a scale-shear (12, L) and the joint's position.
 
-    scales: (J, 1, L). ruling: influences by which scales make up the one of a vertex.
+    scales: (J, 1, L). scale_influences: influences of the scales on that of a vertex.
     """
 
     matrices: FloatArray
     scales: FloatArray
-    ruling: Influences
+    scale_influences: Influences
 
 
 def vertices(shape: VertexBlock) -> tuple[FloatArray, OptionalArray, OptionalArray]:
-    """Return points, normals and tangents, None for those that are not wanted: kernels are compiled without them."""
+    """Return points, normals and tangents; None if not requested, as kernels are compiled without them."""
     return shape.points, _or_none(shape.normals), _or_none(shape.tangents)
 
 
 def output(target: OutputSlice) -> tuple[int, tuple[FloatArray, OptionalArray, OptionalArray]]:
-    """Return the first column and the arrays of a target, None for those that are not wanted."""
+    """Return the first column and the arrays of a target; None if not requested."""
     return target.at, (target.positions, _or_none(target.normals), _or_none(target.tangents))
 
 
 def aligned(*shape: int) -> FloatArray:
-    """Return an array (shape) with anything in it that starts at a cache line."""
+    """Return an uninitialized array (shape), aligned to a cache line."""
     size = math.prod(shape)
     memory: FloatArray = np.empty(size + CACHE_LINE_BYTES // 4, np.float32)
     first = -memory.ctypes.data % CACHE_LINE_BYTES // 4
@@ -85,8 +85,9 @@ def aligned(*shape: int) -> FloatArray:
 
 
 def group_influences(influences: Influences) -> Influences:
-    """Return the same influences, the last GROUP of each vertex filled up by its first joint with weight 0.
+    """Return the same influences, padded per vertex to a multiple of GROUP by its first joint.
 
+    The padding has weight 0.
     group_influences([0.7, 0.3], [4, 7], start [0, 2]) → [0.7, 0.3, 0, 0], [4, 7, 4, 4], start [0, 4]
     """
     counts = np.diff(influences.start)
@@ -103,4 +104,4 @@ def _or_none(values: FloatArray) -> FloatArray | None:
     return values if len(values) else None
 
 
-NOTHING: FloatArray = np.empty((0, 0, 3), np.float32)  # the normals or tangents of a Target that wants none
+NO_OUTPUT: FloatArray = np.empty((0, 0, 3), np.float32)  # normals or tangents of an OutputSlice without them

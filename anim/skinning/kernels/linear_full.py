@@ -1,4 +1,4 @@
-"""Linear blending of matrices, for points that change, or with directions."""
+"""Kernel of linear blending for morphed points, or with normals and tangents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Linear blending of points that never change, without directions: the shortest way."""
+"""Kernel of linear blending for constant points without directions, the fastest case."""
 
 from __future__ import annotations
 

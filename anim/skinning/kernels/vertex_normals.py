@@ -1,4 +1,4 @@
-"""Normals of vertices from the faces around them."""
+"""Kernel of vertex normals from the faces around them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from anim.skinning.kernels.layout import FloatArray
 
 @jit
 def vertex_normals(faces: Ints, positions: FloatArray, normals: FloatArray) -> None:
-    """Write unit normals of positions (n, V, 3): the sum of the faces' normals, each as long as its area."""
+    """Write unit normals of positions (n, V, 3): area-weighted sums of the faces' normals."""
     for f in range(len(positions)):
         p, n = positions[f], normals[f]
         for v in range(len(n)):

@@ -1,4 +1,4 @@
-"""How much smaller linear blending makes the space around vertices."""
+"""Kernel of the volume factor of linear blending around vertices."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from anim.skinning.kernels.weighted_sum import blend
 
 @jit
 def volume_ratio(influences: Influences, matrices: FloatArray, logs: FloatArray, factors: FloatArray) -> None:
-    """Write det(Σ w A) / Π |det A|^w of vertices into factors (V, n); matrices (J, 12, L), logs (J, L) of |det A|."""
+    """Write det(Σ w A) / Π |det A|^w of vertices into factors (V, n).
+
+    matrices: (J, 12, L). logs: (J, L) of |det A|.
+    """
     m, found, size = np.empty((12, LANES), np.float32), np.empty(LANES, np.float32), np.empty(LANES, np.float32)
     for v in range(len(factors)):
         blend(m, matrices, influences, v, 12)

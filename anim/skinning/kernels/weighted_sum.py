@@ -1,7 +1,7 @@
 """Weighted sums of rows: matrices, quaternions or dual quaternions (C, L) of a vertex's joints.
 
-Influences come in groups of four (`layout.GROUP`), so that a sum is written once for most vertices and not added to
-term by term: half the time, since writing is what costs (measured).
+Influences come in groups of four (`layout.GROUP`), so that a sum is written once for most vertices instead of
+term by term: half the time, because writes dominate (measured).
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ from anim.skinning.kernels.layout import GROUP, LANES, FloatArray, Influences
 
 @inline
 def blend(total: FloatArray, terms: FloatArray, influences: Influences, v: int, rows: int) -> None:
-    """Set the first C rows of `total` to the sum of a vertex's matrices (J, C, L), by weight; 0 without influences."""
+    """Set the first C rows of `total` to the weighted sum of a vertex's matrices (J, C, L).
+
+    0 without influences.
+    """
     begin, end = influences.start[v], influences.start[v + 1]
     if begin == end:
         total[:] = 0
@@ -37,11 +40,11 @@ def blend(total: FloatArray, terms: FloatArray, influences: Influences, v: int, 
 def blend_quaternions(
     total: FloatArray, terms: FloatArray, influences: Influences, v: int, rows: int, signed: FloatArray
 ) -> None:
-    """Set the first C rows of `total` to the sum of a vertex's quaternions, or dual ones, in the first's hemisphere.
+    """Set the first C rows of `total` to the sum of a vertex's quaternions in the first's hemisphere.
 
-    A vertex has at least one. The first is the strongest, and per frame the others are negated where they are in the
-    other hemisphere. So the sum is never shorter than the first one's weight, and can always be normalized, opposite
-    rotations included. signed: (I, L), room for the weights with their signs.
+    Dual quaternions have 8 rows. A vertex has at least one influence. The first is the strongest, and per frame the
+    others are negated if they are in the other hemisphere. So the sum is never shorter than the first one's weight, and
+    can always be normalized, opposite rotations included. signed: (I, L), scratch buffer for the signed weights.
     """
     begin, end = influences.start[v], influences.start[v + 1]
     pivot = terms[influences.joint[begin]]

@@ -1,4 +1,4 @@
-"""How far skin stands off the links between its joints, and a clamp that pulls back what bulges."""
+"""Distance of skin from the bones between its joints, and a clamp against bulges."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from anim.skinning.polar_decomposition import joint_origins
 
 @dataclass(frozen=True, slots=True)
 class BoneSegments:
-    """The links of a skin: from each joint to those below it, or the joint's own place where none is below.
+    """The bones of a skin: from each joint to its children, or the joint's own position for a leaf.
 
-    start: (J + 1,) into tips (B,): joint numbers at the far ends. distance: (V,) m from each vertex to the nearest link
-    of its joints in bind pose. share: (V,) 1 where two joints hold a vertex equally, 0 where one holds it alone.
-    joints: (J, 3) m, where they are in bind pose.
+    start: (J + 1,) into tips (B,): joint indices at the far ends. distance: (V,) m from each vertex to the nearest bone
+    of its joints in bind pose. fraction: (V,) 1 for two equal weights, 0 for a single joint.
+    joints: (J, 3) m, positions in bind pose.
     """
 
     start: Ints
@@ -32,7 +32,7 @@ class BoneSegments:
 
 
 def bone_segments(rig: SkinBinding) -> BoneSegments:
-    """Return the links of a rig and how far its vertices are from them."""
+    """Return the bones of a rig with the distances of its vertices."""
     count = len(rig.nodes)
     below = [np.flatnonzero(rig.ancestors == j) for j in range(count)]
     tips = [each if len(each) else np.array([j]) for j, each in enumerate(below)]
@@ -50,10 +50,10 @@ def bone_segments(rig: SkinBinding) -> BoneSegments:
 
 @dataclass(frozen=True)
 class BulgeClamp:
-    """A method whose vertices are pulled back to the distance from their links that they have in bind pose.
+    """A method with a clamp of vertices to their distance from the bones in bind pose.
 
-    As much as two joints share a vertex: what one joint holds alone stays. Distances grow with the pivot's scale.
-    Source: the idea of Kim & Han 2014, "Bulging-free dual quaternion skinning", with the nearest link for their axis.
+    Weighted by the blend of two joints: vertices of one joint stay. Distances grow with the pivot's scale.
+    Source: the idea of Kim & Han 2014, "Bulging-free dual quaternion skinning", with the nearest bone for their axis.
     """
 
     inner: Skinner
@@ -64,7 +64,7 @@ class BulgeClamp:
         object.__setattr__(self, "links", bone_segments(self.rig))
 
     def pack(self, matrices: Floats) -> tuple[Any, FloatArray, FloatArray]:
-        """Return what the inner method needs, where joints are (n, J, 3), and their scales (n, J)."""
+        """Return the packed matrices of the inner method, joint positions (n, J, 3), and their scales (n, J)."""
         return self.inner.pack(matrices), *clamp_positions(self.links, matrices)
 
     def skin(
@@ -81,14 +81,14 @@ class BulgeClamp:
 
 
 def clamp_positions(of: BoneSegments, matrices: Floats) -> tuple[FloatArray, FloatArray]:
-    """Return where joints stand (n, J, 3) under matrices (n, J, 3, 4), and how much they scale (n, J)."""
+    """Return positions (n, J, 3) and scales (n, J) of joints under matrices (n, J, 3, 4)."""
     at = matrix.apply(matrices, of.joints[:, None])[..., 0, :]
     scales = np.cbrt(np.abs(np.linalg.det(matrices[..., :3])))
     return at.astype(np.float32), scales.astype(np.float32)
 
 
 def _blend_weight(rig: SkinBinding) -> FloatArray:
-    """1 − (w₁ − w₂)² of the two strongest weights, as shares of the two; 0 where there is one."""
+    """1 − (w₁ − w₂)² of the two strongest weights, as fractions of their sum; 0 for one weight."""
     counts = np.diff(rig.start)
     two = counts > 1
     strongest, second = np.zeros(len(counts)), np.zeros(len(counts))

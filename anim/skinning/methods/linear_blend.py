@@ -1,4 +1,4 @@
-"""Linear blend skinning: what every glTF player does."""
+"""Linear blend skinning, the method of every glTF player."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from anim.skinning.methods.skinner import lanes
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """The same matrices in two orders. columns: (J, 4, 3L). rows: (J, 12, L)."""
+    """The same matrices in two layouts. columns: (J, 4, 3L). rows: (J, 12, L)."""
 
     columns: FloatArray | None
     rows: FloatArray | None
@@ -34,7 +34,7 @@ class Packed:
 class LinearBlend:
     """Blends matrices: p′ = (Σ w M) p; normals by its inverse transpose, tangents by itself.
 
-    plain: no frame has points of its own and no directions are wanted, which takes a shorter way to the same numbers.
+    plain: points are constant and no directions are requested; a faster kernel with equal results.
     Source: glTF 2.0, 3.7.3.1; Magnenat-Thalmann et al. 1988.
     """
 
@@ -53,7 +53,7 @@ class LinearBlend:
         object.__setattr__(self, "coefficients", weighted.astype(np.float32))
 
     def pack(self, matrices: Floats) -> Packed:
-        """Return the matrices (n, J, 3, 4) as the kernel reads them."""
+        """Return the matrices (n, J, 3, 4) in the kernel's layout."""
         if not self.plain:
             return Packed(None, lanes(matrices))
         frames, joints = matrices.shape[:2]

@@ -14,7 +14,10 @@ from anim.skinning.methods.skinner import Skinner
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One method. about: for --help. skinner: gets a rig, and whether its points never change and need no normals."""
+    """One method. about: for --help. skinner: called with a rig, and whether its points are constant.
+
+    The second argument also requires that no normals or tangents are requested.
+    """
 
     about: str
     skinner: Callable[[SkinBinding, bool], Skinner]

@@ -1,4 +1,4 @@
-"""What every skinning method gives: matrices packed for its kernel, and the kernel's call."""
+"""Interface of skinning methods: packing of matrices for a kernel, and its call."""
 
 from __future__ import annotations
 
@@ -12,20 +12,23 @@ class Skinner(Protocol):
     """One method on one rig."""
 
     def pack(self, matrices: Floats) -> Any:
-        """Return what the kernel reads of the joints' matrices (n, J, 3, 4), world_from_mesh."""
+        """Return the joints' matrices (n, J, 3, 4), world_from_mesh, in the kernel's layout."""
 
     def skin(self, packed: Any, shape: VertexBlock, target: OutputSlice, first: int, last: int) -> None:
         """Write vertices first … last of all n frames into the target."""
 
 
 def lanes(values: Floats) -> FloatArray:
-    """Return (n, J, ...) as float32 (J, C, LANES): a row of frames per joint and number, the last frame filling up."""
+    """Return (n, J, ...) as float32 (J, C, LANES): a row of frames per joint and component.
+
+    The last frame is repeated as padding.
+    """
     frames, joints = values.shape[:2]
     return fill_lanes(values.reshape(frames, joints, -1).transpose(1, 2, 0))
 
 
 def fill_lanes(values: Floats) -> FloatArray:
-    """Return (..., n) as float32 (..., LANES), the last of the n filling up."""
+    """Return (..., n) as float32 (..., LANES), padded with the last of the n."""
     frames = values.shape[-1]
     rows = aligned(*values.shape[:-1], LANES)
     rows[..., :frames] = values

@@ -39,16 +39,16 @@ def scene(of: Mesh, parents: Sequence[int], *, inverse_bind: Any = None, **rest:
     return Scene(nodes, (MeshInstance(count, of, skin, of.rest_weights),))
 
 
-def random_scene(seed: int, *, joints: int = 9, vertices: int = 150, stretch: float = 0.0, **more: Any) -> Scene:
+def random_scene(seed: int, *, joints: int = 9, vertices: int = 150, scale_shear: float = 0.0, **more: Any) -> Scene:
     """Return a tree of joints with turned binds and a mesh of 0 to 5 influences a vertex; weights add up to 1.
 
-    stretch: how far scales at rest are from 1; a joint's scale under a turned one shears what hangs on it.
+    scale_shear: deviation of scales at rest from 1; a joint's scale under a turned one shears what hangs on it.
     """
     random = np.random.default_rng(seed)
     parents = [-1, *(int(random.integers(0, j)) for j in range(1, joints))]
     turns = random.normal(size=(joints, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-    scales = np.exp(stretch * random.normal(size=(joints, 3)))
+    scales = np.exp(scale_shear * random.normal(size=(joints, 3)))
     binds = matrix.from_trs(random.normal(size=(joints, 3)), np.roll(turns, 1, axis=0), np.ones((joints, 3)))
     held = np.stack([random.permutation(joints)[:5] for _ in range(vertices)])
     weights = random.random((vertices, 5))

@@ -61,7 +61,7 @@ def test_a_candy_wrapper_and_its_share() -> None:
 
 def test_indices_are_the_determinants_of_the_blend() -> None:
     """Scales and shears divided out, for random joints; scales alone are no collapse."""
-    of = random_scene(4, stretch=0.5)
+    of = random_scene(4, scale_shear=0.5)
     played = moving(of, 1)
     matrices, body = skinning_matrices(of, played, TIMES)[..., :3], of.instances[0].mesh
     blended = np.einsum("vi,fviab->fvab", body.weights, matrices[:, body.joints])

@@ -9,7 +9,7 @@ from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.model import Mesh
 from anim.skinning.binding import bind_skin
-from anim.skinning.methods.rotation_centers import WIDTH, find_centers
+from anim.skinning.methods.rotation_centers import SIMILARITY_WIDTH, find_centers
 from tests.anim.skinning.scenes import random_scene
 from tests.files import opened_fixture
 
@@ -29,7 +29,7 @@ def plainly(mesh: Mesh, joints: int) -> Floats:
             for k in range(joints):
                 if j != k:
                     tj, tk = of_faces[:, j], of_faces[:, k]
-                    similar += p[j] * p[k] * tj * tk * np.exp(-((p[j] * tk - p[k] * tj) ** 2) / WIDTH**2)
+                    similar += p[j] * p[k] * tj * tk * np.exp(-((p[j] * tk - p[k] * tj) ** 2) / SIMILARITY_WIDTH**2)
         total = (similar * areas).sum()
         if total > 0:
             result[v] = (similar * areas) @ middles / total
