@@ -31,7 +31,7 @@ def pair(
     """
     random = np.random.default_rng(seed)
     morphs = {"targets": 0.3 * random.normal(size=(2, 30, 3)), "rest_weights": [0.1, 0.0]} if seed % 3 == 0 else {}
-    scene = random_scene(seed, joints=JOINTS, vertices=30, stretch=0.2 * (seed % 2), **morphs)
+    scene = random_scene(seed, joints=JOINTS, vertices=30, scale_shear=0.2 * (seed % 2), **morphs)
     axes = [np.unique(np.concatenate(([0.0], random.random(random.integers(1, 8)), [1.0]))) for _ in range(2)]
     distance = float(random.choice(wild))
     chances = {"rotation": 0.9, "translation": 0.4, "scale": 0.2}

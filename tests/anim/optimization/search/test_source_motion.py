@@ -57,7 +57,7 @@ def _chained(of: Scene, node: int, local: tuple[Floats, Floats, Floats], frame: 
 
 
 def test_worlds_are_products_of_matrices_with_turns_as_stored() -> None:
-    of = scene(stretch=0.3)
+    of = scene(scale_shear=0.3)
     count = len(of.skeleton)
     local = (RNG.normal(size=(count, 3, 3)), 1.01 * quaternion.normalize(RNG.normal(size=(count, 3, 4))),
              RNG.uniform(0.5, 2, (count, 3, 3)))  # fmt: skip
@@ -101,7 +101,7 @@ def test_rest_and_middle_are_off_by_what_they_say() -> None:
 @pytest.mark.parametrize(("stretch", "slack"), [(0.0, 1.01), (0.2, 1.5)])
 def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int, stretch: float, slack: float) -> None:
     """Each track, changed at random by a little: no answering vertex moves more than it says, but for shear."""
-    of = scene(seed, stretch=stretch)
+    of = scene(seed, scale_shear=stretch)
     what = waving()
     points = every_point(of)
     source = truth_of(of, what, points)
