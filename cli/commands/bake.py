@@ -49,10 +49,10 @@ def command(
     method: Annotated[Method, typer.Option("--method", help=ABOUT)] = LBS,
     blend: Annotated[
         float | None,
-        typer.Option("--blend", metavar="0..1", help="Share of the method; the rest is lbs.", min=0, max=1),
+        typer.Option("--blend", metavar="0..1", help="Blend weight of the method against lbs.", min=0, max=1),
     ] = None,
     bulge_clamp: Annotated[
-        bool, typer.Option("--bulge-clamp", help="Keep skin no farther from the links between joints than at rest.")
+        bool, typer.Option("--bulge-clamp", help="Limit the distance of skin from its bones to that at rest.")
     ] = False,
     fps: Annotated[
         float | None,
@@ -68,7 +68,7 @@ def command(
         bool,
         typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(caches.formats_with('tangents'))})."),
     ] = False,
-    rigid: Annotated[bool, typer.Option("--rigid", help="Bake meshes that only nodes move, too.")] = False,
+    rigid: Annotated[bool, typer.Option("--rigid", help="Bake unskinned meshes too.")] = False,
     format: caches.FormatOption = None,
     up: caches.UpOption = None,
     vertex_order: caches.VertexOrderOption = None,

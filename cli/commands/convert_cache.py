@@ -34,11 +34,12 @@ def command(
     format: caches.FormatOption = None,
     at: Annotated[float | None, typer.Option("--at", metavar="S", help="Only the frame at this time.")] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="New frames, on straight lines between the old.")
+        float | None,
+        typer.Option("--fps", metavar="N", help="Frames per second; linear interpolation between the old frames."),
     ] = None,
     input_fps: Annotated[
         float | None,
-        typer.Option("--input-fps", metavar="N", help="Frames per second of an IN that says none (PC2: 24)."),
+        typer.Option("--input-fps", metavar="N", help="Frames per second of an IN that stores none (PC2: 24)."),
     ] = None,
     up: caches.UpOption = None,
     vertex_order: caches.VertexOrderOption = None,

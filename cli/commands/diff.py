@@ -45,7 +45,7 @@ def command(
     old: Annotated[str, typer.Argument(metavar="A", help="A .glb or .gltf file, '-' for stdin.", show_default=False)],
     new: Annotated[
         str | None,
-        typer.Argument(metavar="[B]", help="What to hold against it; with --players none.", show_default=False),
+        typer.Argument(metavar="[B]", help="File to compare with; none with --players.", show_default=False),
     ] = None,
     *,
     format: common.Report = Format.TEXT,
@@ -54,7 +54,9 @@ def command(
     ] = None,
     fail_above: Annotated[
         str | None,
-        typer.Option("--fail-above", metavar="LENGTH", help="Exit 6 where more is found: 0.5mm, or 0.1% of the size."),
+        typer.Option(
+            "--fail-above", metavar="LENGTH", help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the size."
+        ),
     ] = None,
     player: Annotated[
         Player,
@@ -62,13 +64,16 @@ def command(
     ] = SPEC,
     players: Annotated[
         str | None,
-        typer.Option("--players", metavar="P,Q", help="A as two players show it, spec,nlerp: one file, no B."),
+        typer.Option("--players", metavar="P,Q", help="Two players to compare on one file, without B: spec,nlerp."),
     ] = None,
     fps: Annotated[
         float, typer.Option("--samples-per-second", metavar="N", help="Samples per second, in addition to all keys.")
     ] = FPS,
     shell: Annotated[
-        str, typer.Option("--shell", metavar="LENGTH", help="How far around nodes without vertices; 0: leave them out.")
+        str,
+        typer.Option(
+            "--shell", metavar="LENGTH", help="Radius of the probes at nodes without vertices; 0: skip such nodes."
+        ),
     ] = "1%",
     clip: common.Clips = None,
     quiet: common.Quiet = False,

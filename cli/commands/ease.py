@@ -44,13 +44,16 @@ def command(
         str, typer.Option("--ease", metavar="NAME", help="smoothstep, quad-in-out, 'cubic-bezier(.2,0,0,1)', …")
     ] = "smoothstep",
     list_eases: Annotated[bool, typer.Option("--list", help="Show all eases with their shapes.")] = False,
-    per: Annotated[
-        Per, typer.Option("--per", help="Ease every piece from key to key, or the whole range once.")
-    ] = Per.SEGMENT,
+    per: Annotated[Per, typer.Option("--per", help="Ease every key interval, or the whole range once.")] = Per.SEGMENT,
     start: common.From = None,
     end: common.To = None,
     tolerance: Annotated[
-        str, typer.Option("--tolerance", metavar="SHARE", help="For eases that no cubic is: share of a piece's range.")
+        str,
+        typer.Option(
+            "--tolerance",
+            metavar="SHARE",
+            help="Maximum error for easings that are not cubic: fraction of a key interval's range.",
+        ),
     ] = "0.1%",
     angle_tolerance: Annotated[
         str, typer.Option("--angle-tolerance", metavar="ANGLE", help="The same for rotations: 0.05deg, 0.001rad.")

@@ -60,17 +60,21 @@ def command(
     *,
     order: Annotated[
         str | None,
-        typer.Option("--order", metavar="ORDER", help="Of the axes as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
+        typer.Option("--order", metavar="ORDER", help="Rotation order, as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
     ] = None,
     axes: Annotated[
-        AxesConvention | None, typer.Option("--axes", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+        AxesConvention | None,
+        typer.Option("--axes", help="Intrinsic (body) or extrinsic (fixed) axes; FBX and Maya: extrinsic."),
     ] = None,
     unit: Annotated[Unit | None, typer.Option("--unit", help="Unit of the angles (CSV, JSON).")] = None,
     keys: Annotated[
-        KeyPlacement, typer.Option("--keys", help="Where keys stand; auto keeps recordings' grid.")
+        KeyPlacement, typer.Option("--keys", help="Key placement; auto keeps the grid of recordings.")
     ] = KeyPlacement.AUTO,
     angle_tolerance: Annotated[
-        str, typer.Option("--angle-tolerance", metavar="ANGLE", help="The most that slerp may leave the Euler motion.")
+        str,
+        typer.Option(
+            "--angle-tolerance", metavar="ANGLE", help="Maximum angle between slerp and the Euler motion: 0.05deg."
+        ),
     ] = "0.05deg",
     scale: Annotated[
         float | None,
@@ -80,7 +84,7 @@ def command(
     bvh_position: Annotated[
         BvhPosition, typer.Option("--bvh-position", help="BVH positions replace the OFFSET, or add to it.")
     ] = BvhPosition.REPLACE,
-    mesh: Annotated[Mesh, typer.Option("--mesh", help="Body of the new skeleton.")] = Mesh.NONE,
+    mesh: Annotated[Mesh, typer.Option("--mesh", help="Mesh of the new skeleton.")] = Mesh.NONE,
     onto: Annotated[
         str | None, typer.Option("--onto", metavar="FILE", help="Put the motion on this character, a glTF.")
     ] = None,
@@ -94,12 +98,13 @@ def command(
         GroundMode, typer.Option("--floor", help="--onto: soles on the floor, or heights scaled and no more.")
     ] = GroundMode.CONTACT,
     bind_time: Annotated[
-        float | None, typer.Option("--bind-time", metavar="S", help="--onto: when the source stands in its rest pose.")
+        float | None,
+        typer.Option("--bind-time", metavar="S", help="--onto: time of the source's rest pose, in seconds."),
     ] = None,
     name: Annotated[str | None, typer.Option("--name", help="Name of the clip; else the file's.")] = None,
     replace: Annotated[
         str | None,
-        typer.Option("--replace", metavar="CLIP", help="--onto: the clip that gives way, or '#3'."),
+        typer.Option("--replace", metavar="CLIP", help="--onto: clip to replace, by name or '#3'."),
     ] = None,
     format: Annotated[Format, typer.Option("--format", help="Report as text on stderr, or JSON.")] = Format.TEXT,
     dry_run: common.DryRun = False,

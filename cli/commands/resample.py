@@ -27,9 +27,9 @@ def command(
         float, typer.Option("--fps", metavar="N", help="Frames per second; any number above 0.", show_default=False)
     ],
     interpolation: Annotated[
-        Interpolation, typer.Option("--interpolation", help="What lies between the new keys.")
+        Interpolation, typer.Option("--interpolation", help="Interpolation of the new keys.")
     ] = AS_IT_IS,
-    snap: Annotated[bool, typer.Option("--snap", help="Move the jumps of STEP tracks onto the grid too.")] = False,
+    snap: Annotated[bool, typer.Option("--snap", help="Move the keys of STEP tracks to the grid too.")] = False,
     clip: common.Clips = None,
     node: common.Nodes = None,
     path: common.Paths = None,

@@ -22,17 +22,17 @@ def command(
     output: common.Output = "-",
     *,
     speed: Annotated[
-        float | None, typer.Option("--speed", metavar="N", help="Times as fast: 0.25 takes four times as long.")
+        float | None, typer.Option("--speed", metavar="N", help="Speed factor; 0.25 is four times slower.")
     ] = None,
     duration: Annotated[
         float | None, typer.Option("--duration", metavar="S", help="Seconds from first to last key.")
     ] = None,
     reverse: Annotated[bool, typer.Option("--reverse", help="Play it backwards.")] = False,
-    ping_pong: Annotated[bool, typer.Option("--ping-pong", help="There and back: twice as long.")] = False,
+    ping_pong: Annotated[bool, typer.Option("--ping-pong", help="Append the reversed clip: twice as long.")] = False,
     warp_ease: Annotated[
-        str | None, typer.Option("--warp", metavar="EASE", help="Run through the whole clip with an ease.")
+        str | None, typer.Option("--warp", metavar="EASE", help="Easing of time over the whole clip.")
     ] = None,
-    offset: Annotated[float, typer.Option("--offset", metavar="S", help="Start so many seconds later.")] = 0.0,
+    offset: Annotated[float, typer.Option("--offset", metavar="S", help="Delay in seconds.")] = 0.0,
     clip: common.Clips = None,
     node: common.Nodes = None,
     path: common.Paths = None,

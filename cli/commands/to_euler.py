@@ -47,7 +47,8 @@ def command(
         ),
     ] = DEFAULT_ORDER,
     axes: Annotated[
-        AxesConvention, typer.Option("--axes", help="Axes of the turning thing, or fixed ones (FBX, Maya).")
+        AxesConvention,
+        typer.Option("--axes", help="Intrinsic (body) or extrinsic (fixed) axes; FBX and Maya: extrinsic."),
     ] = AxesConvention.INTRINSIC,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of the angles; BVH has degrees.")] = Unit.DEG,
     fps: Annotated[

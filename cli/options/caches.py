@@ -41,9 +41,7 @@ class RestMesh(StrEnum):
 
 
 Product = Annotated[str, typer.Argument(metavar="OUT", help=f"A cache: {FORMATS}; '-' for stdout.", show_default=False)]
-UpOption = Annotated[
-    Up | None, typer.Option("--up", help="Axis that points up; z is what Blender has.", show_default=False)
-]
+UpOption = Annotated[Up | None, typer.Option("--up", help="Up axis; z for Blender.", show_default=False)]
 VertexOrderOption = Annotated[
     Order | None,
     typer.Option(
@@ -56,14 +54,14 @@ FormatOption = Annotated[
     Format | None,
     typer.Option(
         "--format",
-        help="Of OUT; a name that ends as another of these is refused; default: by its ending, npz for '-'.",
+        help="Output format (default: from the extension, npz for '-'); a conflicting extension is an error.",
         show_default=False,
     ),
 ]
 MaxError = Annotated[
     str | None,
     typer.Option(
-        "--max-error", metavar="LENGTH", help="Morph targets: how far a vertex may be off: 0.5mm, 0.1%, default 0.1%."
+        "--max-error", metavar="LENGTH", help="Morph targets: maximum vertex error, 0.5mm or 0.1%, default 0.1%."
     ),
 ]
 Quantize = Annotated[bool, typer.Option("--quantize", help="Morph targets as 16-bit integers.")]
@@ -74,14 +72,14 @@ LayoutOption = Annotated[
     ),
 ]
 PresetOption = Annotated[
-    Preset | None, typer.Option("--preset", help="Textures: whose axes; default plain.", show_default=False)
+    Preset | None, typer.Option("--preset", help="Textures: target engine; default plain.", show_default=False)
 ]
 DepthOption = Annotated[
     Depth | None, typer.Option("--depth", help=".exr: float (default) or half.", show_default=False)
 ]
 RestMeshOption = Annotated[
     RestMesh | None,
-    typer.Option("--rest-mesh", help=".pc2, .mdd: the rest mesh beside, default ply.", show_default=False),
+    typer.Option("--rest-mesh", help=".pc2, .mdd: format of the companion rest mesh, default ply.", show_default=False),
 ]
 
 

@@ -39,12 +39,12 @@ class Format(StrEnum):
     JSON = "json"
 
 
-Report = Annotated[Format, typer.Option("--format", help="Text to read, or one JSON document.")]
-From = Annotated[float | None, typer.Option("--from", metavar="S", help="From so many seconds of the clip on.")]
-To = Annotated[float | None, typer.Option("--to", metavar="S", help="Up to so many seconds of the clip.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do everything but write.")]
+Report = Annotated[Format, typer.Option("--format", help="Report format: text or one JSON document.")]
+From = Annotated[float | None, typer.Option("--from", metavar="S", help="Start time in seconds.")]
+To = Annotated[float | None, typer.Option("--to", metavar="S", help="End time in seconds.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do not write anything.")]
 Quiet = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="No words, no tables: only errors, warnings, products."),
+    typer.Option("--quiet", "-q", help="Print only errors, warnings and products."),
 ]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more: one line per clip.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print more: one line per clip.")]
