@@ -1,5 +1,7 @@
 """Interpolation of LINEAR rotations by different players.
 
+Each player is a row of PLAYERS with its values and, for bounds on derivatives, its arc; a test compares the two.
+
 glTF specifies slerp. Quaternions stored as integers or rounded floats are rarely of unit length, though; players differ
 in their treatment of that, and some do not rotate at constant speed. An error bound holds in a player only if it was
 measured with that player's interpolation.
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Bools, Floats
 from anim.errors import RangeError, check_type
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, ValueKind
@@ -30,9 +32,12 @@ class PlayerModel:
 
     about: players that use it. between: (a, b, u) with keys (..., 4) and u (..., 1) → (..., 4), None for glTF's slerp.
     normalizes: whether values at keys, of STEP and outside the keys are normalized.
+    arc: (a, b) with keys (4, ...) in one hemisphere, normalized for GLTF → the angle θ (...) in radians, 0 for a line,
+    of (sin((1 − u)θ)·a + sin(uθ)·b) / sin θ, and a mask (...) of those that are then normalized.
     """
 
     about: str
+    arc: Callable[[Floats, Floats], tuple[Floats, Bools]]
     between: Callable[[Floats, Floats, Floats], Floats] | None = None
     normalizes: bool = True
 
@@ -112,11 +117,49 @@ def _align_sign(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.where((a * b).sum(axis=-1, keepdims=True) < 0, -b, b))
 
 
+def _slerp_arc(a: Floats, b: Floats) -> tuple[Floats, Bools]:
+    minus, plus = b - a, b + a
+    theta = 2 * np.arctan2(np.sqrt((minus * minus).sum(axis=0)), np.sqrt((plus * plus).sum(axis=0)))
+    return theta, np.zeros(theta.shape, np.bool_)
+
+
+def _chord_arc(a: Floats, b: Floats) -> tuple[Floats, Bools]:
+    del b
+    return np.zeros(a.shape[1:]), np.ones(a.shape[1:], np.bool_)
+
+
+def _three_arc(a: Floats, b: Floats) -> tuple[Floats, Bools]:
+    return _stored_arc(a, b, THREE_NLERP_DOT)
+
+
+def _babylon_arc(a: Floats, b: Floats) -> tuple[Floats, Bools]:
+    theta, line = _stored_arc(a, b, BABYLON_LERP_DOT)
+    return theta, np.zeros(line.shape, np.bool_)
+
+
+def _stored_arc(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
+    """Slerp angle of keys of any length, 0 from the dot product `short` on, and a mask of distinct keys that near."""
+    dot = (a * b).sum(axis=0)
+    equal = (a == b).all(axis=0)
+    is_line = (dot >= short) | equal
+    return np.arccos(np.where(is_line, 1.0, dot)), is_line & ~equal
+
+
+GLTF = "spec"  # the player that normalizes keys first; arcs between them are of unit length
+
 PLAYERS = {
-    "spec": PlayerModel("as glTF says: slerp of normalized keys"),
+    GLTF: PlayerModel("as glTF says: slerp of normalized keys", _slerp_arc),
     "three": PlayerModel(
-        "three.js: slerp of keys as stored, normalized only where they are near each other", _three_slerp, False
+        "three.js: slerp of keys as stored, normalized only where they are near each other",
+        _three_arc,
+        _three_slerp,
+        False,
     ),
-    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _babylon_slerp, False),
-    "nlerp": PlayerModel("Unity (glTFast), Blender: component by component, then normalized", _chord, True),
+    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _babylon_arc, _babylon_slerp, False),
+    "nlerp": PlayerModel("Unity (glTFast), Blender: component by component, then normalized", _chord_arc, _chord),
 }
+
+
+def is_divided(player: str) -> bool:
+    """Return whether a player normalizes constant values; GLTF has normalized the keys before."""
+    return PLAYERS[player].normalizes and player != GLTF

@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.arcs import ARCS
 from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
 from anim.measure.continuous_bound.interval_rise import interval_rise
 from anim.measure.continuous_bound.intervals import LONG
 from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
 from anim.model import Clip
+from anim.sampling.players import PLAYERS
 
 BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is as good
-MIN_INTERVAL_S = 128  # parts that a stretch between two times is cut into at most
+MAX_PARTS = 128  # parts that a stretch between two times is cut into at most
+PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # those with normalized arcs are adjacent, so that others skip that
 BLOCK = 1_000_000  # players × stretches × groups and nodes at once, each some 100 bytes
 
 
@@ -80,7 +81,7 @@ class Prover:
         where quaternions run through zero or turn too far between two times.
         """
         player, worst = max(((name, look.error) for name, look in looks.items()), key=lambda each: each[1].max_error)
-        if not self._knows_all or not set(looks) <= set(ARCS):
+        if not self._knows_all or not set(looks) <= set(PLAYERS):
             return Proof(None, worst, player)
         bound = max(worst.max_error, floor)
         room = max(bound * BOUND_SLACK, NOISE * self.ruler.diagonal)
@@ -118,15 +119,15 @@ class Prover:
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
                 parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.slack))
-                finest = np.clip(parts, 1, MIN_INTERVAL_S).astype(np.int64)
+                finest = np.clip(parts, 1, MAX_PARTS).astype(np.int64)
                 asked.append(subdivide(player, times, risen.rise, is_open, finest))
         return closed, refine(self.ruler, clips, asked, self._parts, target=aim.found + aim.slack)
 
 
 def _limits(looks: Mapping[str, ErrorSamples], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
-    """What no displacement of groups exceeds at some times, by player in the order of LAWS."""
+    """What no displacement of groups exceeds at some times, by player in PLAYER_ORDER."""
     return {
         player: np.concatenate([looks[player].limits[i][:, stretch] for i in order]).astype(np.float64)
-        for player in ARCS
+        for player in PLAYER_ORDER
         if player in looks
     }

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.measure.continuous_bound.arcs import ARCS, GLTF, is_divided
 from anim.measure.continuous_bound.endpoints import of_batch
 from anim.measure.continuous_bound.intervals import Intervals
 from anim.model import Interpolation
 from anim.sampling.batch import Batch
+from anim.sampling.players import GLTF, PLAYERS, is_divided
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def rotation_endpoints(
     b *= np.where((a * b).sum(axis=0) < 0, -1.0, 1.0)
     theta, unit = np.zeros(a.shape[1:]), np.zeros(a.shape[1:], np.bool_)
     for p, player in enumerate(players):
-        angle, divided = ARCS[player](a[:, p], b[:, p])
+        angle, divided = PLAYERS[player].arc(a[:, p], b[:, p])
         theta[p] = np.where(of.mixed, angle, 0.0)
         unit[p] = np.where(of.mixed, divided, of.tracked & is_divided(player)) | of.is_cubic
     value = _blend(a, b, theta, of.shares)

@@ -1,4 +1,4 @@
-"""The laws that are derived from, against the players that play: the same quaternions, on both sides of every key."""
+"""Arcs of players against their values: the same quaternions, on both sides of every key."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.arcs import ARCS
 from anim.measure.continuous_bound.intervals import merge_intervals
+from anim.measure.continuous_bound.prover import PLAYER_ORDER
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
 from anim.measure.error.metric import dense_times
 from anim.model import Interpolation, Track
@@ -30,8 +30,8 @@ def _rotations(mode: Interpolation, seed: int) -> Track:
     return track("rotation", TIMES, keys, mode, tangents=sides)
 
 
-def test_every_player_has_a_law() -> None:
-    assert set(ARCS) == set(PLAYERS)
+def test_the_prover_orders_every_player() -> None:
+    assert sorted(PLAYER_ORDER) == sorted(PLAYERS)
 
 
 @pytest.mark.parametrize("mode", [LINEAR, STEP, CUBICSPLINE])
@@ -40,7 +40,7 @@ def test_laws_play_as_players_do(mode: Interpolation, seed: int) -> None:
     moving = clip(_rotations(mode, seed))
     times = np.unique(np.concatenate((dense_times(moving), [0.0, 1.2])))
     where = merge_intervals(times, moving)
-    players = list(ARCS)
+    players = list(PLAYER_ORDER)
     found = rotation_endpoints(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
     length = np.linalg.norm(found.value, axis=1)  # (2, P, G, U)
     shown = found.value / np.where(found.unit, length, 1.0)[:, None]
@@ -60,7 +60,7 @@ def test_within_gaps_the_law_goes_on(seed: int) -> None:
     """Half-way through a gap, by c″ = −ν²c from both ends, divided by its length where it says so."""
     moving = clip(_rotations(LINEAR, seed))
     where = merge_intervals(dense_times(moving), moving)
-    players = list(ARCS)
+    players = list(PLAYER_ORDER)
     found = rotation_endpoints(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
     middle = (found.value[0] + found.value[1]) / (2 * np.cos(found.turn / 2))
     middle /= np.where(found.unit, np.linalg.norm(middle, axis=0), 1.0)

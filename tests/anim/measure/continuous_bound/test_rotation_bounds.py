@@ -8,14 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.arcs import ARCS
 from anim.measure.continuous_bound.intervals import Intervals, merge_intervals
 from anim.measure.continuous_bound.node_bounds import local_bounds, world_bounds
 from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.measure.error.metric import dense_times
 from anim.model import Clip, Scene
 from anim.sampling import world_matrices
-from anim.sampling.players import sampler_for
+from anim.sampling.players import PLAYERS, sampler_for
 from tests.anim.measure.continuous_bound.making import pair
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, skeleton, track
 
@@ -31,7 +30,7 @@ def _derivatives(of: Scene, moving: Clip, where: Intervals, player: str, share: 
     return np.stack((here, (right - left) / (2 * step), (right - 2 * here + left) / step**2))
 
 
-@given(st.integers(0, 100_000), st.sampled_from(list(ARCS)), st.floats(0.05, 0.95))
+@given(st.integers(0, 100_000), st.sampled_from(list(PLAYERS)), st.floats(0.05, 0.95))
 @settings(max_examples=40, deadline=None)
 def test_no_derivative_exceeds_its_majorant(seed: int, player: str, share: float) -> None:
     of, before, after = pair(seed, modes=(STEP, LINEAR, LINEAR, CUBICSPLINE))
