@@ -6,6 +6,7 @@ import io
 import struct
 import warnings
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,15 @@ from anim.errors import FormatError
 from anim.gltf.reading.materials import CLAMP_TO_EDGE, MIRRORED_REPEAT
 from anim.show.filmstrip.renderer import GAMMA
 
+if TYPE_CHECKING:
+    from PIL import Image
+
 MAX_SIDE = 1024  # texels; larger images are reduced, since frames have a few hundred pixels
 MAX_PIXELS = 1 << 27  # of an image in the file
 DECODER_ERRORS = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # errors of decoders
 FORMATS = ("PNG", "JPEG", "WEBP")
 LINEAR = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)  # linear light of each byte, the inverse of `to_srgb`
+GRAY_16 = 65535  # largest gray level of 16-bit PNG
 
 Texels = NDArray[np.uint8]
 
@@ -68,13 +73,22 @@ def decode_image(data: Bytes) -> Texels:
             if image.width * image.height > MAX_PIXELS:
                 raise FormatError(f"has {image.width} × {image.height} pixels (limit {MAX_PIXELS // 10**6} million)")
             image.draft("RGB", (MAX_SIDE, MAX_SIDE))
-            pixels = image.convert("RGBA")
+            pixels = _as_bytes(image).convert("RGBA")
             pixels.thumbnail((MAX_SIDE, MAX_SIDE))
             return np.array(pixels)
     except Image.UnidentifiedImageError:
         raise FormatError(f"is no PNG, JPEG or WebP that can be decoded (starts with {data[:8].tobytes()!r})") from None
     except (*DECODER_ERRORS, Image.DecompressionBombError) as error:
         raise FormatError(f"can't be decoded ({str(error).lower()})") from None
+
+
+def _as_bytes(image: Image.Image) -> Image.Image:
+    """The image with 8 bits per channel: Pillow's conversion clips gray levels of 16 bits instead of scaling them."""
+    from PIL import Image
+
+    if not image.mode.startswith("I"):
+        return image
+    return Image.fromarray((np.asarray(image).astype(np.int64) / GRAY_16 * 255).round().clip(0, 255).astype(np.uint8))
 
 
 def _wrap(index: Ints, size: int, mode: int) -> Ints:

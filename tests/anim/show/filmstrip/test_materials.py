@@ -250,6 +250,15 @@ def test_images_are_decoded(form: str, mode: str) -> None:
     assert np.abs(found[..., :3].astype(int) - 200).max() <= 4
 
 
+def test_gray_levels_of_16_bits_are_scaled() -> None:
+    data = io.BytesIO()
+    Image.fromarray(np.array([[0, 128, 32768, 65535]], np.uint16)).save(data, "PNG")
+    found = decode_image(np.frombuffer(data.getvalue(), np.uint8))
+    assert found[0, :, 0].tolist() == [0, 0, 128, 255]
+    assert (found[..., :3] == found[..., :1]).all()
+    assert (found[..., 3] == 255).all()
+
+
 @pytest.mark.parametrize("form", ["PNG", "JPEG"])
 def test_large_images_are_reduced(form: str) -> None:
     texels = np.zeros((600, 3000, 4), np.uint8) + np.array(YELLOW, np.uint8)
