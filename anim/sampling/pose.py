@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from copy import copy
 from typing import TypeAlias
 
@@ -87,14 +87,27 @@ def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
 
 
 def world_rotations(skeleton: Skeleton, local: Floats) -> dict[int, Floats]:
-    """Return the world rotation (F, 4) of every node from local ones (F, N, 4), without scale."""
+    """Return the world rotation (F, 4) of every node from local ones (F, N, 4).
+
+    Scales count by the signs of the rest pose only. Below an odd count of negative scales the result is the rotation
+    in −1 times the orthogonal world matrix: the −1 cancels between two poses.
+    """
     world: dict[int, Floats] = {}
     for level in skeleton.levels():
         for node in level.tolist():
             parent = int(skeleton.parents[node])
             own = local[:, node]
-            world[node] = own if parent < 0 else quaternion.multiply(world[parent], own)
+            world[node] = own if parent < 0 else quaternion.multiply(with_scale_signs(skeleton, parent, world), own)
     return world
+
+
+def with_scale_signs(skeleton: Skeleton, node: int, world: Mapping[int, Floats]) -> Floats:
+    """Return a node's world rotation (..., 4) times the signs of its scale: the space of its children."""
+    signs = np.where(skeleton.scale[node] < 0, -1.0, 1.0)
+    signs = signs * signs.prod()  # none or two are negative: a rotation by 180° about the third axis
+    if (signs > 0).all():
+        return world[node]
+    return quaternion.multiply(world[node], np.append(signs > 0, 0.0))
 
 
 def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:

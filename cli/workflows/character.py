@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from anim.errors import NotFoundError
 from anim.exchange.retarget import aliases
 from anim.exchange.retarget.apply import apply_to_character, matchable_nodes
-from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks
+from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks, scaled_ancestors
 from anim.exchange.retarget.retarget import GroundMode
 from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
 from anim.gltf import authoring
@@ -78,6 +78,10 @@ def put_on_character(
         if num_gone:
             what = f"{text.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
             voice.warn(f"{what} go with it: it is another figure's motion")
+        scaled = scaled_ancestors(done, stay, scene.skeleton)
+        if scaled:
+            names = ", ".join(scene.skeleton.label(node) for node in scaled)
+            voice.warn(f"the motion lacks the scale of {names} in '{old.name}': joints below get their rest size")
         clip = add_retained_tracks(done, stay, scene.skeleton)
         return made, writer.replace_clips(document, {casting.replaced: clip})
     return made, authoring.add_clips(document, [done.clip])

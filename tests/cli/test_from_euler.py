@@ -12,10 +12,13 @@ import pytest
 
 from anim.exchange.formats import bvh_reader
 from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.measure.error.metric import ErrorMetric
+from anim.model import Clip
 from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import Run, built, help_line, refusal, shell
+from tests.clips import track
 from tests.files import glb_of, opened, opened_fixture, opened_path
 
 SMALL = b"""HIERARCHY
@@ -223,6 +226,23 @@ def test_what_a_bvh_does_not_hold_stays_when_the_clip_gives_way(call: Call, asse
     assert "tracks of 'lbr_run_normal_anm_default' that the motion has no node for stay" in run.err
     other = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", character, "--replace", "#0")
     assert "that the motion has no node for go with it" in other.err
+
+
+def test_a_scale_that_a_bvh_does_not_hold_is_named_when_its_clip_gives_way(call: Call, tmp_path: Path) -> None:
+    content = json.loads(json.dumps(opened_fixture("biped").json))
+    content["nodes"].append({"name": "armature", "children": [0]})
+    armature = content["scenes"][0]["nodes"][0] = len(content["nodes"]) - 1
+    document = replace(opened_fixture("biped"), json=content)
+    walk = reader.clips(document)[0]
+    for largest, named in ((2.0, True), (1.0, False)):
+        scale = track("scale", [0, 1], [[1.0] * 3, [largest] * 3], node=armature)
+        character = tmp_path / "scaled.glb"
+        character.write_bytes(glb_of(writer.replace_clips(document, {0: Clip("walk", (*walk.tracks, scale))})))
+        call("to-euler", character, tmp_path / "walk.bvh", "--clip", "walk")
+        onto = ("--onto", character, "--replace", "walk", "--scale", ".01", "-q")
+        run = call("from-euler", tmp_path / "walk.bvh", "-", *onto)
+        run.product()
+        assert ("warning: the motion lacks the scale of node 22 'armature' in 'walk'" in run.err) == named
 
 
 def test_strangers_are_shown_how_to_pair(call: Call, asset: Find) -> None:

@@ -17,7 +17,7 @@ from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling import rest_pose, world_matrices
 from anim.sampling import sample_pose as posed
-from anim.sampling.pose import local_by_node, world_by_node, world_rotations
+from anim.sampling.pose import local_by_node, with_scale_signs, world_by_node, world_rotations
 
 MIN_SCALE_VOLUME = 1e-9  # of a unit cube's volume; a smaller scale flattens an axis
 NUM_HEIGHT_SAMPLES = 64  # times at which the height of the motion is sampled
@@ -220,9 +220,9 @@ def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int,
     for level in skeleton.levels():
         for node in level.tolist():
             parent = int(skeleton.parents[node])
+            parent_world = with_scale_signs(skeleton, parent, world) if parent >= 0 else None
             if node in wanted:
                 world[node] = wanted[node]
-                parent_world = world[parent] if parent >= 0 else None
                 found[node] = (
                     wanted[node]
                     if parent_world is None
@@ -230,7 +230,7 @@ def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int,
                 )
             else:
                 own = skeleton.rotation[node]
-                world[node] = own if parent < 0 else quaternion.multiply(world[parent], own)
+                world[node] = own if parent_world is None else quaternion.multiply(parent_world, own)
     return found
 
 

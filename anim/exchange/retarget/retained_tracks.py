@@ -16,6 +16,8 @@ from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
 
+SAME_SCALE = 1e-6  # relative difference of float32 scales by rounding
+
 
 def retained_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], int]:
     """Return the retained tracks of a replaced clip, and the count of removed ones without a motion node.
@@ -26,6 +28,17 @@ def retained_tracks(old: Clip, done: CharacterClip) -> tuple[tuple[Track, ...], 
     known = set(done.matching.pairs.values())
     found = tuple(t for t in old.tracks if t.node is None or t.path == "weights" or t.node not in known)
     return (found, 0) if done.measure is Measure.BUILD else ((), len(found))
+
+
+def scaled_ancestors(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> list[int]:
+    """Return the nodes above matched joints with another scale in the retained tracks than at rest.
+
+    `add_retained_tracks` removes their effect from the joints: a motion such as BVH has no scale.
+    """
+    known = set(done.matching.pairs.values())
+    above = {up for node in known for up in _between(skeleton, node, known)}
+    scales = [(track.node, track.values) for track in stay if track.node is not None and track.path == "scale"]
+    return sorted({n for n, v in scales if n in above and not np.allclose(v, skeleton.scale[n], rtol=SAME_SCALE)})
 
 
 def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> Clip:

@@ -16,6 +16,7 @@ from anim.exchange.euler.to_euler import to_euler
 from anim.exchange.formats import bvh_reader, json_reader
 from anim.exchange.retarget.apply import apply_to_character
 from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
+from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.maths.euler import AxesConvention
@@ -99,7 +100,7 @@ def test_all_clips_come_back(name: str, kind: str, asset: Find) -> None:
     assert {name: error for name, error in errors.items() if error >= MAX_ERROR_M} == {}
 
 
-def _under(bones: Skeleton, translation: Floats, rotation: Floats, scale: float) -> Skeleton:
+def _under(bones: Skeleton, translation: Floats, rotation: Floats, scale: float | Floats) -> Skeleton:
     """The skeleton below one node more."""
     parents = np.where(bones.parents < 0, len(bones), bones.parents)
     return Skeleton(
@@ -107,7 +108,7 @@ def _under(bones: Skeleton, translation: Floats, rotation: Floats, scale: float)
         np.append(parents, -1),
         np.concatenate((bones.translation, [translation])),
         np.concatenate((bones.rotation, [rotation])),
-        np.concatenate((bones.scale, [[scale] * 3])),
+        np.concatenate((bones.scale, [np.broadcast_to(scale, 3)])),
     )
 
 
@@ -127,6 +128,22 @@ def test_a_figure_placed_elsewhere_does_the_same(name: str, kind: str, asset: Fi
     expected, found = (world_matrices(placed, sample_pose(placed, each, times)) for each in (clip, done.clip))
     np.testing.assert_allclose(found[..., 3], expected[..., 3], atol=2 * MAX_ERROR_M)
     assert done.scale == pytest.approx(2, abs=1e-6)
+
+
+@FORMATS
+@pytest.mark.parametrize("mirror", [(-1.0, 1, 1), (2, -2, 2), (-1, 1, -1), (-1, -1, -1)])
+def test_a_figure_below_a_rotating_mirror_comes_back(mirror: tuple[float, ...], kind: str, asset: Find) -> None:
+    """The mirroring node is no joint: its track is retained, and joints get the rotations that BVH has in the world."""
+    document = character("biped", asset)
+    scene, walk = reader.scene(document), reader.clips(document)[0]
+    placed = replace(scene, skeleton=_under(scene.skeleton, ASIDE, TURNED, np.array(mirror)))
+    times = walk.tracks[0].times
+    angles = np.outer(np.linspace(0, 2, len(times)), (0.3, 1.0, -0.5))
+    turning = track("rotation", times, quaternion.from_rotation_vector(angles), node=len(scene.skeleton))
+    clip = Clip("turning", (*walk.tracks, turning))
+    done = apply_to_character(_written(placed, clip, kind, FPS.get("biped")), placed, aliases={}, nested=True)
+    found = add_retained_tracks(done, retained_tracks(clip, done)[0], placed.skeleton)
+    assert ErrorMetric(placed).error_at(clip, found, times).max_error < MAX_ERROR_M
 
 
 @pytest.mark.parametrize("factor", [2.0, 0.01])
