@@ -196,7 +196,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
         with documents.content(path) as (data, name):
             head = data[:HEAD].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
-                document = container.read(data)
+                document = container.read(data, resolver.refuse_relative)
                 documents.repaired_note(document, name, voice)
                 yield gltf.pages(document) or document, name, resolver.refuse_relative
             else:

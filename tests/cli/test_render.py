@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Find, Fixture
-from tests.cli.running import built, refusal
+from tests.cli.running import built, help_line, refusal
 
 SMALL = ("--size", "64")
 
@@ -243,3 +243,9 @@ def test_what_is_drawn_on_the_surface(option: str, fixture: Fixture, call: Call)
     plain, marked = call(*args).product(), call(*args, option).product()
     assert plain != marked
     assert call(*args, option).product() == marked
+
+
+def test_a_gltf_with_a_buffer_beside_it_needs_its_path(call: Call) -> None:
+    run = call("render", "-", "-", stdin=built("gltf_external"))
+    assert "'walk data.bin' lies beside the file, but the input is a pipe" in refusal(run, 3)
+    assert help_line(run) == "give the file's path, or pipe a GLB"
