@@ -1,4 +1,4 @@
-"""The figures of quaternions on cubics, which all players divide by their length."""
+"""Bounds of quaternions on cubics, which all players normalize."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from anim.measure.continuous_bound.quaternion_bounds import MIN_LENGTH, Quaterni
 
 
 def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic: Bools, h: Floats) -> QuaternionBounds:
-    """Return the figures with those of cubics in their places.
+    """Return the bounds with those of cubic tracks replaced.
 
     value, cubic: (2, 4, P, G, U) the mixes at both ends, and (2, 2, 4, P, G, U) their first and second derivatives.
     is_cubic: (U,). h: (G, 1) s.
@@ -25,7 +25,7 @@ def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic:
 
 
 def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> QuaternionBounds:
-    """Return the figures of cubics with values, slopes and second derivatives (2, 4, P, G, U) at both ends."""
+    """Return the bounds of cubics with values, slopes and second derivatives (2, 4, P, G, U) at both ends."""
     of = arc_mix(value, slope)
     push = np.sqrt((bend * bend).sum(axis=1).max(axis=0))  # no |c″| is larger
     jerk = np.sqrt(((bend[1] - bend[0]) ** 2).sum(axis=0)) / h  # |c‴|, constant
@@ -46,7 +46,7 @@ def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Quaterni
 
 
 def _min_norm(value: Floats, h: Floats) -> Floats:
-    """The least length on the chord (P, G, U)."""
+    """The smallest length on the chord (P, G, U)."""
     chord = (value[1] - value[0]) / h
     square, along, rate = ((x * y).sum(axis=0) for x, y in ((value[0],) * 2, (value[0], chord), (chord, chord)))
     return np.asarray(np.sqrt(nearest(square, along, rate, h)))

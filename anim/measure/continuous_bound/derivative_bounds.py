@@ -1,10 +1,10 @@
-"""Majorants: numbers that no motion exceeds, nor its first two derivatives, of a motion and of another version of it.
+"""Majorants: upper bounds of a motion, its first two derivatives, and those of another version of it.
 
-A majorant is an array (3, 2, ...). [k, 0] is no less than the k-th derivative of the first version, at any time of
-a gap; [k, 1] is [k, 0] and on top of it no less than how far the k-th derivatives of both are apart. So [k, 1] bounds
-the second version, and [k, 1] − [k, 0] the difference. Both rows multiply by Leibniz' rule, and what is left between
-them bounds the difference of the products: b·y − a·x = (b − a)·y + a·(y − x). Hence nothing is lost where two versions
-are alike, however fast they move. A third row, where there is one, is a third version of the same kind.
+A majorant is an array (3, 2, ...). [k, 0] bounds the k-th derivative of the first version at any time of an interval;
+[k, 1] is [k, 0] plus a bound of the difference of the k-th derivatives. So [k, 1] bounds the second version, and
+[k, 1] − [k, 0] the difference. Both rows multiply by Leibniz' rule, and their difference bounds the difference of the
+products: b·y − a·x = (b − a)·y + a·(y − x). Hence nothing is lost for equal versions, however fast they move. A third
+row, if present, is a third version of the same kind.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from anim.arrays import Floats
 
 
 def derivative_bound(first: Floats, apart: Floats) -> Floats:
-    """Return the majorant (3, 2, ...) of what is bounded by `first` (3, ...), with another at most `apart` from it."""
+    """Return the majorant (3, 2, ...) of a motion bounded by `first` (3, ...), with differences up to `apart`."""
     return np.stack((first, first + apart), axis=1)
 
 
 def resting(first: Floats, apart: Floats | float = 0.0) -> Floats:
-    """Return the majorant (3, 2, ...) of what does not move; first, apart: (...)."""
+    """Return the majorant (3, 2, ...) of a constant; first, apart: (...)."""
     result = np.zeros((3, 2, *first.shape))
     result[0, 0] = first
     result[0, 1] = first + apart

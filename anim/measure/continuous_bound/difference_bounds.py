@@ -1,12 +1,12 @@
-"""How far quaternions of two versions of a clip can drift apart within a gap, with their first two derivatives.
+"""Bounds of the difference of two versions' quaternions within an interval, with two derivatives.
 
-Both versions obey q″ = −λq − 2ρq′ + e, see `flight`, so that the difference d of two quaternions obeys
+Both versions obey q″ = −λq − 2ρq′ + e, see `quaternion_bounds`, so that the difference d of two quaternions obeys
 
     |d″| ≤ λ|d| + |Δλ||q| + 2ρ|d′| + 2|Δρ||q′| + |Δe|
 
-In a gap of length h no |d| exceeds the larger one of both ends by more than h²/8 · sup|d″|, no |d′| by more than
-h/2 · sup|d″|. With that, the line above has sup|d″| on both sides, and is solved for it. Nothing in it is as large as
-the motion itself where both versions are alike.
+In an interval of length h no |d| exceeds the larger one of both ends by more than h²/8 · sup|d″|, no |d′| by more than
+h/2 · sup|d″|. With that, the line above has sup|d″| on both sides, and is solved for it. All its terms vanish for equal
+versions.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ MIN_LENGTH = 1e-3  # where less than this of sup|d″| is left on one side, noth
 def difference_bounds(
     a: QuaternionBounds, b: QuaternionBounds, between: tuple[ChordBounds, ChordBounds, Bools], h: Floats
 ) -> Floats:
-    """Return bounds (3, P, G, U) of |d| and its first two derivatives, for b's quaternions less a's.
+    """Return bounds (3, P, G, U) of |d| and its first two derivatives, for b's quaternions minus a's.
 
-    between: both as lines, and where (P, G, U) both are lines that are divided by their length. h: (G, 1) s.
+    between: both as lines, and the mask (P, G, U) of lines normalized in both. h: (G, 1) s.
     """
     start, rate = (np.sqrt(_squares(x, y).max(axis=0)) for x, y in ((b.value, a.value), (b.slope, a.slope)))
     pull, drag = _between_lines(*between[:2], h)
@@ -38,7 +38,7 @@ def difference_bounds(
 
 
 def _between_lines(a: ChordBounds, b: ChordBounds, h: Floats) -> tuple[Floats, Floats]:
-    """Bounds of |Δλ| and |Δρ| on lines that are divided by their length.
+    """Bounds of |Δλ| and |Δρ| on normalized lines.
 
     There λ = wedge / |c|⁴ and ρ = c·c′ / |c|²: of a constant, a square of time and a line, and so are differences.
     """

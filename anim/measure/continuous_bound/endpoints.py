@@ -1,4 +1,4 @@
-"""Vectors at both ends of every gap: values, slopes and second derivatives, one-sided, as tracks have them there."""
+"""One-sided values, slopes and second derivatives of vectors at both ends of every interval."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from anim.sampling.batch import Batch
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """What U vectors of C components do at both ends (2) of G gaps: value, slope per s, bend per s², each
-    (2, C, G, U). Within a gap the third derivative is constant: it is a line or a cubic."""
+    """Value, slope per s and second derivative per s² of U vectors at both ends of G intervals, (2, C, G, U).
+
+    Within an interval the third derivative is constant: a line or a cubic.
+    """
 
     value: Floats
     slope: Floats
@@ -26,9 +28,9 @@ class Endpoints:
 
 
 def endpoints(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals) -> Endpoints:
-    """Return what vectors do that are at `rest` (U, C) where no track moves them.
+    """Return the endpoints of vectors, `rest` (U, C) without a track.
 
-    place: for numbers of nodes which of the vectors each is.
+    place: index of the vector by node index.
     """
     shape = (2, rest.shape[1], len(where), len(rest))
     found = Endpoints(np.broadcast_to(rest.T[:, None], shape).copy(), np.zeros(shape), np.zeros(shape))
@@ -40,7 +42,7 @@ def endpoints(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], w
 
 
 def of_batch(batch: Batch, where: Intervals) -> tuple[Floats, Floats, Floats]:
-    """Return values, slopes and bends (2, C, G, U) of the U tracks of a batch, rotations as they are mixed."""
+    """Return values, slopes and second derivatives (2, C, G, U) of a batch's U tracks; rotations not normalized."""
     at = where.on(batch.times)
     start, end = (np.moveaxis(batch.values[k], -1, 0) for k in (at.left, at.right))  # (C, G, U)
     if batch.interpolation is Interpolation.STEP:
@@ -55,9 +57,9 @@ def of_batch(batch: Batch, where: Intervals) -> tuple[Floats, Floats, Floats]:
 
 
 def vector_bounds(of: Endpoints, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
-    """Return bounds (3, ...) of the sizes of a vector and its first two derivatives in every gap.
+    """Return bounds (3, ...) of the norm of a vector and its first two derivatives in every interval.
 
-    lengths: (G,) s. size: of vectors (C, G, U); convex, as norms are.
+    lengths: (G,) s. size: norm of vectors (C, G, U); convex.
     """
     h = lengths[:, None]
     bend = np.maximum(*map(size, of.bend))
@@ -67,7 +69,7 @@ def vector_bounds(of: Endpoints, lengths: Floats, size: Callable[[Floats], Float
 
 
 def slide_bounds(first: Endpoints, second: Endpoints, lengths: Floats, size: Callable[[Floats], Floats]) -> Floats:
-    """Return the majorant (3, 2, ...) of a vector in two versions. lengths, size: as of `swings`."""
+    """Return the majorant (3, 2, ...) of a vector in two versions. lengths, size: as of `vector_bounds`."""
     apart = Endpoints(second.value - first.value, second.slope - first.slope, second.bend - first.bend)
     return derivative_bound(vector_bounds(first, lengths, size), vector_bounds(apart, lengths, size))
 

@@ -1,4 +1,4 @@
-"""How far points are from the joints that carry them: what turns a bound on joints into one on a surface."""
+"""Influence radius of joints: distance of the points that they carry."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from anim.measure.error.shell_points import ShellPoints
 
 @dataclass(frozen=True, slots=True)
 class Morphing:
-    """How morph weights move points of one surface.
+    """Displacement of one surface's points by morph weights.
 
-    owners: the nodes whose weights count in both versions. rest: (2, M) weights where no track moves them.
-    targets: (J, M) m, no point that a joint carries is moved farther in the joint's space by a weight of 1.
+    owners: the nodes with the weights in both versions. rest: (2, M) weights without a track.
+    targets: (J, M) m, bound of the displacement in each joint's space at weight 1.
     """
 
     owners: tuple[int, int]
@@ -27,11 +27,11 @@ class Morphing:
 
 @dataclass(frozen=True, slots=True)
 class InfluenceRadius:
-    """What J joints carry of one surface.
+    """Bounds of the points of one surface by J joints.
 
-    nodes: (J,). arms: (J,) m, no point that a joint carries is farther from it, in its own space; of a morphed surface
-    without any weight. apart: (J,) m, no point's two versions are farther apart there. share: (J,), the largest sum of
-    skin weights of a vertex. groups: joints that carry some of each group of points.
+    nodes: (J,). arms: (J,) m, largest distance of a carried point from the joint in its own space; of a morphed surface
+    at weights 0. apart: (J,) m, largest difference there between both versions. fraction: (J,), the largest sum of
+    skin weights of a vertex. groups: joints with influence on each group of points.
     """
 
     nodes: Ints
@@ -43,7 +43,7 @@ class InfluenceRadius:
 
 
 def influence_radius(part: PointGroups) -> InfluenceRadius | None:
-    """Return what carries a surface, None where other nodes do so in the second version."""
+    """Return the influence radius of a surface's joints; None if the second version has other joints."""
     if isinstance(part, ShellPoints):
         arms = np.sqrt((part.points * part.points).sum(axis=-1)).max(axis=-1, initial=0.0)
         same = np.array_equal(part.nodes, part.partners)
@@ -60,7 +60,7 @@ def influence_radius(part: PointGroups) -> InfluenceRadius | None:
 
 
 def join_reaches(reaches: Sequence[InfluenceRadius]) -> InfluenceRadius:
-    """Return several surfaces that are not morphed as one, their groups in order."""
+    """Return several surfaces without morph targets as one, their groups in order."""
     firsts = np.cumsum([0, *(len(each.nodes) for each in reaches)])
     groups = [joints + first for each, first in zip(reaches, firsts[:-1], strict=True) for joints in each.groups]
     return InfluenceRadius(
@@ -78,9 +78,9 @@ def _morphing(part: SkinnedGroups, old: Binding, new: Binding) -> Morphing:
 
 
 def _arms(part: SkinnedGroups, points: Floats, bind: Floats, one: float) -> Floats:
-    """The longest of the vectors (V, 3) that each used joint carries (J,), in the joint's space by `bind` (J, 3, 4).
+    """The longest vector (V, 3) per used joint (J,), in the joint's space by `bind` (J, 3, 4).
 
-    one: 1 for points, 0 for what has no place.
+    one: 1 for points, 0 for directions.
     """
     result = np.zeros(len(part.used))
     for joints, weights in zip(part.surface.joints.T, part.surface.weights.T, strict=True):

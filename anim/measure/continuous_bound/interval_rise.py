@@ -1,4 +1,4 @@
-"""By how much vertices can be displaced more between times than at them."""
+"""Bound of the displacement between times, above that at the times."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from anim.model import Clip, Scene
 
 @dataclass(frozen=True, slots=True)
 class IntervalRise:
-    """Of C groups, between each of F times and the next (C, F − 1), in m; inf where nothing is known.
+    """Bounds for C groups between each of F times and the next (C, F − 1), in m; inf if unknown.
 
-    rise: by how much displacements can exceed the larger one of both ends. jump: by how much the displacement just
-    before the later time can exceed the one at it.
+    rise: excess of displacements over the larger one of both ends. jump: excess of the displacement just before the
+    later time over the one at it.
     """
 
     rise: Floats

@@ -1,4 +1,4 @@
-"""Gaps: stretches of time within which every track of two clips is one smooth piece."""
+"""Time intervals in which every track of two clips is one smooth segment."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LONG = 0.05  # s; longer gaps are split at all times looked at: how much a motio
 
 
 class Intervals:
-    """G gaps. edges: (G + 1,) s, increasing."""
+    """G intervals. edges: (G + 1,) s, increasing."""
 
     def __init__(self, edges: Floats) -> None:
         self.edges = edges
@@ -21,17 +21,17 @@ class Intervals:
 
     @property
     def starts(self) -> Floats:
-        """Where they start (G,), in s."""
+        """Start times (G,), in s."""
         return self.edges[:-1]
 
     @property
     def ends(self) -> Floats:
-        """Where they end (G,), in s."""
+        """End times (G,), in s."""
         return self.edges[1:]
 
     @property
     def lengths(self) -> Floats:
-        """How long they are (G,), in s."""
+        """Lengths (G,), in s."""
         return np.diff(self.edges)
 
     def __len__(self) -> int:
@@ -39,11 +39,11 @@ class Intervals:
 
     @property
     def first(self) -> Intervals:
-        """The first of them."""
+        """The first interval alone."""
         return Intervals(self.edges[:2])
 
     def on(self, keys: Floats) -> IntervalKeys:
-        """Return where they lie between keys (K,) in s."""
+        """Return the intervals' positions on keys (K,) in s."""
         if id(keys) not in self._placed:
             self._placed[id(keys)] = keys, interval_keys(keys, self)
         return self._placed[id(keys)][1]
@@ -55,10 +55,10 @@ class Intervals:
 
 @dataclass(frozen=True, slots=True)
 class IntervalKeys:
-    """Gaps on the keys of one time axis.
+    """Intervals on the keys of one time axis.
 
-    left, right: (G,) the keys of the piece that the gap is in. start, end: (G,) shares of the way between them, both 0
-    where the first or last key is held. duration: (G,) s from left to right. inside: (G,) whether nothing is held.
+    left, right: (G,) keys of the segment. start, end: (G,) interpolation parameters, both 0 beyond the first or last
+    key. duration: (G,) s from left to right. inside: (G,) whether the interval is between keys.
     """
 
     left: Ints
@@ -86,7 +86,7 @@ def merge_intervals(times: Floats, *clips: Clip, longest: float = LONG) -> Inter
 
 
 def interval_keys(keys: Floats, where: Intervals) -> IntervalKeys:
-    """Return where gaps lie between keys (K,) in s."""
+    """Return the positions of intervals on keys (K,) in s."""
     last = len(keys) - 1
     left = np.clip(np.searchsorted(keys, where.starts, side="right") - 1, 0, last)
     right = np.minimum(left + 1, last)

@@ -1,4 +1,4 @@
-"""A bound on how far two versions of a clip are apart at every time, not only where it was looked."""
+"""Proof of a bound on the distance of two versions of a clip at every time."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from anim.model import Clip
 from anim.sampling.players import PLAYERS
 
 BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is as good
-MAX_PARTS = 128  # parts that a stretch between two times is cut into at most
+MAX_PARTS = 128  # per interval between two times
 PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # those with normalized arcs are adjacent, so that others skip that
 BLOCK = 1_000_000  # players × stretches × groups and nodes at once, each some 100 bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What is known of every time of a clip.
+    """Bound over every time of a clip.
 
-    bound: m, no vertex is displaced more at any time, but for rounding; None where nothing could be proven.
-    error, player: the largest distance that was seen, for a proof may look where nobody has looked before.
+    bound: m, of the displacement of any vertex at any time, except for rounding; None if unproven.
+    error, player: the largest sampled distance, including samples of the proof.
     """
 
     bound: float | None
@@ -125,7 +125,7 @@ class Prover:
 
 
 def _limits(looks: Mapping[str, ErrorSamples], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
-    """What no displacement of groups exceeds at some times, by player in PLAYER_ORDER."""
+    """Bounds of the displacement of groups at given times, by player in PLAYER_ORDER."""
     return {
         player: np.concatenate([looks[player].limits[i][:, stretch] for i in order]).astype(np.float64)
         for player in PLAYER_ORDER

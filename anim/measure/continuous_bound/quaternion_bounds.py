@@ -1,7 +1,7 @@
-"""What the quaternions of one version do within gaps, in figures that no time of the gap exceeds.
+"""Bounds of one version's quaternions within intervals.
 
-A quaternion q, the mix c as it is or divided by its length, obeys q″ = −λq − 2ρq′ + e. On an arc λ = ν², on a line 0,
-with ρ = e = 0. Divided by its length, λ = |q′|², ρ = c·c′/|c|², and e is what of c″/|c| is at right angles to q; on a
+A quaternion q, the mix c unchanged or normalized, obeys q″ = −λq − 2ρq′ + e. On an arc λ = ν², on a line 0,
+with ρ = e = 0. Normalized, λ = |q′|², ρ = c·c′/|c|², and e is the part of c″/|c| perpendicular to q; on a
 line |c|²|q′| is constant, and ρ′ = λ − ρ².
 """
 
@@ -18,12 +18,12 @@ MIN_LENGTH = 1e-3  # shorter mixes have no direction that could be relied on
 
 @dataclass(frozen=True, slots=True)
 class QuaternionBounds:
-    """Quaternions of P players, G gaps and U nodes; every figure (P, G, U) where nothing else is said.
+    """Quaternions of P players, G intervals and U nodes; every value (P, G, U) unless noted.
 
-    value, slope: (2, 4, P, G, U), q and q′ at both ends. size, speed: neither |q| nor |q′| is larger.
-    pull: (2, P, G, U), λ at both ends; neither λ nor |λ′| is larger than most_pull and pull_rate. drag, most_drag,
-    drag_rate: the same of ρ. own: (2, 4, P, G, U), most_own, own_rate: the same of e; None and 0 where no e is.
-    excess: (3, P, G, U), neither |1 − |q|²| nor its first two derivatives are larger.
+    value, slope: (2, 4, P, G, U), q and q′ at both ends. size, speed: bounds of |q| and |q′|. lambda_: (2, P, G, U), λ
+    at both ends; max_lambda, lambda_rate: bounds of λ and |λ′|. rho, max_rho, rho_rate: the same of ρ. own: (2, 4, P,
+    G, U), max_residual, residual_rate: the same of e; None and 0 without e. excess: (3, P, G, U), bounds of |1 − |q|²|
+    and its first two derivatives.
     """
 
     value: Floats
@@ -43,7 +43,7 @@ class QuaternionBounds:
 
     @property
     def bend(self) -> Floats:
-        """No |q″| is larger (P, G, U)."""
+        """Bound of |q″| (P, G, U)."""
         return np.asarray(self.max_lambda * self.size + 2 * self.max_rho * self.speed + self.max_residual)
 
 
@@ -67,9 +67,9 @@ class ArcMix:
 
 @dataclass(frozen=True, slots=True)
 class ChordBounds:
-    """A mix on a line, scaled to length 1 where a gap starts; each (P, G, U), or (2, P, G, U) at both ends.
+    """A mix on a line, scaled to length 1 at an interval's start; (P, G, U), or (2, P, G, U) at both ends.
 
-    square: |c|², along: c·c′, rate: |c′|². wedge: (|c|²|q′|)², which is constant. nearest, farthest: the least and
+    square: |c|², along: c·c′, rate: |c′|². wedge: (|c|²|q′|)², which is constant. nearest, farthest: the smallest and
     the largest |c|².
     """
 
@@ -100,7 +100,10 @@ def chord_bounds(of: ArcMix, h: Floats) -> ChordBounds:
 
 
 def slerp_bounds(of: ArcMix, turn: Floats, h: Floats) -> QuaternionBounds:
-    """Return the figures of arcs and lines as they are: q = c. turn: (P, G, U) rad, ν times the gap's length."""
+    """Return the bounds of arcs and lines without normalization: q = c.
+
+    turn: (P, G, U) rad, ν times the interval's length.
+    """
     reach = 1 - turn * turn / 8  # no c is larger than the larger end divided by this, nor is c′, for c″ = −ν²c
     size, speed = (np.sqrt(each.max(axis=0)) / reach for each in (of.square, of.rate))
     pull = (turn / h) ** 2
@@ -113,7 +116,7 @@ def slerp_bounds(of: ArcMix, turn: Floats, h: Floats) -> QuaternionBounds:
 
 
 def nlerp_bounds(of: ArcMix, chord: ChordBounds) -> QuaternionBounds:
-    """Return the figures of lines that are divided by their length: q = c / |c|. chord: as `line` gives it."""
+    """Return the bounds of normalized lines: q = c / |c|. chord: that of `chord_bounds`."""
     drag = chord.along / chord.square
     most_drag = np.abs(chord.along).max(axis=0) / chord.nearest
     pull, most_pull = chord.wedge / chord.square**2, chord.wedge / chord.nearest**2
@@ -132,21 +135,21 @@ def select_bounds(into: QuaternionBounds, part: QuaternionBounds, players: slice
 
 
 def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
-    """Return the least |c|² on a line, nan where it is next to nothing: of |c|² and c·c′ at its start, and |c′|²."""
+    """Return the smallest |c|² on a line, nan near 0, from |c|² and c·c′ at its start, and |c′|²."""
     until = np.clip(-along / np.where(rate > 0, rate, 1.0), 0.0, h)
     least = square + until * (2 * along + until * rate)
     return np.asarray(np.where(least > MIN_LENGTH**2, least, np.nan))
 
 
 def directed(of: ArcMix, drag: Floats) -> tuple[Floats, Floats]:
-    """Return the direction of a mix, and how fast that changes (2, 4, P, G, U). drag: (2, P, G, U)."""
+    """Return the direction of a mix, and its derivative (2, 4, P, G, U). drag: (2, P, G, U)."""
     over = 1 / np.sqrt(of.square)[:, None]
     value = of.value * over
     return value, of.slope * over - drag[:, None] * value
 
 
 def _excess(of: ArcMix, pull: Floats, h: Floats) -> Floats:
-    """By how much |c|² is off 1, with two derivatives: it swings about its mean with 2ν, where it is not constant."""
+    """Bound of |c|² − 1, with two derivatives: it oscillates about its mean with 2ν, or is constant."""
     push = 2 * (of.rate[0] - pull * of.square[0])
     drift = 2 * of.along[0]
     swing = np.sqrt(push * push + 4 * pull * drift * drift)

@@ -1,4 +1,4 @@
-"""A second look, at times between those of the first, where displacements may have risen above what was seen there."""
+"""Refinement of the bound: samples in intervals in which displacements may exceed it."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Subintervals:
 
 @dataclass(frozen=True, slots=True)
 class RefinedMaximum:
-    """What a second look shows.
+    """Result of a refinement.
 
-    bound: m, nothing is displaced more in any stretch. largest: m, the longest displacement that was seen. player,
-    time: whose, and when, in s.
+    bound: m, of the displacement in all intervals. largest: m, the largest sampled displacement. player,
+    time: of that sample, s.
     """
 
     bound: float = 0.0

@@ -1,7 +1,7 @@
-"""Quaternions at both ends of every gap, as several players mix them, and by which law they go on between.
+"""Quaternions at both ends of every interval by player, and their arcs between.
 
-Within a gap a quaternion is a mix c of two keys, on a line (c″ = 0), on an arc (c″ = −ν²c) or on a cubic, as it is or
-divided by its length.
+Within an interval a quaternion is a mix c of two keys, on a line (c″ = 0), on an arc (c″ = −ν²c) or on a cubic,
+unchanged or normalized.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _keys(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where
 
 
 def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
-    """The keys on both sides (4, P, G, U) as players have them before they mix them."""
+    """The keys on both sides (4, P, G, U) in players, before interpolation."""
     directed = of.keys
     if GLTF in players:
         length = np.sqrt((of.keys * of.keys).sum(axis=1))

@@ -1,4 +1,4 @@
-"""How much the displacement of points can bend between neighboring times, by majorants of the nodes that carry them."""
+"""Bounds of the second derivative of displacements, from majorants of the nodes that carry the points."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from anim.measure.continuous_bound.track_partition import ClipVersion
 
 @dataclass(frozen=True, slots=True)
 class SecondDerivativeBound:
-    """What no point of C groups exceeds in G gaps, each (C, G).
+    """Bounds for points of C groups in G intervals, each (C, G).
 
-    bend: m/s², the second derivative of the displacement. jump: m, how far the displacement jumps where the gap ends.
+    bend: m/s², the second derivative of the displacement. jump: m, its jump at the interval's end.
     """
 
     bend: Floats
@@ -29,7 +29,7 @@ class SecondDerivativeBound:
 def second_derivative_bound(
     of: InfluenceRadius, nodes: NodeBounds, first: ClipVersion, second: ClipVersion, where: Intervals
 ) -> SecondDerivativeBound:
-    """Return how much displacements bend, and jump, of what is carried as `of` says. nodes: in the world."""
+    """Return bounds of the second derivative and jumps of displacements. nodes: in the world."""
     points = resting(of.arms, of.apart)[..., None]
     if of.morphing is not None:
         points = points + _morphed(of.morphing, first, second, where)
