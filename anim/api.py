@@ -1,6 +1,6 @@
 """Functions of the facade `anim`, on assets and names of clips.
 
-Lengths may have units, as on the command line: "0.5mm", "2cm", "0.1%" of the diagonal of the model's bounding box;
+Lengths as text have units, as on the command line: "0.5mm", "2cm", "0.1%" of the diagonal of the model's bounding box;
 numbers are metres.
 """
 
@@ -9,18 +9,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from numbers import Integral
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from anim import units
+from anim.arguments import check_function, file_path, glob_list, kind
 from anim.arrays import Floats, as_floats
 from anim.asset import Asset, PathName, as_asset
 from anim.caches import cache_file
 from anim.caches.options import WriteOptions
 from anim.caches.transforms import bounds, up_axis, vertex_order
-from anim.errors import AnimError, RangeError, check_number
+from anim.errors import AnimError, RangeError, ShapeError, check_number
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
@@ -85,9 +87,10 @@ class BakedCache(VertexCache):
         Options as of `gltf-anim bake`. Raises UnsupportedError for another extension or a missing package, RangeError
         for an option that the format doesn't support, OutputError if the file can't be written.
         """
+        name = file_path(path)
         cache = up_axis.to_up_axis(vertex_order.reorder(self, order), up)
         limit = None if max_error is None else _meters(max_error, "max_error", lambda: bounds.diagonal(cache))
-        cache_file.save(cache, os.fspath(path), WriteOptions(limit, quantize, layout, preset, depth, rest_mesh))
+        cache_file.save(cache, name, WriteOptions(limit, quantize, layout, preset, depth, rest_mesh))
 
 
 def optimize(
@@ -97,13 +100,13 @@ def optimize(
     clips: str | Sequence[str] | None = None,
     max_angle: str | float | None = None,
     max_speed_error: Length | None = None,
-    keep_nodes: Sequence[str] = (),
+    keep_nodes: str | Sequence[str] = (),
     drop: str = "unused",
     rebase_rest: bool = False,
     meshopt: str | None = None,
     effort: str = "balanced",
     workers: int = 1,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] | None = None,
 ) -> OptimizeResult:
     """Return the asset with its animations in fewer bytes and no vertex displaced by more than `max_error` at any time.
 
@@ -111,7 +114,7 @@ def optimize(
     max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
     keep_nodes: globs for nodes with exact motion. drop: "rest", "unused" or "never", removed channels at the rest pose.
     meshopt: "ext" or "khr" for compression by that extension. effort: "fast", "balanced" or "max".
-    workers: processes; a script with more than one needs `if __name__ == "__main__":`.
+    workers: processes, 0 for one per core; a script with more than one needs `if __name__ == "__main__":`.
     The result is the asset itself if nothing gets smaller.
     optimize("walk.glb", max_error="0.5mm").save("small.glb")
     """
@@ -125,10 +128,14 @@ def optimize(
         length(max_error, "max_error"),
         length(SHELL_PER_DIAGONAL, "shell"),
         MAX_POINTER_ERROR,
-        units.parse_angle(max_angle, "max_angle") if isinstance(max_angle, str) else max_angle,
+        None if max_angle is None else _radians(max_angle, "max_angle"),
         None if max_speed_error is None else length(max_speed_error, "max_speed_error"),
     )
-    kept = Selection((), keep_nodes).chosen_nodes(asset.skeleton) if keep_nodes else ()
+    nodes = glob_list(keep_nodes, "keep_nodes")
+    kept = Selection((), nodes).chosen_nodes(asset.skeleton) if nodes else ()
+    _check_workers(workers)
+    if progress is not None:
+        check_function(progress, "progress", "a function of the fraction done")
     _check_choice("effort", effort, tuple(EFFORTS))
     _check_choice("drop", drop, tuple(Drop))
     _check_choice("meshopt", meshopt or "ext", ("ext", "khr"))
@@ -139,15 +146,15 @@ def optimize(
         effort=effort,
         given=(str(max_error), str(max_angle), str(max_speed_error)),
     )
-    globs = [clips] if isinstance(clips, str) else list(clips or ())
+    globs = glob_list(clips, "clips")
     found = search.optimize(
         asset.document,
         asset.scene,
         tuple(asset.clips),
         request,
         chosen=match_names(globs, asset.clips.names, "clip"),
-        workers=workers,
-        progress=progress,
+        workers=workers or os.cpu_count() or 1,
+        progress=progress or (lambda _: None),
     )
     return _build_result(asset, found, limits)
 
@@ -165,7 +172,7 @@ def bake(
     normals: bool = False,
     tangents: bool = False,
     rigid: bool = False,
-    meshes: Sequence[str] = (),
+    meshes: str | Sequence[str] = (),
 ) -> BakedCache:
     """Return a clip as a vertex cache: every vertex at every frame, skinned by `method`.
 
@@ -176,8 +183,9 @@ def bake(
     """
     asset = as_asset(asset)
     scene = asset.scene if not (normals or tangents) else reader.scene(asset.document, normals=True, tangents=tangents)
+    globs = glob_list(meshes, "meshes")
     names = [each.mesh.name or f"#{i}" for i, each in enumerate(scene.instances)]
-    nodes = [scene.instances[i].node for i in match_names(list(meshes), names, "mesh")] if meshes else None
+    nodes = [scene.instances[i].node for i in match_names(globs, names, "mesh")] if globs else None
     playing = _clip(asset, clip)
     cache = skinning.bake(
         scene,
@@ -209,7 +217,7 @@ def diff(
     `old`. player: of both, or two, "spec,nlerp". fps: of the sampled grid, in addition to all keys.
     """
     old, new = as_asset(old), as_asset(new)
-    globs = [clips] if isinstance(clips, str) else list(clips or ())
+    globs = glob_list(clips, "clips")
     chosen = match_names(globs, old.clips.names, "clip") if globs else None
     metric = ErrorMetric(old.scene, new.scene)
     return compare.diff(metric, tuple(old.clips), tuple(new.clips), chosen=chosen, player=player, fps=fps)
@@ -276,12 +284,34 @@ def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
 
 
 def _meters(value: Length, name: str, scale: Callable[[], float], *, at_least: float | None = None) -> float:
+    if isinstance(value, str) and units.is_zero(value):
+        value = 0.0
     if isinstance(value, str):
-        return units.parse_length(value, name, scale)
+        length = units.parse_length(value, name, scale)
+        if not units.has_unit(value):
+            text = value.strip()
+            raise RangeError(f"{name} is '{text}', without a unit (expected '{text}mm' or '{text}m', say)")
+        return length
     check_number(value, name)
     if not np.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
         raise RangeError(f"{name} is {value} (expected metres above 0, or a length like '0.5mm' or '0.1%')")
     return float(value)
+
+
+def _radians(value: str | float, name: str) -> float:
+    if isinstance(value, str):
+        return units.parse_angle(value, name)
+    check_number(value, name)
+    if not (np.isfinite(value) and value > 0):
+        raise RangeError(f"{name} is {value} (expected radians above 0, or an angle like '0.5deg')")
+    return float(value)
+
+
+def _check_workers(workers: object) -> None:
+    if isinstance(workers, bool) or not isinstance(workers, Integral):
+        raise ShapeError(f"workers is {kind(workers)} (expected a number of processes, 0 for one per core)")
+    if workers < 0:
+        raise RangeError(f"workers is {workers} (expected a number of processes, 0 for one per core)")
 
 
 def _check_choice(name: str, value: str, known: Sequence[str]) -> None:

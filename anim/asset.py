@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import io
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,10 +12,13 @@ from typing import BinaryIO, TypeAlias
 
 import numpy as np
 
+from anim.arguments import check_binary_file, check_function, file_path, glob_list
 from anim.arrays import Bytes
 from anim.clip_list import Clips
 from anim.errors import AnimError, RangeError, ShapeError
 from anim.files import links
+from anim.files.resolver import refuse_without_folder
+from anim.files.stream import write_stream
 from anim.gltf.document import Document, json_array
 from anim.gltf.io.source import Source, glb_chunks, open_bytes, open_file, write_file
 from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
@@ -66,7 +68,8 @@ class Asset:
         change: Clip → Clip, such as `lambda clip: anim.ops.resample(clip, fps=30)`. A new name is written too.
         clips: globs for names, "run*" or several; all by default. Raises NotFoundError for a glob without match.
         """
-        globs = [clips] if isinstance(clips, str) else list(clips or ())
+        check_function(change, "change", "a function from Clip to Clip")
+        globs = glob_list(clips, "clips")
         new = {}
         for i in match_names(globs, self.clips.names, "clip"):
             old = self.clips[i]
@@ -106,34 +109,33 @@ def load(file: PathName | RawBytes | BinaryIO) -> Asset:
     if isinstance(file, Document | Asset):
         raise ShapeError(f"file is {type(file).__name__} (expected a path or bytes)", help="it is loaded already")
     if isinstance(file, str | os.PathLike):
-        path = os.fspath(file)
+        path = file_path(file, "file")
         return _read_asset(path, lambda: open_file(path))
     name = "bytes" if isinstance(file, RAW_BYTES) else str(getattr(file, "name", "file"))
     data = _bytes_of(file)
-    return _read_asset(name, lambda: open_bytes(data, name))
+    return _read_asset(name, lambda: open_bytes(data, name, resolve=refuse_without_folder))
 
 
 def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
     """Write an asset as GLB or, for a path with the extension .gltf, as text with a companion .bin.
 
     path: a name with the extension .glb, .gltf, .vrm or .vrma, or a binary file open for writing, for a GLB.
-    Files are replaced atomically; the input may be the output. An unchanged asset keeps its bytes. In another folder
-    external images are copied next to the output.
-    Raises OutputError if a file can't be written, RangeError for another extension.
+    Files are replaced atomically; the input may be the output. An unchanged asset keeps its bytes; changes
+    in the dicts and lists of its JSON are written. In another folder external images are copied next to the output.
+    Raises OutputError if a file can't be written, RangeError for another extension, ShapeError for a file not open for
+    binary writing.
     """
     asset = Asset(asset) if isinstance(asset, Document) else asset
     if not isinstance(asset, Asset):
         raise ShapeError(f"asset is {type(asset).__name__} (expected an Asset)", help="save(result.asset, path)")
-    unchanged = asset.source.bytes_of(asset.document) if asset.source is not None else None
     if not isinstance(path, str | os.PathLike):
-        if not hasattr(path, "write"):
-            raise ShapeError(f"path is {path!r} (expected a path or a binary file)")
-        for piece in glb_chunks(asset.document, unchanged):
-            path.write(piece.data)
+        check_binary_file(path, "path", "write")
+        name = str(getattr(path, "name", "file"))
+        write_stream(path, (piece.data for piece in glb_chunks(asset.document, _own_bytes(asset))), name)
         return
-    name = os.fspath(path)
+    name = file_path(path)
     _check_ending(name)
-    write_file(asset.document, name, asset.source, unchanged=unchanged)
+    write_file(asset.document, name, asset.source, unchanged=_own_bytes(asset))
 
 
 def as_asset(value: Asset | Document | PathName) -> Asset:
@@ -141,6 +143,12 @@ def as_asset(value: Asset | Document | PathName) -> Asset:
     if isinstance(value, Asset):
         return value
     return Asset(value) if isinstance(value, Document) else load(value)
+
+
+def _own_bytes(asset: Asset) -> Bytes | None:
+    """Bytes that the asset was read from, None if it was changed since then."""
+    own = asset.source.bytes_of(asset.document) if asset.source is not None else None
+    return None if own is None or asset.source is None or asset.source.is_edited() else own
 
 
 def _read_asset(name: str, read: Callable[[], Source]) -> Asset:
@@ -152,10 +160,8 @@ def _read_asset(name: str, read: Callable[[], Source]) -> Asset:
 
 
 def _bytes_of(file: RawBytes | BinaryIO) -> Bytes:
-    if not isinstance(file, RAW_BYTES) and not hasattr(file, "read"):
-        raise ShapeError(f"file is {type(file).__name__} (expected a path, bytes or a binary file)")
-    if isinstance(file, io.TextIOBase):
-        raise ShapeError("file is open for text (expected a binary file)", help='open it with "rb"')
+    if not isinstance(file, RAW_BYTES):
+        check_binary_file(file, "file", "read")
     data: object = file if isinstance(file, RAW_BYTES) else file.read()
     if isinstance(data, np.ndarray):
         return data

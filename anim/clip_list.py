@@ -9,7 +9,7 @@ from typing import overload
 from anim.errors import NotFoundError, ShapeError
 from anim.gltf.reading import reader
 from anim.model import Clip
-from anim.operations.selection import match_names
+from anim.operations.selection import not_found
 
 
 class Clips:
@@ -33,7 +33,7 @@ class Clips:
         if len(found) > 1:
             raise NotFoundError(f"{len(found)} clips are called '{key}'", help=f"take one by its index: {found}")
         if not found:
-            match_names([_without_wildcards(key)], self.names, "clip")  # raises, with similar names
+            raise not_found(key, self.names, "clip")
         return found[0]
 
     @overload
@@ -56,6 +56,8 @@ class Clips:
         return f"Clips({', '.join(self.names)})"
 
     def _checked(self, key: int) -> int:
+        if isinstance(key, bool):  # an index for Python: clips[len(clips) > 1] is a slip
+            raise ShapeError("a clip is taken by bool (expected its name or its index)")
         try:
             index = range(len(self))[operator.index(key)]
         except TypeError:
@@ -64,8 +66,3 @@ class Clips:
             count = f"{len(self)} clips: {', '.join(self.names)}" if self._clips else "no clips"
             raise NotFoundError(f"there is no clip {key} (the file has {count})") from None
         return index
-
-
-def _without_wildcards(name: str) -> str:
-    """Glob that matches this name only."""
-    return "".join(f"[{each}]" if each in "*?[" else each for each in name)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from anim.arguments import glob_list
 from anim.model import Clip, Skeleton
 from anim.operations.ease import ease
 from anim.operations.loop import append_first_frame, loop
@@ -33,11 +34,11 @@ __all__ = ["append_first_frame", "ease", "loop", "resample", "retime", "select_t
 
 
 def select_tracks(
-    clip: Clip, skeleton: Skeleton, *, nodes: Sequence[str] = (), paths: Sequence[str] = ()
+    clip: Clip, skeleton: Skeleton, *, nodes: str | Sequence[str] = (), paths: str | Sequence[str] = ()
 ) -> frozenset[int]:
     """Return the indices of the tracks of some nodes, by globs, and of some paths: "translation", "rotation", ….
 
     Raises NotFoundError for a glob that matches no node.
     ops.resample(clip, fps=30, tracks=ops.select_tracks(clip, skeleton, nodes=["*Hand*"]))
     """
-    return Selection((), nodes, paths).chosen_tracks(clip, skeleton)
+    return Selection((), glob_list(nodes, "nodes"), glob_list(paths, "paths")).chosen_tracks(clip, skeleton)

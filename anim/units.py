@@ -9,6 +9,7 @@ from collections.abc import Callable
 from anim.errors import RangeError
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
+_ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
@@ -33,6 +34,16 @@ def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
     if (unit not in LENGTHS and unit != "%") or value <= 0:
         raise RangeError(f"{name} is '{text}' (expected a length above 0, like 0.5mm, 2cm or 0.1%)")
     return value / 100 * diagonal() if unit == "%" else value * LENGTHS[unit]
+
+
+def is_zero(text: str) -> bool:
+    """Return True for a length or fraction of 0, with or without unit: "0", "0.0mm", "0%"."""
+    return _ZERO.fullmatch(text) is not None
+
+
+def has_unit(text: str) -> bool:
+    """Return True if a valid length or angle has a unit: "0.5mm", not "0.5"."""
+    return not text.rstrip()[-1:].isdigit() and not text.rstrip().endswith(".")
 
 
 def parse_angle(text: str, name: str) -> float:

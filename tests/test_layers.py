@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Packages from the bottom up; one may import from its own level only where NEIGHBORS says so.
 LEVELS = (
     {"errors"},
-    {"arrays", "units"},
+    {"arguments", "arrays", "units"},
     {"maths", "files"},
     {"model"},
     {"gltf", "sampling"},

@@ -66,6 +66,14 @@ def refuse_relative(address: str) -> Bytes:
     )
 
 
+def refuse_without_folder(address: str) -> Bytes:
+    """Raise FormatError: an input from bytes has no folder."""
+    raise FormatError(
+        f"'{address}' lies beside the file, but bytes have no folder",
+        help="load the file's path, or anim.Asset(container.read(data, resolve=…)) with a function that reads it",
+    )
+
+
 def locate(folder: Path, address: str) -> Path:
     """Return the path of a file in or below the folder. Raises FormatError.
 

@@ -71,8 +71,13 @@ def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[i
         return list(range(len(names)))
     for glob in globs:
         if not any(_is_meant(i, name, glob) for i, name in enumerate(names)):
-            raise NotFoundError(f"no {what} matches '{glob}'", help=_suggestion(glob, names, what))
+            raise not_found(glob, names, what)
     return [i for i, name in enumerate(names) if any(_is_meant(i, name, glob) for glob in globs)]
+
+
+def not_found(name: str, names: Iterable[str], what: str) -> NotFoundError:
+    """Return the error for a name or glob without match, with similar names."""
+    return NotFoundError(f"no {what} matches '{name}'", help=_suggestion(name, names, what))
 
 
 def _is_meant(number: int, name: str, glob: str) -> bool:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from anim.measure.error.surface import diagonal
 from anim.model import Scene
 from anim.operations.selection import Selection
 from anim.optimization.options import Bounds
+from anim.units import is_zero
 from cli import units
 from cli.errors import UsageError
 
 MAX_ERROR = "0.01%"  # of the diagonal
-ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
 BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
 
 
@@ -28,13 +27,13 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
         text, option = said[name], f"--{name.replace('_', '-')}"
         if text is None:
             return None
-        return 0.0 if ZERO.fullmatch(text) else units.parse_length(text, option, lambda: scale)
+        return 0.0 if is_zero(text) else units.parse_length(text, option, lambda: scale)
 
     pointer, angle, speed = said["max_pointer_error"] or "0", said["max_angle"], said["max_speed_error"]
     return Bounds(
         length("max_error") or 0.0,
         length("shell") or 0.0,
-        0.0 if ZERO.fullmatch(pointer) else units.parse_fraction(pointer, "--max-pointer-error"),
+        0.0 if is_zero(pointer) else units.parse_fraction(pointer, "--max-pointer-error"),
         None if angle is None else units.parse_angle(angle, "--max-angle"),
         None if speed is None else units.parse_length(speed, "--max-speed-error", lambda: scale),
     )
@@ -49,7 +48,7 @@ def notes(said: Mapping[str, str | None]) -> Iterator[str]:
     """Yield notes on lengths without a unit, which are metres."""
     for name in ("max_error", "shell"):
         text = (said[name] or "").strip()
-        if text and text[-1].isdigit() and not ZERO.fullmatch(text):
+        if text and text[-1].isdigit() and not is_zero(text):
             yield f"--{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
 
 

@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,59 @@ def test_what_was_only_loaded_is_saved_with_its_bytes(name: str, tmp_path: Path)
     (tmp_path / "in.glb").write_bytes(data)
     anim.save(anim.load(tmp_path / "in.glb"), tmp_path / "out.glb")
     assert (tmp_path / "out.glb").read_bytes() == data
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+def test_changes_in_the_json_are_saved(ending: str, biped: Path, tmp_path: Path) -> None:
+    anim.load(biped).save(tmp_path / f"in.{ending}")
+    asset = anim.load(tmp_path / f"in.{ending}")
+    asset.document.json["nodes"][0]["name"] = "renamed"
+    asset.save(tmp_path / f"out.{ending}")
+    assert anim.load(tmp_path / f"out.{ending}").skeleton.names[0] == "renamed"
+    out = io.BytesIO()
+    asset.save(out)
+    assert anim.load(out.getvalue()).skeleton.names[0] == "renamed"
+
+
+class _ShortFile(io.RawIOBase):
+    """A raw file that accepts at most 1000 bytes per call, as the system may."""
+
+    def __init__(self) -> None:
+        self.data = b""
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any) -> int:
+        self.data += bytes(data[:1000])
+        return min(len(data), 1000)
+
+
+def test_short_writes_of_a_raw_file_are_completed(biped: Path) -> None:
+    file = _ShortFile()
+    anim.save(anim.load(biped), file)  # type: ignore[arg-type]
+    assert file.data == biped.read_bytes()
+
+
+def test_a_file_that_returns_no_count_gets_all_bytes(biped: Path) -> None:
+    class Collector:
+        data = b""
+
+        def write(self, data: Any) -> None:
+            self.data += bytes(data)
+
+    file = Collector()
+    anim.save(anim.load(biped), file)  # type: ignore[arg-type]
+    assert file.data == biped.read_bytes()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+@pytest.mark.parametrize("buffering", [-1, 0])
+def test_a_full_disk_is_an_output_error(buffering: int, biped: Path) -> None:
+    asset = anim.load(biped)
+    refused = pytest.raises(anim.OutputError, match="/dev/full: can't be written")
+    with suppress(OSError), open("/dev/full", "wb", buffering=buffering) as file, refused:
+        anim.save(asset, file)
 
 
 def test_paths_bytes_and_files_load_alike(biped: Path) -> None:
@@ -82,7 +136,7 @@ def test_buffers_stay_in_the_folder_of_a_gltf(address: str, biped: Path, tmp_pat
 
 def test_bytes_have_no_folder(biped: Path, tmp_path: Path) -> None:
     anim.load(biped).save(tmp_path / "walk.gltf")
-    with pytest.raises(anim.FormatError, match="lies beside"):
+    with pytest.raises(anim.FormatError, match="lies beside the file, but bytes have no folder"):
         list(anim.load((tmp_path / "walk.gltf").read_bytes()).clips)
 
 

@@ -12,7 +12,7 @@ from typing import TypeAlias
 from anim.errors import FormatError
 from anim.files import atomic, links, resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
-from anim.gltf.io import container, gltf_files, images, uri
+from anim.gltf.io import container, gltf_files, images, json_text, uri
 
 MAX_OPEN_ATTEMPTS = 20  # attempts to open a .gltf with its buffers, while others replace it
 
@@ -40,6 +40,10 @@ class Source:
         """Return the input's bytes if the document is unchanged since it was read, else None."""
         return self.data if document is self.document and not document.expanded else None
 
+    def is_edited(self) -> bool:
+        """Return True if the JSON of the document was changed in place, a dict or list of it, since it was read."""
+        return json_text.dump(container.read(self.data).json) != json_text.dump(self.document.json)
+
     def is_at(self, path: str) -> bool:
         """Return True if this is the file at `path`."""
         return self.folder is not None and os.path.realpath(self.name) == os.path.realpath(path)
@@ -65,9 +69,18 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     return Source(document, path, len(data) + external_size(document), real.parent, data)
 
 
-def open_bytes(data: Bytes, name: str, opener: Opener = container.read) -> Source:
-    """Return the document in `data`, without a folder. name: its label in messages. Raises FormatError."""
-    document = opener(data, resolver.refuse_relative)
+def open_bytes(
+    data: Bytes,
+    name: str,
+    opener: Opener = container.read,
+    *,
+    resolve: container.Resolve = resolver.refuse_relative,
+) -> Source:
+    """Return the document in `data`, without a folder. name: its label in messages. Raises FormatError.
+
+    resolve: called for external buffers; by default raises the error for an input from a pipe.
+    """
+    document = opener(data, resolve)
     return Source(document, name, len(data) + external_size(document), None, data)
 
 
