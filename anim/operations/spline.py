@@ -40,7 +40,7 @@ def spline(
     unchanged; so are tracks with one key. Values are unchanged except under a rule that approximates (bspline).
     tangents: one of TANGENTS, or its name as text: "natural", "tcb(0, 0, 0.5)".
     cyclic: a loop: the first and the last key are neighbors, so value and speed are continuous at the seam. A track
-    that starts late or ends early has zero speed at the seam: its keys are not neighbors.
+    that starts late or ends early gets keys at the clip's start and end, with its first and last value.
     root: the node with a translation that continues from cycle to cycle, −1 for none.
     label: gives the name of a node for errors (`Skeleton.label`).
     Raises RangeError if the rule can't be used, and for a loop with a track of different first and last value.
@@ -52,7 +52,7 @@ def spline(
     for i in sorted(chosen):
         track = new[i]
         try:
-            new[i] = _apply_rule(track, rule, cyclic=cyclic and _spans(track, clip))
+            new[i] = _apply_rule(_span(track, clip) if cyclic or rule.loop else track, rule, cyclic=cyclic)
             travels = track.node == root and track.path == "translation"
             if (cyclic or rule.loop) and new[i] is not track and not travels:
                 _check_closed(track)
@@ -79,10 +79,25 @@ def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
     return moved, turned
 
 
-def _spans(track: Track, clip: Clip) -> bool:
-    """Return whether a track has keys at both ends of its clip, within the resolution of float32 times."""
+def _span(track: Track, clip: Clip) -> Track:
+    """Return a track with keys at both ends of its clip, within the resolution of float32 times."""
+    if not _takes_tangents(track):
+        return track
     near = END_TOLERANCE_FRACTION * max(clip.end, 1.0)
-    return bool(track.times[0] <= clip.start + near and track.times[-1] >= clip.end - near)
+    keys = np.arange(len(track.times))
+    start, end = int(track.times[0] > clip.start + near), int(track.times[-1] < clip.end - near)
+    times = np.concatenate(([clip.start] * start, track.times, [clip.end] * end))
+    keys = np.concatenate((keys[:1].repeat(start), keys, keys[-1:].repeat(end)))
+    if len(keys) == len(track.times):
+        return track
+    values = track.values[keys]
+    linear = Interpolation.LINEAR  # tangents follow
+    return replace(track, times=times, values=values, interpolation=linear, in_tangents=None, out_tangents=None)
+
+
+def _takes_tangents(track: Track) -> bool:
+    is_step = track.interpolation is Interpolation.STEP or track.kind is ValueKind.DISCRETE
+    return not is_step and len(track.times) > 1
 
 
 def _check_closed(track: Track) -> None:
@@ -96,7 +111,7 @@ def _check_closed(track: Track) -> None:
 
 
 def _apply_rule(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
-    if track.interpolation is Interpolation.STEP or track.kind is ValueKind.DISCRETE or len(track.times) == 1:
+    if not _takes_tangents(track):
         return track
     make = apply_rotation_tangents if track.kind is ValueKind.ROTATION else apply_tangents
     keys = make(track.times, track.values, rule, cyclic=cyclic)

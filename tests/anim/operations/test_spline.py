@@ -70,13 +70,15 @@ def test_the_way_of_a_root_goes_on() -> None:
     np.testing.assert_allclose(end, start, atol=1e-12)
 
 
-def test_a_track_within_the_clip_has_no_neighbors_over_the_seam() -> None:
-    """It rests before its first key and after its last one."""
+@pytest.mark.parametrize("name", ["time-aware", "natural", "catmull-rom", "akima", "monotone"])
+def test_a_loop_track_within_the_clip_gets_keys_at_its_ends(name: str) -> None:
     late = clips.track("translation", [1, 2, 2.5], [[v, 0, 0] for v in (0, 3, 0)])
     whole = clips.track("scale", [0, 3], np.ones((2, 3)), node=1)
-    new = spline(Clip("", (late, whole)), tangents=parse("time-aware"), cyclic=True).tracks[0]
-    plain = splined(late, "time-aware")
-    np.testing.assert_array_equal(np.asarray(new.out_tangents), np.asarray(plain.out_tangents))
+    new = spline(Clip("", (late, whole)), tangents=parse(name), cyclic=True).tracks[0]
+    np.testing.assert_array_equal(new.times, [0, 1, 2, 2.5, 3])
+    np.testing.assert_array_equal(new.values[:, 0], [0, 0, 3, 0, 0])
+    end, start = rates(new, np.array([3.0]), before=True), rates(new, np.array([0.0]), before=False)
+    np.testing.assert_allclose(end, start, atol=1e-12)
 
 
 def test_holds_and_single_keys_stay() -> None:
