@@ -76,7 +76,7 @@ def test_nodes_depth_first() -> None:
 
 @pytest.mark.parametrize("method", SKINNING_METHODS)
 def test_mesh_space_is_the_node_away_from_world_space(method: str) -> None:
-    of = random_scene(3, stretch=0.2)
+    of = random_scene(3, scale_shear=0.2)
     played = moving(of, 4)
     node = of.instances[0].node
     turning = track("rotation", [0, 2], about("z", [10, 100]), node=node)
@@ -147,7 +147,7 @@ def test_blend_goes_from_lbs_to_the_method() -> None:
 
 @pytest.mark.parametrize("method", SKINNING_METHODS)
 def test_same_bytes_for_any_chunk_and_number_of_threads(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    of = random_scene(7, stretch=0.3)
+    of = random_scene(7, scale_shear=0.3)
     played = moving(of, 3)
     once = bake(of, played, times=TIMES, method=method, threads=1).load_all().positions
     monkeypatch.setattr(chunk_pipeline, "MIN_VERTICES", 7)
@@ -185,7 +185,7 @@ def test_only_what_skins_or_morphs_is_baked_unless_rigid_is_wanted() -> None:
 
 
 def test_rest_is_the_scene_without_a_clip() -> None:
-    of = random_scene(3, stretch=0.4)
+    of = random_scene(3, scale_shear=0.4)
     cache = bake(of, moving(of, 1), times=np.zeros(1))
     still = bake(of, clip(), times=np.zeros(1)).load_all().positions[0]
     assert cache.rest is not None

@@ -25,7 +25,7 @@ FRAMES = 231  # eight chunks of 32, the last one shorter
 def _scene(method: str) -> tuple[Scene, Clip]:
     """A skinned mesh whose shape is animated, and a rigid one on a joint."""
     random = np.random.default_rng(5)
-    of = random_scene(7, stretch=0.3 if method != "lbs" else 0.0, targets=random.normal(size=(2, 150, 3)) / 4)
+    of = random_scene(7, scale_shear=0.3 if method != "lbs" else 0.0, targets=random.normal(size=(2, 150, 3)) / 4)
     rigid = MeshInstance(3, mesh(np.eye(3), np.empty((3, 0)), np.empty((3, 0)), faces=TRIANGLE), None, np.zeros(0))
     of = replace(of, instances=(*of.instances, rigid))
     shapes = track("weights", np.linspace(0, 2, 5), random.random((5, 2)), node=of.instances[0].node)

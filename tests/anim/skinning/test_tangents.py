@@ -42,7 +42,7 @@ def with_neighbors(of: Scene) -> tuple[Scene, Floats]:
 @pytest.mark.parametrize("stretch", [0.0, 0.4])
 @pytest.mark.parametrize("space", ["world", "mesh"])
 def test_tangents_and_normals_follow_the_surface(method: str, stretch: float, space: str) -> None:
-    of, handed = with_neighbors(random_scene(3, vertices=60, stretch=stretch))
+    of, handed = with_neighbors(random_scene(3, vertices=60, scale_shear=stretch))
     cache = bake(of, moving(of, 4), times=TIMES, method=method, normals=True, tangents=True, space=space)
     found = cache.load_all()
     assert found.normals is not None

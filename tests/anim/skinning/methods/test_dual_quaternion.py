@@ -48,7 +48,7 @@ def test_the_kernel_is_the_plain_loop() -> None:
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 def test_one_influence_is_exactly_its_matrix(method: str, mirror: float) -> None:
     """Scale, shear and mirror included: the shear comes from uneven scales above turned joints."""
-    of = random_scene(8, stretch=0.4)
+    of = random_scene(8, scale_shear=0.4)
     of = Scene(of.skeleton, of.instances)
     scales = of.skeleton.scale.copy()
     scales[0, 0] *= mirror
@@ -72,7 +72,7 @@ def test_one_influence_is_exactly_its_matrix(method: str, mirror: float) -> None
 
 
 def test_a_split_gives_the_matrix_back() -> None:
-    of = random_scene(1, stretch=0.7)
+    of = random_scene(1, scale_shear=0.7)
     matrices = skinning_matrices(of, moving(of, 2), TIMES)
     matrices[:, 3, :, :3] *= -1
     centers = np.random.default_rng(0).normal(size=(matrices.shape[1], 3))

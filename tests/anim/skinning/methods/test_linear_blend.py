@@ -33,7 +33,7 @@ def baked(of: Scene, played: Clip, times: Floats = TIMES, **how: object) -> Floa
 
 @pytest.mark.parametrize("stretch", [0.0, 0.5])
 def test_the_kernel_is_the_plain_loop_and_the_sparse_product(stretch: float) -> None:
-    of = random_scene(3, stretch=stretch)
+    of = random_scene(3, scale_shear=stretch)
     played = moving(of, 4)
     body, matrices = of.instances[0].mesh, skinning_matrices(of, played, TIMES)
     plain = looped(body.positions, body.joints, body.weights, matrices)
