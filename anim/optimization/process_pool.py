@@ -70,8 +70,8 @@ def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator
         yield ProcessPool(pool, shared)
         pool.shutdown()
     finally:
-        parent_end.close()  # running workers exit now, without a wait
-        pool.shutdown(wait=False, cancel_futures=True)
+        parent_end.close()  # running workers exit now
+        pool.shutdown(cancel_futures=True)  # the pool's thread has ended before the interpreter shuts down
         lifeline.close()
 
 

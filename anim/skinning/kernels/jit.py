@@ -6,6 +6,7 @@ import hashlib
 import os
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -21,7 +22,7 @@ def jit(function: Function) -> Function:
 
     It runs without the GIL, divides by IEEE 754, and has no fast-math: equal numbers on every machine.
     """
-    return cast(Function, numba.njit(nogil=True, error_model="numpy", cache=True)(function))
+    return cast(Function, numba.njit(nogil=True, error_model="numpy", cache=_has_cache())(function))
 
 
 def inline(function: Function) -> Function:
@@ -31,11 +32,25 @@ def inline(function: Function) -> Function:
 
 def is_compiled() -> bool:
     """Return whether any kernel is in the cache, so that a first run can be announced."""
-    return any(Path(numba.config.CACHE_DIR).glob("**/*.nbc"))
+    return _has_cache() and any(Path(numba.config.CACHE_DIR).glob("**/*.nbc"))
+
+
+@cache
+def _has_cache() -> bool:
+    """Return whether the cache folder can be written; without it kernels are compiled in each process.
+
+    Numba would fall back to `__pycache__` beside the kernels, which machine code of other sources may be in.
+    """
+    folder = numba.config.CACHE_DIR
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return bool(folder) and os.access(folder, os.W_OK)
 
 
 def _cache_folder() -> str:
-    """The user's folder for this version and these sources; "" for numba's default.
+    """The user's folder for this version and these sources; "" where there is none.
 
     Numba checks the file of a function for changes, but not those of its callees.
     """
