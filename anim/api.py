@@ -9,20 +9,19 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from numbers import Integral
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from anim import units
-from anim.arguments import check_function, file_path, glob_list, kind
+from anim.arguments import check_choice, check_function, check_workers, file_path, glob_list, meters, radians
 from anim.arrays import Floats, as_floats
 from anim.asset import Asset, PathName, as_asset
 from anim.caches import cache_file
 from anim.caches.options import WriteOptions
-from anim.caches.transforms import bounds, up_axis, vertex_order
-from anim.errors import AnimError, RangeError, ShapeError, check_number
+from anim.caches.transforms import bounds, up_axis
+from anim.caches.transforms.vertex_order import reorder
+from anim.errors import AnimError, RangeError
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
@@ -52,7 +51,8 @@ class OptimizeResult:
     """Optimized asset with its errors.
 
     asset: the asset to save. max_error: m, largest displacement of any vertex in any clip, measured on the saved bytes.
-    errors: the same by name of each optimized clip, in the order of the file.
+    errors: the same by name of each optimized clip, in the order of the file; "#i" for clip i if an earlier clip has
+    its name.
     """
 
     asset: Asset
@@ -74,7 +74,7 @@ class BakedCache(VertexCache):
         path: PathName,
         *,
         up: str = "y",
-        order: str = "file",
+        vertex_order: str = "file",
         max_error: Length | None = None,
         quantize: bool = False,
         layout: str = "morph",
@@ -88,8 +88,8 @@ class BakedCache(VertexCache):
         for an option that the format doesn't support, OutputError if the file can't be written.
         """
         name = file_path(path)
-        cache = up_axis.to_up_axis(vertex_order.reorder(self, order), up)
-        limit = None if max_error is None else _meters(max_error, "max_error", lambda: bounds.diagonal(cache))
+        cache = up_axis.to_up_axis(reorder(self, vertex_order), up)
+        limit = None if max_error is None else meters(max_error, "max_error", lambda: bounds.diagonal(cache))
         cache_file.save(cache, name, WriteOptions(limit, quantize, layout, preset, depth, rest_mesh))
 
 
@@ -122,23 +122,23 @@ def optimize(
     scale = diagonal(asset.scene)
 
     def length(value: Length, name: str) -> float:
-        return _meters(value, name, lambda: scale, at_least=0.0)
+        return meters(value, name, lambda: scale, at_least=0.0)
 
     limits = Bounds(
         length(max_error, "max_error"),
         length(SHELL_PER_DIAGONAL, "shell"),
         MAX_POINTER_ERROR,
-        None if max_angle is None else _radians(max_angle, "max_angle"),
+        None if max_angle is None else radians(max_angle, "max_angle"),
         None if max_speed_error is None else length(max_speed_error, "max_speed_error"),
     )
     nodes = glob_list(keep_nodes, "keep_nodes")
     kept = Selection((), nodes).chosen_nodes(asset.skeleton) if nodes else ()
-    _check_workers(workers)
+    check_workers(workers)
     if progress is not None:
         check_function(progress, "progress", "a function of the fraction done")
-    _check_choice("effort", effort, tuple(EFFORTS))
-    _check_choice("drop", drop, tuple(Drop))
-    _check_choice("meshopt", meshopt or "ext", ("ext", "khr"))
+    check_choice("effort", effort, tuple(EFFORTS))
+    check_choice("drop", drop, tuple(Drop))
+    check_choice("meshopt", meshopt or "ext", ("ext", "khr"))
     request = Request(
         limits,
         Policy(Drop(drop), rebase_rest=rebase_rest, keep=frozenset(kept)),
@@ -257,7 +257,9 @@ def _build_result(asset: Asset, found: search.Optimized, limits: Bounds) -> Opti
         label = reader.clip_label(asset.clips[bad[0]].name, bad[0])
         raise AnimError(f"{label}: {off.max_error:g} m at {off.time:g} s (bound {limits.max_error:g} m)")
     names = asset.clips.names
-    errors = {names[i]: each.error.max_error for i, each in sorted(found.verdicts.items())}
+    errors: dict[str, float] = {}
+    for i, each in sorted(found.verdicts.items()):
+        errors[f"#{i}" if names[i] in errors else names[i]] = each.error.max_error
     smaller = replace(asset, document=found.document)
     if found.unchanged or _size(smaller) >= _size(asset):
         return OptimizeResult(asset, 0.0, dict.fromkeys(errors, 0.0))
@@ -281,39 +283,3 @@ def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
     if fps is not None:
         return frame_times(clip.start, clip.end, fps=fps)
     return np.unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
-
-
-def _meters(value: Length, name: str, scale: Callable[[], float], *, at_least: float | None = None) -> float:
-    if isinstance(value, str) and units.is_zero(value):
-        value = 0.0
-    if isinstance(value, str):
-        length = units.parse_length(value, name, scale)
-        if not units.has_unit(value):
-            text = value.strip()
-            raise RangeError(f"{name} is '{text}', without a unit (expected '{text}mm' or '{text}m', say)")
-        return length
-    check_number(value, name)
-    if not np.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
-        raise RangeError(f"{name} is {value} (expected metres above 0, or a length like '0.5mm' or '0.1%')")
-    return float(value)
-
-
-def _radians(value: str | float, name: str) -> float:
-    if isinstance(value, str):
-        return units.parse_angle(value, name)
-    check_number(value, name)
-    if not (np.isfinite(value) and value > 0):
-        raise RangeError(f"{name} is {value} (expected radians above 0, or an angle like '0.5deg')")
-    return float(value)
-
-
-def _check_workers(workers: object) -> None:
-    if isinstance(workers, bool) or not isinstance(workers, Integral):
-        raise ShapeError(f"workers is {kind(workers)} (expected a number of processes, 0 for one per core)")
-    if workers < 0:
-        raise RangeError(f"workers is {workers} (expected a number of processes, 0 for one per core)")
-
-
-def _check_choice(name: str, value: str, known: Sequence[str]) -> None:
-    if value not in known:
-        raise RangeError(f"{name} is '{value}' (expected {', '.join(known)})")

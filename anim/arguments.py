@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from numbers import Integral
 from typing import Any
 
-from anim.errors import RangeError, ShapeError
+from anim import units
+from anim.errors import RangeError, ShapeError, check_number
 
 
 def glob_list(globs: object, name: str) -> list[str]:
@@ -57,3 +60,46 @@ def check_binary_file(file: Any, name: str, method: str) -> None:
 def kind(value: object) -> str:
     """Return a value's type for messages: "None", "int"."""
     return "None" if value is None else type(value).__name__
+
+
+def meters(value: str | float, name: str, scale: Callable[[], float], *, at_least: float | None = None) -> float:
+    """Return a length in metres from a number, or from text with a unit; `scale` is the length of 100 %, in metres.
+
+    Raises RangeError below `at_least`, or if that is None, for 0 and less.
+    """
+    if isinstance(value, str) and units.is_zero(value):
+        value = 0.0
+    if isinstance(value, str):
+        length = units.parse_length(value, name, scale)
+        if not units.has_unit(value):
+            text = value.strip()
+            raise RangeError(f"{name} is '{text}', without a unit (expected '{text}mm' or '{text}m', say)")
+        return length
+    check_number(value, name)
+    if not math.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
+        raise RangeError(f"{name} is {value} (expected metres above 0, or a length like '0.5mm' or '0.1%')")
+    return float(value)
+
+
+def radians(value: str | float, name: str) -> float:
+    """Return an angle above 0 in radians from a number, or from text with a unit."""
+    if isinstance(value, str):
+        return units.parse_angle(value, name)
+    check_number(value, name)
+    if not (math.isfinite(value) and value > 0):
+        raise RangeError(f"{name} is {value} (expected radians above 0, or an angle like '0.5deg')")
+    return float(value)
+
+
+def check_workers(workers: object) -> None:
+    """Raise ShapeError or RangeError unless `workers` is a number of processes."""
+    if isinstance(workers, bool) or not isinstance(workers, Integral):
+        raise ShapeError(f"workers is {kind(workers)} (expected a number of processes, 0 for one per core)")
+    if workers < 0:
+        raise RangeError(f"workers is {workers} (expected a number of processes, 0 for one per core)")
+
+
+def check_choice(name: str, value: str, known: Sequence[str]) -> None:
+    """Raise RangeError unless `value` is one of the known."""
+    if value not in known:
+        raise RangeError(f"{name} is '{value}' (expected {', '.join(known)})")
