@@ -5,7 +5,7 @@ BIN := .venv/bin
 OUT := demo-out
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test slow blender format clean
+.PHONY: demo test slow docs blender format clean
 
 demo: $(BIN)/.installed
 	@$(BIN)/python -m fixtures $(OUT)/fixtures 2>/dev/null
@@ -20,6 +20,11 @@ test: $(BIN)/.installed
 # What takes minutes: real files under three bounds, judged by three.js. CI runs it too.
 slow: $(BIN)/.installed
 	$(BIN)/python -m pytest -n auto -m slow
+
+# The reference of commands, and the pages' pictures and output.
+docs: $(BIN)/.installed
+	$(BIN)/python -m docs.generate
+	$(BIN)/python -m docs.pages
 
 # Blender's module, which plays what we write in some slow tests: 370 MB, for one version of Python, so in its own venv.
 blender: .venv-blender/.installed
