@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Packages from the bottom up; one may import from its own level only where NEIGHBORS says so.
 LEVELS = (
     {"errors"},
-    {"arguments", "arrays", "units"},
-    {"maths", "files"},
+    {"arrays", "units"},
+    {"arguments", "maths", "files"},
     {"model"},
     {"gltf", "sampling"},
     {"curves"},

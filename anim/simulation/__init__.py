@@ -1,0 +1,1 @@
+"""Motion that follows from forces, written as keys: springs, particles, cloth, rigid bodies."""

@@ -1,0 +1,61 @@
+"""Steps of a simulation, against the frames of its output.
+
+Both are counted by integers from the start: step n is at n · step, frame k at k / fps. Nothing is accumulated, so the
+result does not depend on how long the simulation has run.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError, check_number
+from anim.sampling.times import frame_times
+
+MAX_STEPS = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Fixed steps of `step_s` seconds from −`warm_up_s` to at least `duration_s`; frames are written from 0 on.
+
+    Raises RangeError for a step that isn't above 0, negative lengths, or more than ten million steps.
+    """
+
+    step_s: float
+    duration_s: float
+    warm_up_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("step", self.step_s), ("duration", self.duration_s), ("warm-up", self.warm_up_s)):
+            check_number(value, name)
+            if not math.isfinite(value) or value < 0 or (value == 0 and name == "step"):
+                raise RangeError(f"{name} is {value:g} s (expected {'above 0' if name == 'step' else 'at least 0'})")
+        if (self.duration_s + self.warm_up_s) / self.step_s > MAX_STEPS:
+            raise RangeError(f"more than {MAX_STEPS} steps of {self.step_s:g} s")
+
+    @property
+    def num_steps(self) -> int:
+        """Number of steps from 0 on."""
+        return _count(self.duration_s / self.step_s)
+
+    @property
+    def num_warm_up_steps(self) -> int:
+        """Number of steps before 0."""
+        return _count(self.warm_up_s / self.step_s)
+
+    def times(self) -> Floats:
+        """Return the times of all steps from 0 on: (num_steps + 1,) s."""
+        return np.arange(self.num_steps + 1, dtype=np.float64) * self.step_s
+
+    def frames(self, fps: float) -> Floats:
+        """Return the frame times (F,) s from 0 to the duration."""
+        return frame_times(0.0, self.duration_s, fps=fps)
+
+
+def _count(steps: float) -> int:
+    """Whole number of steps that covers this many; a rounding error of 1e-9 steps doesn't add one."""
+    return math.ceil(steps - 1e-9)

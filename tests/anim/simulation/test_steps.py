@@ -1,0 +1,23 @@
+"""Counts and times of steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.errors import RangeError
+from anim.simulation.steps import Steps
+
+
+def test_steps_are_counted_by_integers() -> None:
+    steps = Steps(1 / 240, 10.0, 0.5)
+    assert (steps.num_steps, steps.num_warm_up_steps) == (2400, 120)
+    assert steps.times()[-1] == 2400 / 240
+    assert Steps(0.3, 1.0).num_steps == 4
+    np.testing.assert_array_equal(Steps(0.1, 1.0).frames(4), [0, 0.25, 0.5, 0.75, 1])
+
+
+@pytest.mark.parametrize("values", [(0.0, 1.0), (-1.0, 1.0), (0.1, -1.0), (np.nan, 1.0), (0.1, np.inf), (1e-9, 1e9)])
+def test_steps_without_sense_are_refused(values: tuple[float, float]) -> None:
+    with pytest.raises(RangeError):
+        Steps(*values)
