@@ -125,6 +125,7 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
     )
     said = words(run.product())
     assert "C1 at every key; overshoots by 0.00108" in said
+    assert "velocity, per second" in said  # signed, so no speed
     assert "C0 at every key; no overshoot" in said
     timed = words(call("plot", "--through", "0:0,0.5:0.9,2:1", "--format", "svg").product())
     assert {"catmull-rom", "0.5", "2 s"} <= set(timed)

@@ -17,6 +17,8 @@ FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the t
 FLOAT32_GIMBAL_TOLERANCE_RAD = 1e-6  # rad from lock, below which float32 rotations can't separate first and third angle
 NEAR_LOCK_DEG = 5.0  # rates of angles are amplified 23 times there
 FULL_TURN_DEG = 360.0
+MAX_LINE_STEP_DEG = 3.0  # between points of a line; Euler angles race near lock, where the rotation itself does not
+MAX_REFINEMENTS = 6  # halvings of the time between two points
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +39,16 @@ def rotation_curve(track: Track, *, view: str, rest: Floats) -> RotationCurve:
         keys = degrees(track.values, view=view, rest=rest)
         held = replace(track, path="translation", values=keys, interpolation=Interpolation.STEP)
         return RotationCurve(polylines.value_line(held), keys, polylines.step_edges(held))
-    dense = polylines.value_line(track)
-    values = degrees(dense.values, view=view, rest=rest)
-    at = np.searchsorted(dense.times, track.times).clip(max=len(values) - 1)
-    return RotationCurve(Polyline(dense.times, values), values[at], None)
+    times = polylines.value_line(track).times
+    values = degrees(sample(track, times), view=view, rest=rest)
+    for _ in range(MAX_REFINEMENTS):
+        coarse = np.flatnonzero(np.abs(np.diff(values, axis=0)).max(axis=1) > MAX_LINE_STEP_DEG)
+        if not len(coarse):
+            break
+        times = np.insert(times, coarse + 1, (times[coarse] + times[coarse + 1]) / 2)
+        values = degrees(sample(track, times), view=view, rest=rest)
+    at = np.searchsorted(times, track.times).clip(max=len(values) - 1)
+    return RotationCurve(Polyline(times, values), values[at], None)
 
 
 def degrees(q: Floats, *, view: str, rest: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Plot of curves through given values by several tangent rules: overshoot, speed, acceleration, continuity."""
+"""Plot of curves through given values by several tangent rules: overshoot, velocity, acceleration, continuity."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ENTRY = 0.56
 def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, kind: str) -> bytes:
     """Return a plot of curves through keys by tangent rules, as the bytes of a PNG or SVG file.
 
-    Curve, speed and acceleration of all rules are drawn in common panels; values outside the range of the two
+    Curve, velocity and acceleration of all rules are drawn in common panels; values outside the range of the two
     neighboring keys are filled. The legend lists continuity at keys and overshoot of each rule.
 
     times: (K,) s, increasing. values: (K,), K ≥ 2. rules: names as in TANGENTS, or "linear", "step"; at most six.
@@ -59,7 +59,7 @@ def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, k
         sheet.text(MARGIN + 0.05, 0.33, f"Through {listed}", fontsize=TITLE + 2, weight="bold")
         _values(sheet.panel(x, y, ACROSS, CURVE), curves, t, v)
         y += CURVE + CAPTION
-        sheet.text(x, y - 0.08, "speed, per second", fontsize=SMALL, color=SOFT)
+        sheet.text(x, y - 0.08, "velocity, per second", fontsize=SMALL, color=SOFT)
         _rates(sheet.panel(x, y, ACROSS, SPEED), curves, 1)
         y += SPEED + CAPTION
         sheet.text(x, y - 0.08, "acceleration, per second²", fontsize=SMALL, color=SOFT)
@@ -76,7 +76,7 @@ def tangent_plot(times: ArrayLike, values: ArrayLike, rules: Sequence[str], *, k
 
 @dataclass(frozen=True, slots=True)
 class _Curve:
-    """One rule's curve: points (P,) s and (P, 3) value, speed, acceleration, NaN between segments.
+    """One rule's curve: points (P,) s and (P, 3) value, velocity, acceleration, NaN between segments.
 
     bounds: (P,) the value, clamped to the range of the two neighboring keys. worst: the greatest distance from that
     range, signed. departure: greatest distance from a key. jumps: at the keys.
@@ -137,7 +137,7 @@ def _track(times: Floats, values: Floats, name: str) -> tuple[Track, float]:
 
 
 def _points(track: Track, k: arrays.Ints, u: Floats) -> Floats:
-    """Value, speed and acceleration (P, 3) at u (P,) of the segments k (P,), one-sided at their ends."""
+    """Value, velocity and acceleration (P, 3) at u (P,) of the segments k (P,), one-sided at their ends."""
     start, end = track.values[k, 0], track.values[k + 1, 0]
     h = track.times[k + 1] - track.times[k]
     none = np.zeros(len(k))
@@ -146,8 +146,8 @@ def _points(track: Track, k: arrays.Ints, u: Floats) -> Floats:
     if track.in_tangents is None or track.out_tangents is None:
         return np.stack((start + u * (end - start), (end - start) / h, none), axis=1)
     piece = start, h * track.out_tangents[k, 0], end, h * track.in_tangents[k + 1, 0]
-    value, speed = hermite.evaluate(u, *piece), hermite.first_derivative(u, *piece) / h
-    return np.stack((value, speed, hermite.second_derivative(u, *piece) / h**2), axis=1)
+    value, velocity = hermite.evaluate(u, *piece), hermite.first_derivative(u, *piece) / h
+    return np.stack((value, velocity, hermite.second_derivative(u, *piece) / h**2), axis=1)
 
 
 def _insert_breaks(points: Floats) -> Floats:

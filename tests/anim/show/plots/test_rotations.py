@@ -48,6 +48,16 @@ def test_the_distance_to_lock_is_that_of_the_middle_angle() -> None:
     assert found.times[found.values[:, 0].argmin()] == pytest.approx(0.5, abs=0.05)
 
 
+def test_angles_that_race_near_lock_are_a_smooth_line() -> None:
+    """A steady rotation about Y, tilted by 4°: X and Z go through 180° while Y passes 90°."""
+    tilted = (
+        Rotation.from_euler("Y", [[0], [90], [180]], degrees=True) * Rotation.from_euler("x", 4, degrees=True)
+    ).as_quat()
+    line = rotation_curve(track("rotation", [0, 1, 2], tilted), view="XYZ", rest=NONE).line
+    assert np.ptp(line.values, axis=0) == pytest.approx([172, 86, 180], abs=0.01)
+    assert np.abs(np.diff(line.values, axis=0)).max() < 3.1
+
+
 def _words(view: str, *tracks: object) -> list[str]:
     document = build_document(clips.skeleton([-1, 0, 1]), [Clip("wave", tracks)])  # type: ignore[arg-type]
     return words(track_plot(select_tracks(document, Selection(), limit=9, view=view).shown, title="t", kind="svg"))
