@@ -24,7 +24,8 @@ _NO_MEMORY = (
 class AnimError(Exception):
     """Base of all errors: problem, position and help.
 
-    problem: one line with the actual and the expected value.
+    problem: one line with the actual and the expected value; parameters of the caller's are written as `name`, for
+    which the command line puts the option's name.
     where: the position from the outside in, "clip 'walk', track 3"; empty if the problem contains it.
     help: one line of advice, or empty; tracebacks show it too.
     """

@@ -56,7 +56,7 @@ COMMANDS = {
     "from-euler": CommandInfo(
         "Turn Euler tracks (BVH, CSV, JSON curves) into glTF.",
         (
-            "gltf-anim from-euler walk.bvh walk.glb --mesh sticks",
+            "gltf-anim from-euler walk.bvh walk.glb --skeleton-mesh sticks",
             "gltf-anim from-euler walk.bvh hero-walk.glb --onto hero.glb --fail-unmatched 12",
             "gltf-anim from-euler curves.csv door.glb --order XYZ --axes extrinsic --unit deg",
         ),

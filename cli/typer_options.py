@@ -1,11 +1,12 @@
-"""Parsers and metavars of options by type, with the project's error messages, for typer."""
+"""Options for typer: parsers and metavars by type, the project's error messages, options named in library errors."""
 
 from __future__ import annotations
 
 import difflib
 import math
+import re
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Any
 
@@ -14,9 +15,10 @@ from typer import TyperException
 from typer.core import TyperCommand
 from typer.models import ArgumentInfo, OptionInfo
 
-from anim.errors import not_written
+from anim.errors import AnimError, not_written
 
 METAVARS = {str: "TEXT", int: "N", float: "N"}
+LISTINGS = {"EASINGS": "gltf-anim ease --list", "TANGENTS": "gltf-anim spline --list"}  # by the library's table
 
 
 class Parsing:
@@ -43,7 +45,15 @@ class Parsing:
 
 
 class Command(Parsing, TyperCommand):
-    """Command with a help page that shows arguments without a type."""
+    """Command with a help page that shows arguments without a type, and with its options named in errors."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; errors of the library name its options instead of parameters."""
+        try:
+            return super().invoke(ctx)
+        except AnimError as error:
+            name_options(error, {each.name: each.opts[0] for each in self.params if each.param_type_name == "option"})
+            raise
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the tables of arguments and options."""
@@ -53,6 +63,17 @@ class Command(Parsing, TyperCommand):
             if shown:
                 with formatter.section(heading):
                     formatter.write_dl(shown)
+
+
+def name_options(error: AnimError, options: Mapping[str, str]) -> None:
+    """Replace every `parameter` in an error by the option for it, and remove the quotes where there is none.
+
+    "choose `fps`", {"fps": "--fps"} → "choose --fps"
+    """
+    names = {**LISTINGS, **options}
+    error.problem, error.help = (
+        re.sub(r"`(\w+)`", lambda found: names.get(found[1], found[1]), words) for words in (error.problem, error.help)
+    )
 
 
 def _show_help(ctx: Any, param: Any, wanted: bool) -> None:

@@ -29,6 +29,12 @@ PENDING = (  # packages whose docstrings are not rewritten yet
     "anim/measure/inspect/",
     "anim/measure/loops/",
 )
+ADVICE = (  # modules that compose command lines, the advice of findings
+    "anim/measure/inspect/",
+    "anim/measure/loops/recommendations.py",
+    "anim/skinning/analysis/recommendations.py",
+)
+OPTION = re.compile(r"(?<![\w-])--[a-z]")
 OPENINGS = re.compile(r"(what|how|which|whose|whether)\b", re.IGNORECASE)
 
 
@@ -65,6 +71,18 @@ def test_no_docstring_opens_with_a_question_word() -> None:
     assert not found, "begin with an imperative or a noun phrase"
 
 
+def test_the_library_names_no_option() -> None:
+    """Errors and notes write parameters as `name`; the command line names the option for it."""
+    found = [
+        (_short(path), text)
+        for path in MODULES
+        if _short(path).startswith("anim/") and not _short(path).startswith(ADVICE)
+        for text in _strings(path)
+        if OPTION.search(text)
+    ]
+    assert not found, "write the parameter in backquotes"
+
+
 def _public_names(path: Path) -> Iterator[str]:
     """Yield functions, classes, their methods, and constants of a module whose names begin with no underscore."""
     for node in _tree(path).body:
@@ -88,6 +106,16 @@ def _docstring_openings(path: Path) -> Iterator[str]:
     for node in ast.walk(_tree(path)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             yield (ast.get_docstring(node) or "\n").splitlines()[0]
+
+
+def _strings(path: Path) -> Iterator[str]:
+    """Yield the strings of a module that are no docstrings."""
+    nodes = list(ast.walk(_tree(path)))
+    blocks = [node for node in nodes if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and node.body]
+    docstrings = {id(node.body[0].value) for node in blocks if isinstance(node.body[0], ast.Expr)}
+    for node in nodes:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
+            yield node.value
 
 
 def _words(name: str) -> set[str]:

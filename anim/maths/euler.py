@@ -112,7 +112,7 @@ def is_proper(order: str) -> bool:
 def check_order(order: str) -> str:
     """Return the order in capitals. Raises RangeError unless it is one of the twelve."""
     if order.upper() not in ORDERS:
-        raise RangeError(f"order is '{order}' (expected one of {', '.join(ORDERS)})")
+        raise RangeError(f"`order` is '{order}' (expected one of {', '.join(ORDERS)})")
     return order.upper()
 
 

@@ -46,7 +46,7 @@ class ProcessPool:
             except BrokenProcessPool:
                 raise UnsupportedError(
                     f"{label(task)}: a process that worked on it, or on one of the next clips, was ended by the system",
-                    help="if memory ran out: --jobs 1 takes least",
+                    help="if memory ran out, `workers` 1 needs the least",
                 ) from None
             yield result
 

@@ -172,7 +172,9 @@ def _handedness(chosen: Sequence[MeshInstance]) -> Floats:
     for instance in chosen:
         if instance.mesh.tangents is None:
             name = instance.mesh.name or f"node {instance.node}"
-            raise UnsupportedError(f"mesh '{name}' has no tangents", help="--normals needs nothing of the file")
+            raise UnsupportedError(
+                f"mesh '{name}' has no tangents", help="`normals` are computed where a file has none"
+            )
         signs.append(instance.mesh.tangents[:, 3])
     return np.concatenate(signs)
 
@@ -199,8 +201,8 @@ def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -
     if blend is not None and not 0 <= blend <= 1:
         raise RangeError(f"blend is {blend:g} (expected 0 … 1)")
     if method == "lbs" and (blend is not None or bulge_clamp):
-        what = "blend" if blend is not None else "bulge clamp"
-        raise RangeError(f"{what} needs another method than lbs (expected dqs or cor)")
+        what = "blend" if blend is not None else "bulge_clamp"
+        raise RangeError(f"`{what}` requires a method other than lbs (expected dqs or cor)")
     if space not in SPACES:
         raise RangeError(f"space is '{space}' (expected one of {', '.join(SPACES)})")
 
@@ -215,7 +217,7 @@ def _check_indices(nodes: Sequence[int] | None, threads: int | None) -> None:
 def _hint(scene: Scene, *, rigid: bool) -> str:
     if not any(len(instance.mesh.positions) for instance in scene.instances):
         return "the file has no mesh with vertices"
-    return "" if rigid else "meshes that only nodes move are baked with --rigid"
+    return "" if rigid else "unskinned meshes are baked with `rigid`"
 
 
 def _parts(scene: Scene, layers: Sequence[BoundMesh]) -> Iterator[MeshPart]:

@@ -49,7 +49,7 @@ def command(
     method: Annotated[Method, typer.Option("--method", help=ABOUT)] = LBS,
     blend: Annotated[
         float | None,
-        typer.Option("--blend", metavar="0..1", help="Blend weight of the method against lbs.", min=0, max=1),
+        typer.Option("--blend-weight", metavar="0..1", help="Blend weight of the method against lbs.", min=0, max=1),
     ] = None,
     bulge_clamp: Annotated[
         bool, typer.Option("--bulge-clamp", help="Limit the distance of skin from its bones to that at rest.")
@@ -66,7 +66,9 @@ def command(
     ] = False,
     tangents: Annotated[
         bool,
-        typer.Option("--tangents", help=f"Bake normals and tangents ({', '.join(caches.formats_with('tangents'))})."),
+        typer.Option(
+            "--vertex-tangents", help=f"Bake normals and tangents ({', '.join(caches.formats_with('tangents'))})."
+        ),
     ] = False,
     rigid: Annotated[bool, typer.Option("--rigid", help="Bake unskinned meshes too.")] = False,
     format: caches.FormatOption = None,

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from anim.errors import FormatError, RangeError
+from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import KeyPlacement
 from anim.exchange.euler.convention import PartialConvention
 from anim.exchange.euler.evaluate import bounding_size, skeleton
@@ -84,7 +84,7 @@ def command(
     bvh_position: Annotated[
         BvhPosition, typer.Option("--bvh-position", help="BVH positions replace the OFFSET, or add to it.")
     ] = BvhPosition.REPLACE,
-    mesh: Annotated[Mesh, typer.Option("--mesh", help="Mesh of the new skeleton.")] = Mesh.NONE,
+    mesh: Annotated[Mesh, typer.Option("--skeleton-mesh", help="Mesh of the new skeleton.")] = Mesh.NONE,
     onto: Annotated[
         str | None, typer.Option("--onto", metavar="FILE", help="Put the motion on this character, a glTF.")
     ] = None,
@@ -126,7 +126,7 @@ def command(
     if onto is None and (alias, fail_unmatched, bind_time, replace, floor) != (*[None] * 4, GroundMode.CONTACT):
         words = "--alias, --fail-unmatched, --floor, --replace and --bind-time"
         raise UsageError(f"{words} require --onto (the character)")
-    stated = PartialConvention(_order(order), axes, unit)
+    stated = PartialConvention(None if order is None else check_order(order), axes, unit)
     with documents.content(source, ending=TRACK_FORMATS["bvh"].suffix) as (data, called):
         kind = registry.of_path(source) or registry.of_content(data.tobytes())
         motion = kind.read(data.tobytes(), TrackReadOptions(stated, bvh_position))
@@ -166,13 +166,6 @@ def command(
     voice.info(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
 
 
-def _order(order: str | None) -> str | None:
-    try:
-        return None if order is None else check_order(order)
-    except RangeError as error:
-        raise UsageError(f"--{error.problem}") from None
-
-
 def _check(
     source: str, output: str, format: Format, scale: float | None, onto: str | None, mesh: Mesh, *, dry_run: bool
 ) -> None:
@@ -180,7 +173,7 @@ def _check(
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
     if onto is not None and mesh is not Mesh.NONE:
-        raise UsageError("--mesh makes a body for a new skeleton (--onto has one)")
+        raise UsageError("--skeleton-mesh makes a body for a new skeleton (--onto has one)")
     if source == onto == documents.PIPE:
         raise UsageError("SOURCE and --onto can't both be stdin")
     if format is Format.JSON and output == documents.PIPE and not dry_run:

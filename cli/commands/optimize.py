@@ -110,7 +110,7 @@ def command(
         Objective, typer.Option("--objective", help="Fewest bytes as a file, or after gzip.")
     ] = Objective.FILE,
     effort: Annotated[Effort, typer.Option("--effort", help="How long to search.")] = BALANCED,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes; 0: one per core.")] = 0,
+    workers: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes; 0: one per core.")] = 0,
     report: Annotated[
         str | None, typer.Option("--report", metavar="FILE", help="Write all figures as JSON, '-' for stdout.")
     ] = None,
@@ -145,7 +145,7 @@ def command(
         raise UsageError("--curve goes with neither --max-bytes nor --report")
     with documents.source(input, voice) as source:
         work = optimize_job(
-            source, output, clip=clip or (), jobs=jobs, detailed=report is not None or verbose, voice=voice
+            source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
         )
         said = {
             "max_error": optimize_request.MAX_ERROR if max_error is None else max_error,

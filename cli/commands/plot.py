@@ -11,6 +11,7 @@ import typer
 
 from anim.arrays import Floats
 from anim.curves.easing.table import parse
+from anim.errors import NotFoundError
 from anim.maths.euler import check_order
 from anim.operations.selection import Selection
 from anim.show.plots import track_plot as tracks
@@ -160,7 +161,11 @@ def _tracks(
         raise UsageError("IN and --compare can't both be stdin")
     names = None
     with documents.source(source, voice) as opened:
-        chosen, name = select_tracks(opened.document, selection, limit=limit, view=view), opened.name
+        name = opened.name
+        try:
+            chosen = select_tracks(opened.document, selection, limit=limit, view=view)
+        except NotFoundError as error:
+            raise error.advise("gltf-anim inspect IN --tracks lists them") from None
     if other is not None:
         with documents.source(other, voice) as opened:
             chosen, alone = compared(chosen, opened.document)

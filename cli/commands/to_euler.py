@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from anim.errors import NotFoundError, RangeError
+from anim.errors import NotFoundError
 from anim.exchange.euler.motion import Convention, EulerMotion, Unit
 from anim.exchange.euler.rotation_order import AUTO, DEFAULT_ORDER, OrderRules, parse
 from anim.exchange.euler.to_bvh_motion import to_bvh
@@ -122,10 +122,7 @@ def _kind(output: str, format: Format | None) -> TrackFormat:
 
 
 def _orders(text: str, kind: TrackFormat) -> OrderRules:
-    try:
-        orders = parse(text)
-    except RangeError as error:
-        raise UsageError(f"--{error.problem}") from None
+    orders = parse(text)
     if not orders.is_one and kind is TRACK_FORMATS["csv"]:
         raise UsageError("a CSV has one order for all nodes", help="write .json or .bvh")
     return orders

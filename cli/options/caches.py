@@ -17,6 +17,7 @@ from anim.caches.vat import presets
 from cli.errors import UsageError
 
 FORMATS = ", ".join(CACHE_FORMATS)
+VECTOR_OPTIONS = {"normals": "--normals", "tangents": "--vertex-tangents"}
 
 Up = StrEnum("Up", [(up, up) for up in UPS])  # type: ignore[misc]
 Order = StrEnum("Order", [(name, name) for name in vertex_order.ORDERS])  # type: ignore[misc]
@@ -111,5 +112,6 @@ def check_supported(ending: str, **wanted: bool) -> None:
     for what, is_wanted in wanted.items():
         if is_wanted and what not in CACHE_FORMATS[ending].holds:
             raise UsageError(
-                f"--{what} does not apply to {ending}", help=f"{', '.join(formats_with(what))} keep {what}"
+                f"{VECTOR_OPTIONS[what]} does not apply to {ending}",
+                help=f"{', '.join(formats_with(what))} keep {what}",
             )

@@ -125,9 +125,9 @@ def _bounded(request: Request, max_error: float) -> Request:
 
 
 def optimize_job(
-    source: Source, output: str, *, clip: Sequence[str], jobs: int, detailed: bool, voice: Reporter
+    source: Source, output: str, *, clip: Sequence[str], workers: int, detailed: bool, voice: Reporter
 ) -> OptimizeJob:
-    """Return the job for a source. clip: globs. jobs: processes, 0 for one per core.
+    """Return the job for a source. clip: globs. workers: processes, 0 for one per core.
 
     Raises NotFoundError; FormatError or UnsupportedError if vertices can't be read, since no bound can be verified.
     """
@@ -142,7 +142,7 @@ def optimize_job(
         Selection(clip).chosen_clips(reader.names(document)),
         diagonal(scene),
         output,
-        jobs or os.cpu_count() or 1,
+        workers or os.cpu_count() or 1,
         detailed,
         Progress("optimize", 1000, shown=not voice.quiet),
     )

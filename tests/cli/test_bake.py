@@ -217,12 +217,12 @@ def test_joints_that_scale_unevenly_are_named_for_methods_that_turn(call: Call, 
     [
         (("--fps", "0"), 2, "--fps is 0 (expected a number above 0)"),
         (("--method", "lsb"), 2, "'lsb' is none of lbs, dqs, cor"),
-        (("--blend", "0.5"), 2, "blend needs another method than lbs"),
-        (("--method", "dqs", "--blend", "2"), 2, "2 is too large (expected at most 1)"),
+        (("--blend-weight", "0.5"), 2, "--blend-weight requires a method other than lbs"),
+        (("--method", "dqs", "--blend-weight", "2"), 2, "2 is too large (expected at most 1)"),
         (("--mesh", "hand"), 5, "no mesh matches 'hand'"),
         (("--clip", "twits"), 5, "no clip matches 'twits'"),
         (("--quantize",), 2, "--quantize does not apply to .npz"),
-        (("--tangents",), 4, "has no tangents"),
+        (("--vertex-tangents",), 4, "has no tangents"),
     ],
 )
 def test_refusals(args: tuple[str, ...], code: int, words: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
@@ -230,7 +230,9 @@ def test_refusals(args: tuple[str, ...], code: int, words: str, call: Call, fixt
     assert not list(tmp_path.glob("*.npz"))
 
 
-@pytest.mark.parametrize(("option", "name"), [("--normals", "a.pc2"), ("--normals", "a.stl"), ("--tangents", "a.ply")])
+@pytest.mark.parametrize(
+    ("option", "name"), [("--normals", "a.pc2"), ("--normals", "a.stl"), ("--vertex-tangents", "a.ply")]
+)
 def test_what_a_format_has_no_place_for(option: str, name: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
     run = call("bake", fixture("arm"), tmp_path / name, "--clip", "twist", option)
     assert f"{option} does not apply to {name[1:]}" in refusal(run, 2)
@@ -240,7 +242,7 @@ def test_what_a_format_has_no_place_for(option: str, name: str, call: Call, fixt
 def test_tangents_of_a_real_file(call: Call, asset: Find, tmp_path: Path) -> None:
     """Rigid nodes turn them as they turn the file's own: checked by a product with the nodes' matrices."""
     source = asset("BusterDrone/busterDrone.gltf")
-    call("bake", source, tmp_path / "a.npz", "--rigid", "--tangents", "--fps", "1").product()
+    call("bake", source, tmp_path / "a.npz", "--rigid", "--vertex-tangents", "--fps", "1").product()
     document = opened_path(source)
     of, (played,) = reader.scene(document, tangents=True), reader.clips(document)
     with np.load(tmp_path / "a.npz") as arrays:

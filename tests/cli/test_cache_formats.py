@@ -132,7 +132,7 @@ def test_frames_of_a_longer_sequence_are_said_and_kept(walk: Path, call: Call) -
 def test_uneven_frames_are_said(tmp_path: Path, call: Call) -> None:
     with (tmp_path / "a.npz").open("wb") as file:
         np.savez(file, positions=np.eye(3, dtype="f4")[None].repeat(4, 0), times=[0, 0.1, 0.5, 0.6], faces=[[0, 1, 2]])
-    words = "note: frames are not evenly spaced: 0.1 … 0.4 s apart; --fps spaces them\n"
+    words = "note: frames are not evenly spaced: 0.1 … 0.4 s apart (a frame rate spaces them)\n"
     for name in ("b.ply", "b.obj", "b.stl", "b.exr", "b.png"):
         assert words in call("convert-cache", tmp_path / "a.npz", tmp_path / name).err
     assert "evenly" not in call("convert-cache", tmp_path / "a.npz", tmp_path / "c.ply", "--fps", "10").err
@@ -156,7 +156,7 @@ def test_directions_that_are_lost_are_said(tmp_path: Path, call: Call) -> None:
     assert "note: tangents are left out: ply has no place" in call("convert-cache", source, tmp_path / "a.ply").err
     assert "left out" not in call("convert-cache", source, played).err
     run = call("convert-cache", played, tmp_path / "b.npz")
-    assert "warning: normals and tangents are not played (bake --normals or --tangents does that)\n" in run.err
+    assert "warning: normals and tangents are not played: bake the glTF file with them\n" in run.err
 
 
 def test_one_frame_of_any_format_reads_the_same_by_name_and_pipe(tmp_path: Path, call: Call) -> None:

@@ -183,5 +183,5 @@ def test_refusals(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     assert "is no .png or .svg file" in refusal(call("collapse", source, "--plot", tmp_path / "a.gif"), 2)
     assert "no mesh matches 'x'" in refusal(call("collapse", source, "--mesh", "x"), 5)
     clamp = call("collapse", source, "--method", "lbs", "--bulge-clamp")
-    assert "bulge clamp needs another method than lbs" in refusal(clamp, 2)
+    assert "--bulge-clamp requires a method other than lbs" in refusal(clamp, 2)
     assert "no skinned mesh" in refusal(call("collapse", fixture("morph_cube")), 5)

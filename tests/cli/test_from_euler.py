@@ -55,7 +55,7 @@ def _valid(data: bytes) -> None:
 
 @pytest.mark.parametrize("mesh", ["none", "sticks"])
 def test_a_bvh_through_a_pipe(call: Call, mesh: str) -> None:
-    run = call("from-euler", "-", "-", "--mesh", mesh, stdin=SMALL)
+    run = call("from-euler", "-", "-", "--skeleton-mesh", mesh, stdin=SMALL)
     document = opened(run.product())
     _valid(run.out)
     bones, clip = reader.skeleton(document), reader.clips(document)[0]
@@ -72,7 +72,7 @@ def test_two_figures_in_a_bvh(call: Call) -> None:
     roots = head.partition("\n")[2]
     rows = "\n".join(f"{row} {row}" for row in body.strip().splitlines()[2:])
     text = f"HIERARCHY\n{roots}{roots.replace('hip', 'pelvis')}MOTION\nFrames: 2\nFrame Time: 0.1\n{rows}\n"
-    run = call("from-euler", "-", "-", "--mesh", "sticks", stdin=text.encode())
+    run = call("from-euler", "-", "-", "--skeleton-mesh", "sticks", stdin=text.encode())
     document = opened(run.product())
     _valid(run.out)
     assert [skin["joints"] for skin in document.json["skins"]] == [[0, 1], [3, 4]]
@@ -113,7 +113,7 @@ def test_the_range_of_angles_shows_a_wrong_unit(call: Call) -> None:
 def test_a_body_without_a_size(call: Call) -> None:
     """Hidden things have a scale of 0, whose matrix has no inverse."""
     flat = b"#node,door,,0,0,0,0,0,0,0,1,1\n#node,knob,door,1,0,0\n" + CURVES
-    _valid(call("from-euler", "-", "-", *XYZ, "--mesh", "sticks", stdin=flat).product())
+    _valid(call("from-euler", "-", "-", *XYZ, "--skeleton-mesh", "sticks", stdin=flat).product())
 
 
 def test_an_order_in_small_letters_and_keys_before_zero(call: Call) -> None:
@@ -130,7 +130,7 @@ def test_a_gltf_with_its_bin(call: Call, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["cmu_01_01.bvh", "freebvh.bvh", "example.bvh"])
 def test_real_files_are_valid(name: str, call: Call, asset: Find) -> None:
-    run = call("from-euler", asset(f"bvh/{name}"), "-", "--mesh", "sticks")
+    run = call("from-euler", asset(f"bvh/{name}"), "-", "--skeleton-mesh", "sticks")
     document = opened(run.product())
     _valid(run.out)
     assert reader.clips(document)[0].name == name.removesuffix(".bvh")
@@ -311,7 +311,7 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
             "line 5: unknown channel 'Zrot' (expected Xposition … Zrotation; truncated?)",
         ),
         ((), b"\x89PNG\r\n", 3, "stdin: starts with"),
-        (XYZ, SMALL, 2, "a BVH says the order of every joint itself"),
+        (XYZ, SMALL, 2, "--order, --axes and --unit do not apply to a BVH, which specifies the order"),
         ((), CURVES, 2, "rotation order not specified"),
         (XYZ, CURVES.replace(b"1,90", b"1,9O"), 3, "stdin: line 3: door.rx is '9O'"),
         (XYZ, CURVES.replace(b"door.rz", b"door.rq"), 3, "stdin: line 1: "),
@@ -323,7 +323,7 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         (("--replace", "walk"), SMALL, 2, "require --onto (the character)"),
         (("--format", "json"), SMALL, 2, "both want stdout"),
         (("--onto", "-"), SMALL, 2, "SOURCE and --onto can't both be stdin"),
-        ((*XYZ, "--bvh-position", "add"), CURVES, 2, "--bvh-position is about BVH"),
+        ((*XYZ, "--bvh-position", "add"), CURVES, 2, "--bvh-position does not apply to curves without OFFSET"),
         (("--onto", "nobody.glb"), SMALL, 3, "nobody.glb: can't be read"),
         (("--order", "XXY"), SMALL, 2, "--order is 'XXY' (expected one of XYZ,"),
     ],
@@ -349,8 +349,8 @@ def test_a_rest_pose_must_be_in_the_motion(call: Call, fixture: Fixture, asset: 
 
 
 def test_sticks_and_a_character_exclude_each_other(call: Call, fixture: Fixture) -> None:
-    run = call("from-euler", "-", "-", "--onto", fixture("biped"), "--mesh", "sticks", stdin=SMALL)
-    assert "--mesh makes a body" in refusal(run, 2)
+    run = call("from-euler", "-", "-", "--onto", fixture("biped"), "--skeleton-mesh", "sticks", stdin=SMALL)
+    assert "--skeleton-mesh makes a body" in refusal(run, 2)
 
 
 def test_dry_run_writes_nothing(call: Call, tmp_path: Path) -> None:
@@ -361,7 +361,7 @@ def test_dry_run_writes_nothing(call: Call, tmp_path: Path) -> None:
 
 
 def test_same_bytes_twice(call: Call) -> None:
-    runs: list[Run] = [call("from-euler", "-", "-", "--mesh", "sticks", stdin=SMALL) for _ in range(2)]
+    runs: list[Run] = [call("from-euler", "-", "-", "--skeleton-mesh", "sticks", stdin=SMALL) for _ in range(2)]
     assert runs[0].product() == runs[1].product()
 
 

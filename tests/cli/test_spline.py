@@ -51,4 +51,4 @@ def test_a_loop_that_is_open_is_named_and_closed_by_the_help(call: Call, walk: P
         assert call("spline", closed, "-", "--clip", "walk", *options).code == 0
     unknown = call("spline", half, "-", "--tangents", "catmul-rom", "--cyclic")
     assert "did you mean 'catmull-rom'?" in unknown.err
-    assert help_line(unknown) == "gltf-anim spline --list"
+    assert help_line(unknown) == "see gltf-anim spline --list"

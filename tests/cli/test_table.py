@@ -10,9 +10,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+import typer
 
 import cli.commands
+from anim.errors import RangeError
 from cli import main
+from cli.typer_options import name_options
 from tests.cli.conftest import Call
 from tests.cli.running import ROOT, built, shell
 from tests.fixtures.reading import split
@@ -79,6 +82,25 @@ def test_the_help_has_the_examples_of_the_table(command: str, call: Call) -> Non
     for example in row.examples:
         assert " ".join(example.split()) in text
     assert " ".join((command, row.about)) in " ".join(call("--help").product().decode().split())
+
+
+def test_an_option_takes_the_same_kind_of_value_in_all_commands() -> None:
+    kinds: dict[str, set[str]] = {}
+    group = typer.main.get_command(main.app)
+    for command in main.COMMANDS:
+        for param in group.get_command(None, command).params:  # type: ignore[attr-defined]
+            kind = "flag" if getattr(param, "is_flag", False) else str(param.metavar)
+            for option in param.opts if param.param_type_name == "option" else ():
+                kinds.setdefault(option, set()).add("choice" if kind.startswith("<") else kind)
+    assert len(kinds) > 60
+    assert not {option: sorted(found) for option, found in kinds.items() if len(found) > 1}
+
+
+def test_errors_of_the_library_name_options_instead_of_parameters() -> None:
+    error = RangeError("`fps` and `times` exclude each other", help="see `EASINGS`")
+    name_options(error, {"fps": "--samples-per-second"})
+    assert str(error) == "--samples-per-second and times exclude each other"
+    assert error.help == "see gltf-anim ease --list"
 
 
 @pytest.mark.parametrize("command", main.COMMANDS)

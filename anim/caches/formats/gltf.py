@@ -46,7 +46,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
         return found
     played = document_playback.evaluate_document(document, fps=reading.fps, note=reading.note)
     if names := document_playback.directions(document):
-        reading.note(f"{' and '.join(names)} are not played (bake --{' or --'.join(names)} does that)")
+        reading.note(f"{' and '.join(names)} are not played: bake the glTF file with them")
     return played
 
 

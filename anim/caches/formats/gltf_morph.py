@@ -42,13 +42,13 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
         raise UnsupportedError(
             f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices are "
             f"{12 * cache.frame_count * cache.vertex_count / 1e9:.1f} GB of positions (at most 1.1)",
-            help="choose fewer with --fps, or --layout flip-visibility, or .usdc, .npz, .pc2, .mdd: those are streamed",
+            help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed)",
         )
     whole = cache.load_all()
     limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * bounds.diagonal(cache)
     best = _smallest_encoding(whole.positions, cache.times, limit, quantize=writing.quantize)
     if best is None:
-        advice = "allow more --max-error" + (", or leave out --quantize" if writing.quantize else "")
+        advice = "allow a larger `max_error`" + (", or leave out `quantize`" if writing.quantize else "")
         raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help=advice)
     form, worst = best
     _write(cache, whole, form, outputs, quantize=writing.quantize)

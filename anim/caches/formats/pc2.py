@@ -70,7 +70,8 @@ def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
     if off[:-1].max() > frame_spacing.EVEN:
         k = int(np.argmax(off[:-1] > frame_spacing.EVEN))
         raise RangeError(
-            f"PC2 has frames at even steps, and frame {k} at {times[k]:.4g} s is off them", help="choose --fps"
+            f"PC2 has frames at even steps, and frame {k} at {times[k]:.4g} s is off them",
+            help="choose a frame rate with `fps`",
         )
     fps = float(f"{1 / step:.6g}")
     if off[-1] > frame_spacing.EVEN:

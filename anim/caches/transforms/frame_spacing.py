@@ -27,7 +27,9 @@ def notes(times: Floats) -> tuple[str, ...]:
     _, off = frame_spacing(times)
     steps = np.diff(times)
     if off[:-1].max() > EVEN:
-        return (f"frames are not evenly spaced: {steps.min():.3g} … {steps.max():.3g} s apart; --fps spaces them",)
+        return (
+            f"frames are not evenly spaced: {steps.min():.3g} … {steps.max():.3g} s apart (a frame rate spaces them)",
+        )
     return (last_frame_note(times, off),) if off[-1] > EVEN else ()
 
 

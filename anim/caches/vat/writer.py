@@ -115,7 +115,7 @@ def _grid(cache: VertexCache) -> TextureLayout:
         most = MAX_HEIGHT // rows
         raise RangeError(
             f"{cache.frame_count} frames of {rows} rows don't fit into a texture (at most {most})",
-            help="choose fewer frames with --fps, or cut the clip",
+            help="choose fewer frames with `fps`, or trim the clip",
         )
     return found
 

@@ -28,7 +28,8 @@ class Factory(Generic[T]):
 def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str, listing: str) -> T:
     """Return what `text` names: an entry of `ready`, or one made by `makers` with the arguments in parentheses.
 
-    kind: type of the entries for messages, such as "ease". Case and spaces around names and arguments are ignored.
+    kind: type of the entries for messages, such as "easing". listing: the table of names, for the help.
+    Case and spaces around names and arguments are ignored.
     Raises RangeError for an unknown name, with the nearest ones, and for wrong arguments, with the usage.
     parse_call("back-out(3)", ...) → makers["back-out"].make(("3",))
     """
@@ -41,7 +42,9 @@ def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T
     if name not in makers:
         if name in ready:
             raise RangeError(f"{kind} '{name}' takes no arguments (got {inside!r})")
-        raise RangeError(f"unknown {kind} {call[1]!r}{_suggestion(call[1], [*ready, *makers])}", help=listing)
+        raise RangeError(
+            f"unknown {kind} {call[1]!r}{_suggestion(call[1], [*ready, *makers])}", help=f"see `{listing}`"
+        )
     maker = makers[name]
     if inside is None:
         raise RangeError(f"{kind} '{name}' requires arguments", help=f"write {maker.usage}")

@@ -56,7 +56,7 @@ def parse(text: str) -> Easing:
     Raises RangeError for an unknown name, with the nearest ones in its help, and for invalid arguments.
     parse("cubic-bezier(.2, 0, 0, 1)").value(0.5) → 0.87
     """
-    return parse_call(text, EASINGS, EASING_FACTORIES, kind="easing", listing="gltf-anim ease --list")
+    return parse_call(text, EASINGS, EASING_FACTORIES, kind="easing", listing="EASINGS")
 
 
 def sparkline(easing: Easing, width: int = 24) -> str:

@@ -46,7 +46,7 @@ def parse(text: str) -> TangentRule:
     Raises RangeError for an unknown name, with the nearest ones in its help, and for invalid arguments.
     parse("tcb(0, 0, 0.5)"), parse("akima")
     """
-    return parse_call(text, TANGENTS, TANGENT_FACTORIES, kind="tangent rule", listing="gltf-anim spline --list")
+    return parse_call(text, TANGENTS, TANGENT_FACTORIES, kind="tangent rule", listing="TANGENTS")
 
 
 def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:

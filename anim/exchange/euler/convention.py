@@ -61,7 +61,7 @@ def require_complete(said: PartialConvention) -> Convention:
     missing = next(name for name in ("order", "frame", "unit") if getattr(said, name) is None)
     raise RangeError(
         f"{NAMES[missing]} not specified",
-        help="order, axes and unit are required; XYZ in FBX and Maya is order XYZ with extrinsic axes",
+        help="`order`, `axes` and `unit` are required; XYZ in FBX and Maya is order XYZ with extrinsic axes",
     )
 
 

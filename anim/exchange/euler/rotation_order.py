@@ -66,7 +66,7 @@ def parse(text: str) -> OrderRules:
         else:
             otherwise.append(checked)
     if len(otherwise) > 1:
-        raise RangeError(f"order is '{text}' (expected one for all nodes, and NAME=ORDER for others)")
+        raise RangeError(f"`order` is '{text}' (expected one for all nodes, and NAME=ORDER for others)")
     return OrderRules(otherwise[0] if otherwise else DEFAULT_ORDER, tuple(rules))
 
 

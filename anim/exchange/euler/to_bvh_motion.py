@@ -127,7 +127,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
         step = (end - start) / max(len(keys) - 1, 1)
         shown = np.asarray(np.arange(len(keys)) * step, np.float64)
         if np.abs(keys - start - shown).max() > GRID_TOLERANCE_FRAMES * step + TIME_ROUNDING_FRACTION * end:
-            raise RangeError("keys stand on no even grid, as a BVH needs", help="give --fps")
+            raise RangeError("keys are not evenly spaced, as a BVH requires", help="choose a frame rate with `fps`")
         return shown, keys
     at = start + shown
     nearest = keys[np.clip(np.searchsorted(keys, at - TIME_ROUNDING_FRACTION * at), 0, len(keys) - 1)]

@@ -52,7 +52,7 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
 def write(motion: EulerMotion, convention: Convention) -> bytes:
     """Return the motion as a BVH. Raises UnsupportedError for extrinsic angles: BVH has none."""
     if convention.frame != AxesConvention.INTRINSIC:
-        raise UnsupportedError("a BVH's angles are intrinsic", help="give --axes intrinsic; the order reads backwards")
+        raise UnsupportedError("a BVH's angles are intrinsic", help="an extrinsic order is an intrinsic one reversed")
     return bvh_writer.write(motion)
 
 

@@ -52,7 +52,7 @@ def _frame_times(motion: EulerMotion) -> Floats:
     times = max((curve.times for curve in curves), key=len)
     steps = np.diff(times)
     if len(steps) and np.ptp(steps) > 1e-3 * steps.mean():
-        raise UnsupportedError("keys stand on no even grid, as a BVH needs", help="give --fps")
+        raise UnsupportedError("keys are not evenly spaced, as a BVH requires", help="choose a frame rate with `fps`")
     return times
 
 

@@ -37,7 +37,7 @@ class TrackFormat:
 
 def _read_bvh(data: bytes, reading: TrackReadOptions) -> EulerMotion:
     if reading.stated != UNSPECIFIED:
-        raise RangeError("a BVH says the order of every joint itself (no --order, --axes or --unit)")
+        raise RangeError("`order`, `axes` and `unit` do not apply to a BVH, which specifies the order of every joint")
     return bvh_reader.read(data, position=reading.bvh_position)
 
 
@@ -46,7 +46,7 @@ def _curves(
 ) -> Callable[[bytes, TrackReadOptions], EulerMotion]:
     def read_curves(data: bytes, reading: TrackReadOptions) -> EulerMotion:
         if reading.bvh_position is not BvhPosition.REPLACE:
-            raise RangeError("these curves have no OFFSET (--bvh-position is about BVH)")
+            raise RangeError("`bvh_position` does not apply to curves without OFFSET (only to a BVH)")
         return read(data, reading.stated)
 
     return read_curves

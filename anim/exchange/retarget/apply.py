@@ -76,7 +76,7 @@ def apply_to_character(
         first = source.skeleton.names[moving[0]], target.skeleton.names[tops[0]]
         raise NotFoundError(
             "no joint of the motion is one of the character",
-            help=f"pair them in an --alias file, in lines such as '{first[0]},{first[1]}'",
+            help=f"pair them in an `alias` file, in lines such as '{first[0]},{first[1]}'",
         )
     if nested:
         bound = bind_pose(

@@ -94,10 +94,10 @@ def retarget(
     Raises NotFoundError without a matched joint, RangeError for CONTACT in a motion of over a day.
     """
     if not matching.pairs:
-        raise NotFoundError("no joint of the motion is one of the character", help="name them in an --alias file")
+        raise NotFoundError("no joint of the motion is one of the character", help="pair them in an `alias` file")
     if floor == GroundMode.CONTACT and source.clip.end - source.clip.start > MAX_CONTACT_DURATION_S:
         seconds = source.clip.end - source.clip.start
-        raise RangeError(f"the motion lasts {seconds:g} s: too long to see when feet are down", help="--floor keep")
+        raise RangeError(f"the motion lasts {seconds:g} s: too long to find foot contacts", help="choose `floor` keep")
     follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, bind_time=bind_time)
     size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
     knots, before = _times(source.clip)

@@ -76,7 +76,7 @@ def select_tracks(document: Document, selection: Selection, *, limit: int, view:
     if view not in (FROM_REST, COMPONENTS):
         found = [each for each in found if each.track.kind is ValueKind.ROTATION]
     if not found:
-        raise NotFoundError("no track is selected", help="gltf-anim inspect IN --tracks lists them")
+        raise NotFoundError("no track is selected")
     moving = [each for each in found if _is_moving(each.track)] or found
     return TrackSelection(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
 

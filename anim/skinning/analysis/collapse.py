@@ -73,7 +73,7 @@ class Comparison:
         if not skinned:
             raise NotFoundError("there is no skinned mesh to look at")
         if bulge_clamp and set(methods) == {"lbs"}:
-            raise RangeError("bulge clamp needs another method than lbs (expected dqs or cor)")
+            raise RangeError("`bulge_clamp` requires a method other than lbs (expected dqs or cor)")
         self._scene = scene
         self._bakers = {
             method: prepare_bake(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)

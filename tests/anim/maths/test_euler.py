@@ -118,5 +118,5 @@ def test_fewer_axes_are_fewer_turns() -> None:
 
 
 def test_an_unknown_order_is_refused() -> None:
-    with pytest.raises(RangeError, match="order is 'XXY'"):
+    with pytest.raises(RangeError, match="`order` is 'XXY'"):
         euler.from_quaternion(np.array((0.0, 0, 0, 1)), order="XXY")

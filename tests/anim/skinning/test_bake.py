@@ -178,7 +178,7 @@ def test_only_what_skins_or_morphs_is_baked_unless_rigid_is_wanted() -> None:
     of = reader.scene(opened_fixture("interpolations"))
     with pytest.raises(NotFoundError, match="no mesh with a skin or morph targets") as refused:
         bake(of, clip(), times=np.zeros(1))
-    assert "--rigid" in refused.value.help
+    assert "`rigid`" in refused.value.help
     assert bake(of, clip(), times=np.zeros(1), rigid=True).vertex_count == of.vertex_count
     nodes = [of.instances[1].node]
     assert bake(of, clip(), times=np.zeros(1), rigid=True, nodes=nodes).vertex_count == 36
@@ -197,8 +197,8 @@ def test_rest_is_the_scene_without_a_clip() -> None:
     [
         ({"method": "lsb"}, r"method is 'lsb' \(expected one of lbs, dqs, cor\)"),
         ({"method": "dqs", "blend": 1.5}, r"blend is 1.5 \(expected 0 … 1\)"),
-        ({"blend": 0.5}, "blend needs another method than lbs"),
-        ({"bulge_clamp": True}, "bulge clamp needs another method than lbs"),
+        ({"blend": 0.5}, "`blend` requires a method other than lbs"),
+        ({"bulge_clamp": True}, "`bulge_clamp` requires a method other than lbs"),
         ({"space": "bind"}, r"space is 'bind' \(expected one of world, mesh\)"),
     ],
 )

@@ -16,7 +16,7 @@ from tests.anim.caches.making import FACES, written
         ([0.0], ""),
         ([0.0, 0.7], ""),
         ([0.5, 0.75, 1.0, 1.25], ""),
-        ([0.0, 0.1, 0.2, 0.4, 0.5], "frames are not evenly spaced: 0.1 … 0.2 s apart; --fps spaces them"),
+        ([0.0, 0.1, 0.2, 0.4, 0.5], "frames are not evenly spaced: 0.1 … 0.2 s apart (a frame rate spaces them)"),
         ([0.0, 0.1, 0.2, 0.25], "the last frame is at 0.25 s, 0.5 steps off"),
         (np.round(np.arange(2000) / 29.97, 5).tolist(), ""),  # rounding of the first step doesn't add up
     ],

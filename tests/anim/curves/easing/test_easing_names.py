@@ -19,11 +19,11 @@ def test_name_is_what_makes_it(name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message", "help"),
     [
-        ("quadin", "unknown easing 'quadin' (did you mean 'quad-in'", "gltf-anim ease --list"),
-        ("easeInOutQuad", "unknown easing 'easeInOutQuad' (did you mean 'quad-in-out'?)", "ease --list"),
-        ("elastic", "(did you mean 'elastic-in' or 'elastic-out'", "ease --list"),
-        ("bounzy", "unknown easing 'bounzy' (did you mean 'bounce-in'", "ease --list"),
-        ("qwxyz", "unknown easing 'qwxyz'", "gltf-anim ease --list"),
+        ("quadin", "unknown easing 'quadin' (did you mean 'quad-in'", "see `EASINGS`"),
+        ("easeInOutQuad", "unknown easing 'easeInOutQuad' (did you mean 'quad-in-out'?)", "`EASINGS`"),
+        ("elastic", "(did you mean 'elastic-in' or 'elastic-out'", "`EASINGS`"),
+        ("bounzy", "unknown easing 'bounzy' (did you mean 'bounce-in'", "`EASINGS`"),
+        ("qwxyz", "unknown easing 'qwxyz'", "see `EASINGS`"),
         ("spring", "requires arguments", "write spring(stiffness, damping)"),
         ("spring(1)", "number of arguments is 1 (expected 2)", "write spring"),
         ("spring(0, 1)", "expected finite and above 0", ""),

@@ -30,7 +30,7 @@ def test_what_is_said_counts_in_turn() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "problem"), [("XXY", "order is 'XXY'"), ("a=", "order is ''"), ("XYZ,ZYX", "one for all")]
+    ("text", "problem"), [("XXY", "`order` is 'XXY'"), ("a=", "`order` is ''"), ("XYZ,ZYX", "one for all")]
 )
 def test_what_is_none_is_refused(text: str, problem: str) -> None:
     with pytest.raises(RangeError, match=problem):

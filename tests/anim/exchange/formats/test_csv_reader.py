@@ -124,7 +124,7 @@ def test_a_node_whose_name_begins_like_a_comment_keeps_its_keys() -> None:
         (UNSPECIFIED, "rotation order not specified"),
         (PartialConvention("XYZ"), "axes convention not specified"),
         (PartialConvention("XYZ", AxesConvention.INTRINSIC), "angle unit not specified"),
-        (PartialConvention("XXZ", AxesConvention.INTRINSIC, Unit.DEG), "order is 'XXZ'"),
+        (PartialConvention("XXZ", AxesConvention.INTRINSIC, Unit.DEG), "`order` is 'XXZ'"),
     ],
 )
 def test_the_convention_is_never_guessed(stated: PartialConvention, problem: str) -> None:

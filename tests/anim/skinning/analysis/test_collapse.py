@@ -307,7 +307,7 @@ def test_the_clamp_is_that_of_bake() -> None:
     assert held.methods[1].volume == pytest.approx([wanted[0] / wanted[1]], rel=1e-4)
     assert held.methods[1].bulge < free.methods[1].bulge - 0.3
     assert held.methods[0].volume == pytest.approx(free.methods[0].volume)
-    with pytest.raises(RangeError, match="bulge clamp needs another method than lbs"):
+    with pytest.raises(RangeError, match="`bulge_clamp` requires a method other than lbs"):
         collapse(of, bend, times=time, methods=("lbs",), bulge_clamp=True)
 
 
