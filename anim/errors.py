@@ -6,6 +6,7 @@ AnimError
 ├─ NotFoundError     no such clip, node, skin or mesh
 ├─ RangeError        a parameter outside its valid range
 ├─ ShapeError        an array of the wrong shape or type: an error of the caller
+├─ UnstableError     a simulation that diverges: not finite, or with more energy than it can have
 └─ OutputError       the output can't be written: a full or read-only disk, no permission
 """
 
@@ -71,6 +72,10 @@ class RangeError(AnimError):
 
 class ShapeError(AnimError):
     """An array has the wrong shape or type."""
+
+
+class UnstableError(AnimError):
+    """A simulation diverges: values that are not finite, or far more energy than was put in."""
 
 
 class OutputError(AnimError):

@@ -15,6 +15,7 @@ from anim.errors import (
     NotFoundError,
     OutputError,
     RangeError,
+    UnstableError,
     UnsupportedError,
     is_out_of_memory,
 )
@@ -30,6 +31,7 @@ CODES: dict[type[AnimError], int] = {
     NotFoundError: NOT_FOUND,
     RangeError: USAGE,
     OutputError: FORMAT,
+    UnstableError: CHECK,
 }
 
 

@@ -8,8 +8,9 @@ import importlib
 import os
 import signal
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -171,41 +172,51 @@ COMMANDS = {
 
 
 class LazyGroup(Parsing, TyperGroup):
-    """Group of the commands in `cli.commands`, one module each, imported on use."""
+    """Group of commands, one module each, imported on use.
+
+    table: of the commands. package: of their modules. noun: one of them, for messages.
+    """
+
+    table: ClassVar[Mapping[str, CommandInfo]] = COMMANDS
+    package: ClassVar[str] = "cli.commands"
+    noun: ClassVar[str] = "command"
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, in the table's order."""
-        return list(COMMANDS)
+        return list(self.table)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command, imported on demand, or its placeholder; None for an unknown name."""
-        row = COMMANDS.get(cmd_name)
+        row = self.table.get(cmd_name)
         if row is None or cmd_name in self.commands:
             return self.commands.get(cmd_name)
-        name = cmd_name.replace("-", "_")
-        function = importlib.import_module(f"cli.commands.{name}").command
-        single = typer.Typer(add_completion=False, rich_markup_mode=None)
-        examples = "\n".join(f"  {example}" for example in row.examples)
-        single.command(cmd_name, cls=Command, epilog=f"\b\nExamples:\n{examples}")(set_parsers(function))
+        module = importlib.import_module(f"{self.package}.{cmd_name.replace('-', '_')}")
+        epilog = "\b\nExamples:\n" + "\n".join(f"  {example}" for example in row.examples)
+        if hasattr(module, "command"):
+            single = typer.Typer(add_completion=False, rich_markup_mode=None)
+            single.command(cmd_name, cls=Command, epilog=epilog)(set_parsers(module.command))
+        else:  # a package with a command for each kind
+            single = typer.Typer(cls=module.Group, add_completion=False, rich_markup_mode=None, no_args_is_help=True)
+            single.callback(help=module.Group.__doc__, epilog=epilog)(lambda: None)
         return typer.main.get_command(single)
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
         """Return the commands and options with this prefix; descriptions come from the table, without imports."""
-        self.commands = {name: TyperCommand(name, short_help=row.about) for name, row in COMMANDS.items()}
+        self.commands = {name: TyperCommand(name, short_help=row.about) for name, row in self.table.items()}
         return super().shell_complete(ctx, incomplete)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command named in `args`; a misspelled one raises an error, except in completion."""
-        if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
-            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            hint = f" Did you mean '{near[0]}'?" if near else f" The commands are {', '.join(COMMANDS)}."
-            ctx.fail(f"no such command '{args[0]}'.{hint}")
+        if args and args[0] not in self.table and not args[0].startswith("-") and not ctx.resilient_parsing:
+            near = difflib.get_close_matches(args[0], self.table, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else f" The {self.noun}s are {', '.join(self.table)}."
+            ctx.fail(f"no such {self.noun} '{args[0]}'.{hint}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the table of commands without importing any."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, row.about) for name, row in COMMANDS.items()])
+        with formatter.section(f"{self.noun.capitalize()}s"):
+            formatter.write_dl([(name, row.about) for name, row in self.table.items()])
 
 
 app = typer.Typer(

@@ -1,0 +1,68 @@
+"""Report of a simulation: step size against stability, energy, error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+SCHEMA = "simulate/1"
+SAFE_STEP_FRACTION = 0.9  # of the stability limit, for advice
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationReport:
+    """Figures of one run; None where a kind of simulation has no such figure.
+
+    step_s: of the simulation, which divides a frame of the output. num_steps: from 0 on. integrator: a name in
+    INTEGRATORS, or "" for a kind with a method of its own. omega_h: largest angular frequency times step, limit: the
+    integrator's. energy_j: {"start", "end", "peak"}. drift_per_s: relative change of energy per second.
+    worst_stretch: {"fraction", "where", "time_s"}. penetration_m: deepest, into an obstacle.
+    first_bad_step: index of the first step without a finite result. error_estimate_m: largest distance to the same run
+    with half the step. figures: of this kind alone, by JSON key. advice: a line with a runnable option, or "".
+    """
+
+    kind: str
+    step_s: float
+    num_steps: int
+    fps: float
+    duration_s: float
+    warm_up_s: float = 0.0
+    integrator: str = ""
+    omega_h: float | None = None
+    omega_h_limit: float | None = None
+    energy_j: Mapping[str, float] | None = None
+    drift_per_s: float | None = None
+    worst_stretch: Mapping[str, Any] | None = None
+    penetration_m: float | None = None
+    first_bad_step: int | None = None
+    error_estimate_m: float | None = None
+    loop_seam_m: float | None = None
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    advice: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as JSON values; an infinite limit is null."""
+        result: dict[str, Any] = {"schema": SCHEMA}
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.name == "figures":
+                result |= value
+            else:
+                result[each.name] = None if isinstance(value, float) and not math.isfinite(value) else value
+        return result
+
+
+def advise_step(omega_h: float, limit: float, step: float, integrator: str) -> str:
+    """Return advice for a step beyond the stability limit: "ω·h = 2.4, verlet's limit is 2: --step 1/282 or …"."""
+    if omega_h <= limit:
+        return ""
+    words = (
+        f"ω·h = {omega_h:.3g}, {integrator}'s limit is {limit:.3g}" if limit else f"{integrator} always gains energy"
+    )
+    if not limit:
+        return f"{words}: --integrator verlet"
+    per_second = math.ceil(omega_h / (step * limit * SAFE_STEP_FRACTION))
+    other = " or --integrator rk4" if integrator != "rk4" and omega_h < 2 * math.sqrt(2) else ""
+    return f"{words}: --step 1/{per_second}{other}"

@@ -1,0 +1,60 @@
+"""Options of all kinds of simulation."""
+
+from __future__ import annotations
+
+import re
+from enum import StrEnum
+from fractions import Fraction
+from typing import Annotated
+
+import typer
+
+from anim.simulation.integrators import INTEGRATORS
+from cli.errors import UsageError
+
+Integrator = StrEnum("Integrator", [(name, name) for name in INTEGRATORS])  # type: ignore[misc]
+
+Clip = Annotated[
+    str | None,
+    typer.Option("--clip", metavar="GLOB", help="The clip that drives the simulation; the first without this."),
+]
+Fps = Annotated[float, typer.Option("--fps", metavar="N", help="Output frames per second.")]
+Step = Annotated[
+    str, typer.Option("--step", metavar="S", help="Time step of the simulation in seconds, such as 1/240.")
+]
+Duration = Annotated[
+    float | None,
+    typer.Option("--duration", metavar="S", help="Seconds to simulate; the length of the clip without this.", min=0),
+]
+WarmUp = Annotated[
+    float,
+    typer.Option("--warm-up", metavar="S", help="Seconds to simulate before the first frame, at its pose.", min=0),
+]
+Loop = Annotated[bool, typer.Option("--loop", help="Close the loop: end as it begins, and report the seam.")]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of random numbers.", min=0)]
+IntegratorOption = Annotated[Integrator, typer.Option("--integrator", help="Method of time integration.")]
+MaxError = Annotated[
+    str | None,
+    typer.Option("--max-error", metavar="LENGTH", help="Remove keys within this error, such as 0.5mm or 0.1%."),
+]
+ReportFile = Annotated[
+    str | None,
+    typer.Option(
+        "--report",
+        metavar="FILE",
+        help="Write a report: steps, stability, energy, error (.json), or its picture (.png).",
+    ),
+]
+
+
+def parse_seconds(text: str, option: str) -> float:
+    """Return seconds above 0 from "1/240", "0.01" or "10ms". Raises UsageError."""
+    match = re.fullmatch(r"\s*([\d.]+(?:e[+-]?\d+)?(?:/[\d.]+)?)\s*(s|ms)?\s*", text, re.IGNORECASE)
+    try:
+        top, _, bottom = (match[1] if match else "").partition("/")
+        value = float(Fraction(top) / Fraction(bottom or 1)) * (1e-3 if match and match[2] == "ms" else 1.0)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        value = 0.0
+    if not value > 0:
+        raise UsageError(f"{option} is '{text}' (expected seconds above 0, such as 1/240 or 5ms)")
+    return value
