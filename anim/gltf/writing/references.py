@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from anim.gltf.document import Json, json_array
 
@@ -22,6 +22,9 @@ HARMLESS = frozenset(
     KHR_xmp_json_ld VRMC_materials_mtoon VRMC_node_constraint VRMC_springBone VRMC_vrm VRMC_vrm_animation
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
+
+_CONTAINERS = (dict, list)  # of JSON
+_Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its parent's, and its key or index there
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,24 +121,39 @@ def _of_draco(json: Json) -> Iterator[int]:
             yield from _whole_numbers(draco.get("bufferView"))
 
 
-def unknown_extensions(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (JSON pointer, content) of unknown extensions at any depth."""
+def unknown_extensions(value: Json | list[Any]) -> list[tuple[str, Any]]:
+    """Return (JSON pointer, content) of unknown extensions at any depth."""
+    found: list[tuple[str, Any]] = []
+    _collect_unknown(value, None, found)
+    return found
+
+
+def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str, Any]]) -> None:
+    """Append the unknown extensions inside a value, whose pointer is `path`.
+
+    This goes through all of a file's JSON, up to 100 000 objects: pointers are only written out where one is needed.
+    """
     if isinstance(value, list):
         for i, item in enumerate(value):
-            if isinstance(item, dict | list):
-                yield from unknown_extensions(item, f"{place}/{i}")
+            if isinstance(item, _CONTAINERS):
+                _collect_unknown(item, (path, i), found)
         return
     for key, item in value.items():
-        if key == "extras" or not isinstance(item, dict | list):
+        if not isinstance(item, _CONTAINERS) or key == "extras":
             continue
         if key == "extensions" and isinstance(item, dict):
             for name, extension in item.items():
                 if name not in HARMLESS:
-                    yield f"{place}/extensions/{name}", extension
-                elif isinstance(extension, dict | list):
-                    yield from unknown_extensions(extension, f"{place}/extensions/{name}")
+                    found.append((_pointer(((path, key), name)), extension))
+                elif isinstance(extension, _CONTAINERS):
+                    _collect_unknown(extension, ((path, key), name), found)
         else:
-            yield from unknown_extensions(item, f"{place}/{key}")
+            _collect_unknown(item, (path, key), found)
+
+
+def _pointer(path: _Path) -> str:
+    """JSON pointer of a position: ((None, "nodes"), 3) → "/nodes/3"."""
+    return "" if path is None else f"{_pointer(path[0])}/{path[1]}"
 
 
 def _objects(value: Any) -> Iterator[Json]:

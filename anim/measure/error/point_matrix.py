@@ -54,6 +54,18 @@ class PointMatrix:
         np.add.at(dense, (row, column), values)
         return PointRows(dense)
 
+    def take(self, chosen: Ints) -> PointMatrix:
+        """Return some of the points, by index."""
+        return PointMatrix(self.nodes, self.joints[chosen], self.factors[chosen])
+
+    def distinct(self, labels: Ints) -> Ints:
+        """Return the indices of points (increasing) that differ from all before them with the same label (P,)."""
+        rows = np.column_stack((labels, self.joints, self.factors.reshape(len(self), -1)))
+        first: dict[bytes, int] = {}
+        for i, row in enumerate(rows):
+            first.setdefault(row.tobytes(), i)
+        return np.array(list(first.values()), np.int64)
+
     def places(self, world: Floats) -> Floats:
         """Return where the points are (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
         matrices = world[self.nodes]

@@ -160,8 +160,9 @@ def _clip(
 
 def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
     """The facts, with the key at the clip's end not redundant where only constant tracks have one."""
-    at_end = [i for i, track in enumerate(clip.tracks) if track.times[-1] == clip.end]
-    if clip.end <= clip.start or not all(counted.constant[i] and counted.redundant[i] for i in at_end):
+    end = clip.end  # found once: it goes through all tracks
+    at_end = [i for i, track in enumerate(clip.tracks) if track.times[-1] == end]
+    if end <= clip.start or not all(counted.constant[i] and counted.redundant[i] for i in at_end):
         return counted
     redundant = counted.redundant.copy()
     redundant[min(at_end, key=lambda i: redundant[i])] -= 1

@@ -21,16 +21,16 @@ def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[
     nothing, and need no axis. A key that every track on its time axis can do without goes; other keys only where a
     time axis of the track's own costs less than they take.
     """
-    needed: dict[int, Bools] = {}  # by time axis: keys that any track needs
+    common: dict[int, Bools] = {}  # by time axis: keys that no track needs
     for i, mask in given.items():
         axis = id(tracks[i].times)
-        needed[axis] = needed.get(axis, np.zeros(len(mask), np.bool_)) | ~mask
+        common[axis] = common[axis] & mask if axis in common else mask
     masks = [np.zeros(len(track.times), np.bool_) for track in tracks]
     for i, own in given.items():
-        shared = ~needed[id(tracks[i].times)]
-        count = int(own.sum())
-        saved = (count - int(shared.sum())) * _key_bytes(tracks[i])
-        masks[i] = own if saved > AXIS_JSON + TIME * (len(own) - count) else shared
+        if count := np.count_nonzero(own):
+            shared = common[id(tracks[i].times)]
+            saved = (count - np.count_nonzero(shared)) * _key_bytes(tracks[i])
+            masks[i] = own if saved > AXIS_JSON + TIME * (len(own) - count) else shared
     return masks
 
 

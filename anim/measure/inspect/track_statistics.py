@@ -49,7 +49,7 @@ class TrackStats:
 def stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> TrackStats:
     """Return the facts about tracks that were `joined`, in the order that they had before."""
     result, masks = _all_stats(groups, skeleton)
-    result.redundant[:] += np.array([mask.sum() for mask in masks], np.int64)
+    result.redundant[:] += np.array([np.count_nonzero(mask) for mask in masks], np.int64)
     return result
 
 
@@ -104,8 +104,9 @@ def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, gi
     result.no_effect[group.numbers] = _at_rest(group, constant, skeleton)
     fewest = 1 if group.tangents is None else 2
     result.redundant[group.numbers] = np.where(constant, np.maximum(group.counts - fewest, 0), 0)
-    masks = np.split(_redundant(group, values, constant), group.starts[1:])
-    given.update((number, masks[i]) for i, number in enumerate(group.numbers.tolist()) if not constant[i])
+    mask = _redundant(group, values, constant)
+    for i in np.flatnonzero(~constant).tolist():
+        given[int(group.numbers[i])] = mask[group.starts[i] : group.starts[i] + group.counts[i]]
 
 
 def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:

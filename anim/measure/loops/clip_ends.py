@@ -28,6 +28,7 @@ DIFFERENCES = np.array(
     float,
 )
 SPEED = 1  # its row
+WITHOUT_FRAME = DIFFERENCES[:2]  # for parts that no motion per frame is asked of: there the others are 0, or the first
 STEP_TIME_INDEX = [0, 1, 1, 3, 4, 6, 6, 7]  # when a STEP track is looked at: it has no speed
 
 
@@ -124,6 +125,6 @@ def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:
         world[..., 3] -= skeleton.descendants(root)[:, None, None] * way
 
 
-def differences(values: Floats, axis: int) -> Floats:
-    """Return the DIFFERENCES of values along the axis of their times."""
-    return np.asarray(np.moveaxis(np.tensordot(DIFFERENCES, values, (1, axis)), 0, axis))
+def differences(values: Floats, axis: int, wanted: Floats = DIFFERENCES) -> Floats:
+    """Return differences of values along the axis of their times. wanted: rows of DIFFERENCES."""
+    return np.asarray(np.moveaxis(np.tensordot(wanted, values, (1, axis)), 0, axis))

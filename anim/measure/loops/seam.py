@@ -22,7 +22,7 @@ from anim.sampling.pose import rest_pose, sample_pose, world_by_node
 PARTS = ("translation", "rotation", "scale")
 STEPS = np.array([-1.0, 1])  # of two frames: the move
 VELOCITIES = np.array([1.0, -1, -1, 1])  # of two times before and two after a key: how much the moves differ
-AT_ONCE = 4_000_000  # numbers; moves of points that are looked at together
+AT_ONCE = 1_000_000  # numbers; moves of points that are looked at together
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,17 +87,26 @@ class SkinMotion:
         return orientation_probes.probe_size(self.points.places(self._rest_world)) if len(self.points) else 1.0
 
     @cached_property
+    def _all(self) -> tuple[PointMatrix, Ints]:
+        """The distinct points of all meshes, and the node of each one's mesh (P,): seams of texture coordinates and
+        normals are vertices that always move alike."""
+        points = point_matrix.all_points(self._scene, self._lever)
+        owners = np.repeat([part.owner for part in self._surfaces], [len(part.points) for part in self._surfaces])
+        chosen = points.distinct(owners) if self.is_skin else np.arange(len(points))
+        return points.take(chosen), owners[chosen] if self.is_skin else chosen
+
+    @property
     def _every(self) -> PointMatrix:
-        return point_matrix.all_points(self._scene, self._lever)
+        return self._all[0]
 
     @cached_property
     def _rows(self) -> PointRows:
         return self._every.rows()
 
-    @cached_property
+    @property
     def _owners(self) -> Ints:
         """The node of each point's mesh (P,)."""
-        return np.repeat([part.owner for part in self._surfaces], [len(part.points) for part in self._surfaces])
+        return self._all[1]
 
     def places(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
         """Return where the points that stick out are (P, F, 3) at times (F,), the way of node `root` taken off."""
@@ -164,21 +173,27 @@ class SkinMotion:
         if not parts or not len(self._every):
             return [Seam() for _ in parts]
         seen = clip_ends.poses_around_ends(self.skeleton, parts, groups)
-        count = max(AT_ONCE // (3 * len(clip_ends.DIFFERENCES) * len(self._every)), 1)
+        wanted = clip_ends.DIFFERENCES if any(part.frame for part in parts) else clip_ends.WITHOUT_FRAME
+        count = max(AT_ONCE // (3 * len(wanted) * len(self._every)), 1)
         return [
             seam
             for first in range(0, len(parts), count)
-            for seam in self._seams(seen[first : first + count], parts[first : first + count])
+            for seam in self._seams(seen[first : first + count], parts[first : first + count], wanted)
         ]
 
-    def _seams(self, seen: Sequence[EndPoses], parts: Sequence[LoopRange]) -> list[Seam]:
-        differences = np.stack([clip_ends.differences(each.world, 1) for each in seen], axis=1)  # (N, parts, D, 3, 4)
+    def _seams(self, seen: Sequence[EndPoses], parts: Sequence[LoopRange], wanted: Floats) -> list[Seam]:
+        """wanted: (D, T), rows of DIFFERENCES."""
+        worlds = np.stack([each.world for each in seen], axis=1)  # (N, parts, T, 3, 4)
+        differences = clip_ends.differences(worlds, 2, wanted)
         squares = self._squares(differences.reshape(len(self.skeleton), -1, 3, 4)).reshape(
             len(self._every), len(seen), -1
         )
-        return [self._seam(squares[:, i], each, part) for i, (each, part) in enumerate(zip(seen, parts, strict=True))]
+        return [
+            self._seam(squares[:, i], each, part, wanted)
+            for i, (each, part) in enumerate(zip(seen, parts, strict=True))
+        ]
 
-    def _seam(self, squares: Floats, seen: EndPoses, part: LoopRange) -> Seam:
+    def _seam(self, squares: Floats, seen: EndPoses, part: LoopRange, wanted: Floats) -> Seam:
         """squares: (P, D), the squared lengths of all differences, of meshes that morph as they are at rest."""
         morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in seen.weights]
         if morphing:
@@ -186,17 +201,19 @@ class SkinMotion:
         most = np.sqrt(squares.max(axis=0)).astype(np.float64)
         fastest = self._carrier(int(squares[:, clip_ends.SPEED].argmax()))
         for mesh in morphing:
-            moved = _longest_each(clip_ends.differences(_morphing(mesh, seen), 0))
+            moved = _longest_each(clip_ends.differences(_morphing(mesh, seen), 0, wanted))
             fastest = self._name(mesh.owner) if moved[clip_ends.SPEED] > most[clip_ends.SPEED] else fastest
             most = np.maximum(most, moved)
-        gap, speed, second, last, going_on = most.tolist()
+        gap, speed, *of_frames = most.tolist()
+        second, last, going_on = of_frames or (0.0, 0.0, gap)
         speed = speed / (part.probe - part.shortest) if part.end > part.start else 0.0
         return Seam(gap, speed, fastest if speed else "", max(second, last), going_on)
 
     def _squares(self, differences: Floats) -> Floats:
         """Squared lengths (P, F) of the moves of all points, by differences of world matrices (N, F, 3, 4)."""
         moves = self._rows.moves(point_matrix.stack_points(differences, self._every.nodes))
-        return np.asarray((moves * moves).sum(axis=1))
+        moves *= moves
+        return np.asarray(moves.sum(axis=1))
 
     def _carrier(self, point: int) -> str:
         """Name of the node that carries most of a point."""

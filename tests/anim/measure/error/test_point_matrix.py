@@ -132,3 +132,13 @@ def test_points_answer_for_what_they_noticeably_hang_on() -> None:
     faint = replace(one, factors=0.1 * one.factors)
     assert faint.on(nodes).tolist() == [True, True]  # where none hangs on it noticeably: all that do at all
     assert not one.on(np.zeros(9, np.bool_)).any()
+
+
+def test_distinct_points_are_the_first_of_each_label() -> None:
+    joints = np.array([[0, 1], [0, 1], [1, 0], [0, 1], [0, 1]])
+    factors = np.ones((5, 2, 4))
+    factors[3, 1, 2] = 2.0
+    points = PointMatrix(np.array([4, 7]), joints, factors)
+    chosen = points.distinct(np.array([0, 0, 0, 0, 1]))
+    assert chosen.tolist() == [0, 2, 3, 4]
+    assert points.take(chosen).joints.tolist() == [[0, 1], [1, 0], [0, 1], [0, 1]]

@@ -237,3 +237,16 @@ def test_a_jump_at_the_end_counts() -> None:
     found = analyze_loop(CHAIN, clip(*_swinging().tracks, stepped))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [each.gap for each in found.joints] == [pytest.approx(0.05)]
+
+
+@pytest.mark.parametrize("targets", [None, [0.0, 1, 0]])
+def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike | None) -> None:
+    drifting = _swinging(j1=3.0)
+    skin = SkinMotion(_chain(targets))
+    whole = LoopRange(drifting, drifting.start, drifting.end)
+    (alone,) = skin.seams([whole])
+    both = skin.seams([whole, replace(whole, frame=1 / FPS)])
+    assert both[0] == pytest.approx(alone)
+    assert (alone.gap, alone.speed, alone.fastest) == pytest.approx((both[1].gap, both[1].speed, both[1].fastest))
+    assert (alone.frame, alone.going_on) == (0.0, alone.gap)
+    assert both[1].frame > 0
