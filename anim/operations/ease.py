@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.curves.easing import table
 from anim.curves.easing.function import Easing
-from anim.curves.fitting import adaptive_keys
+from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_linear, fit_segments
 from anim.errors import RangeError, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
@@ -105,14 +105,13 @@ class _Job:
 
     def _followed(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        return adaptive_keys.to_cubicspline(track, adaptive_keys.cubic_keys(motion, corners, tolerance=tolerance))
+        return cubic_keys(track, motion, corners, tolerance=tolerance)
 
     def _sampled(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        keys = adaptive_keys.linear_keys(motion, corners, tolerance=tolerance)
-        return with_keys(track, keys.times, keys.values, Interpolation.LINEAR)
+        return with_keys(track, *linear_keys(motion, corners, tolerance=tolerance), Interpolation.LINEAR)
 
-    def _motion(self, track: Track, inside: Bools) -> tuple[adaptive_keys.TrackFunction, Floats, float]:
+    def _motion(self, track: Track, inside: Bools) -> tuple[TrackFunction, Floats, float]:
         """The eased track as functions of time, its non-smooth times, and the tolerance of its approximation."""
         allowed, speed = self._allowed(track, inside)
         near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
@@ -123,7 +122,7 @@ class _Job:
         corners = np.concatenate((track.times, (starts[:, None] + durations[:, None] * breaks).reshape(-1)))
         eased = EasedTrack(track, inside, cubics)
         return (
-            adaptive_keys.TrackFunction(eased.values, eased.rates, track.kind is ValueKind.ROTATION),
+            TrackFunction(eased.values, track.kind is ValueKind.ROTATION, eased.rates),
             np.sort(corners),
             allowed / 2,
         )
@@ -135,6 +134,4 @@ class _Job:
             return self.tolerances.angle, speed
         ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]
         moving = ranges[ranges > 0]
-        return adaptive_keys.float32_tolerance(
-            track, self.tolerances.fraction * float(moving.min() if len(moving) else 1.0)
-        ), speed
+        return float32_tolerance(track, self.tolerances.fraction * float(moving.min() if len(moving) else 1.0)), speed

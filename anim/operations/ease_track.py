@@ -67,9 +67,9 @@ class EasedTrack:
     def __init__(self, track: Track, inside: Bools, cubics: Sequence[CubicSegment]) -> None:
         self._track, self._inside, self._cubics = track, inside, tuple(cubics)
 
-    def values(self, times: Floats) -> Floats:
+    def values(self, times: Floats, before: bool) -> Floats:
         """Return the values (F, C) at times (F,)."""
-        left, u = self._place(times, before=False)
+        left, u = self._place(times, before=before)
         return segment.evaluate(self._track, left, np.where(self._inside[left], evaluate(self._cubics, u), u))
 
     def rates(self, times: Floats, before: bool) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from anim.arrays import Floats, unique_sorted
 from anim.curves.easing import table
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
-from anim.curves.fitting import adaptive_keys
+from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_segments
 from anim.errors import RangeError, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
@@ -72,7 +72,7 @@ def warp(
         allowed = (
             angle_tolerance
             if track.kind is ValueKind.ROTATION
-            else adaptive_keys.float32_tolerance(track, tolerance * _extent(track))
+            else float32_tolerance(track, tolerance * _extent(track))
         )
         times = _build_map(track, easing, first, last, allowed)
         key = (id(track.times), times.cubics)
@@ -146,13 +146,12 @@ def _warp_track(track: Track, times: TimeMap, corners: Floats, allowed: float, i
         return _remove_repeats(with_keys(track, corners, values, Interpolation.STEP))
     motion = _motion(track, times)
     if interpolation == "linear":
-        keys = adaptive_keys.linear_keys(motion, corners, tolerance=allowed / 2)
-        return with_keys(track, keys.times, keys.values, Interpolation.LINEAR)
-    return adaptive_keys.to_cubicspline(track, adaptive_keys.cubic_keys(motion, corners, tolerance=allowed / 2))
+        return with_keys(track, *linear_keys(motion, corners, tolerance=allowed / 2), Interpolation.LINEAR)
+    return cubic_keys(track, motion, corners, tolerance=allowed / 2)
 
 
-def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
-    def values(at: Floats) -> Floats:
+def _motion(track: Track, times: TimeMap) -> TrackFunction:
+    def values(at: Floats, before: bool) -> Floats:
         return sample(track, _snap_to_keys(times.old(at), track.times))
 
     def changes(at: Floats, before: bool) -> Floats:
@@ -162,7 +161,7 @@ def _motion(track: Track, times: TimeMap) -> adaptive_keys.TrackFunction:
         forward, back = rates(track, old, before=before), rates(track, old, before=not before)
         return np.asarray(np.where((tempo >= 0)[:, None], forward, back) * tempo[:, None])
 
-    return adaptive_keys.TrackFunction(values, changes, track.kind is ValueKind.ROTATION)
+    return TrackFunction(values, track.kind is ValueKind.ROTATION, changes)
 
 
 def _snap_to_keys(times: Floats, keys: Floats) -> Floats:

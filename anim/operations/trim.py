@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.fitting import adaptive_keys
+from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys
 from anim.errors import RangeError, check_number
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
@@ -111,13 +111,13 @@ def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[
 
 def _insert_cut_times(track: Track, times: Floats) -> Floats:
     """The times with more in the cut segments at both ends, in which a rotation's cubic is normalized anew."""
-    motion = adaptive_keys.TrackFunction(
-        lambda at: sample(track, at), lambda at, before: rates(track, at, before=before), rotation=True
+    motion = TrackFunction(
+        lambda at, before: sample(track, at), rotation=True, rates=lambda at, before: rates(track, at, before=before)
     )
     parts = [times]
     for piece in (times[:2], times[-2:]):
         if not np.isin(piece, track.times).all():
-            parts.append(adaptive_keys.cubic_keys(motion, piece, tolerance=ANGLE_TOLERANCE_RAD).times)
+            parts.append(cubic_keys(track, motion, piece, tolerance=ANGLE_TOLERANCE_RAD).times)
     return np.unique(np.concatenate(parts))
 
 

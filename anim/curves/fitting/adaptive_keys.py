@@ -1,47 +1,105 @@
-"""Adaptive keys of a motion given by functions: segments are halved until their error is within the tolerance."""
+"""Adaptive keys: segments are split until interpolation between their ends follows a motion within a tolerance."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints, unique_sorted
+from anim.errors import RangeError
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track
 from anim.sampling.times import distinct_float32
 
-SAMPLES = np.array(
+CUBIC_SAMPLES = np.array(
     [0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97]
 )  # of a segment; errors can vanish at ½ alone
-MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, slerp and quaternion splines are inaccurate
-MIN_SEGMENT_S = 1e-5  # s; float32 times below a minute have a finer resolution
-MAX_HALVINGS = 24  # greatest number of halvings of a segment
+NUM_LINEAR_SAMPLES = 15  # evenly inside a segment
+SAFETY_FACTOR = 1.02  # the greatest error is between samples
+MAX_ANGLE_RAD = np.radians(120)  # of one segment; above 180° slerp takes the other arc
+MAX_TRAVEL_RAD = np.radians(360)  # sum over all axes per segment before sampling, so that samples miss no rotation
+TIME_ROUNDING_FRACTION = 1e-4  # fraction of a segment's length that float32 times may add or remove
+JUMP_TOLERANCE = 1e-7  # a larger difference of the value before and at a knot is a jump
+MIN_CUBIC_SEGMENT_S = 1e-5  # float32 times below a minute have a finer resolution
+MAX_SUBDIVISIONS = 64  # segments that one segment is split into at a time
+MAX_KEYS = 2_000_000
+MAX_ROUNDS = 40
+
+SegmentCount: TypeAlias = Callable[[Floats, Floats], Ints]  # starts, ends (B,) → (B,); 1 where no split is needed
 
 
 @dataclass(frozen=True, slots=True)
 class TrackFunction:
     """Motion as functions of time.
 
-    values: times (F,) s → values (F, C), unit quaternions if `rotation`.
+    values: times (F,) s, before → values (F, C), unit quaternions if `rotation`; `before` gives the left limit at each
+    time, different at jumps.
     rates: times (F,), before → change per second just before or just after: (F, C), angular velocity (F, 3) in rad/s
-    along the body's own axes for rotations.
+    along the body's own axes for rotations. For cubic keys only.
+    travel: starts, ends (B,) → a bound (B,) of the path length of angles between in radians, if these may make whole
+    turns between two knots.
     """
 
-    values: Callable[[Floats], Floats]
-    rates: Callable[[Floats, bool], Floats]
+    values: Callable[[Floats, bool], Floats]
     rotation: bool
+    rates: Callable[[Floats, bool], Floats] | None = None
+    travel: Callable[[Floats, Floats], Floats] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class KeySet:
-    """Keys: times (K,) s, values (K, C), tangents (K, C) per second."""
+def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
+    """Return key times (K,) and values (K, C) with slerp, or lerp, within `tolerance` of the motion.
 
-    times: Floats
-    values: Floats
-    in_tangents: Floats
-    out_tangents: Floats
+    knots: (T,) s, increasing, between which the motion is smooth; each one is a key. At a jump of the value there is
+    another key at the previous float32 time. No segment rotates by more than 120°; signs are continuous.
+    tolerance: radians for rotations, the value's own unit otherwise; > 0.
+    XYZ (0, 0, 0) → (90°, 90°, 0) at 0.1° → 15 keys
+    Raises RangeError for over two million keys.
+    """
+
+    def count(a: Floats, b: Floats) -> Ints:
+        at = sample_times(a, b, NUM_LINEAR_SAMPLES)
+        values = motion.values(at.ravel(), False).reshape(*at.shape, -1)
+        values[:, -1] = motion.values(b, True)
+        if motion.rotation:
+            return rotation_segment_count(values[:, :, None], tolerance)
+        return vector_segment_count(values[:, :, None], tolerance)
+
+    times = refine(_split_by_travel(motion, knots), count)
+    values = motion.values(times, False)
+    earlier = np.nextafter(times[1:].astype(np.float32), np.float32(0)).astype(np.float64)
+    arriving = motion.values(times[1:], True)
+    jumps = np.flatnonzero((_distance(motion, arriving, values[1:]) > JUMP_TOLERANCE) & (earlier > times[:-1]))
+    times = np.insert(times, jumps + 1, earlier[jumps])
+    values = np.insert(values, jumps + 1, arriving[jumps], axis=0)
+    return times, quaternion.align_signs(values) if motion.rotation else values
+
+
+def cubic_keys(track: Track, motion: TrackFunction, knots: Floats, *, tolerance: float) -> Track:
+    """Return `track` with CUBICSPLINE keys that approximate `motion` within `tolerance`, as `linear_keys` does."""
+    assert motion.rates is not None
+
+    def count(a: Floats, b: Floats) -> Ints:
+        return np.where((b - a > MIN_CUBIC_SEGMENT_S) & (_cubic_error(motion, a, b) > tolerance), 2, 1)
+
+    times = refine(knots, count)
+    times = times[distinct_float32(times)]
+    values = motion.values(times, False)
+    before, after = motion.rates(times, True), motion.rates(times, False)
+    if motion.rotation:
+        values = quaternion.align_signs(values)
+        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    before[0], after[-1] = 0.0, 0.0
+    return replace(
+        track,
+        interpolation=Interpolation.CUBICSPLINE,
+        times=times,
+        values=values,
+        in_tangents=before,
+        out_tangents=after,
+    )
 
 
 def float32_tolerance(track: Track, tolerance: float) -> float:
@@ -49,89 +107,114 @@ def float32_tolerance(track: Track, tolerance: float) -> float:
     return max(tolerance, 4 * float(np.spacing(np.float32(np.abs(track.values).max(initial=0.0)))))
 
 
-def to_cubicspline(track: Track, keys: KeySet) -> Track:
-    """Return `track` with these keys as CUBICSPLINE."""
-    return replace(
-        track,
-        interpolation=Interpolation.CUBICSPLINE,
-        times=keys.times,
-        values=keys.values,
-        in_tangents=keys.in_tangents,
-        out_tangents=keys.out_tangents,
-    )
+def refine(times: Floats, count: SegmentCount) -> Floats:
+    """Return times (T,) and added float32-exact ones, until no segment needs to be split.
 
-
-def cubic_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
-    """Return CUBICSPLINE keys that approximate `motion` within `tolerance`: value units, or radians for rotations.
-
-    corners: (K,) s, increasing: required key times, including both ends; the motion must be smooth between two.
+    count: takes segments from a to b (B,), returns for each the number of segments (B,), up to MAX_SUBDIVISIONS, to
+    split it into; 1 for none.
+    Raises RangeError for over two million keys.
     """
-    times = _bisect(motion, corners, tolerance, _cubic_segment)
-    values = _values(motion, times)
-    before, after = motion.rates(times, True), motion.rates(times, False)
-    if motion.rotation:
-        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
-    before[0], after[-1] = 0.0, 0.0
-    return KeySet(times, values, before, after)
-
-
-def linear_keys(motion: TrackFunction, corners: Floats, *, tolerance: float) -> KeySet:
-    """Return LINEAR keys that approximate `motion` within `tolerance`; tangents are 0 and unused."""
-    times = _bisect(motion, corners, tolerance, _linear_segment)
-    values = _values(motion, times)
-    return KeySet(times, values, np.zeros_like(values), np.zeros_like(values))
-
-
-Between = Callable[[TrackFunction, Floats, Floats], Floats]  # starts, ends (P,) → values (P, S, C) at SAMPLES
-
-
-def _bisect(motion: TrackFunction, corners: Floats, tolerance: float, between: Between) -> Floats:
-    done = [corners]
-    start, end = corners[:-1], corners[1:]
-    for _ in range(MAX_HALVINGS):
-        wide = end - start > MIN_SEGMENT_S
-        start, end = start[wide], end[wide]
-        if not len(start):
+    found, a, b = [times], times[:-1], times[1:]
+    for _ in range(MAX_ROUNDS):
+        middle = _round_to_float32((a + b) / 2)
+        splittable = (middle > a) & (middle < b)
+        a, b = a[splittable], b[splittable]
+        if not len(a):
             break
-        bad = _deviation(motion, start, end, between) > tolerance
-        middle = (start[bad] + end[bad]) / 2
-        done.append(middle)
-        start, end = np.concatenate((start[bad], middle)), np.concatenate((middle, end[bad]))
-    times = np.sort(np.concatenate(done))
-    return times[distinct_float32(times)]
+        counts = count(a, b)
+        again = counts > 1
+        if counts[again].sum() + sum(map(len, found)) > MAX_KEYS:
+            raise RangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
+        a, b = split_segments(a[again], b[again], counts[again])
+        found.append(a)
+    return unique_sorted(np.concatenate(found))
 
 
-def _deviation(motion: TrackFunction, start: Floats, end: Floats, between: Between) -> Floats:
-    """Greatest error of each segment (P,); infinite if its angle is too large."""
-    at = start[:, None] + (end - start)[:, None] * SAMPLES
-    true = motion.values(at.reshape(-1)).reshape(*at.shape, -1)
-    given = between(motion, start, end)
-    if not motion.rotation:
-        return np.asarray(np.abs(given - true).max(axis=(1, 2), initial=0.0))
-    off = quaternion.angle_between(given, true).max(axis=1)
-    turned = quaternion.angle_between(true[:, 1:], true[:, :-1]).sum(axis=1)
-    return np.where(turned > MAX_ANGLE_RAD, np.inf, off)
+def split_segments(a: Floats, b: Floats, counts: Ints) -> tuple[Floats, Floats]:
+    """Segments from a to b (B,) split evenly at float32-exact times, without empty ones: starts, ends."""
+    piece = np.repeat(np.arange(len(a)), counts)
+    step = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+    length = (b - a)[piece] / counts[piece]
+    starts = np.where(step == 0, a[piece], _round_to_float32(a[piece] + step * length))
+    last = step == counts[piece] - 1
+    ends = np.where(last, b[piece], _round_to_float32(a[piece] + (step + 1) * length))
+    some = ends > starts
+    return starts[some], ends[some]
 
 
-def _cubic_segment(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
-    a, b = motion.values(start), motion.values(end)
+def sample_times(a: Floats, b: Floats, inner: int) -> Floats:
+    """Return times (B, inner + 2), evenly from each a to b (B,), both of them exact."""
+    at = a[:, None] + (b - a)[:, None] * (np.arange(inner + 2) / (inner + 1))
+    at[:, -1] = b
+    return at
+
+
+def rotation_segment_count(values: Floats, tolerance: float) -> Ints:
+    """Return the slerp segments (B,) that rotations need; values (B, S, N, 4): N joints at times of `sample_times`.
+
+    By the angle of a segment if it is too large for one, since its error is meaningless then, else by its error.
+    """
+    steps = quaternion.angle_between(values[:, 1:], values[:, :-1]).sum(axis=1)
+    by_angle = np.ceil(steps / MAX_ANGLE_RAD - TIME_ROUNDING_FRACTION).max(axis=-1, initial=1)
+    chord = quaternion.slerp(values[:, :1], values[:, -1:], _inner_fractions(values)[:, None])
+    error = quaternion.angle_between(chord, values[:, 1:-1]).max(axis=(1, 2), initial=0.0)
+    by_error = segment_count(error * SAFETY_FACTOR, tolerance)
+    return np.where(by_angle > 1, np.minimum(by_angle, MAX_SUBDIVISIONS).astype(np.int64), by_error)
+
+
+def vector_segment_count(values: Floats, tolerance: float) -> Ints:
+    """Return the linear segments (B,) that N paths need; values (B, S, N, C) at times of `sample_times`."""
+    u = _inner_fractions(values)[:, None, None]
+    chord = values[:, :1] + (values[:, -1:] - values[:, :1]) * u
+    error = np.sqrt(((chord - values[:, 1:-1]) ** 2).sum(axis=-1)).max(axis=(1, 2), initial=0.0)
+    return segment_count(error * SAFETY_FACTOR, tolerance)
+
+
+def segment_count(error: Floats, tolerance: float) -> Ints:
+    """Return the linear segments (B,) to split segments with these errors (B,) into, up to MAX_SUBDIVISIONS.
+
+    Source: the chord error of a segment of length h is about h² · α / 8, so an error e needs √(e / tolerance) segments.
+    """
+    return np.clip(np.ceil(np.sqrt(error / tolerance) - 1e-9), 1, MAX_SUBDIVISIONS).astype(np.int64)
+
+
+def _inner_fractions(values: Floats) -> Floats:
+    last = values.shape[1] - 1
+    return np.asarray(np.arange(1, last) / last)
+
+
+def _split_by_travel(motion: TrackFunction, knots: Floats) -> Floats:
+    if motion.travel is None or len(knots) < 2:
+        return knots
+    counts = np.maximum(np.ceil(motion.travel(knots[:-1], knots[1:]) / MAX_TRAVEL_RAD), 1)
+    if counts.sum() > MAX_KEYS:
+        raise RangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")
+    return np.append(split_segments(knots[:-1], knots[1:], counts.astype(np.int64))[0], knots[-1])
+
+
+def _distance(motion: TrackFunction, p: Floats, q: Floats) -> Floats:
+    return quaternion.angle_between(p, q) if motion.rotation else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))
+
+
+def _cubic_error(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
+    """Greatest error of each cubic segment (B,); infinite if its angle is too large."""
+    assert motion.rates is not None
+    at = start[:, None] + (end - start)[:, None] * CUBIC_SAMPLES
+    true = motion.values(at.ravel(), False).reshape(*at.shape, -1)
+    a, b = motion.values(start, False), motion.values(end, False)
     leaving, arriving = motion.rates(start, False), motion.rates(end, True)
     if motion.rotation:
         b = b * np.where(quaternion.dot(a, b) < 0, -1.0, 1.0)[:, None]
         leaving, arriving = quaternion.derivative(a, leaving), quaternion.derivative(b, arriving)
     duration = (end - start)[:, None]
     piece = (each[:, None] for each in (a, duration * leaving, b, duration * arriving))
-    result = hermite.evaluate(SAMPLES[None, :, None], *piece)
-    return quaternion.normalize(result) if motion.rotation else result
+    fitted = hermite.evaluate(CUBIC_SAMPLES[None, :, None], *piece)
+    if not motion.rotation:
+        return np.asarray(np.abs(fitted - true).max(axis=(1, 2), initial=0.0))
+    error = quaternion.angle_between(quaternion.normalize(fitted), true).max(axis=1)
+    angle = quaternion.angle_between(true[:, 1:], true[:, :-1]).sum(axis=1)
+    return np.where(angle > MAX_ANGLE_RAD, np.inf, error)
 
 
-def _linear_segment(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
-    a, b = motion.values(start)[:, None], motion.values(end)[:, None]
-    if motion.rotation:
-        return quaternion.slerp(a, b, np.broadcast_to(SAMPLES, (len(start), len(SAMPLES))))
-    return np.asarray(a + SAMPLES[None, :, None] * (b - a))
-
-
-def _values(motion: TrackFunction, times: Floats) -> Floats:
-    values = motion.values(times)
-    return quaternion.align_signs(values) if motion.rotation else values
+def _round_to_float32(times: Floats) -> Floats:
+    return np.asarray(times.astype(np.float32).astype(np.float64))

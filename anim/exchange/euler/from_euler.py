@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, unique_sorted
+from anim.curves.fitting.adaptive_keys import TrackFunction, linear_keys
 from anim.errors import AnimError, RangeError
-from anim.exchange.euler import adaptive_keys as placing
-from anim.exchange.euler.adaptive_keys import SampledPath
 from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement, curves_of, is_baked
 from anim.exchange.euler.curve import Curve, Mode, travel
 from anim.exchange.euler.evaluate import (
@@ -99,21 +98,18 @@ def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, 
     moving, scaling = [*node.moves.values()], [*node.scales.values()]
     if node.pivots is not NO_PIVOTS:
         moving = curves_of(node)
-    parts: list[tuple[str, list[Curve], SampledPath, float]] = [
-        (
-            "translation",
-            moving,
-            SampledPath(lambda at, before: evaluate_translation(node, at, before), _no_travel, False),
-            size,
-        ),
-        (
-            "rotation",
-            turning,
-            SampledPath(lambda at, before: evaluate_rotation(node, at, before), _travel(turning), True),
-            1.0,
-        ),
-        ("scale", scaling, SampledPath(lambda at, before: evaluate_scale(node, at, before), _no_travel, False), 1.0),
-    ]
+    translation = TrackFunction(lambda at, before: evaluate_translation(node, at, before), rotation=False)
+    rotation = TrackFunction(
+        lambda at, before: evaluate_rotation(node, at, before),
+        rotation=True,
+        travel=lambda a, b: np.asarray(sum((travel(curve, a, b) for curve in turning), np.zeros(len(a)))),
+    )
+    scale = TrackFunction(lambda at, before: evaluate_scale(node, at, before), rotation=False)
+    parts = (
+        ("translation", moving, translation, size),
+        ("rotation", turning, rotation, 1.0),
+        ("scale", scaling, scale, 1.0),
+    )
     tracks = [
         _track(number, name, curves, path, None if tolerance is None else tolerance * unit, axes)
         for name, curves, path, unit in parts
@@ -123,16 +119,16 @@ def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, 
 
 
 def _track(
-    number: int, name: str, curves: list[Curve], path: SampledPath, tolerance: float | None, axes: _Axes
+    number: int, name: str, curves: list[Curve], path: TrackFunction, tolerance: float | None, axes: _Axes
 ) -> Track:
     knots = axes.union(curves)
     changing = [curve for curve in curves if not curve.is_constant]
     stepped = bool(changing) and all((curve.modes[:-1] == Mode.STEP).all() for curve in changing)
     if stepped or tolerance is None:
-        values = path.value(knots, False)
-        values = quaternion.align_signs(values) if path.is_rotation else values
+        values = path.values(knots, False)
+        values = quaternion.align_signs(values) if path.rotation else values
         return Track(number, name, Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
-    times, values = placing.adaptive_keys(path, knots, tolerance=tolerance)
+    times, values = linear_keys(path, knots, tolerance=tolerance)
     return Track(number, name, Interpolation.LINEAR, axes.shared(times), values)
 
 
@@ -142,14 +138,3 @@ def _is_rest(track: Track, node: EulerNode, size: float) -> bool:
         return False
     still = evaluate_translation(node, track.times[:1])[0] if node.pivots is not NO_PIVOTS else node.translation
     return bool((np.abs(track.values - still) <= CONSTANT_TOLERANCE * size).all())
-
-
-def _travel(curves: list[Curve]) -> placing.Travel:
-    def bound(a: Floats, b: Floats) -> Floats:
-        return np.asarray(sum((travel(curve, a, b) for curve in curves), np.zeros(len(a))))
-
-    return bound
-
-
-def _no_travel(a: Floats, b: Floats) -> Floats:
-    return np.zeros(len(a))

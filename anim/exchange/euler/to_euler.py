@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats, unique_sorted
+from anim.curves.fitting.adaptive_keys import segment_count, split_segments
 from anim.errors import RangeError
 from anim.exchange.euler.curve import Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import EulerMotion, EulerNode
@@ -23,7 +24,7 @@ from anim.sampling.track import sample
 LOCK_TOLERANCE_RAD = 1e-6  # rad; uncertainty of a lock in a file's float32 quaternions
 ERROR_FRACTIONS = np.array((0.25, 0.5, 0.75))
 MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
-MAX_ROUNDS, MAX_SUBDIVISIONS, MAX_KEYS = 24, 32, 500_000
+MAX_ROUNDS, MAX_KEYS = 24, 500_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,8 @@ def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, .
         errors = _interval_errors(track, times, angles, order, frame)
         if tolerance is None or errors.max() <= tolerance:
             break
-        finer = _refine(times, errors, tolerance)
+        starts, _ = split_segments(times[:-1], times[1:], segment_count(errors, tolerance))
+        finer = np.append(starts, times[-1])
         if len(finer) == len(times) or len(finer) > MAX_KEYS:
             break
         times = finer
@@ -156,14 +158,6 @@ def _interval_errors(track: Track, times: Floats, angles: Floats, order: str, fr
     made = euler.to_quaternion(straight, order=order, frame=frame)
     jumps = np.nextafter(times[:-1].astype(np.float32), np.float32(np.inf)) >= times[1:]
     return np.where(jumps, 0.0, quaternion.angle_between(made, true).max(axis=0))
-
-
-def _refine(times: Floats, errors: Floats, tolerance: float) -> Floats:
-    pieces = np.clip(np.ceil(np.sqrt(errors / tolerance)), 1, MAX_SUBDIVISIONS).astype(np.int64)
-    new = [
-        times[k] + (times[k + 1] - times[k]) * np.arange(1, pieces[k]) / pieces[k] for k in np.flatnonzero(pieces > 1)
-    ]
-    return key_times(np.concatenate([times, *new]))
 
 
 def _axes(track: Track | None, frames: Floats | None) -> dict[int, Curve]:

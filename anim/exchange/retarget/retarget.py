@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats, Ints, unique_sorted
+from anim.curves.fitting.adaptive_keys import refine, rotation_segment_count, sample_times, vector_segment_count
 from anim.errors import NotFoundError, RangeError
-from anim.exchange.euler import refinement
 from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.retarget.ground_contact import find_soles, ground_offset, has_feet, with_descendants
 from anim.exchange.retarget.joint_matching import JointMatch
@@ -24,6 +25,7 @@ from anim.sampling import rest_pose, world_matrices
 MAX_CONTACT_DURATION_S = 86_400.0  # limit of a motion sampled for contacts, 30 times a second and more
 CONSTANT_TOLERANCE = 1e-7  # rad, factor, and fraction of the target's size: rounding of a constant
 CONTACT_STEP_S = 1 / 30  # s, maximum step between times at which soles are sampled
+NUM_SAMPLES = 7  # inside a segment, of the error of keys
 
 
 class GroundMode(StrEnum):
@@ -111,10 +113,8 @@ def retarget(
         return follow.at(when, np.interp(when, looked_at, lowered))
 
     if source.tolerance is not None:
-        lengths = _metres_per_unit(follow)
-        times = refinement.refine_linear(
-            times, lambda when: _rotations_and_paths(at(when), lengths, size), tolerance=source.tolerance, size=size
-        )
+        units = _metres_per_unit(follow)
+        times = refine(times, partial(_segment_count, at, units=units, size=size, tolerance=source.tolerance))
     inside = at(inside_interval(knots)) if len(before) else None
     wanted = _RequiredKeys(times, at(times), before, knots, inside, thin=source.tolerance is not None)
     clip = Clip(source.clip.name, tuple(_tracks(follow, wanted, size)))
@@ -152,12 +152,26 @@ def _metres_per_unit(follow: PoseTransfer) -> dict[int, float]:
     return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
 
 
-def _rotations_and_paths(
-    found: TargetMotion, lengths: Mapping[int, float], size: float
-) -> tuple[dict[int, Floats], Floats]:
-    """Motion to follow between keys: rotations, and translations and scales as metres (F, P, 3)."""
-    places = [found.translations[node] * length for node, length in lengths.items()]
-    return found.rotations, np.stack([*places, *(scale * size for scale in found.scales.values())], axis=1)
+def _segment_count(
+    motion: Callable[[Floats], TargetMotion],
+    a: Floats,
+    b: Floats,
+    *,
+    units: Mapping[int, float],
+    size: float,
+    tolerance: float,
+) -> Ints:
+    """The segments (B,) from a to b (B,) that the joints need: paths, and scales × size, within tolerance × size.
+
+    units: metres per unit of each node's parent space.
+    """
+    times = sample_times(a, b, NUM_SAMPLES)
+    found = motion(times.ravel())
+    paths = [found.translations[node] * unit for node, unit in units.items()]
+    paths += [scale * size for scale in found.scales.values()]
+    rotations = np.stack([*found.rotations.values()], axis=1).reshape(*times.shape, -1, 4)
+    vectors = np.stack(paths, axis=1).reshape(*times.shape, -1, 3)
+    return np.maximum(rotation_segment_count(rotations, tolerance), vector_segment_count(vectors, tolerance * size))
 
 
 def _tracks(follow: PoseTransfer, wanted: _RequiredKeys, size: float) -> list[Track]:
