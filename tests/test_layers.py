@@ -58,7 +58,7 @@ PUBLIC = {
     "caches.transforms": "bounds resample up_axis vertex_order",
     "caches.vat": "presets",
     "curves.easing": "function table",
-    "curves.fitting": "adaptive_keys easing_fit rotation_fit",
+    "curves.fitting": "adaptive_keys easing_fit key_reduction rotation_fit",
     "curves.tangents": "rule table",
     "exchange.euler": (
         "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"

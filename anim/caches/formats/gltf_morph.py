@@ -18,8 +18,8 @@ from anim.caches.formats.morph_encoding import SHORT, MorphEncoding, encode_morp
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
 from anim.caches.transforms import bounds
-from anim.caches.transforms.frame_reduction import reduce_frames
 from anim.caches.transforms.pca import fit_basis
+from anim.caches.transforms.resample import reduce_frames
 from anim.errors import RangeError, UnsupportedError
 from anim.gltf.authoring_parts import VERTICES
 from anim.model import FrameChunk, VertexCache

@@ -1,15 +1,17 @@
-"""Resample a cache: linear interpolation of vertices between frames."""
+"""Resample or reduce the frames of a cache: vertices are linear between them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.frame_blocks import per_chunk
+from anim.curves.fitting.key_reduction import greedy_indices
 from anim.errors import RangeError
 from anim.model import FrameChunk, VertexCache
 from anim.sampling import frame_times
@@ -17,6 +19,7 @@ from anim.sampling import frame_times
 Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents of one frame
 
 SAME = 1e-6  # s; closer times are the same frame
+COMPARED_VALUES = 1 << 22  # at a time
 
 
 def resample_frames(cache: VertexCache, times: Floats) -> VertexCache:
@@ -97,3 +100,23 @@ def _arrays(chunk: FrameChunk) -> Frame:
 def _unit(vectors: AnyArray) -> AnyArray:
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1)
+
+
+def reduce_frames(positions: AnyArray, times: Floats, limit: float) -> Ints:
+    """Return the indices of frames to keep: linear interpolation reproduces the others within `limit` m.
+
+    positions (F, V, 3). The first and the last frame are kept.
+    """
+    return greedy_indices(len(positions), partial(_fits, positions, times, limit))
+
+
+def _fits(positions: AnyArray, times: Floats, limit: float, start: int, end: int) -> bool:
+    step = max(1, COMPARED_VALUES // max(positions[0].size, 1))
+    delta = positions[end] - positions[start]
+    for first in range(start + 1, end, step):
+        rows = slice(first, min(first + step, end))
+        share = ((times[rows] - times[start]) / (times[end] - times[start])).astype(np.float32)
+        off = positions[rows] - (positions[start] + share[:, None, None] * delta)
+        if float(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0)) > limit * limit:
+            return False
+    return True

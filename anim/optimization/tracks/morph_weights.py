@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from anim.arrays import Floats
+from anim.curves.fitting.key_reduction import greedy_indices
 from anim.measure.error.surface import Surface
 from anim.model import AccessorFormat, Interpolation, Track
 from anim.optimization.options import Packing
@@ -47,7 +49,7 @@ def reduce_weights(
     grid: (K,) s, possible key times, for splines finer than their keys. Splines become linear.
     """
     values = sample(track, grid)
-    keep = _greedy_weight_keys(values, grid, reach, KEY_BUDGET_FRACTION * bound)
+    keep = greedy_indices(len(grid), partial(_is_straight, values, grid, reach, KEY_BUDGET_FRACTION * bound))
     keys, times = values[keep], grid[keep]
     if np.ptp(keys, axis=0).max(initial=0.0) == 0:
         keys, times = keys[:1], times[:1]
@@ -62,25 +64,6 @@ def reduce_weights(
         storage=storage,
     )
     return new, stored, _displacement(sample(new, grid) - values, reach)
-
-
-def _greedy_weight_keys(values: Floats, grid: Floats, reach: Floats, bound: float) -> Floats:
-    """Indices of the keys at the ends of greedy longest segments."""
-    kept, start, last = [0], 0, len(grid) - 1
-    while start < last:
-        good, step = start + 1, 2
-        while good < last and _is_straight(values, grid, reach, bound, start, min(good + step, last)):
-            good, step = min(good + step, last), step * 2
-        bad = min(good + step, last + 1)
-        while bad - good > 1:
-            middle = (good + bad) // 2
-            if _is_straight(values, grid, reach, bound, start, middle):
-                good = middle
-            else:
-                bad = middle
-        kept.append(good)
-        start = good
-    return np.array(kept)
 
 
 def _is_straight(values: Floats, grid: Floats, reach: Floats, bound: float, start: int, end: int) -> bool:

@@ -12,8 +12,8 @@ from pygltflib import GLTF2
 from anim.arrays import AnyArray, Floats
 from anim.caches.options import WriteOptions
 from anim.caches.storage import Memory
-from anim.caches.transforms.frame_reduction import reduce_frames
 from anim.caches.transforms.pca import fit_basis
+from anim.caches.transforms.resample import reduce_frames
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import FormatError, RangeError
 from anim.model import VertexCache

@@ -1,0 +1,59 @@
+"""Key reduction: greedy longest segments within a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from anim.arrays import Bools, Ints
+
+UNBOUNDED = 1 << 30
+
+SegmentTest: TypeAlias = Callable[[Ints, Ints, Ints], Bools]  # track, start, end key (B,) → True where within tolerance
+
+
+def greedy_segments(tracks: int, count: int, fits: SegmentTest) -> Bools:
+    """Return the keys (G, K) that remain of `count` keys of each track; the first and the last always do.
+
+    fits: whether a segment between two keys replaces those between; asked for segments with a key between only.
+    From each key the farthest reachable one is searched by doubling and then halving the step, all tracks at once;
+    greedy choices of the longest segment give few keys, though not always the fewest.
+    """
+    keep = np.zeros((tracks, count), np.bool_)
+    keep[:, 0] = keep[:, -1] = True
+    last = count - 1
+    if count <= 2 or not tracks:
+        return keep
+    track = np.arange(tracks)
+    start = np.zeros(tracks, np.int64)
+    good, step, bad = start + 1, np.full(tracks, 2), np.full(tracks, UNBOUNDED)
+    while len(track):
+        doubling = bad == UNBOUNDED
+        end = np.where(doubling, np.minimum(good + step, last), (good + bad) // 2)
+        tested = end > good
+        within = np.zeros(len(track), np.bool_)
+        if tested.any():
+            within[tested] = fits(track[tested], start[tested], end[tested])
+        good = np.where(within, end, good)
+        step = np.where(within & doubling, step * 2, step)
+        bad = np.where(tested & ~within, end, bad)
+        done = (good >= last) | (bad - good <= 1)
+        if not done.any():
+            continue
+        keep[track[done], good[done]] = True
+        length = good - start
+        start = np.where(done, good, start)
+        good = np.where(done, np.minimum(start + 1, last), good)
+        step = np.where(done, np.maximum(1, length - 1), step)
+        bad = np.where(done, UNBOUNDED, bad)
+        open_ = start < last
+        track, start, good, step, bad = track[open_], start[open_], good[open_], step[open_], bad[open_]
+    return keep
+
+
+def greedy_indices(count: int, fits: Callable[[int, int], bool]) -> Ints:
+    """Return the indices of the keys that remain of one track; fits: as for `greedy_segments`, start and end key."""
+    keep = greedy_segments(1, count, lambda _, start, end: np.array([fits(int(start[0]), int(end[0]))]))
+    return np.flatnonzero(keep[0])
