@@ -184,7 +184,7 @@ def _kind(path: str) -> str:
 
 
 def _drawn(found: DiffReport, ruler: ErrorMetric, one: _Side, other: _Side, kind: str, limit: float | None) -> bytes:
-    apart = [each for each in found.diff.clips if each.error.max_error > 0]
+    apart = [each for each in found.diff.clips if each.error.max_error >= picture.MIN_ERROR_M]
     profiles = [
         replace(
             error_curve(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps),
@@ -193,7 +193,8 @@ def _drawn(found: DiffReport, ruler: ErrorMetric, one: _Side, other: _Side, kind
         for each in apart[: picture.LIMIT]
     ]
     note = _left_out(len(profiles), len(apart), len(found.diff.clips))
-    title = f"{PurePath(found.old.name).name} → {PurePath(found.new.name).name}"
+    names = [PurePath(each.name).name for each in (found.old, found.new)]
+    title = " → ".join(names if names[0] != names[1] else (found.old.name, found.new.name))
     if "," in found.player:
         title = f"{PurePath(found.old.name).name}: {found.player.replace(',', ' → ')}"
     return picture.error_plot(profiles, title=title, kind=kind, limit=limit, note=note)

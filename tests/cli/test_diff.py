@@ -148,6 +148,16 @@ def test_a_picture(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> Non
     assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 2)
 
 
+def test_a_picture_tells_two_files_of_one_name_apart(
+    lifted: tuple[Path, Path], tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("small").mkdir()
+    lifted[1].rename(Path("small") / lifted[0].name)
+    call("diff", lifted[0].name, f"small/{lifted[0].name}", "--plot", "e.svg").product()
+    assert f"{lifted[0].name} → small/{lifted[0].name}" in words(Path("e.svg").read_bytes())
+
+
 def test_a_picture_counts_what_it_leaves_out(asset: Find, tmp_path: Path, call: Call) -> None:
     """Of Fox's three clips one is another."""
     document = opened_path(asset("Fox.glb"))

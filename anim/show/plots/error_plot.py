@@ -20,6 +20,7 @@ THIN = 1.1
 TOP_PADDING_FRACTION = 0.06  # of the scale, above
 NAME_SPACING = 0.12  # of the height, between names
 MAX_NAME_LETTERS = 22  # letters of a joint's name; longer ones are cut to their end
+MIN_ERROR_M = 1e-11  # smaller errors come from rounding
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e2, "cm"), (1e-4, 1e3, "mm"), (0.0, 1e6, "µm"))  # least value in m, factor, name
 
 
@@ -51,8 +52,8 @@ def error_plot(
 
 
 def differing_curves(profiles: Sequence[ErrorCurve]) -> list[ErrorCurve]:
-    """Return the error curves that are not 0 everywhere."""
-    return [each for each in profiles if each.error.any()]
+    """Return the error curves that exceed rounding."""
+    return [each for each in profiles if each.error.max(initial=0.0) >= MIN_ERROR_M]
 
 
 def _cell(sheet: Figure, profile: ErrorCurve, x: float, y: float, width: float, limit: float | None) -> None:
