@@ -6,9 +6,11 @@ block directly behind one shows what its commands print; an image from `pictures
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -16,15 +18,18 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+import cli.main
 import fixtures
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "commands.md")
-INPUTS = ("biped", "tube", "interpolations", "morph_cube")
-NUM_COLORS = 128  # of a picture in the repository
+INPUTS = ("arm", "biped", "interpolations", "morph_cube", "tube")
+NUM_COLORS = 256  # of a picture in the repository
+NUM_REFINEMENTS = 4  # of the palette, by k-means
 BLOCK = re.compile(r"```sh\n(?P<commands>.*?)```(?P<output>\n\n```text\n.*?```)?", re.DOTALL)
 PICTURE = re.compile(r"!\[[^\]]+\]\([./]*pictures/([\w-]+\.png)\)")
+SHELL = re.compile(r"[|<>;&$*?`\"\\]")  # outside of quotes
 DURATION = re.compile(r", took \S+ s\b")  # differs from run to run
 
 
@@ -62,6 +67,18 @@ def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+def _run_here(command: str, folder: Path) -> tuple[int, str]:
+    """Run a line, in this process where it needs no shell, which saves half of the time: (exit code, text)."""
+    if not command.startswith("gltf-anim ") or SHELL.search(re.sub(r"'[^']*'", "", command)):
+        done = run(command, folder)
+        return done.returncode, done.stdout
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
+    with contextlib.chdir(folder), contextlib.redirect_stdout(stream), contextlib.redirect_stderr(stream):
+        code = cli.main.run(shlex.split(command)[1:])
+    stream.seek(0)
+    return code, stream.read()
+
+
 def updated(text: str, folder: Path) -> str:
     """Return a page with the output of its commands, which run in the folder; one that fails raises an error."""
     return BLOCK.sub(lambda block: _updated_block(block, folder), text)
@@ -70,10 +87,10 @@ def updated(text: str, folder: Path) -> str:
 def _updated_block(block: re.Match[str], folder: Path) -> str:
     printed = []
     for command in commands(block["commands"]):
-        done = run(command, folder)
-        if done.returncode:
-            raise RuntimeError(f"{command}: exit {done.returncode}\n{done.stdout}")
-        printed.append(done.stdout)
+        code, text = _run_here(command, folder)
+        if code:
+            raise RuntimeError(f"{command}: exit {code}\n{text}")
+        printed.append(text)
     shown = f"```sh\n{block['commands']}```"
     if block["output"]:
         shown += f"\n\n```text\n{DURATION.sub('', ''.join(printed)).strip(chr(10))}\n```"
@@ -86,7 +103,7 @@ def reduced(picture: bytes) -> bytes:
 
     buffer = io.BytesIO()
     image = Image.open(io.BytesIO(picture)).convert("RGB")
-    image.quantize(NUM_COLORS, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
+    image.quantize(NUM_COLORS, kmeans=NUM_REFINEMENTS, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
 
 
