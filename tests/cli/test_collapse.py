@@ -142,6 +142,7 @@ def test_clips_of_a_picture_have_one_scale(call: Call, fixture: Fixture, tmp_pat
     """A quarter turn leaves 67 % of the tube, a half turn 33 %: the lines of both are to be compared."""
     call("collapse", fixture("tube"), "--plot", tmp_path / "a.svg").product()
     said = words((tmp_path / "a.svg").read_bytes())
+    assert said.count("tube  ·  least collapse index, lbs") == 3
     percents = {text for text in said if text.isdecimal() and int(text) > 1}
     assert len(percents) > 1
     assert min(map(int, percents)) <= 40

@@ -51,7 +51,7 @@ def _cell(sheet: Figure, found: CollapseFinding, x: float, y: float, width: floa
     """One clip. scale: least and greatest volume of all clips, %."""
     mesh, left, across = found.mesh, x + LEFT, width - LEFT - RIGHT
     at = left + 0.14 + sheet.text(left, y + 0.2, found.clip, fontsize=TITLE, weight="bold")
-    sheet.text(at, y + 0.2, f"{mesh.mesh}  ·  least index, lbs", fontsize=SMALL, color=SOFT)
+    sheet.text(at, y + 0.2, f"{mesh.mesh}  ·  least collapse index, lbs", fontsize=SMALL, color=SOFT)
     axes = sheet.panel(left, y + HEAD, across, TALL)
     _draw_index(axes, mesh.times, mesh.indices)
     y += HEAD + TALL + CAPTION

@@ -131,7 +131,7 @@ def _speed(axes: Axes, each: PlotTrack) -> str:
     factor, unit = _unit(each, max(float(np.nanmax(line.values)) for line in found if len(line.times)))
     _single(axes, found, factor, SPEED)
     if each.track.kind is ValueKind.ROTATION:
-        return "turning speed, °/s"
+        return "angular speed, °/s"
     return f"speed, {unit}/s" if unit else "speed, per second"
 
 

@@ -51,7 +51,7 @@ def test_words_of_each_kind_of_track() -> None:
             limit=LIMIT,
         )
     )
-    for expected in ("title", "0", "1", "2", "x", "y", "z", "2 s", "speed, m/s", "turning speed, °/s",
+    for expected in ("title", "0", "1", "2", "x", "y", "z", "2 s", "speed, m/s", "angular speed, °/s",
                      "angle from rest, °"):  # fmt: skip
         assert expected in said, expected
     assert "translation, m  ·  linear, 3 keys" in said
