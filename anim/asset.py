@@ -20,8 +20,8 @@ from anim.files import links
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
 from anim.gltf.document import Document, json_array
+from anim.gltf.io import container
 from anim.gltf.io.source import Source, glb_chunks, open_bytes, open_file, write_file
-from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Clip, Scene, Skeleton
@@ -173,10 +173,10 @@ def _bytes_of(file: RawBytes | BinaryIO) -> Bytes:
 def _check_ending(path: str) -> None:
     ending = PurePath(path).suffix.lower()
     target = links.resolve_links(Path(path))
-    if ending in GLTF_SUFFIXES or (target.exists() and not target.is_file() and not target.is_dir()):  # /dev/null
+    if ending in container.SUFFIXES or (target.exists() and not target.is_file() and not target.is_dir()):  # /dev/null
         return
-    near = difflib.get_close_matches(ending, GLTF_SUFFIXES, n=1)
-    expected = ", ".join(GLTF_SUFFIXES)
+    near = difflib.get_close_matches(ending, container.SUFFIXES, n=1)
+    expected = ", ".join(container.SUFFIXES)
     raise RangeError(
         f"{path}: '{ending}' is no ending of a glTF file (expected {expected})",
         help=f"did you mean {PurePath(path).with_suffix(near[0])}?" if near else "bakes and caches have their own save",

@@ -65,7 +65,7 @@ PUBLIC = {
     ),
     "exchange.formats": "bvh_reader registry",
     "exchange.retarget": "aliases apply bind_pose ground_contact rest_alignment retained_tracks retarget vrm_humanoid",
-    "gltf.io": "container images json_text lenient source unused_buffers uri",
+    "gltf.io": "container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors image_data instancing materials reader vertex_colors",
     "gltf.validation": "buffer_layout channel_targets hierarchy schema",

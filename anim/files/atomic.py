@@ -7,7 +7,6 @@ set.
 
 from __future__ import annotations
 
-import filecmp
 import os
 import shutil
 import tempfile
@@ -94,6 +93,8 @@ class AtomicOutputs:
 
         Without the main file (a sequence of numbered frames) the first one replaces it.
         """
+        import filecmp
+
         main = self.main if self.main in self.files else min(self.files)
         with lock_folder(self.folder):
             new = {}

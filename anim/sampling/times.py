@@ -18,6 +18,8 @@ MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
 )
 MAX_FRAMES = 10_000_000
+FLOAT32_SPACING = 2.0**-23  # relative distance of neighboring float32 numbers
+MAX_JUMP_S = 1.5e-6  # s; with two float32 steps, the longest time between two keys that represent a jump
 
 
 def check_fps(fps: float) -> None:

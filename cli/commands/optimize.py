@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
+from anim.gltf.io import container
 from anim.measure.error.surface import is_measured_at
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
@@ -242,7 +242,7 @@ def _check_outputs(input: str, output: str, report: str | None, curve_file: str 
 def _check_report(report: str, input: str, output: str) -> None:
     """Raise UsageError for a report path that is a model's."""
     documents.check_file(report)
-    if PurePath(report).suffix.lower() in (*GLTF_SUFFIXES, ".bin") or Path(report).resolve() in {
+    if PurePath(report).suffix.lower() in (*container.SUFFIXES, ".bin") or Path(report).resolve() in {
         Path(other).resolve() for other in (input, output) if other != documents.PIPE
     }:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")

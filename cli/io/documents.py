@@ -16,11 +16,10 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from anim.errors import AnimError, FormatError, OutputError
-from anim.files import atomic, links, resolver
+from anim.files import links, resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, uri
 from anim.gltf.io.source import Opener, Source, glb_chunks, open_bytes, open_file, write_file
-from anim.gltf.io.unused_buffers import GLTF_SUFFIXES
 from cli import tables
 from cli.errors import UsageError
 from cli.io import output_names, stdout
@@ -108,6 +107,8 @@ def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
         stdout.check_no_terminal()
         stdout.write(piece.data for piece in pieces)
     else:
+        from anim.files import atomic
+
         atomic.write_file(Path(path), list(pieces))
 
 
@@ -127,6 +128,8 @@ def commit_text_after(text: str, path: str) -> Iterator[None]:
         stdout.write_text(text)
         yield
     else:
+        from anim.files import atomic
+
         content = np.frombuffer(text.encode(errors="backslashreplace"), np.uint8)
         with atomic.commit_after(Path(path), [content]):
             yield
@@ -138,13 +141,13 @@ def check_output(path: str) -> None:
     A name without extension is a GLB; devices and named pipes (/dev/null) can have any name.
     """
     check_binary(path)
-    if path == PIPE or (ending := Path(path).suffix).lower() in ("", *GLTF_SUFFIXES):
+    if path == PIPE or (ending := Path(path).suffix).lower() in ("", *container.SUFFIXES):
         return
     target = links.resolve_links(Path(path))
     if target.exists() and not target.is_file():
         return
-    near = difflib.get_close_matches(ending.lower(), GLTF_SUFFIXES, n=1)
-    expected = " or ".join((", ".join(GLTF_SUFFIXES[:-1]), GLTF_SUFFIXES[-1]))
+    near = difflib.get_close_matches(ending.lower(), container.SUFFIXES, n=1)
+    expected = " or ".join((", ".join(container.SUFFIXES[:-1]), container.SUFFIXES[-1]))
     raise UsageError(
         f"{path}: glTF is no {ending.lower()} (expected {expected}, or a name without ending)",
         help=f"did you mean {PurePath(path).with_suffix(near[0])}?" if near else "",
@@ -174,6 +177,8 @@ def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
         if not target.parent.is_dir():
             raise UsageError(f"{path}: there is no folder '{target.parent}'")
         if target.is_file() or not target.exists():
+            from anim.files import atomic
+
             atomic.check_writable(Path(path))
             if not os.access(target.parent, os.W_OK):
                 raise OutputError(f"{path}: can't be written (no permission to write in its folder)")

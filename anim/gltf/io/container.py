@@ -17,6 +17,7 @@ from anim.gltf.io import json_text, uri
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import schema
 
+SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
 MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
 BIN_CHUNK = 0x004E4942

@@ -8,7 +8,6 @@ Buffers that the replaced .gltf no longer uses are removed last, if this program
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -90,6 +89,8 @@ class _Names:
 
 
 def _candidates(preferred: str, data: Bytes) -> Iterator[str]:
+    import hashlib
+
     yield preferred
     digest = hashlib.sha256(data.data).hexdigest()
     name = PurePath(preferred)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -71,6 +70,8 @@ def read_image(folder: Path | None, image: Json) -> Bytes | None:
 
 def _free(target: Path, name: str, data: Bytes, copies: Mapping[Path, Bytes]) -> str:
     """The free name for a copy in the folder."""
+    import hashlib
+
     digest = hashlib.sha256(data.data).hexdigest()
     path = PurePosixPath(name)
     for each in (name, *(str(path.with_name(f"{path.stem}-{digest[:n]}{path.suffix}")) for n in (8, 16, 64))):

@@ -10,7 +10,6 @@ from anim.errors import AnimError, FormatError
 from anim.gltf.document import Bytes, Document, Json
 from anim.gltf.io import container, json_text
 from anim.gltf.reading.node_matrix import expand_matrices
-from anim.gltf.validation import salvage
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +27,8 @@ class BrokenFile:
 
 def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimError) -> BrokenFile:
     """Return the valid parts of a file. refusal: its error, raised again for unreadable JSON."""
+    from anim.gltf.validation import salvage
+
     try:
         raw, binary = _chunks(data)
         parsed = json_text.parse(raw)

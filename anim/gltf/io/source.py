@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import TypeAlias
 
 from anim.errors import FormatError
-from anim.files import atomic, links, resolver
+from anim.files import links, resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
-from anim.gltf.io import container, gltf_files, images, json_text, uri
+from anim.gltf.io import container, json_text, uri
 
 MAX_OPEN_ATTEMPTS = 20  # attempts to open a .gltf with its buffers, while others replace it
 
 Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
+Note: TypeAlias = Callable[[str], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def write_file(
     *,
     unchanged: Bytes | None = None,
     dry_run: bool = False,
-    note: gltf_files.Note = lambda words: None,
+    note: Note = lambda words: None,
 ) -> int:
     """Write a document and return its size: a GLB or, for a `path` ending in .gltf, text and .bin files.
 
@@ -103,6 +104,9 @@ def write_file(
     ones where possible.
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
+    from anim.files import atomic
+    from anim.gltf.io import gltf_files, images
+
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and not source.is_in_folder(path):
         document, copies = images.copy_images(document, source.folder, links.resolve_links(Path(path)).parent)

@@ -7,7 +7,6 @@ Other files remain.
 
 from __future__ import annotations
 
-import hashlib
 import mmap
 import os
 import posixpath
@@ -22,7 +21,6 @@ from anim.errors import AnimError
 from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container, uri
 
-GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
 _HEAD_BYTES = 64  # bytes to detect a glTF
 _BLANK = b"\xef\xbb\xbf \t\r\n"
@@ -66,6 +64,8 @@ def _is_ours(buffer: Path, stem: str) -> bool:
     found = re.fullmatch(rf".+-({lengths})\.bin", buffer.name, re.DOTALL)
     if found is None:
         return False
+    import hashlib
+
     with buffer.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest().startswith(found[1])
 
@@ -91,7 +91,7 @@ def _needs(other: Path, buffer: Path, address: str) -> bool:
             return True
     except OSError:  # a broken link
         return False
-    is_called_so = any(suffix in other.name.lower() for suffix in GLTF_SUFFIXES)
+    is_called_so = any(suffix in other.name.lower() for suffix in container.SUFFIXES)
     try:
         if not other.is_file() or not (is_called_so or _begins_like_gltf(other)):
             return False

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Bytes, Document, Json, json_array
-from anim.gltf.meshopt import codec
 from anim.gltf.validation import buffer_layout
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -143,6 +142,8 @@ class Accessors:
             compressed = buffer_layout.compression(view)
             if compressed is not None:
                 stored = _slice(self._document.buffers[compressed["buffer"]].data, compressed)
+                from anim.gltf.meshopt import codec
+
                 plain = codec.decode(stored, compressed)
                 if len(plain) < view["byteLength"]:
                     raise FormatError(f"decodes to {len(plain)} bytes (expected {view['byteLength']})")

@@ -16,9 +16,7 @@ from anim.arrays import Ints
 from anim.errors import FormatError, UnsupportedError
 from anim.gltf.document import Bytes, Json
 from anim.gltf.reading.accessors import DTYPES, Accessors
-from anim.gltf.validation.buffer_layout import COMPONENTS
-
-EXTENSION = "KHR_draco_mesh_compression"
+from anim.gltf.validation.buffer_layout import COMPONENTS, DRACO
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +33,7 @@ def read_primitive(primitive: Json, accessors: Accessors, *, views: int) -> tupl
     views: count of the file's buffer views. Attributes that are not in the extension are unchanged.
     Raises FormatError if the data contradicts the file, UnsupportedError without DracoPy.
     """
-    extension = primitive["extensions"][EXTENSION]
+    extension = primitive["extensions"][DRACO]
     view, names = _parse_extension(extension, views)
     mesh = decode(accessors.view(view))
     named = {name: number for name, number in names.items() if name in primitive["attributes"]}
@@ -51,7 +49,7 @@ def decode(data: Bytes) -> DracoMesh:
     try:
         import DracoPy
     except ImportError:
-        problem = f"vertices are compressed by {EXTENSION}, which needs the package DracoPy"
+        problem = f"vertices are compressed by {DRACO}, which needs the package DracoPy"
         raise UnsupportedError(problem, help="pip install 'gltf-anim[draco]'") from None
     try:
         found = DracoPy.decode(data.tobytes())
@@ -69,9 +67,9 @@ def _parse_extension(extension: object, views: int) -> tuple[int, dict[str, int]
     about = extension if isinstance(extension, dict) else {}
     view, names = about.get("bufferView"), about.get("attributes")
     if type(view) is not int or not 0 <= view < views:
-        raise FormatError(f"bufferView is {view!r} (the file has {views})", where=EXTENSION)
+        raise FormatError(f"bufferView is {view!r} (the file has {views})", where=DRACO)
     if not isinstance(names, dict) or any(type(number) is not int for number in names.values()):
-        raise FormatError("attributes don't name numbers", where=EXTENSION)
+        raise FormatError("attributes don't name numbers", where=DRACO)
     return view, names
 
 

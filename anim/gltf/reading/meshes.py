@@ -9,9 +9,9 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Document, Json, json_array
-from anim.gltf.reading import draco
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.skin_weights import read_influences
+from anim.gltf.validation.buffer_layout import DRACO
 from anim.model import Mesh, PrimitiveRange
 
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
@@ -76,7 +76,9 @@ class Meshes:
 
     def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
         accessors, faces = self._accessors, None
-        if draco.EXTENSION in primitive.get("extensions", {}):
+        if DRACO in primitive.get("extensions", {}):
+            from anim.gltf.reading import draco
+
             accessors, faces = draco.read_primitive(primitive, accessors, views=self._views)
         attributes = primitive["attributes"]
         if "POSITION" not in attributes:

@@ -9,9 +9,9 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.gltf.document import Document, Json, json_array
-from anim.gltf.reading import draco
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import Texture
+from anim.gltf.validation.buffer_layout import DRACO
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,9 @@ def read_vertex_colors(
     found = no_vertex_colors(count)
     if not count or (name not in attributes and "COLOR_0" not in attributes):
         return found
-    if draco.EXTENSION in primitive.get("extensions", {}):
+    if DRACO in primitive.get("extensions", {}):
+        from anim.gltf.reading import draco
+
         accessors, _ = draco.read_primitive(primitive, accessors, views=len(json_array(document.json, "bufferViews")))
     texcoords, colors = found.texcoords, found.colors
     if texture is not None and name in attributes:

@@ -13,6 +13,7 @@ COMPONENTS = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4)} 
 COMPONENTS |= {"MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4)}
 MAX_ZERO_FILLED_COMPONENTS = 2**23  # components of an accessor without data; nothing in the file bounds its size
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+DRACO = "KHR_draco_mesh_compression"
 
 
 def check(json: Json) -> None:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Set
 from typing import Any, TypeAlias
 
 from anim.gltf.document import Document, Json, json_array
+from anim.gltf.validation.buffer_layout import DRACO
 from anim.gltf.writing import references
 from anim.gltf.writing.insertion import empty_views, placeholders
 
 IndexMaps: TypeAlias = list[int]  # new index by old index
 
-DRACO = "KHR_draco_mesh_compression"
 INSTANCING = "EXT_mesh_gpu_instancing"
 
 

@@ -18,8 +18,9 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.measure.continuity import knots
-from anim.measure.continuity.knots import FLOAT32, PAIR, Knots, lengths
+from anim.measure.continuity.knots import Knots, lengths
 from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
+from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 
 SAME = 1e-3  # of the track's RMS speed or acceleration, or rad between two directions; jumps below are none
 CLOSED = 1e-3  # of the track's range; a loop's end this near its start is meant to be the same
@@ -156,8 +157,8 @@ class _Analysis:
         self._speed, self._acceleration = (0.0, 0.0) if self.still else knots.root_mean_squares(track)
         self._size = float(np.abs(track.values).max())
         storage = track.storage
-        self._step = FRACTIONS.get(storage.component_type, 1.0) if storage.normalized else FLOAT32 * self._size
-        self._late = FLOAT32 * float(track.times[-1])
+        self._step = FRACTIONS.get(storage.component_type, 1.0) if storage.normalized else FLOAT32_SPACING * self._size
+        self._late = FLOAT32_SPACING * float(track.times[-1])
 
     def at_keys(self) -> KeyJumps:
         """The jumps at the interior keys; two keys that stand for a jump are one, at the time of the second."""
@@ -204,14 +205,14 @@ class _Analysis:
     def _value_noise(self, at: Knots) -> Floats:
         """What a value may differ by on both sides of a pair of keys without a jump: rounding, and motion between."""
         going = np.maximum(*(lengths(rates) for rates in at.rates))
-        return np.asarray(8 * FLOAT32 * self._size + 2 * (PAIR + 2 * self._late) * going)
+        return np.asarray(8 * FLOAT32_SPACING * self._size + 2 * (MAX_JUMP_S + 2 * self._late) * going)
 
     def _speed_noise(self, at: Knots) -> Floats:
         """How far stored values and times leave the speeds open: chords of LINEAR; tangents are stored themselves."""
         noise = np.zeros(len(at.times))
         for rates, h in zip(at.rates, at.durations, strict=True):
             going = lengths(rates)
-            noise += 8 * FLOAT32 * going
+            noise += 8 * FLOAT32_SPACING * going
             if self.track.interpolation is Interpolation.LINEAR:
                 noise += (4 * self._step + 2 * self._late * going) / h
         return noise
@@ -222,7 +223,7 @@ class _Analysis:
         if self.track.interpolation is not Interpolation.CUBICSPLINE:
             return noise
         for rates, pulls, h in zip(at.rates, at.accelerations, at.durations, strict=True):
-            off = FLOAT32 + self._late / h
+            off = FLOAT32_SPACING + self._late / h
             noise += 12 * self._step / h**2 + off * (12 * lengths(rates) / h + 4 * lengths(pulls))
         return noise
 

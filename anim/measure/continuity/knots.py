@@ -10,10 +10,9 @@ from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import derivatives
+from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 from anim.sampling.track import sample
 
-FLOAT32 = 2.0**-23  # relative distance of neighboring float32 numbers
-PAIR = 1.5e-6  # s; with two float32 steps, the longest time between two keys that stand for a jump
 GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))  # of a piece; exact for the squared speed of a cubic
 GAUSS_WEIGHTS = (5 / 18, 8 / 18, 5 / 18)
 
@@ -70,7 +69,7 @@ def loop_knot(track: Track, *, start: float, end: float) -> Knots:
     ends, starts = np.array([end]), np.array([start])
     shown = ends
     if track.interpolation is Interpolation.STEP:
-        shown = np.array([end - PAIR - 2 * FLOAT32 * end, end])
+        shown = np.array([end - MAX_JUMP_S - 2 * FLOAT32_SPACING * end, end])
         ends, starts = np.array([end, end]), np.array([start, start])
     return Knots(
         ends,
@@ -128,7 +127,7 @@ def lengths(vectors: Floats) -> Floats:
 
 def _segments(track: Track) -> Ints:
     """Numbers of the pieces between keys that are no jumps: (P,)."""
-    return np.flatnonzero(np.diff(track.times) > PAIR + 2 * FLOAT32 * track.times[1:])
+    return np.flatnonzero(np.diff(track.times) > MAX_JUMP_S + 2 * FLOAT32_SPACING * track.times[1:])
 
 
 def _one_sided(before: Floats, after: Floats, at_start: Bools, at_end: Bools) -> tuple[Floats, Floats]:

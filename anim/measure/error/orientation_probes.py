@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
+from anim.model import Skeleton
+from anim.sampling import rest_pose, world_matrices
 
 PROBE_DISTANCE = 0.05  # of the skeleton's size: how far from a node its turning counts
 PER_NODE = 3
 SPEED_STEP = 1e-4  # s; speeds at an end are taken over this time: what a player shows in the first moment
+ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # of the six points around a node, along its own axes
 
 
 def probe_points(world: Floats) -> Floats:
@@ -28,3 +31,10 @@ def probe_size(places: Floats) -> float:
     """Return the diagonal of the box around the points (P, F, 3) in the first frame; 1 where it has none."""
     first = places[:, 0]
     return float(np.linalg.norm(first.max(axis=0) - first.min(axis=0))) or 1.0
+
+
+def shell_points(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
+    """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
+    axes = world_matrices(skeleton, rest_pose(skeleton))[0][nodes, :, :3]
+    scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
+    return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])

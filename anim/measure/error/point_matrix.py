@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.shell_points import shell_points as shells_of
+from anim.measure.error.orientation_probes import shell_points as shells_of
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Scene
 

@@ -6,12 +6,10 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
+from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PosedScene
 from anim.measure.error.surface import Surface
 from anim.model import Skeleton
-from anim.sampling import rest_pose, world_matrices
-
-ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # of the six points, along the node's own axes
 
 
 class ShellPoints:
@@ -58,13 +56,6 @@ class ShellPoints:
         """Return −1, for these points are no vertices."""
         del found
         return -1
-
-
-def shell_points(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
-    """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
-    axes = world_matrices(skeleton, rest_pose(skeleton))[0][nodes, :, :3]
-    scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
-    return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])
 
 
 def nodes_without_vertices(skeleton: Skeleton, surfaces: list[Surface]) -> Bools:

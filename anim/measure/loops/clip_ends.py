@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.measure.continuity.knots import FLOAT32, PAIR
 from anim.measure.error import orientation_probes
 from anim.model import Clip, Interpolation, Pose, Skeleton
 from anim.sampling.concatenation import ConcatenatedTracks, concatenate
 from anim.sampling.pose import world_by_node
+from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 
 PARTS = ("translation", "rotation", "scale")
 # Of the times start, just after it, a probe on, a frame on, and the same before the end: the pose, the speed (times the
@@ -54,7 +54,7 @@ class LoopRange:
     @property
     def shortest(self) -> float:
         """Seconds from an end within which two keys stand for a jump, which is no speed."""
-        return min(PAIR + 2 * FLOAT32 * abs(self.end), self.probe / 2)
+        return min(MAX_JUMP_S + 2 * FLOAT32_SPACING * abs(self.end), self.probe / 2)
 
     def times(self) -> Floats:
         """Return the times (T,) of DIFFERENCES."""

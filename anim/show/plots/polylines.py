@@ -8,9 +8,10 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, unique_sorted
 from anim.maths import quaternion
-from anim.measure.continuity.knots import FLOAT32, PAIR, lengths
+from anim.measure.continuity.knots import lengths
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import derivatives
+from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 from anim.sampling.track import sample
 
 NUM_LINE_POINTS = 800  # of a line: one for each pixel of a wide panel
@@ -95,7 +96,7 @@ def handles(track: Track) -> tuple[Floats, Floats]:
 def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
     """Times (P, m) within every segment, both ends included, and a mask (P,) of those followed by a jump."""
     steps = np.diff(track.times)
-    real = np.asarray(steps > PAIR + 2 * FLOAT32 * track.times[1:])
+    real = np.asarray(steps > MAX_JUMP_S + 2 * FLOAT32_SPACING * track.times[1:])
     chosen = np.flatnonzero(real) if pieces_only else np.arange(len(steps))
     straight = track.interpolation is Interpolation.LINEAR and (pieces_only or track.kind is not ValueKind.ROTATION)
     count = (
