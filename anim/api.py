@@ -19,7 +19,7 @@ from anim.arrays import Floats, as_floats
 from anim.asset import Asset, PathName, as_asset
 from anim.caches import cache_file
 from anim.caches.options import WriteOptions
-from anim.caches.transforms import bounds, up_axis
+from anim.caches.transforms import statistics, up_axis
 from anim.caches.transforms.vertex_order import reorder
 from anim.errors import AnimError, RangeError
 from anim.gltf.document import Document
@@ -32,8 +32,7 @@ from anim.measure.error.surface import diagonal
 from anim.model import Clip, VertexCache
 from anim.operations.selection import Selection, match_names
 from anim.optimization import optimize as search
-from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy
-from anim.optimization.request import Request
+from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Request
 from anim.sampling.sample import PoseTable
 from anim.sampling.sample import sample as sample_table
 from anim.sampling.times import frame_times
@@ -89,7 +88,7 @@ class BakedCache(VertexCache):
         """
         name = file_path(path)
         cache = up_axis.to_up_axis(reorder(self, vertex_order), up)
-        limit = None if max_error is None else meters(max_error, "max_error", lambda: bounds.diagonal(cache))
+        limit = None if max_error is None else meters(max_error, "max_error", lambda: statistics.diagonal(cache))
         cache_file.save(cache, name, WriteOptions(limit, quantize, layout, preset, depth, rest_mesh))
 
 

@@ -55,7 +55,7 @@ LAZY |= {"mujoco", "pxr", "dask"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
     "caches.formats": "gltf mesh_sequence",
-    "caches.transforms": "bounds resample up_axis vertex_order",
+    "caches.transforms": "resample statistics up_axis vertex_order",
     "caches.vat": "presets",
     "curves.easing": "function table",
     "curves.fitting": "adaptive_keys easing_fit key_reduction rotation_fit",
@@ -64,10 +64,10 @@ PUBLIC = {
         "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"
     ),
     "exchange.formats": "bvh_reader registry",
-    "exchange.retarget": "aliases apply bind_pose ground_contact rest_alignment retained_tracks retarget vrm_humanoid",
+    "exchange.retarget": "aliases apply bind_pose ground_contact joint_roles rest_alignment retained_tracks retarget",
     "gltf.io": "container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
-    "gltf.reading": "accessors image_data instancing materials reader vertex_colors",
+    "gltf.reading": "accessors instancing materials reader vertex_colors",
     "gltf.validation": "buffer_layout channel_targets hierarchy schema",
     "gltf.writing": "byte_ranges references reindex writer",
     "measure.compare": "diff name_matching",
@@ -78,7 +78,7 @@ PUBLIC = {
         "clip_findings file_findings frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"
     ),
     "measure.loops": "loop_analysis recommendations seam",
-    "optimization.search": "solution",
+    "optimization.search": "plan",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations tangent_plot track_plot "

@@ -1,4 +1,4 @@
-"""The formats of vertex caches, by the ending of their files."""
+"""The formats of vertex caches, by file extension or by their first bytes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.signatures import Signature, is_mdd, is_obj, is_stl, starts_with
 from anim.caches.storage import Inputs, Outputs
 from anim.caches.vat import reader, writer
-from anim.errors import UnsupportedError
+from anim.errors import FormatError, UnsupportedError
 from anim.model import VertexCache
 
 Read: TypeAlias = Callable[[Inputs, ReadOptions], VertexCache]
 Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
+HEAD = 1024  # bytes that are enough for every signature
 
 
 class Files(Enum):
@@ -111,3 +112,14 @@ def _of(ending: str) -> CacheFormat:
     if found is None:
         raise UnsupportedError(f"unsupported cache format '{ending}' (expected {', '.join(CACHE_FORMATS)})")
     return found
+
+
+def sniff_format(head: bytes, size: int) -> str:
+    """Return the file extension of a format by a file's first bytes (`HEAD`, if possible) and its size.
+
+    Raises FormatError for bytes that no cache format starts with.
+    """
+    for ending, each in CACHE_FORMATS.items():
+        if each.begins(head, size):
+            return ending
+    raise FormatError(f"starts with {head[:12]!r}, as no cache format does" if head else "is empty")

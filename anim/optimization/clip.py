@@ -12,12 +12,11 @@ from anim.model import FLOAT32, Clip, Interpolation, Track
 from anim.optimization.options import Drop
 from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.context import Context
-from anim.optimization.search.plan import TrackAction, TrialResult
+from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
 from anim.optimization.search.search import search
-from anim.optimization.search.solution import Solution, value_bytes
 from anim.optimization.search.source_motion import PATHS, SourceMotion, analyze_source, key_grid
 from anim.optimization.search.trial import CHORD_BOUND_FRACTION, TrialRunner
-from anim.optimization.tracks import clip_ends, key_reduction, lossless, morph_weights
+from anim.optimization.tracks import clip_ends, key_reduction, morph_weights
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
 
@@ -105,7 +104,7 @@ class _TrackSorter:
 
     def _keep_exactly(self, i: int) -> None:
         track = self._clip.tracks[i]
-        slim = lossless.reduce_lossless(track)
+        slim = key_reduction.reduce_lossless(track)
         if len(slim.times) == 1 and self._is_droppable(i) and track.node is not None and track.path in PATHS:
             is_exact = self._context.bounds.max_error == 0  # a rest pose in decimals differs from float32 keys
             precision = np.float64 if is_exact else np.float32
@@ -137,7 +136,7 @@ class _TrackSorter:
             reach = context.morph_reach(track.node)
             exact = context.bounds.max_error == 0 or track.node in context.policy.keep
             if exact or not reach.size or track.interpolation is Interpolation.STEP:
-                self._keep_track(i, lossless.reduce_lossless(track))
+                self._keep_track(i, key_reduction.reduce_lossless(track))
                 continue
             from_rest = morph_weights.weight_error(track, context.weights_at_rest(track.node), reach)
             if self._is_droppable(i) and from_rest <= bound:
@@ -148,7 +147,7 @@ class _TrackSorter:
                 track, reach, bound, key_grid([track]), context.coding.packing
             )
             if track.interpolation is Interpolation.CUBICSPLINE and self._spline_is_smaller(i, new, {i: (new, stored)}):
-                self._keep_track(i, lossless.reduce_lossless(track))
+                self._keep_track(i, key_reduction.reduce_lossless(track))
                 continue
             self._done[i] = new, stored
             self._spent += error
@@ -217,7 +216,7 @@ def _new_track(track: Track, at: Floats, stored: EncodedKeys) -> Track:
         values=stored.exact(),
         in_tangents=None,
         out_tangents=None,
-        storage=lossless.INT16 if stored.form in ("int16", "quaternion") else FLOAT32,
+        storage=key_reduction.INT16 if stored.form in ("int16", "quaternion") else FLOAT32,
     )
 
 

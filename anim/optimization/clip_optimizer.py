@@ -10,10 +10,9 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
-from anim.optimization.options import EFFORTS, Effort
-from anim.optimization.request import Request
+from anim.optimization.options import EFFORTS, Effort, Request
 from anim.optimization.search.context import Context, build_context
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification, verify
 

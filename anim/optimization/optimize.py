@@ -9,13 +9,13 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
-from anim.optimization import fingerprint
+from anim.optimization import writing
 from anim.optimization.clip import Task
 from anim.optimization.clip_optimizer import ClipOptimizer, optimize_clip, verify_solution
+from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
-from anim.optimization.request import Request
 from anim.optimization.rest_pose import rebase
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.optimization.verification import Verification
@@ -62,7 +62,7 @@ def optimize(
     """
     chosen = range(len(clips)) if chosen is None else chosen
     options = f"{request.name} {tuple(chosen)}"
-    if fingerprint.has_mark(document, clips, options):
+    if writing.has_mark(document, clips, options):
         return Optimized(document, {}, {}, unchanged=True)
     request = _visible_clips(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
@@ -91,7 +91,7 @@ def optimize(
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):
         verdicts[number] = optimizer.verify(number, read_back[number])
-    done = fingerprint.add_mark(new, read_back, options)
+    done = writing.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 

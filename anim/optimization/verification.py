@@ -9,11 +9,10 @@ from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric, MotionError, dense_times, key_and_mid_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip
-from anim.optimization.options import Bounds, Reference
-from anim.optimization.tracks.loop_closure import opened_tracks
+from anim.optimization.options import PLAYERS, Bounds, Reference
+from anim.optimization.tracks.clip_ends import opened_tracks
 
 FLOAT_NOISE = 1e-9  # of the diagonal: rounding in float64 of equal motion
-PLAYERS = ("spec", "three", "raw", "nlerp")  # "three" can exceed both others: 3 % on Fox
 
 
 @dataclass(frozen=True, slots=True)

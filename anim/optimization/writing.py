@@ -1,8 +1,10 @@
-"""Writing of solutions into a document, and the check that it contains exactly them."""
+"""Writing of solutions into a document, the check that it contains them, and its mark."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +13,10 @@ from anim.gltf.meshopt import storage
 from anim.gltf.writing import reindex, writer
 from anim.model import Clip, Track
 from anim.optimization.options import Packing
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 
 FILTERS = {"quaternion": "QUATERNION", "exponent": "EXPONENTIAL"}  # meshopt's names of EncodedKeys.form
+KEY = "gltf-anim"
 
 
 def write_solutions(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
@@ -45,3 +48,35 @@ def _is_same_track(a: Track, b: Track) -> bool:
         return False
     pairs = ((a.times, b.times), (a.values, b.values), (a.in_tangents, b.in_tangents), (a.out_tangents, b.out_tangents))
     return all(x is None if y is None else x is not None and np.array_equal(x, y) for x, y in pairs)
+
+
+def add_mark(document: Document, clips: Iterable[Clip], options: str) -> Document:
+    """Return the document with a mark of its clips and options in `asset.extras`.
+
+    A repeated command then changes nothing: it would use the bound a second time, since the source's motion is not in
+    the file. Unchanged if `extras` is no object.
+    """
+    asset = document.json["asset"]
+    extras = asset.get("extras", {})
+    if not isinstance(extras, dict):
+        return document
+    marked = {**asset, "extras": {**extras, KEY: _mark(clips, options)}}
+    return replace(document, json={**document.json, "asset": marked})
+
+
+def has_mark(document: Document, clips: Iterable[Clip], options: str) -> bool:
+    """Return whether the document carries the mark of exactly these clips and options."""
+    extras = document.json["asset"].get("extras", {})
+    mark = extras.get(KEY) if isinstance(extras, dict) else None
+    return mark is not None and mark == _mark(clips, options)
+
+
+def _mark(clips: Iterable[Clip], options: str) -> str:
+    digest = hashlib.blake2b(options.encode(), digest_size=6)
+    for clip in clips:
+        digest.update(clip.name.encode(errors="surrogatepass"))
+        for track in clip.tracks:
+            digest.update(f"{track.target} {track.interpolation} {track.values.shape}".encode(errors="surrogatepass"))
+            for numbers in (track.times, track.values, track.in_tangents, track.out_tangents):
+                digest.update(b"" if numbers is None else numbers.tobytes())
+    return f"optimize {digest.hexdigest()}"

@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from anim.arrays import Floats, unique_sorted
-from anim.caches.transforms import bounds, up_axis
+from anim.caches.transforms import statistics, up_axis
 from anim.caches.transforms import vertex_order as orders
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene, VertexCache
@@ -28,8 +28,8 @@ from cli.errors import UsageError
 from cli.first_run import announce_compiling
 from cli.io import cache_files, documents, output_names, scenes
 from cli.io.cache_files import SavedCache
-from cli.options import caches, common, mesh_selection
-from cli.options.skinning_methods import ABOUT, Method
+from cli.options import caches, common, meshes
+from cli.options.meshes import ABOUT, Method
 from cli.progress import Progress
 from cli.reports import bake_notes
 from cli.text import Reporter, plural
@@ -59,7 +59,7 @@ def command(
         typer.Option("--fps", metavar="N", help="Frames per second; without it one frame per key of the clip."),
     ] = None,
     clip: common.Clips = None,
-    mesh: mesh_selection.Meshes = None,
+    mesh: meshes.Meshes = None,
     space: Annotated[Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")] = WORLD,
     normals: Annotated[
         bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(caches.formats_with('normals'))}).")
@@ -112,10 +112,10 @@ def command(
             voice,
             normals=normals or tangents,
             tangents=tangents,
-            nodes=lambda scene: mesh_selection.nodes(scene, mesh),
+            nodes=lambda scene: meshes.nodes(scene, mesh),
         )
         numbers = Selection(clip or ()).chosen_clips(reader.names(document))
-        nodes = mesh_selection.nodes(scene, mesh)
+        nodes = meshes.nodes(scene, mesh)
         groups = _groups(scene, nodes, output, rigid=rigid)
         jobs = _jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
         announce_compiling(voice)
@@ -236,7 +236,9 @@ def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCach
 
 
 def _meters(max_error: str | None, cache: VertexCache) -> float | None:
-    return None if max_error is None else units.parse_length(max_error, "--max-error", lambda: bounds.diagonal(cache))
+    return (
+        None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
+    )
 
 
 def _report_notes(done: list[_Done], voice: Reporter) -> None:

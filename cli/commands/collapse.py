@@ -18,9 +18,9 @@ from anim.skinning.analysis.recommendations import CollapseFinding
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
 from cli.io import documents, scenes
-from cli.options import common, mesh_selection
+from cli.options import common, meshes
 from cli.options.common import Format
-from cli.options.skinning_methods import Method
+from cli.options.meshes import Method
 from cli.progress import Progress
 from cli.reports import collapse_report
 from cli.reports.collapse_report import CollapseReport
@@ -40,7 +40,7 @@ def command(
     ] = False,
     fps: Annotated[float, typer.Option("--samples-per-second", metavar="N", help="Samples per second of a clip.")] = 30,
     clip: common.Clips = None,
-    mesh: mesh_selection.Meshes = None,
+    mesh: meshes.Meshes = None,
     format: common.Report = Format.TEXT,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="OUT", help="Draw index and volume over time into a .png or .svg.")
@@ -63,14 +63,12 @@ def command(
     with documents.source(input, voice) as source:
         document = source.document
         clips = reader.clips(document)
-        scene = scenes.read_scene(document, source.name, voice, nodes=lambda scene: mesh_selection.nodes(scene, mesh))
+        scene = scenes.read_scene(document, source.name, voice, nodes=lambda scene: meshes.nodes(scene, mesh))
         numbers = Selection(clip or ()).chosen_clips(reader.names(document))
         if plot is not None and not numbers:
             raise NotFoundError("there is no clip to draw")
         announce_compiling(Reporter(quiet))
-        comparison = Comparison(
-            scene, methods=methods, bulge_clamp=bulge_clamp, nodes=mesh_selection.nodes(scene, mesh)
-        )
+        comparison = Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=meshes.nodes(scene, mesh))
         progress = Progress("collapse", len(numbers), shown=not quiet)
         for done, i in enumerate(numbers):
             times = frame_times(clips[i].start, clips[i].end, fps=fps)

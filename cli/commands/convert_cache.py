@@ -11,7 +11,7 @@ import typer
 
 from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS
-from anim.caches.transforms import bounds, resample, up_axis
+from anim.caches.transforms import resample, statistics, up_axis
 from anim.caches.transforms import vertex_order as orders
 from anim.model import FrameChunk, VertexCache
 from cli import text, units
@@ -85,7 +85,7 @@ def command(
             announce_compiling(voice)
         cache = _changed(loaded.cache, at, fps, up, vertex_order)
         if max_error is not None:
-            given["max_error"] = units.parse_length(max_error, "--max-error", lambda: bounds.diagonal(cache))
+            given["max_error"] = units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
         writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:

@@ -26,7 +26,7 @@ from cli.errors import CheckError
 from cli.io import documents
 from cli.options import common
 from cli.reports import inspect_report
-from cli.reports.inspect_data import Inspected, Smoothness
+from cli.reports.inspect_report import Inspected, Smoothness
 from cli.text import Reporter
 
 SCHEMA = 1

@@ -15,18 +15,16 @@ import typer
 from anim.gltf.io import container
 from anim.measure.error.surface import is_measured_at
 from anim.optimization.optimize import Optimized
-from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
+from anim.optimization.options import EFFORTS, PLAYERS, Drop, Objective, Packing, Policy, Reference, Request
 from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, curve
-from anim.optimization.request import Request
-from anim.optimization.verification import PLAYERS
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
 from cli.reports import optimize_json, optimize_report
 from cli.text import Reporter
-from cli.workflows import optimize_request
+from cli.workflows import optimize_job
 from cli.workflows.edit_clips import note_images
-from cli.workflows.optimize_job import OptimizeJob, optimize_job
+from cli.workflows.optimize_job import OptimizeJob
 
 PICTURES = (".png", ".svg")
 
@@ -139,23 +137,23 @@ def command(
     """
     began = time.perf_counter()
     voice = Reporter(quiet, verbose)
-    max_count = None if max_bytes is None else optimize_request.count_of_bytes(max_bytes)
+    max_count = None if max_bytes is None else optimize_job.count_of_bytes(max_bytes)
     _check_outputs(input, output, report, curve_file, dry_run=dry_run)
     if curve_file is not None and (max_bytes is not None or report is not None):
         raise UsageError("--curve goes with neither --max-bytes nor --report")
     with documents.source(input, voice) as source:
-        work = optimize_job(
+        work = optimize_job.optimize_job(
             source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
         )
         said = {
-            "max_error": optimize_request.MAX_ERROR if max_error is None else max_error,
+            "max_error": optimize_job.MAX_ERROR if max_error is None else max_error,
             "shell": shell,
             "max_pointer_error": max_pointer_error,
             "max_angle": max_angle,
             "max_speed_error": max_speed_error,
         }
-        bounds = optimize_request.bounds(work.scene, said)
-        for words in optimize_request.notes(said):
+        bounds = optimize_job.bounds(work.scene, said)
+        for words in optimize_job.notes(said):
             voice.warn(words)
         request = Request(
             bounds,
@@ -164,13 +162,13 @@ def command(
                 reference,
                 rebase_rest,
                 drop_invisible,
-                optimize_request.nodes_to_keep(keep_node or (), work.scene),
+                optimize_job.nodes_to_keep(keep_node or (), work.scene),
             ),
             Packing.CORE if meshopt is None else Packing(meshopt.value),
             objective,
             str(effort),
             PLAYERS if player is Player.ANY else ("spec",),
-            optimize_request.raw_options(bounds, said),
+            optimize_job.raw_options(bounds, said),
         )
         if curve_file is not None:
             _draw_curve(work, request, curve_file, voice, dry_run=dry_run)

@@ -15,8 +15,7 @@ import typer
 from anim.arrays import Floats
 from anim.caches.formats import gltf
 from anim.caches.options import ReadOptions
-from anim.caches.registry import CACHE_FORMATS, reader_for
-from anim.caches.sniffing import HEAD, sniff_format
+from anim.caches.registry import CACHE_FORMATS, HEAD, reader_for, sniff_format
 from anim.caches.storage import Memory, suffix
 from anim.files import resolver
 from anim.gltf.document import Document
@@ -32,8 +31,8 @@ from cli import text
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
 from cli.io import cache_files, documents, scenes
-from cli.options import common, mesh_selection
-from cli.options.skinning_methods import Method
+from cli.options import common, meshes
+from cli.options.meshes import Method
 
 EXTENSIONS = (".png", *image_file.ANIMATED_FORMATS)
 FRAMES, FPS = 8, 24.0
@@ -87,8 +86,8 @@ def command(
             show_default=False,
         ),
     ] = None,
-    mesh: mesh_selection.Meshes = None,
-    hide: mesh_selection.Hidden = None,
+    mesh: meshes.Meshes = None,
+    hide: meshes.Hidden = None,
     follow: Annotated[
         bool | None,
         typer.Option(
@@ -134,10 +133,8 @@ def command(
             if is_moving and count is not None and count > 1 and len(numbers) > 1:
                 when = _one_rate(seen, numbers, when)
             announce_compiling(voice)
-            scene = scenes.read_scene(
-                seen, name, voice, nodes=lambda scene: mesh_selection.visible_meshes(scene, mesh, hide)
-            )
-            nodes = mesh_selection.visible_meshes(scene, mesh, hide)
+            scene = scenes.read_scene(seen, name, voice, nodes=lambda scene: meshes.visible_meshes(scene, mesh, hide))
+            nodes = meshes.visible_meshes(scene, mesh, hide)
             found = clips.of_document(
                 seen,
                 numbers,

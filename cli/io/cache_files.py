@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from anim.caches import registry
 from anim.caches.formats import mesh_sequence
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.registry import CACHE_FORMATS, Files
-from anim.caches.sniffing import sniff_format
+from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.storage import suffix
 from anim.errors import AnimError, FormatError, OutputError, not_written
+from anim.files import links
 from anim.model import VertexCache
+from cli import text
 from cli.errors import UsageError
 from cli.io import cache_folders, documents
-from cli.reports import cache_notes
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +123,8 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
             raise not_written(away if is_pipe else path, error) from None
         finally:
             staged.clear()
-    lost = cache_notes.unsupported_notes(cache, ending)
-    left = cache_notes.unwritable_note(staged.names[:-1]) if is_pipe else cache_notes.orphans_note(path, names, ending)
+    lost = unsupported_notes(cache, ending)
+    left = unwritable_note(staged.names[:-1]) if is_pipe else orphans_note(path, names, ending)
     return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)))
 
 
@@ -139,3 +141,30 @@ def _ending(inputs: cache_folders.CacheFolder) -> str:
         if own:
             return own  # which is then reported as unknown
         raise
+
+
+def unsupported_notes(cache: VertexCache, ending: str) -> tuple[str, ...]:
+    """Return notes on data of the cache that the format can't store."""
+    carried = [name for name, has in (("normals", cache.has_normals), ("tangents", cache.has_tangents)) if has]
+    lost = [name for name in carried if name not in CACHE_FORMATS[ending].holds]
+    return (f"{' and '.join(lost)} are left out: {ending[1:]} has no place for them",) if lost else ()
+
+
+def unwritable_note(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the note on the files that a pipe can't take."""
+    return (f"not written, since the output is a pipe: {', '.join(names)}",) if names else ()
+
+
+def orphans_note(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
+    """Return the note on frames of an earlier sequence beside those written to `path`."""
+    if CACHE_FORMATS[ending].files is not Files.FRAMES:
+        return ()
+    target, there = links.resolve_links(Path(path)), []
+    with suppress(OSError):
+        there = os.listdir(target.parent)
+    notes = []
+    if old := [name for name in mesh_sequence.sequence_files(target.name, there) if name not in written]:
+        notes.append(f"{text.plural(len(old), 'frame')} of before still there, from {old[0]} on")
+    if target.name in there and target.name not in (*written, *old):
+        notes.append(f"{target.name} of before is still there, and is what that name reads")
+    return tuple(notes)

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from anim.caches.sniffing import HEAD
+from anim.caches.registry import HEAD
 from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError
 from anim.files import links

@@ -11,7 +11,7 @@ from anim.gltf.reading.reader import clip_name
 from anim.measure.continuity.continuity import ContinuityClass, LoopGap, MaxJump, TrackContinuity
 from anim.measure.inspect.report import ClipReport
 from cli import tables
-from cli.reports.inspect_data import Inspected, Smoothness
+from cli.reports.inspect_report import Inspected, Smoothness
 from cli.tables import Cell
 from cli.text import format_length, format_number, plural
 

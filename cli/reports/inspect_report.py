@@ -5,18 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import TYPE_CHECKING, TypeAlias
 
 from anim.gltf.reading.reader import clip_name
 from anim.measure.inspect.file_findings import Finding
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
 from cli import tables
-from cli.reports.inspect_data import Inspected, Smoothness
 from cli.tables import Cell
 from cli.text import format_bytes, format_length, format_span, format_speed, plural
+
+if TYPE_CHECKING:
+    from anim.measure.continuity.continuity import TrackContinuity
 
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 MIN_ROOT_DISTANCE_M = 1e-4  # smaller displacements of the root show no speed
 MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
+Inspected: TypeAlias = tuple[str, int, Facts]  # name, size in bytes, contents
+Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip and track
 
 
 def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, tracks: bool) -> str:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from anim.optimization.options import Reference
-from anim.optimization.request import Request
+from anim.optimization.options import Reference, Request
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from cli.text import format_length
 

@@ -11,7 +11,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.inspect.storage_cost import storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 from cli.reports import optimize_bound
 from cli.reports.optimize_report import OptimizeReport, count_keys
 

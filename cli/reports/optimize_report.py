@@ -14,13 +14,12 @@ from anim.gltf.writing.references import extensions_naming_keys
 from anim.measure.inspect.storage_cost import storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip
-from anim.optimization.fingerprint import KEY
 from anim.optimization.optimize import Optimized
-from anim.optimization.options import Drop
+from anim.optimization.options import Drop, Request
 from anim.optimization.rate_distortion import RatePoint
-from anim.optimization.request import Request
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
+from anim.optimization.writing import KEY
 from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length, plural

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from anim.errors import NotFoundError
 from anim.exchange.retarget import aliases
 from anim.exchange.retarget.apply import apply_to_character, matchable_nodes
+from anim.exchange.retarget.joint_roles import read_vrm_roles
 from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks, scaled_ancestors
 from anim.exchange.retarget.retarget import GroundMode
-from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
 from anim.gltf import authoring
 from anim.gltf.document import Document
 from anim.gltf.io.source import Source

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.registry import CACHE_FORMATS
-from anim.caches.sniffing import sniff_format
+from anim.caches.registry import CACHE_FORMATS, sniff_format
 from anim.caches.transforms.resample import at_time
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Fixture

@@ -9,7 +9,7 @@ import pytest
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats import gltf
-from anim.caches.transforms import bounds, document_playback
+from anim.caches.transforms import statistics
 from anim.caches.transforms.vertex_order import reorder
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -53,7 +53,7 @@ def test_morph_targets_play_as_we_play_them(
 ) -> None:
     out = tmp_path / "out.glb"
     assert call("bake", asset(name), out, "--clip", clip, "--fps", 24, *options, *more).code == 0
-    assert _error(out, reorder(document_playback.evaluate_document(opened_path(out)), "blender")) < BOUND
+    assert _error(out, reorder(gltf.evaluate_document(opened_path(out)), "blender")) < BOUND
 
 
 def test_a_flip_book(call: Call, asset: Find, tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ def test_a_flip_book(call: Call, asset: Find, tmp_path: Path) -> None:
     ours = reorder(frames, "blender")
     pages = vertices(out, (ours.times + 1e-3).tolist())  # not at the very instant of turning over
     assert len(pages) == ours.frame_count
-    assert _apart(sum(pages.values(), np.zeros(())), ours.load_all().positions) < BOUND * bounds.diagonal(ours)
+    assert _apart(sum(pages.values(), np.zeros(())), ours.load_all().positions) < BOUND * statistics.diagonal(ours)
 
 
 def test_a_point_cache_made_into_morph_targets(call: Call, asset: Find, tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def _at_keys(document: Document, clip: Clip) -> VertexCache:
 def _error(path: Path, ours: VertexCache, clip: str | None = None) -> float:
     """How far Blender's vertices are from ours at most, as a share of the diagonal; one object is in the file."""
     (seen,) = vertices(path, ours.times.tolist(), clip=clip).values()
-    return _apart(seen, ours.load_all().positions) / bounds.diagonal(ours)
+    return _apart(seen, ours.load_all().positions) / statistics.diagonal(ours)
 
 
 def _apart(a: Floats, b: AnyArray) -> float:

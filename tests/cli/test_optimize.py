@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from anim.gltf.reading import reader
-from anim.optimization.fingerprint import KEY
+from anim.optimization.writing import KEY
 from cli.reports import optimize_report
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Find, Fixture

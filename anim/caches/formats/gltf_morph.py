@@ -17,7 +17,7 @@ from anim.caches.formats.gltf_stream import GlbFile, primitive, signed
 from anim.caches.formats.morph_encoding import SHORT, MorphEncoding, encode_morphs
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
-from anim.caches.transforms import bounds
+from anim.caches.transforms import statistics
 from anim.caches.transforms.pca import fit_basis
 from anim.caches.transforms.resample import reduce_frames
 from anim.errors import RangeError, UnsupportedError
@@ -45,7 +45,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
             help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed)",
         )
     whole = cache.load_all()
-    limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * bounds.diagonal(cache)
+    limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * statistics.diagonal(cache)
     best = _smallest_encoding(whole.positions, cache.times, limit, quantize=writing.quantize)
     if best is None:
         advice = "allow a larger `max_error`" + (", or leave out `quantize`" if writing.quantize else "")

@@ -13,7 +13,7 @@ from anim.caches import frame_blocks
 from anim.caches.formats import mesh_frame
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs, read_all
-from anim.caches.transforms import frame_spacing
+from anim.caches.transforms import statistics
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
 
@@ -56,7 +56,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
             with outputs.create(name) as file:
                 file.write(mesh_frame.write(mesh_frame.MeshFrame(positions, faces, normals, remark), ending))
     notes = ("STL keeps no order of vertices: each triangle has three of its own",) if ending == ".stl" else ()
-    return WriteResult(notes=(*notes, *frame_spacing.notes(cache.times)))
+    return WriteResult(notes=(*notes, *statistics.notes(cache.times)))
 
 
 def frame_number(name: str, number: int) -> str:

@@ -15,7 +15,7 @@ from anim.arrays import Floats
 from anim.caches import frame_blocks, rest_mesh
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs, read_exactly
-from anim.caches.transforms import frame_spacing
+from anim.caches.transforms import statistics
 from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
@@ -66,14 +66,14 @@ def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
     """Frames per second, and notes about the last frame, which may be early at a clip's end."""
     if len(times) == 1:
         return DEFAULT_FPS, ()
-    step, off = frame_spacing.frame_spacing(times)
-    if off[:-1].max() > frame_spacing.EVEN:
-        k = int(np.argmax(off[:-1] > frame_spacing.EVEN))
+    step, off = statistics.frame_spacing(times)
+    if off[:-1].max() > statistics.EVEN:
+        k = int(np.argmax(off[:-1] > statistics.EVEN))
         raise RangeError(
             f"PC2 has frames at even steps, and frame {k} at {times[k]:.4g} s is off them",
             help="choose a frame rate with `fps`",
         )
     fps = float(f"{1 / step:.6g}")
-    if off[-1] > frame_spacing.EVEN:
-        return fps, (f"{frame_spacing.last_frame_note(times, off)}; PC2 shows it one step after the one before",)
+    if off[-1] > statistics.EVEN:
+        return fps, (f"{statistics.last_frame_note(times, off)}; PC2 shows it one step after the one before",)
     return fps, ()

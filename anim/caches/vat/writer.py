@@ -26,7 +26,7 @@ from anim.caches.formats import exr, png
 from anim.caches.formats.gltf_stream import GlbFile, primitive
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs, companion_name
-from anim.caches.transforms import frame_spacing
+from anim.caches.transforms import statistics
 from anim.caches.vat import metadata, presets
 from anim.caches.vat.presets import Preset
 from anim.errors import RangeError
@@ -105,7 +105,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
     _write_mesh(cache, still, grid, engine, outputs, about.mesh)
     with outputs.create(f"{outputs.main}.json") as file:
         file.write(metadata.text(about, engine))
-    return WriteResult(worst / engine.per_meter, (*engine.advice, *frame_spacing.notes(cache.times)))
+    return WriteResult(worst / engine.per_meter, (*engine.advice, *statistics.notes(cache.times)))
 
 
 def _grid(cache: VertexCache) -> TextureLayout:

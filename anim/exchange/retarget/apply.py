@@ -6,6 +6,8 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+import numpy as np
+
 from anim.errors import NotFoundError
 from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
@@ -13,8 +15,11 @@ from anim.exchange.retarget.ground_contact import has_feet
 from anim.exchange.retarget.joint_matching import JointMatch, match_joints, match_same_hierarchy
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.retarget import GroundMode, retarget
-from anim.exchange.retarget.up_axis import up_axis
-from anim.model import Clip, Scene
+from anim.model import Clip, Scene, Skeleton
+from anim.sampling import rest_pose, world_matrices
+
+MIN_AXIS_FRACTION = 0.8  # fraction of the length along the axis; 37°
+FEET = ("left_foot", "right_foot")
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,3 +140,19 @@ def _other_nodes(target: Scene, joints: Set[int]) -> list[int]:
     for level in target.skeleton.levels():
         inside |= {node for node in level.tolist() if int(parents[node]) in inside}
     return sorted(inside - joints - holders - {-1})
+
+
+def up_axis(skeleton: Skeleton, roles: Mapping[str, int]) -> str:
+    """Return "X", "Y" or "Z", the axis from the feet to the hips at rest in world space.
+
+    Without feet, from the hips to the head. "" if these are unknown, or the direction is along no axis clearly: an
+    animal's back points forward, its legs still point down.
+    """
+    places = world_matrices(skeleton, rest_pose(skeleton))[0, :, :3, 3]
+    feet = [places[roles[role]] for role in FEET if role in roles]
+    if "hips" not in roles or not (feet or "head" in roles):
+        return ""
+    hips = places[roles["hips"]]
+    way = np.abs(hips - np.mean(feet, axis=0) if feet else places[roles["head"]] - hips)
+    axis = int(way.argmax())
+    return "XYZ"[axis] if way[axis] > MIN_AXIS_FRACTION * np.linalg.norm(way) else ""

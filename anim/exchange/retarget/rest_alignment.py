@@ -1,4 +1,4 @@
-"""Alignment of two whole rest poses: heading, size, and floor level."""
+"""Alignment of two whole rest poses: similarity, heading, size, and floor level."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from enum import StrEnum
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.exchange.euler.motion import IDENTITY
 from anim.exchange.retarget.joint_matching import JointMatch
-from anim.exchange.retarget.rest_pose import RestPose, facing_rotation
-from anim.exchange.retarget.similarity import fit_similarity
+from anim.exchange.retarget.rest_pose import RestPose, facing_rotation, rotation_between
+from anim.maths import quaternion
 
 BUILD_TOLERANCE = 1e-3  # fraction of the radius; joints that differ less between two rest poses have the same build
 MIN_MATCHED_FRACTION = 0.5  # minimum fraction of the source's joints that must be matched to measure the size
 MIN_HANGING_FRACTION = 0.1  # of the size; minimum depth of the lowest joint below 0 for a hanging rest pose
+MIN_RANK_FRACTION = 1e-6  # ratio of second to first singular value; below it, points are within a thousandth of a line
 
 
 class Measure(StrEnum):
@@ -113,3 +115,38 @@ def _root(pose: RestPose, node: int) -> int:
     while pose.parents[node] >= 0:
         node = pose.parents[node]
     return node
+
+
+@dataclass(frozen=True, slots=True)
+class Similarity:
+    """target ≈ scale · rotation · source + offset. rotation: unit quaternion (4,).
+
+    error: largest residual distance, divided by the radius of the target's points. unique: False for collinear or
+    coincident points, for which other rotations give the same result.
+    """
+
+    rotation: Floats
+    scale: float
+    error: float
+    unique: bool
+
+
+def fit_similarity(source: Floats, target: Floats) -> Similarity:
+    """Return the best transform of points (P, 3) to others (P, 3); of several, the smallest rotation.
+
+    For collinear points the rotation about the line is 0, for coincident points every rotation, and the scale is 1. The
+    error is infinite if only one set is coincident. A reflection is no similarity: its error is large.
+    (points, the same twice as large and rotated by 90° about y) → rotation (0, 0.707, 0, 0.707), scale 2, error 0
+    Source: S. Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991.
+    """
+    a, b = source - source.mean(axis=0), target - target.mean(axis=0)
+    radii = [float(np.linalg.norm(points, axis=1).max(initial=0.0)) for points in (a, b)]
+    if not min(radii) > 0:
+        return Similarity(IDENTITY, 1.0, 0.0 if max(radii) == 0 else np.inf, False)
+    u, s, vt = np.linalg.svd(b.T @ a)
+    unique = bool(s[1] > MIN_RANK_FRACTION * s[0])
+    signs = np.array((1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt)))) if unique else np.array((1.0, 0, 0))
+    rotation = quaternion.from_matrix((u * signs) @ vt) if unique else rotation_between(vt[0], u[:, 0])
+    scale = float((s * signs).sum() / (a * a).sum())
+    error = np.linalg.norm(b - scale * quaternion.rotate(rotation, a), axis=1).max()
+    return Similarity(rotation, scale, float(error) / radii[1], unique)

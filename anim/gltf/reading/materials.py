@@ -1,4 +1,4 @@
-"""Materials → base color: factor, texture and alpha mode only."""
+"""Materials → base color: factor, texture and alpha mode only; bytes of images."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import FormatError
-from anim.gltf.document import Document, Json, json_array
+from anim.gltf.document import Bytes, Document, Json, json_array
+from anim.gltf.io import uri
+from anim.gltf.io.container import Resolve
+from anim.gltf.reading.accessors import Accessors
 from anim.gltf.validation.rules import Check, ObjectRule, at_least, numbers, text
 
 REPEAT, CLAMP_TO_EDGE, MIRRORED_REPEAT = 10497, 33071, 33648  # wrap modes of samplers
@@ -133,3 +136,22 @@ def _item(json: Json, key: str, index: Any) -> Json:
     if type(index) is not int or not 0 <= index < len(found) or not isinstance(found[index], dict):
         raise FormatError(f"uses {key}[{index}] (the file has {len(found)})")
     return found[index]
+
+
+def image_data(document: Document, index: int, accessors: Accessors, resolve: Resolve | None = None) -> Bytes:
+    """Return the encoded bytes of an image.
+
+    resolve: returns the bytes of a file in the input's folder by its relative path; None if the input has no folder.
+    Raises FormatError if they cannot be read.
+    """
+    image = json_array(document.json, "images")[index]
+    if "bufferView" in image:
+        return accessors.view(image["bufferView"])
+    address = image.get("uri", "")
+    if uri.is_data(address):
+        return np.frombuffer(uri.decode_data(address, uri.IMAGE_TYPES), np.uint8)
+    path = uri.relative_path(address)
+    if resolve is None:
+        raise FormatError(f"'{path}' lies beside the file, which has no folder")
+    found = resolve(path)
+    return found if isinstance(found, np.ndarray) else np.frombuffer(found, np.uint8)

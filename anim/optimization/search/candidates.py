@@ -14,7 +14,7 @@ from anim.optimization.search.key_fit import KeyFit
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
 from anim.optimization.search.time_axes import SharedAxis
 from anim.optimization.tracks import quantization
-from anim.optimization.tracks.loop_closure import close_ends
+from anim.optimization.tracks.clip_ends import close_ends
 from anim.optimization.tracks.quantization import EncodedKeys, Form
 from anim.sampling.track import KeyInterval, find_interval
 

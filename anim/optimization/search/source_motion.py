@@ -14,7 +14,7 @@ from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimization.options import Reference
 from anim.optimization.search import playback
 from anim.optimization.search.playback import level_world_matrices, required_levels
-from anim.optimization.tracks.loop_closure import closure_sign
+from anim.optimization.tracks.clip_ends import closure_sign
 from anim.sampling import sample_pose, times
 from anim.sampling.track import find_interval
 

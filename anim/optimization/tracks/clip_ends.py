@@ -1,4 +1,10 @@
-"""Single keys of constant tracks, and keys that preserve the clip's start and end."""
+"""First and last keys: loop closure, constant extension, single keys.
+
+Loop closure: equal first and last keys of a track stay equal, to the bit.
+
+q and −q are the same rotation; if the last key is −q, it stays the first one with all signs changed, so that
+neighboring keys keep their signs.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +12,51 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.model import Interpolation, Track
+from anim.arrays import Floats
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Track, ValueKind
+
+
+def closure_sign(values: Floats, tolerance: float) -> float:
+    """Return s if the last of the values (K, C) is s · the first within `tolerance`; 0 for none.
+
+    tolerance: in units of the values. s is −1 only for rotations that end with the opposite sign; callers pass no other
+    values that change sign.
+    ([0 0 0 1] … [0 0 0 −1], 0) → −1
+    """
+    signs = (1.0, -1.0) if values.shape[1] == 4 else (1.0,)
+    return next((sign for sign in signs if np.linalg.norm(values[-1] - sign * values[0]) <= tolerance), 0.0)
+
+
+def close_ends(keys: Floats, signs: Floats) -> Floats:
+    """Return keys (K, G, C) whose ends are equal where `signs` (G,) is not 0: both become their mean.
+
+    Rotations stay unit.
+    """
+    tied = np.flatnonzero(signs)
+    if not len(tied):
+        return keys
+    keys, sign = keys.copy(), signs[tied, None]
+    ends = (keys[0, tied] + sign * keys[-1, tied]) / 2
+    if keys.shape[2] == 4:
+        ends = quaternion.normalize(ends)
+    keys[0, tied], keys[-1, tied] = ends, sign * ends
+    return keys
+
+
+def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:
+    """Return the targets with equal first and last values in `before`, but not in `after`.
+
+    Tracks that `after` lacks are at rest, and so closed.
+    """
+    closed = {track.target for track in before.tracks if _is_closed(track)}
+    return [track.target for track in after.tracks if track.target in closed and not _is_closed(track)]
+
+
+def _is_closed(track: Track) -> bool:
+    """Return whether the first and the last value are equal to the bit; q and −q are equal."""
+    first, last = track.values[[0, -1]].tolist()  # faster than numpy for so few values
+    return bool(first == last or (track.kind is ValueKind.ROTATION and first == [-each for each in last]))
 
 
 def single_key(track: Track) -> Track:

@@ -10,8 +10,8 @@ import numpy as np
 from anim.arrays import Bools, Floats, as_key_times
 from anim.measure.inspect.track_statistics import removable_keys
 from anim.model import Clip, Skeleton, Track
-from anim.optimization.request import Request
-from anim.optimization.search.solution import Solution
+from anim.optimization.options import Request
+from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import EncodedKeys
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.show.filmstrip import heat_map
+from anim.show.filmstrip import palette
 from anim.show.filmstrip.renderer import to_srgb
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def write_header(image: Image, title: str, legend: str, *, left: int, top: int) 
     write(image, legend, right, top, color=FAINT)
     across, height = BAR
     right -= across + 8
-    image[top + 6 : top + 6 + height, right : right + across] = to_srgb(heat_map.colors(np.linspace(0, 1, across)))
+    image[top + 6 : top + 6 + height, right : right + across] = to_srgb(palette.colors(np.linspace(0, 1, across)))
     write(image, "0", right - 8 - width("0"), top, color=FAINT)
 
 

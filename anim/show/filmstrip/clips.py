@@ -18,7 +18,7 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.materials import read_materials
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
 from anim.sampling import frame_times
-from anim.show.filmstrip import heat_map, palette, root_path
+from anim.show.filmstrip import palette, root_path
 from anim.show.filmstrip.filmstrip import MAX_POINTS, Extent, Strip
 from anim.show.filmstrip.ground import ground_height
 from anim.show.filmstrip.materials import MaterialReader
@@ -208,10 +208,10 @@ def _distances(
 ) -> Floats | None:
     """Distances (F, V) m from the clip's first method, or of a single method from the rest pose."""
     if not alone:
-        return None if is_first else heat_map.distances(positions, reference)
+        return None if is_first else palette.distances(positions, reference)
     if shot.cache.rest is None:
         raise NotFoundError("has no rest pose that distances could be measured from")
-    return heat_map.distances(positions, shot.cache.rest)
+    return palette.distances(positions, shot.cache.rest)
 
 
 def _body(scene: Scene, cache: VertexCache) -> Bools:

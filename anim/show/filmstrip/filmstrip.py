@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.errors import RangeError
-from anim.show.filmstrip import captions, heat_map
+from anim.show.filmstrip import captions, palette
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, fit_camera
 from anim.show.filmstrip.captions import FAINT, LINE
 from anim.show.filmstrip.renderer import SceneView, mark_spacing, render_frame, setup_view, to_srgb, translate_view
@@ -250,7 +250,7 @@ def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> I
     for f, positions in enumerate(row.positions):
         colors = row.colors
         if row.distances is not None:
-            colors = heat_map.heat_colors(row.distances[f], row.faces, most)
+            colors = palette.heat_colors(row.distances[f], row.faces, most)
         seen, now = positions.astype(np.float64), scenery
         if row.root_path is not None:
             place = row.root_path.at(row.times[f])

@@ -13,8 +13,7 @@ from anim.errors import AnimError
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.io.container import Resolve
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.image_data import image_data
-from anim.gltf.reading.materials import Material, read_materials
+from anim.gltf.reading.materials import Material, image_data, read_materials
 from anim.gltf.reading.vertex_colors import VertexColors, no_vertex_colors, read_vertex_colors, vertex_count
 from anim.model import MeshPart, VertexCache
 from anim.show.filmstrip import palette

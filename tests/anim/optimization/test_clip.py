@@ -12,8 +12,8 @@ from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import Drop, Packing, Policy
-from anim.optimization.search.solution import Solution
-from anim.optimization.tracks.lossless import INT16
+from anim.optimization.search.plan import Solution
+from anim.optimization.tracks.key_reduction import INT16
 from anim.sampling.track import sample
 from tests.anim.optimization.making import TIMES, scene, setting_of, turning, waving
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, track

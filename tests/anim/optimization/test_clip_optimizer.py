@@ -11,10 +11,9 @@ from anim.model import Clip
 from anim.optimization import clip_optimizer as site_
 from anim.optimization.clip import Task, solve
 from anim.optimization.clip_optimizer import ClipOptimizer, optimize_clip
-from anim.optimization.options import Bounds
-from anim.optimization.request import Request
+from anim.optimization.options import Bounds, Request
 from anim.optimization.search.context import Context
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 from tests.anim.optimization.making import scene, waving
 from tests.clips import about, clip, track
 

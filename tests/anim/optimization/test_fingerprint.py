@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from anim.gltf.document import Document
-from anim.optimization.fingerprint import KEY, add_mark, has_mark
+from anim.optimization.writing import KEY, add_mark, has_mark
 from tests.clips import STEP, clip, track
 
 CLIPS = (clip(track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]]), name="a"),)

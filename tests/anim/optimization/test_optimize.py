@@ -15,9 +15,8 @@ from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.measure.error.statistics import statistics
 from anim.model import Clip, Interpolation
 from anim.optimization.optimize import Optimized, optimize
-from anim.optimization.options import Bounds, Drop, Objective, Packing, Policy
-from anim.optimization.request import Request
-from anim.optimization.verification import PLAYERS as VERIFIED
+from anim.optimization.options import PLAYERS as VERIFIED
+from anim.optimization.options import Bounds, Drop, Objective, Packing, Policy, Request
 from anim.sampling.players import PLAYERS
 from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.khronos import errors, needs_validator, validate_many

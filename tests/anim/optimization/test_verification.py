@@ -11,8 +11,8 @@ import pytest
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
-from anim.optimization.options import Bounds, Reference
-from anim.optimization.verification import PLAYERS, Verification, verify
+from anim.optimization.options import PLAYERS, Bounds, Reference
+from anim.optimization.verification import Verification, verify
 from anim.sampling import players
 from tests.clips import STEP, about, clip, skeleton, track
 

@@ -10,7 +10,7 @@ import pytest
 from anim.gltf.reading import reader
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import Packing
-from anim.optimization.search.solution import Solution
+from anim.optimization.search.plan import Solution
 from anim.optimization.writing import changed_clips, write_solutions
 from tests.anim.optimization.making import setting_of
 from tests.files import glb_of, opened, opened_fixture

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.caches.registry import CACHE_FORMATS, reader_for
-from anim.caches.sniffing import sniff_format
-from anim.caches.transforms import bounds
+from anim.caches.registry import CACHE_FORMATS, reader_for, sniff_format
+from anim.caches.transforms import statistics
 from anim.caches.transforms.resample import at_rate, at_time, resample_frames
 from anim.caches.transforms.vertex_order import reorder
 from anim.errors import FormatError, RangeError, UnsupportedError
@@ -64,9 +63,9 @@ def test_blenders_order_keeps_points() -> None:
 
 
 def test_bounds() -> None:
-    low, high = bounds.bounds(cache())
+    low, high = statistics.bounds(cache())
     assert low == pytest.approx(positions_of(cache()).min(axis=(0, 1)))
-    assert bounds.diagonal(cache()) == pytest.approx(np.linalg.norm(high - low))
+    assert statistics.diagonal(cache()) == pytest.approx(np.linalg.norm(high - low))
 
 
 @pytest.mark.parametrize("ending", [".npz", ".pc2", ".mdd", ".usdc", ".usda", ".glb"])

@@ -10,8 +10,7 @@ from anim.errors import FormatError, NotFoundError
 from anim.exchange.retarget import aliases
 from anim.exchange.retarget.joint_matching import JointMatch, match_joints
 from anim.exchange.retarget.joint_names import JointName, normalize_names
-from anim.exchange.retarget.joint_roles import MIDDLE, SIDED, joint_roles
-from anim.exchange.retarget.vrm_humanoid import read_vrm_roles
+from anim.exchange.retarget.joint_roles import MIDDLE, SIDED, joint_roles, read_vrm_roles
 from tests.anim.exchange.figures import Find
 from tests.files import opened_path
 

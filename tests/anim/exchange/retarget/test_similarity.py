@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
-from anim.exchange.retarget.similarity import fit_similarity
+from anim.exchange.retarget.rest_alignment import fit_similarity
 
 FIGURE = np.array(((0.0, 0, 0), (0, 1, 0), (0.3, 1, 0), (0, 1.5, 0.2)))
 LINE = np.array(((0.0, 1, 0), (0, 2, 0), (0, 4.5, 0)))

@@ -8,8 +8,8 @@ import numpy as np
 
 from anim.model import FLOAT32, Clip, Interpolation
 from anim.optimization.options import Objective, Packing
-from anim.optimization.search.solution import Solution, value_bytes
-from anim.optimization.tracks.lossless import INT16
+from anim.optimization.search.plan import Solution, value_bytes
+from anim.optimization.tracks.key_reduction import INT16
 from anim.optimization.tracks.quantization import BYTE_COSTS, EncodedKeys, Encoding, encode_all
 from tests.clips import about, clip, track
 

@@ -16,9 +16,8 @@ from anim.maths import quaternion
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Track
 from anim.optimization.optimize import optimize
-from anim.optimization.options import Bounds, Drop, Packing, Policy
-from anim.optimization.request import Request
-from anim.optimization.tracks.loop_closure import close_ends, closure_sign, opened_tracks
+from anim.optimization.options import Bounds, Drop, Packing, Policy, Request
+from anim.optimization.tracks.clip_ends import close_ends, closure_sign, opened_tracks
 from tests.clips import STEP, about, clip, track
 from tests.files import glb_of, opened, opened_fixture
 

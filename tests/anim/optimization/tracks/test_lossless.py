@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import FLOAT32, Interpolation, Track
-from anim.optimization.tracks.lossless import INT16, reduce_lossless
+from anim.optimization.tracks.key_reduction import INT16, reduce_lossless
 from anim.sampling.track import sample
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, track
 

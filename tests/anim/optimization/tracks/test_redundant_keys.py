@@ -11,9 +11,8 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.track_statistics import stats
 from anim.model import Clip
 from anim.optimization.optimize import Optimized, optimize
-from anim.optimization.options import Bounds, Packing, Policy
-from anim.optimization.request import Request
-from anim.optimization.search.solution import Solution
+from anim.optimization.options import Bounds, Packing, Policy, Request
+from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.sampling.concatenation import concatenate

@@ -10,7 +10,7 @@ from PIL import Image
 
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
-from anim.show.filmstrip import heat_map, image_file
+from anim.show.filmstrip import image_file, palette
 from anim.show.filmstrip.camera import fit_camera
 from anim.show.filmstrip.rasterizer import visible_faces
 from anim.show.filmstrip.renderer import round_down
@@ -97,10 +97,10 @@ def test_pillow_reads_the_png(shape: tuple[int, int, int]) -> None:
 
 
 def test_heat_gets_darker_and_ends_at_the_farthest() -> None:
-    colors = heat_map.colors(np.linspace(0, 1, 50))
+    colors = palette.colors(np.linspace(0, 1, 50))
     assert (np.diff(colors.sum(axis=1)) < 0).sum() > 40
-    assert heat_map.heat_colors(np.array([0.0, 0, 0]), np.array([[0, 1, 2]]), 0.0) == pytest.approx(heat_map.STOPS[:1])
-    assert heat_map.heat_colors(np.array([2.0, 2, 2]), np.array([[0, 1, 2]]), 2.0) == pytest.approx(heat_map.STOPS[-1:])
+    assert palette.heat_colors(np.array([0.0, 0, 0]), np.array([[0, 1, 2]]), 0.0) == pytest.approx(palette.STOPS[:1])
+    assert palette.heat_colors(np.array([2.0, 2, 2]), np.array([[0, 1, 2]]), 2.0) == pytest.approx(palette.STOPS[-1:])
 
 
 @pytest.mark.parametrize(("length", "step"), [(1.0, 1.0), (0.99, 0.5), (19, 10), (5.1, 5), (0.0021, 0.002)])

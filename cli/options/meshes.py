@@ -1,7 +1,8 @@
-"""Selection of meshes: `--mesh GLOB`, `--hide GLOB`."""
+"""Options on meshes: selection, and skinning method."""
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -9,6 +10,7 @@ import typer
 from anim.exchange.retarget.ground_contact import with_descendants
 from anim.model import Scene
 from anim.operations.selection import match_names
+from anim.skinning.methods.registry import SKINNING_METHODS
 
 Meshes = Annotated[
     list[str] | None,
@@ -21,6 +23,8 @@ Hidden = Annotated[
         "--hide", metavar="GLOB", help="Leave out meshes of this name, and all on or below a node of this name."
     ),
 ]
+Method = StrEnum("Method", [(name, name) for name in SKINNING_METHODS])  # type: ignore[misc]
+ABOUT = "; ".join(f"{name}: {method.about}" for name, method in SKINNING_METHODS.items()) + "."
 
 
 def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:

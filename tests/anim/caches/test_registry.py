@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from anim.caches.registry import CACHE_FORMATS
-from anim.caches.sniffing import HEAD, sniff_format
+from anim.caches.registry import CACHE_FORMATS, HEAD, sniff_format
 from anim.caches.transforms.resample import at_time
 from anim.errors import FormatError
 from tests.anim.caches.making import FACES, cache, written

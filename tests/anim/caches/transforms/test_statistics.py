@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.caches.transforms import frame_spacing
+from anim.caches.transforms import statistics
 from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import FACES, written
 
@@ -22,7 +22,7 @@ from tests.anim.caches.making import FACES, written
     ],
 )
 def test_notes(times: list[float], words: str) -> None:
-    assert frame_spacing.notes(np.array(times)) == ((words,) if words else ())
+    assert statistics.notes(np.array(times)) == ((words,) if words else ())
 
 
 @pytest.mark.parametrize(("name", "is_said"), [("a.ply", 1), ("a.stl", 1), ("a.png", 1), ("a.npz", 0), ("a.mdd", 0)])
