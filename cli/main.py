@@ -30,7 +30,7 @@ class CommandInfo(NamedTuple):
 
 COMMANDS = {
     "inspect": CommandInfo(
-        "Show what is in a file and whether it is healthy.",
+        "Show the contents of files, with findings and advice.",
         (
             "gltf-anim inspect walk.glb",
             "gltf-anim inspect *.glb --format json > report.json",
@@ -39,7 +39,7 @@ COMMANDS = {
         ),
     ),
     "sample": CommandInfo(
-        "Give the pose of every node at chosen times.",
+        "Sample the pose of every node at chosen times.",
         (
             "gltf-anim sample walk.glb --at 0.5",
             "gltf-anim sample walk.glb poses.npz --fps 60 --space world",
@@ -47,7 +47,7 @@ COMMANDS = {
         ),
     ),
     "resample": CommandInfo(
-        "Put the keys of clips on a regular grid of frames.",
+        "Resample clips to a regular grid of frames.",
         (
             "gltf-anim resample walk.glb walk30.glb --fps 30",
             "gltf-anim resample hero.glb hero.glb --fps 24 --clip 'Run*' --dry-run",
@@ -55,7 +55,7 @@ COMMANDS = {
         ),
     ),
     "from-euler": CommandInfo(
-        "Turn Euler tracks (BVH, CSV, JSON curves) into glTF.",
+        "Convert Euler tracks (BVH, CSV, JSON) to glTF.",
         (
             "gltf-anim from-euler walk.bvh walk.glb --skeleton-mesh sticks",
             "gltf-anim from-euler walk.bvh hero-walk.glb --onto hero.glb --fail-unmatched 12",
@@ -63,7 +63,7 @@ COMMANDS = {
         ),
     ),
     "to-euler": CommandInfo(
-        "Write a clip as Euler curves: BVH, CSV or JSON.",
+        "Write a clip as continuous Euler curves: BVH, CSV or JSON.",
         (
             "gltf-anim to-euler hero.glb walk.bvh --clip walk --fps 30",
             "gltf-anim to-euler door.glb door.csv --order XYZ --axes extrinsic",
@@ -71,7 +71,7 @@ COMMANDS = {
         ),
     ),
     "ease": CommandInfo(
-        "Give motion another tempo between the same keys.",
+        "Change the speed of motion between keys by an easing.",
         (
             "gltf-anim ease --list",
             "gltf-anim ease poses.glb eased.glb --ease smoothstep",
@@ -79,7 +79,7 @@ COMMANDS = {
         ),
     ),
     "spline": CommandInfo(
-        "Join keys by a smooth curve, by a choice of tangent rules.",
+        "Put smooth curves through keys, by a tangent rule.",
         (
             "gltf-anim spline poses.glb smooth.glb",
             "gltf-anim spline walk.glb loop.glb --tangents natural --cyclic",
@@ -87,7 +87,7 @@ COMMANDS = {
         ),
     ),
     "retime": CommandInfo(
-        "Stretch, reverse or warp the seconds of clips.",
+        "Change the timing of clips: speed, duration, direction, delay.",
         (
             "gltf-anim retime walk.glb slow.glb --speed 0.25",
             "gltf-anim retime walk.glb back.glb --reverse --clip walk",
@@ -95,11 +95,11 @@ COMMANDS = {
         ),
     ),
     "trim": CommandInfo(
-        "Keep a part of a clip, with exact ends.",
+        "Keep one time range of clips.",
         ("gltf-anim trim walk.glb step.glb --from 0.25 --to 0.75 --rebase",),
     ),
     "loop": CommandInfo(
-        "Say whether a clip loops, and close it.",
+        "Report whether clips loop, and close them.",
         (
             "gltf-anim loop walk.glb",
             "gltf-anim loop walk.glb --find --format json",
@@ -107,7 +107,7 @@ COMMANDS = {
         ),
     ),
     "bake": CommandInfo(
-        "Bake skinning by LBS, dual quaternions or centers of rotation to vertex caches.",
+        "Bake skinning and morph targets to vertex caches.",
         (
             "gltf-anim bake walk.glb walk.npz --method dqs --fps 30",
             "gltf-anim bake hero.glb 'caches/{clip}.usdc' --fps 24 --normals",
@@ -115,7 +115,7 @@ COMMANDS = {
         ),
     ),
     "plot": CommandInfo(
-        "See the curves of tracks, of eases, and of tangent rules.",
+        "Plot the curves of tracks, of easings, or of tangent rules.",
         (
             "gltf-anim plot walk.glb walk.png --clip walk --node 'Hip*'",
             "gltf-anim plot walk.glb walk.svg --compare walk30.glb --path rotation",
@@ -124,7 +124,7 @@ COMMANDS = {
         ),
     ),
     "collapse": CommandInfo(
-        "Say where skin collapses when joints turn, and what other methods make of it.",
+        "Find where skin collapses, and compare skinning methods.",
         (
             "gltf-anim collapse hero.glb",
             "gltf-anim collapse hero.glb --clip 'Attack*' --method lbs --method cor --format json",
@@ -132,7 +132,7 @@ COMMANDS = {
         ),
     ),
     "convert-cache": CommandInfo(
-        "Change a vertex cache into another format, frame by frame.",
+        "Convert a vertex cache to another format.",
         (
             "gltf-anim convert-cache walk.npz walk.pc2 --up z --vertex-order blender",
             "gltf-anim convert-cache walk.npz walk.glb --max-error 0.5mm --quantize",
@@ -140,7 +140,7 @@ COMMANDS = {
         ),
     ),
     "render": CommandInfo(
-        "Draw a clip as a filmstrip.",
+        "Draw clips as a filmstrip or as an animated image.",
         (
             "gltf-anim render walk.glb walk.png",
             "gltf-anim render arm.glb twist.png --method lbs --method dqs --heat --clip twist",
@@ -157,7 +157,7 @@ COMMANDS = {
         ),
     ),
     "diff": CommandInfo(
-        "Say how far apart the motion of two files is.",
+        "Measure the difference between the motion of two files.",
         (
             "gltf-anim diff walk.glb walk30.glb",
             "gltf-anim diff walk.glb walk30.glb --plot error.png --player three",
@@ -165,7 +165,7 @@ COMMANDS = {
         ),
     ),
     "convert": CommandInfo(
-        "Change between .glb and .gltf, and nothing else.",
+        "Convert between .glb and .gltf; nothing else changes.",
         ("gltf-anim convert walk.glb walk.gltf", "gltf-anim convert scene/walk.gltf - | gltf-anim inspect"),
     ),
 }
@@ -224,8 +224,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="IN and OUT may be '-' for a pipe (GLB). Exit codes: 0 done, 2 usage, 3 bad input, or a file that can't be "
-    "read or written, 4 not handled, 5 no such clip or node, 6 a check said no.",
+    epilog="IN and OUT may be '-' for a pipe (GLB). Exit codes: 0 done, 2 wrong usage, 3 invalid input, or a file that "
+    "can't be read or written, 4 unsupported input, 5 no such clip, node or mesh, 6 a check failed.",
 )
 
 
@@ -243,7 +243,7 @@ def gltf_anim(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """The command-line workbench for glTF 2.0 animation: look into clips, change them, bake them, draw them."""
+    """The command-line workbench for glTF 2.0 animation: inspect, edit, bake and draw clips."""
 
 
 def main() -> None:

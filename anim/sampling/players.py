@@ -148,15 +148,15 @@ def _stored_arc(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
 GLTF = "spec"  # the player that normalizes keys first; arcs between them are of unit length
 
 PLAYERS = {
-    GLTF: PlayerModel("as glTF says: slerp of normalized keys", _slerp_arc),
+    GLTF: PlayerModel("glTF: slerp of normalized keys", _slerp_arc),
     "three": PlayerModel(
-        "three.js: slerp of keys as stored, normalized only where they are near each other",
+        "three.js: slerp of keys as stored, normalized only if they are close",
         _three_arc,
         _three_slerp,
         False,
     ),
     "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _babylon_arc, _babylon_slerp, False),
-    "nlerp": PlayerModel("Unity (glTFast), Blender: component by component, then normalized", _chord_arc, _chord),
+    "nlerp": PlayerModel("Unity (glTFast), Blender: linear by component, then normalized", _chord_arc, _chord),
 }
 
 

@@ -52,15 +52,18 @@ def command(
         typer.Option("--blend-weight", metavar="0..1", help="Blend weight of the method against lbs.", min=0, max=1),
     ] = None,
     bulge_clamp: Annotated[
-        bool, typer.Option("--bulge-clamp", help="Limit the distance of skin from its bones to that at rest.")
+        bool,
+        typer.Option(
+            "--bulge-clamp", help="Limit the distance of vertices from their joints' segments to that in the rest pose."
+        ),
     ] = False,
     fps: Annotated[
         float | None,
-        typer.Option("--fps", metavar="N", help="Frames per second; without it one frame per key of the clip."),
+        typer.Option("--fps", metavar="N", help="Frames per second (default: one frame per key of the clip)."),
     ] = None,
     clip: common.Clips = None,
     mesh: meshes.Meshes = None,
-    space: Annotated[Space, typer.Option("--space", help="world: of the scene. mesh: of the mesh's own node.")] = WORLD,
+    space: Annotated[Space, typer.Option("--space", help="world: of the scene; mesh: of the mesh's own node.")] = WORLD,
     normals: Annotated[
         bool, typer.Option("--normals", help=f"Bake normals too ({', '.join(caches.formats_with('normals'))}).")
     ] = False,
@@ -84,14 +87,15 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Bake skinning and morph targets to a vertex cache, by a method that glTF itself can't play.
+    """Bake skinning and morph targets to a vertex cache, also by methods that glTF players lack.
 
-    Vertices come in the order of the scene: nodes depth-first, primitives as in the file, vertices as in their
-    accessors. Skinned meshes are in world space, where their own node doesn't count. Several clips need {clip} in OUT,
-    which is replaced by each name; {mesh} makes a file per mesh.
-    Skin weights that don't add up to 1 are divided by their sum, as players do. Where joints scale unevenly, tools
-    define all methods but lbs differently: here each joint stretches the mesh about its own place, then turns it. A
-    method that loses the model in any frame is warned of.
+    Vertices are in scene order: nodes depth-first, primitives as in the file, vertices as in their accessors. Skinned
+    meshes are in world space, and the transform of their own node is ignored. If there are several clips, OUT must
+    contain {clip}, which is replaced by the name of each; {mesh} in OUT writes a file per mesh.
+
+    Skin weights are divided by their sum, as players do. A warning names methods that move a vertex farther from lbs
+    than the model's size. For joints with non-uniform scale, tools define all methods except lbs differently: here each
+    joint first scales the mesh about its own position, then rotates it.
     """
     voice = Reporter(quiet, verbose)
     began = time.perf_counter()

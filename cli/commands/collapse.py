@@ -33,28 +33,33 @@ def command(
     input: common.Input = "-",
     *,
     method: Annotated[
-        list[Method] | None, typer.Option("--method", help="A method to compare; may be repeated.  [default: lbs, dqs]")
+        list[Method] | None,
+        typer.Option("--method", help="Skinning method to compare; may be repeated.  [default: lbs, dqs]"),
     ] = None,
     bulge_clamp: Annotated[
-        bool, typer.Option("--bulge-clamp", help="Look at methods other than lbs as bake --bulge-clamp makes them.")
+        bool, typer.Option("--bulge-clamp", help="Apply the bulge clamp of bake to methods other than lbs.")
     ] = False,
     fps: Annotated[float, typer.Option("--samples-per-second", metavar="N", help="Samples per second of a clip.")] = 30,
     clip: common.Clips = None,
     mesh: meshes.Meshes = None,
     format: common.Report = Format.TEXT,
     plot: Annotated[
-        str | None, typer.Option("--plot", metavar="OUT", help="Draw index and volume over time into a .png or .svg.")
+        str | None, typer.Option("--plot", metavar="OUT", help="Plot index and volume over time: a .png or .svg file.")
     ] = None,
     quiet: common.Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every mesh, not the worst of each clip.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="List every mesh, not only the worst one of each clip.")
+    ] = False,
 ) -> None:
-    """Say where skin collapses when joints twist and bend, and what other methods make of it.
+    """Find where skin collapses as joints twist and bend, and compare skinning methods.
 
-    The collapse index is what linear blending leaves of the radius around a vertex: 1 is rigid, 0.71 a quarter turn
-    between two joints, 0 a candy wrapper. It needs no closed mesh. Where parts of a mesh are closed, the volume that
-    they enclose is compared method by method, against that in bind pose. A clip pinches where an index falls below
-    0.7, or where linear blending leaves less than 90 % of the volume and another method more. Bulge is the greatest
-    distance of a vertex from the links between its joints, against that in bind pose. Below: what to do.
+    The collapse index is the fraction of the radius around a vertex that linear blend skinning preserves: 1 for a rigid
+    motion, 0.71 for a rotation of 90° between two joints, 0 for a candy wrapper. It needs no closed mesh. For closed
+    parts of a mesh, the volume enclosed by each method is compared with that of the bind pose. Bulge is the largest
+    distance of a vertex from the segments between its joints, relative to the bind pose.
+
+    A clip collapses if an index is below 0.7, or if linear blend skinning preserves less than 90 % of the volume and
+    another method preserves more. Recommendations follow the table.
     """
     _check(fps, plot)
     voice = Reporter(quiet)

@@ -18,17 +18,15 @@ def command(
     input: common.Input = "-",
     output: common.Output = "-",
     *,
-    embed: Annotated[
-        bool, typer.Option("--embed", help="Take external images into the file, if they are there.")
-    ] = False,
+    embed: Annotated[bool, typer.Option("--embed", help="Embed external images, if their files exist.")] = False,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> None:
-    """Change between .glb and .gltf, and nothing else.
+    """Convert between .glb and .gltf; nothing else changes.
 
-    A .glb holds buffer 0 in its binary chunk, further buffers as data URIs; a .gltf writes its .bin beside it. The rest
-    of the JSON stays as it is: numbers, order, extras, unknown extensions. In another folder external images are copied
-    beside the output.
+    A .glb contains buffer 0 in its binary chunk, and further buffers as data URIs. A .gltf has a companion .bin file.
+    The rest of the JSON stays: numbers, order, extras, unknown extensions. If the output is in another folder, external
+    images are copied beside it.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()

@@ -32,10 +32,12 @@ def command(
     output: caches.Product = "-",
     *,
     format: caches.FormatOption = None,
-    at: Annotated[float | None, typer.Option("--at", metavar="S", help="Only the frame at this time.")] = None,
+    at: Annotated[
+        float | None, typer.Option("--at", metavar="S", help="Write only the frame at this time, in seconds.")
+    ] = None,
     fps: Annotated[
         float | None,
-        typer.Option("--fps", metavar="N", help="Frames per second; linear interpolation between the old frames."),
+        typer.Option("--fps", metavar="N", help="Frames per second; frames are interpolated linearly."),
     ] = None,
     input_fps: Annotated[
         float | None,
@@ -52,14 +54,16 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> None:
-    """Change a vertex cache into another format, frame by frame.
+    """Convert a vertex cache to another format, frame by frame.
 
-    Any length goes in little memory, but for .glb morph targets (1 GB of positions) and textures (4096 × 8192 pixels).
+    Frames are streamed, so caches of any length fit into memory, except .glb morph targets (up to 1 GB of positions)
+    and textures (up to 4096 × 8192 pixels). The extension of a name selects its format. For names without one, IN is
+    recognized by its first bytes, and --format selects that of OUT.
 
-    Formats go by the name's ending, else IN's by its first bytes and OUT's by --format. PC2 and MDD get a rest mesh
-    beside them (walk.pc2-rest.ply) in the same vertex order; for Blender's Mesh Cache modifier use --up z
-    --vertex-order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply. Textures (.exr, .png) get
-    a JSON file and a mesh beside them. A pipe carries one file: no textures, and only one frame of a sequence.
+    PC2 and MDD get a companion rest mesh (walk.pc2-rest.ply) with the same vertex order; for Blender's Mesh Cache
+    modifier use --up z --vertex-order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply.
+    Textures (.exr, .png) get a companion JSON file and mesh. A pipe carries one file: no textures, and only one frame
+    of a sequence.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()

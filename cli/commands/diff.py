@@ -50,12 +50,12 @@ def command(
     *,
     format: common.Report = Format.TEXT,
     plot: Annotated[
-        str | None, typer.Option("--plot", metavar="OUT", help="Draw the error over time: a .png or .svg file.")
+        str | None, typer.Option("--plot", metavar="OUT", help="Plot the error over time: a .png or .svg file.")
     ] = None,
     fail_above: Annotated[
         str | None,
         typer.Option(
-            "--fail-above", metavar="LENGTH", help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the size."
+            "--fail-above", metavar="LENGTH", help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the model's size."
         ),
     ] = None,
     player: Annotated[
@@ -72,24 +72,28 @@ def command(
     shell: Annotated[
         str,
         typer.Option(
-            "--shell", metavar="LENGTH", help="Radius of the probes at nodes without vertices; 0: skip such nodes."
+            "--shell",
+            metavar="LENGTH",
+            help="Distance from nodes without vertices at which their error is measured; 0: ignore such nodes.",
         ),
     ] = "1%",
     clip: common.Clips = None,
     quiet: common.Quiet = False,
 ) -> None:
-    """Say how far apart the motion of two files is, in metres on the surface.
+    """Measure the difference between the motion of two files, in metres on the surface.
 
-    Clips and nodes are matched by name, then by order. A's vertices are carried through both files, by B's joints as
-    they stand in B: quantized, merged and reordered meshes don't count as motion. Nodes that move no vertex count by
-    six points around them. Looked at: all keys of both, half-way between, and a grid of 120 frames per second.
+    Clips and nodes are matched by name, then by order. A's vertices are moved by the nodes of both files, so that
+    quantized, merged or reordered meshes do not count as motion. Nodes that move no vertex are measured at six points
+    around them (--shell). Errors are measured at all keys of both files, half-way between, and at 120 samples per
+    second.
 
-    Per clip, worst first: the largest distance with joint, vertex and time; p99 and mean over all vertices; the largest
-    turn of a node against the world; the largest difference in speed (jitter), in morph weights, in pointers (of their
-    range); ends that differ, and tracks that only A (−) or only B (+) has. --fail-above also says no where B lacks a
-    clip, and where there are none to compare. --player plays rotations as others than glTF's own rule do; keys that
-    are not of unit length show there. --players spec,nlerp holds one file against itself as two players show it: slerp
-    against nlerp.
+    Per clip, worst first: the largest error with joint, vertex and time; p99 and mean over all vertices; the largest
+    rotation error of a node in world space; the largest error of speed (jitter), of morph weights, and of pointers (as
+    a fraction of their range); end times that differ; the number of tracks that only A (−) or only B (+) has.
+
+    --fail-above also fails if B lacks a clip, and if there is no clip to compare. --player interpolates as other
+    players do, which differs for keys that are not of unit length. --players spec,nlerp compares one file in two
+    players.
     """
     voice, selection = Reporter(quiet), Selection(clip or ())
     who = _players(new, str(player), players)

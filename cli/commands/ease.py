@@ -41,9 +41,12 @@ def command(
     output: common.Output = "-",
     *,
     ease: Annotated[
-        str, typer.Option("--ease", metavar="NAME", help="smoothstep, quad-in-out, 'cubic-bezier(.2,0,0,1)', …")
+        str,
+        typer.Option(
+            "--ease", metavar="NAME", help="Easing: smoothstep, quad-in-out, 'cubic-bezier(.2,0,0,1)', …; see --list."
+        ),
     ] = "smoothstep",
-    list_eases: Annotated[bool, typer.Option("--list", help="Show all eases with their shapes.")] = False,
+    list_eases: Annotated[bool, typer.Option("--list", help="List all easings with their shapes.")] = False,
     per: Annotated[Per, typer.Option("--per", help="Ease every key interval, or the whole range once.")] = Per.SEGMENT,
     start: common.From = None,
     end: common.To = None,
@@ -51,15 +54,18 @@ def command(
         str,
         typer.Option(
             "--tolerance",
-            metavar="SHARE",
-            help="Maximum error for easings that are not cubic: fraction of a key interval's range.",
+            metavar="FRACTION",
+            help="Maximum error of easings that are not cubic, as a fraction of each key interval's range.",
         ),
     ] = "0.1%",
     angle_tolerance: Annotated[
         str, typer.Option("--angle-tolerance", metavar="ANGLE", help="The same for rotations: 0.05deg, 0.001rad.")
     ] = "0.05deg",
     interpolation: Annotated[
-        Interpolation, typer.Option("--interpolation", help="cubicspline needs few keys, linear plays everywhere.")
+        Interpolation,
+        typer.Option(
+            "--interpolation", help="Interpolation of new keys: cubicspline needs fewer, linear plays everywhere."
+        ),
     ] = CUBIC,
     clip: common.Clips = None,
     node: common.Nodes = None,
@@ -68,12 +74,14 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Give motion another tempo between the same keys.
+    """Change the speed of motion between keys by an easing.
 
-    --per segment eases every piece from key to key: same values, same path, new tempo. --per range runs once through
-    all keys from --from to --to with one ease. Cubic eases (smoothstep, quad, cubic, back, bounce, hermite) are written
-    exactly as CUBICSPLINE, others with the fewest keys within --tolerance; steps become STEP. STEP tracks hold on
-    purpose and stay. Overshooting eases go beyond the keys; what that does to scale and weights is reported.
+    --per segment eases every key interval: the values of the keys and the path between them stay, only the speed along
+    the path changes. --per range eases the whole range from --from to --to once, through all its keys.
+
+    Cubic easings (smoothstep, quad, cubic, back, bounce, hermite) are written exactly as CUBICSPLINE, others with as
+    few keys as --tolerance allows; steps() becomes STEP. STEP tracks stay unchanged. Easings that overshoot exceed the
+    values of the keys; the effect on scale and weights is reported.
     """
     if list_eases:
         documents.write_text(_table())

@@ -60,7 +60,7 @@ def command(
     *,
     order: Annotated[
         str | None,
-        typer.Option("--order", metavar="ORDER", help="Rotation order, as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
+        typer.Option("--order", metavar="ORDER", help="Rotation order as written: XYZ … ZYX, XYX … ZYZ (CSV, JSON)."),
     ] = None,
     axes: Annotated[
         AxesConvention | None,
@@ -72,52 +72,60 @@ def command(
     ] = KeyPlacement.AUTO,
     angle_tolerance: Annotated[
         str,
-        typer.Option(
-            "--angle-tolerance", metavar="ANGLE", help="Maximum angle between slerp and the Euler motion: 0.05deg."
-        ),
+        typer.Option("--angle-tolerance", metavar="ANGLE", help="Maximum angle between slerp and the Euler motion."),
     ] = "0.05deg",
     scale: Annotated[
         float | None,
-        typer.Option("--scale", metavar="N", help="Meters per unit, times the file's; for BVH guessed."),
+        typer.Option("--scale", metavar="N", help="Meters per unit; multiplies the file's own value. Guessed for BVH."),
     ] = None,
-    up: Annotated[Up, typer.Option("--up", help="Axis of the source that points up.")] = Up.Y,
+    up: Annotated[Up, typer.Option("--up", help="Up axis of the source.")] = Up.Y,
     bvh_position: Annotated[
-        BvhPosition, typer.Option("--bvh-position", help="BVH positions replace the OFFSET, or add to it.")
+        BvhPosition,
+        typer.Option("--bvh-position", help="BVH positions replace the OFFSET of a joint, or are added to it."),
     ] = BvhPosition.REPLACE,
     mesh: Annotated[Mesh, typer.Option("--skeleton-mesh", help="Mesh of the new skeleton.")] = Mesh.NONE,
     onto: Annotated[
-        str | None, typer.Option("--onto", metavar="FILE", help="Put the motion on this character, a glTF.")
+        str | None, typer.Option("--onto", metavar="FILE", help="Character to transfer the motion to, a glTF file.")
     ] = None,
     alias: Annotated[
-        str | None, typer.Option("--alias", metavar="FILE", help="--onto: names, CSV 'source,target' or JSON.")
+        str | None,
+        typer.Option("--alias", metavar="FILE", help="For --onto: pairs of joint names, CSV 'source,target' or JSON."),
     ] = None,
     fail_unmatched: Annotated[
-        int | None, typer.Option("--fail-unmatched", metavar="N", help="Exit 6 if over N joints are unmatched.", min=0)
+        int | None,
+        typer.Option(
+            "--fail-unmatched", metavar="N", help="For --onto: exit 6 if more than N joints are unmatched.", min=0
+        ),
     ] = None,
     floor: Annotated[
-        GroundMode, typer.Option("--floor", help="--onto: soles on the floor, or heights scaled and no more.")
+        GroundMode,
+        typer.Option("--floor", help="For --onto: keep the contact of soles with the floor, or only scale heights."),
     ] = GroundMode.CONTACT,
     bind_time: Annotated[
         float | None,
-        typer.Option("--bind-time", metavar="S", help="--onto: time of the source's rest pose, in seconds."),
+        typer.Option("--bind-time", metavar="S", help="For --onto: time of the source's rest pose, in seconds."),
     ] = None,
-    name: Annotated[str | None, typer.Option("--name", help="Name of the clip; else the file's.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Name of the clip (default: from the source).")] = None,
     replace: Annotated[
         str | None,
-        typer.Option("--replace", metavar="CLIP", help="--onto: clip to replace, by name or '#3'."),
+        typer.Option("--replace", metavar="CLIP", help="For --onto: clip to replace, by name or '#3'."),
     ] = None,
-    format: Annotated[Format, typer.Option("--format", help="Report as text on stderr, or JSON.")] = Format.TEXT,
+    format: Annotated[
+        Format, typer.Option("--format", help="Report format: text on stderr, or JSON on stdout.")
+    ] = Format.TEXT,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Turn Euler tracks into glTF: BVH, or CSV or JSON curves.
+    """Convert Euler tracks to glTF: BVH, or CSV or JSON curves.
 
-    Every axis is evaluated on its own keys, the axes are combined as --order and --axes say, and keys are placed so
-    that slerp follows the motion between them too. A BVH says its order itself, and keeps its frames. Without --onto a
-    skeleton is made; with it, joints are matched by name and the motion is put on the character, with regard to both
-    rest poses and sizes. -v lists how near each joint comes to gimbal lock, and the matched joints, or all
-    names where none match. README shows what CSV and JSON look like.
+    Each axis is evaluated on its own keys, the angles are combined by --order and --axes, and keys are placed so that
+    slerp follows the motion between them. A BVH specifies its own order and keeps its frames.
+
+    Without --onto, a new skeleton is made. With --onto, joints are matched by name, and the motion is transferred to
+    the character; differences of rest pose and size are taken into account. -v lists the smallest distance of each
+    joint to gimbal lock, and the matched joints, or all names if none match. The README describes the CSV and JSON
+    formats.
     """
     began = time.perf_counter()
     voice = text.Reporter(quiet, verbose)

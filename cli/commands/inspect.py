@@ -43,33 +43,31 @@ class Format(StrEnum):
 
 def command(
     inputs: Annotated[
-        list[str] | None, typer.Argument(metavar="FILE", help="Files, '-' for stdin.", show_default=False)
+        list[str] | None, typer.Argument(metavar="FILE", help="Files to inspect; '-' for stdin.", show_default=False)
     ] = None,
     *,
-    format: Annotated[
-        Format, typer.Option("--format", help="Text to read, or one JSON or CSV document.")
-    ] = Format.TEXT,
-    tracks: Annotated[bool, typer.Option("--tracks", help="List every track, not only clips.")] = False,
+    format: Annotated[Format, typer.Option("--format", help="Text, or one JSON or CSV document.")] = Format.TEXT,
+    tracks: Annotated[bool, typer.Option("--tracks", help="List every track.")] = False,
     continuity: Annotated[
-        bool, typer.Option("--continuity", help="Say how smooth every track is at its keys: jumps, C0, G1, C1, C2.")
+        bool, typer.Option("--continuity", help="Classify the keys of every track by continuity: jump, C0, G1, C1, C2.")
     ] = False,
     fail_on: Annotated[
         Severity | None,
-        typer.Option("--fail-on", help="Exit 6 where a finding is this bad or worse.", show_default=False),
+        typer.Option("--fail-on", help="Exit 6 if a finding has this severity or a worse one.", show_default=False),
     ] = None,
     clip: common.Clips = None,
     quiet: common.Quiet = False,
 ) -> int:
-    """Show what is in a file and whether it is healthy.
+    """Show the contents of files, with findings and advice.
 
     Per clip: length, tracks by path (translation/rotation/scale/weights/pointer), keys, estimated frame rate, bytes,
-    tracks that do nothing, keys that say nothing, the seam of a loop, the speed of the root. Per skin: joints,
-    influences, weights. Below: findings, with what to do. Of a broken file the parts that can be read are
-    shown, and what is wrong with the rest; the exit code is then 3, of several files the worst. --fail-on makes it a
-    gate; with -q the text is left out.
+    tracks without effect, redundant keys, loop gap, and speed of the root. Per skin: joints, influences, weights.
+    Findings follow, each with advice. Broken files are shown as far as they can be read, with exit code 3; for several
+    files the highest code counts. --fail-on turns findings into exit code 6; -q leaves out the text.
 
-    --continuity counts, per track, the keys between its ends by what jumps there: the value (jump), the speed (C0, or
-    G1 where the direction goes on), the acceleration (C1), or nothing (C2), and names the largest jump of each.
+    --continuity counts the keys inside each track by what is discontinuous there: the value (jump), the velocity (C0,
+    or G1 if its direction is continuous), the acceleration (C1), or nothing of these (C2). It lists the largest change
+    of each kind.
     """
     selection = Selection(clip or ())
     done: list[Inspected] = []

@@ -28,7 +28,7 @@ from cli.text import Reporter, format_length, format_speed
 from cli.workflows.edit_clips import edit_clips
 
 SCHEMA = 1
-HELP = "--blend S closes over the last S seconds; --clip leaves others alone"
+HELP = "--blend S closes the loop over the last S seconds; --clip selects clips"
 MAX_NAMES = 3  # joints that a table or a message lists
 
 
@@ -36,16 +36,23 @@ def command(
     input: common.Input = "-",
     output: Annotated[
         str | None,
-        typer.Argument(metavar="OUT", help="Where the closed loop goes; without it: report.", show_default=False),
+        typer.Argument(
+            metavar="OUT",
+            help="A .glb or .gltf file for the closed clips, '-' for stdout; without it, a report.",
+            show_default=False,
+        ),
     ] = None,
     *,
     blend: Annotated[
         float | None,
-        typer.Option("--blend", metavar="S", help="Bend the last S seconds to end as it starts."),
+        typer.Option("--blend", metavar="S", help="Close the loop over the last S seconds of the clip."),
     ] = None,
-    find: Annotated[bool, typer.Option("--find", help="Report the parts that loop best.")] = False,
+    find: Annotated[bool, typer.Option("--find", help="List the time ranges that loop best.")] = False,
     shortest: Annotated[
-        float | None, typer.Option("--shortest", metavar="S", help="For --find; half of the clip by default.")
+        float | None,
+        typer.Option(
+            "--shortest", metavar="S", help="For --find: minimum duration in seconds (default: half of the clip)."
+        ),
     ] = None,
     format: common.Report = Format.TEXT,
     clip: common.Clips = None,
@@ -53,16 +60,18 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Say what kind of loop a clip is, and close it.
+    """Report whether clips loop, and close them.
 
-    Without OUT and --blend: a report per clip: closed; closed except some joints, which are named; open by one frame
-    (its last frame is missing); not a loop; or a single pose. The seam in pose and in speed is measured on the skin,
-    with the way of a traveling root taken off; nodes that move no vertex, like IK controls, don't count, and where no
-    mesh has a vertex all nodes do. "per frame" is the largest motion from one frame to the next, "inside" the largest
-    change of speed at a key inside, on the same vertices: a seam that is much smaller is hardly seen. With OUT:
-    an open loop gets its missing frame; --blend closes any seam in value and speed over the last seconds; where only
-    some joints stay open, it bends these and leaves all others as they are. --find looks for the best part: trim it; a
-    line says where no part loops better than the whole clip.
+    Without OUT and --blend, each clip is reported as closed; closed except some joints, which are named; open by one
+    frame (the last frame is missing); not a loop; or a single pose. "loop gap" and "velocity gap" are the differences
+    between its end and its start, measured on the skin, without root motion. Nodes that move no vertex, such as IK
+    controls, are ignored unless no mesh has vertices. For comparison, "frame step" is the largest motion from one frame
+    to the next, and "velocity step" the largest change of velocity at a key inside the clip: a much smaller gap is
+    hardly visible.
+
+    With OUT, a clip that is open by one frame gets the missing frame. --blend closes any gap of value and velocity; if
+    only some joints are open, it changes only these. --find lists the time ranges that loop best, for trim, and names
+    the clips in which no range loops better than the whole clip.
     """
     selection = Selection(clip or ())
     voice = Reporter(quiet, verbose)
@@ -70,7 +79,7 @@ def command(
         _report(input, selection, voice, find=find, shortest=shortest, format=format)
         return
     if find:
-        raise UsageError("--find only reports", help="trim --from … --to … the part that it names")
+        raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
     closing_of = _Closing(blend, input)
     edit_clips(input, output or documents.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
 
@@ -105,7 +114,7 @@ class _Closing:
         if self._problems:
             raise UsageError(f"{self._path}: {'; '.join(self._problems)}", help=HELP)
         if self._poses:
-            yield f"a single pose, with nothing to close: {', '.join(self._poses)}"
+            yield f"a single pose, without a loop to close: {', '.join(self._poses)}"
 
 
 def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float | None) -> Clip:
@@ -125,7 +134,7 @@ def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float |
 
 def _problem(found: Loop) -> str:
     if found.kind is LoopKind.CLOSED_EXCEPT:
-        return f"closes except at {_names(found, quote=True)}: its end is {format_length(found.seam)} from its start"
+        return f"is closed except at {_names(found, quote=True)}: its end is {format_length(found.seam)} from its start"
     return f"is not a loop: its end is {format_length(found.seam)} from its start at '{found.node}'"
 
 
@@ -170,14 +179,14 @@ def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> It
 def _why_none(clip: Clip, parts: list[Loop]) -> str:
     """Reason for which no part of a clip is worth trimming, "" if one is. parts: the best first."""
     if clip.end <= clip.start:
-        return "a single pose, with no part to find"
+        return "a single pose, without a range to find"
     if not parts:
-        return "no part is as long as --shortest"
+        return "no time range is as long as --shortest"
     if all(each.kind is LoopKind.NOT_A_LOOP for each in parts):
-        return "no part is a loop"
+        return "no time range loops"
     best = parts[0]
     is_whole = max(abs(best.start - clip.start), abs(best.end - clip.end)) < 0.5 / best.fps
-    return "no part loops better than the whole clip" if is_whole else ""
+    return "no time range loops better than the whole clip" if is_whole else ""
 
 
 def _skin(source: Source, voice: Reporter) -> SkinMotion:
@@ -195,12 +204,12 @@ def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
         "clip",
         "seconds",
         "kind",
-        "seam" if on_skin else "seam (nodes)",
-        "per frame",
-        "in speed",
-        "inside",
+        "loop gap" if on_skin else "loop gap (nodes)",
+        "frame step",
+        "velocity gap",
+        "velocity step",
         "at",
-        "travel",
+        "root motion",
     ]
     cells: list[list[tables.Cell]] = [
         [

@@ -56,7 +56,8 @@ def command(
         typer.Option(
             "--max-error",
             metavar="LENGTH",
-            help="How far any vertex may move: 0.5mm, 2cm, 0 (without loss), 0.01% of the size (without this option).",
+            help="Maximum error of any vertex: 0.5mm, 2cm, 0 (lossless), or a part of the model's size; "
+            "0.01% by default.",
         ),
     ] = None,
     max_bytes: Annotated[
@@ -64,60 +65,83 @@ def command(
         typer.Option(
             "--max-bytes",
             metavar="N",
-            help="The smallest error found, up to --max-error if that is given, for a file of 800kB.",
+            help="Maximum file size, like 800kB: the smallest error found that fits, up to --max-error if given.",
         ),
     ] = None,
     meshopt: Annotated[
         Meshopt | None,
-        typer.Option("--meshopt", help="Compress too: EXT_ or KHR_meshopt_compression.", show_default=False),
+        typer.Option("--meshopt", help="Compress by EXT_ or KHR_meshopt_compression too.", show_default=False),
     ] = None,
     drop: Annotated[
         Drop,
-        typer.Option("--drop", help="Channels at rest that may go: in each clip; if in all clips; none."),
+        typer.Option(
+            "--drop",
+            help="Channels equal to the rest pose that are dropped: rest: in each clip; unused: if in all "
+            "clips; never: none.",
+        ),
     ] = Drop.UNUSED,
     rebase_rest: Annotated[
-        bool, typer.Option("--rebase-rest", help="Move the rest pose to where most clips hold it.")
+        bool, typer.Option("--rebase-rest", help="Move the rest pose to the value at which most clips are constant.")
     ] = False,
     drop_invisible: Annotated[
         bool, typer.Option("--drop-invisible", help="Drop channels of nodes that move no vertex.")
     ] = False,
     keep_node: Annotated[
         list[str] | None,
-        typer.Option("--keep-node", metavar="GLOB", help="Leave the motion of these nodes exact; may be repeated."),
+        typer.Option(
+            "--keep-node", metavar="GLOB", help="Keep the motion of nodes with this name exact; may be repeated."
+        ),
     ] = None,
     reference: Annotated[
-        Reference, typer.Option("--reference", help="Stay near the motion at every moment, or at its keys.")
+        Reference,
+        typer.Option("--reference", help="Measure errors against the motion at all times, or at its keys only."),
     ] = Reference.CURVE,
     shell: Annotated[
-        str, typer.Option("--shell", metavar="LENGTH", help="How far around nodes without vertices errors count.")
+        str,
+        typer.Option(
+            "--shell", metavar="LENGTH", help="Distance from nodes without vertices at which their error is measured."
+        ),
     ] = "1%",
     max_pointer_error: Annotated[
-        str, typer.Option("--max-pointer-error", metavar="SHARE", help="Of the range of tracks that move no node.")
+        str,
+        typer.Option(
+            "--max-pointer-error",
+            metavar="FRACTION",
+            help="Maximum error of tracks that move no node, as a fraction of their range.",
+        ),
     ] = "0.01%",
     max_angle: Annotated[
-        str | None, typer.Option("--max-angle", metavar="ANGLE", help="No node may be turned by more: 0.5deg.")
+        str | None,
+        typer.Option("--max-angle", metavar="ANGLE", help="Maximum rotation error of any node, like 0.5deg."),
     ] = None,
     max_speed_error: Annotated[
         str | None,
-        typer.Option("--max-speed-error", metavar="LENGTH", help="Per second, of any vertex: 5mm (against jitter)."),
+        typer.Option(
+            "--max-speed-error",
+            metavar="LENGTH",
+            help="Maximum speed error of any vertex, per second: 5mm (against jitter).",
+        ),
     ] = None,
     player: Annotated[
-        Player, typer.Option("--player", help="The bound holds in any player, or in those that slerp as glTF says.")
+        Player,
+        typer.Option("--player", help="Players in which the bound holds: any, or those that slerp as glTF specifies."),
     ] = Player.ANY,
     objective: Annotated[
-        Objective, typer.Option("--objective", help="Fewest bytes as a file, or after gzip.")
+        Objective, typer.Option("--objective", help="Size to minimize: of the file, or of the file after gzip.")
     ] = Objective.FILE,
-    effort: Annotated[Effort, typer.Option("--effort", help="How long to search.")] = BALANCED,
-    workers: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes; 0: one per core.")] = 0,
+    effort: Annotated[Effort, typer.Option("--effort", help="Search effort: more is smaller and slower.")] = BALANCED,
+    workers: Annotated[
+        int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Number of processes; 0: one per core.")
+    ] = 0,
     report: Annotated[
-        str | None, typer.Option("--report", metavar="FILE", help="Write all figures as JSON, '-' for stdout.")
+        str | None, typer.Option("--report", metavar="FILE", help="Write all measurements as JSON; '-' for stdout.")
     ] = None,
     curve_file: Annotated[
         str | None,
         typer.Option(
             "--curve",
             metavar="FILE",
-            help="Animation bytes of all clips against error as .csv, .png or .svg; writes no glTF then.",
+            help="Write the size of animations against error as .csv, .png or .svg, and no glTF.",
         ),
     ] = None,
     clip: common.Clips = None,
@@ -127,13 +151,16 @@ def command(
 ) -> None:
     """Make animations smaller, within an error that no vertex exceeds.
 
-    The bound is kept on every skinned and morphed vertex at every time, in players that slerp and in those that mix
-    quaternions by components, and it is measured on the bytes that are written. A clip for which no lossy way keeps all
-    bounds is kept without loss. Exit 6, and nothing written: --max-bytes can't be met, or what would be written fails
-    its measurement. Every clip stays, with its exact start and end time; its poses there are within the bound, as at
-    all times; loops that are closed stay closed, to the bit. STEP stays STEP. Channels that do nothing go, constants
-    become one key, equal data is shared, keys and time axes are chosen together, rotations become int16.
-    The same command on its own output changes nothing; another bound counts from there, and errors add up.
+    The bound holds for every skinned and morphed vertex at all times, in players that slerp and in players that
+    interpolate quaternions by component. It is measured on the written bytes. Exit 6, with nothing written, if
+    --max-bytes can't be met or the measurement fails.
+
+    Channels without effect are dropped, constant tracks become one key, equal data is shared, keys and time axes are
+    chosen together, and rotations become int16. A clip without a lossy result within all bounds is stored without loss.
+    Clips keep their exact start and end time, closed loops stay closed to the bit, and STEP stays STEP.
+
+    The same command on its own output changes nothing. With another bound it starts from that output, and errors add
+    up.
     """
     began = time.perf_counter()
     voice = Reporter(quiet, verbose)

@@ -44,49 +44,59 @@ def command(
     ] = None,
     *,
     compare: Annotated[
-        str | None, typer.Option("--compare", metavar="FILE", help="Draw the same tracks of a second file on top.")
+        str | None,
+        typer.Option("--compare", metavar="FILE", help="Draw the same tracks of a second file over the first."),
     ] = None,
     ease: Annotated[
-        list[str] | None, typer.Option("--ease", metavar="NAME", help="Draw this ease instead; may be repeated.")
+        list[str] | None,
+        typer.Option("--ease", metavar="NAME", help="Draw this easing instead of tracks; may be repeated."),
     ] = None,
     through: Annotated[
         str | None,
-        typer.Option("--through", metavar="LIST", help="Draw curves through values, 0,0.9,0.2,1, or time:value pairs."),
+        typer.Option(
+            "--through",
+            metavar="LIST",
+            help="Draw curves through values, like 0,0.9,0.2,1, or through time:value pairs.",
+        ),
     ] = None,
     tangents: Annotated[
         list[str] | None,
-        typer.Option("--tangents", metavar="NAME", help="Rule for --through, also linear and step; may be repeated."),
+        typer.Option(
+            "--tangents", metavar="NAME", help="Tangent rule for --through, or linear or step; may be repeated."
+        ),
     ] = None,
     format: Annotated[
-        Format | None, typer.Option("--format", help="Default: by OUT's ending, else png.", show_default=False)
+        Format | None,
+        typer.Option("--format", help="Output format (default: from OUT's extension, else png).", show_default=False),
     ] = None,
     euler: Annotated[
         str | None,
         typer.Option(
             "--euler",
             metavar="ORDER",
-            help="Rotations as Euler angles (XYZ, ZXY …, intrinsic), and how near gimbal lock is.",
+            help="Rotations as Euler angles of this order (intrinsic: XYZ, ZXY, …), with the distance to gimbal lock.",
         ),
     ] = None,
     components: Annotated[
-        bool, typer.Option("--components", help="Rotations as x, y, z, w of their quaternions, with tangent handles.")
+        bool, typer.Option("--components", help="Rotations as quaternion components x, y, z, w, with tangent handles.")
     ] = False,
-    limit: Annotated[int, typer.Option("--limit", metavar="N", help="At most so many tracks.")] = tracks.LIMIT,
+    limit: Annotated[int, typer.Option("--limit", metavar="N", help="Maximum number of tracks.")] = tracks.LIMIT,
     clip: common.Clips = None,
     node: common.Nodes = None,
     path: common.Paths = None,
     quiet: common.Quiet = False,
 ) -> None:
-    """See the curves of tracks, of eases, and of tangent rules.
+    """Plot the curves of tracks, of easings, or of tangent rules.
 
-    Tracks: values with their keys and tangent handles, and the speed below; rotations in degrees about the joint's own
-    axes from the rest pose, and the whole angle. --euler ZXY shows what an animator's curves of that order would be,
-    and the distance to gimbal lock: near 0 the first and third angle race. Tracks that never move are left out where
-    others do. --compare draws a second file over the first, matched by clip, node and path, and how far they are apart.
+    Tracks: their values with keys and tangent handles, and their speed below. Rotations are in degrees about the
+    joint's own axes, relative to the rest pose, with the total angle. --euler ZXY shows Euler angles of that order, as
+    in an animation tool, and the distance to gimbal lock: near 0, the first and third angle change fast. Constant
+    tracks are left out if others move. --compare draws a second file over the first, matched by clip, node and path,
+    and the difference.
 
-    --ease draws eases side by side: f(t), f′(t), and the tempo as evenly timed dots. --through draws curves through
-    values, one second apart unless given as time:value, with their overshoot, and says how smooth each rule is.
-    Same input and options, same bytes. Needs matplotlib: pip install 'gltf-anim[plot]'.
+    --ease draws easings side by side: f(t), its slope f′(t), and dots at equal time steps. --through draws curves
+    through values, one second apart unless given as time:value, with their overshoot and continuity. The same input and
+    options give the same bytes. Requires matplotlib: pip install 'gltf-anim[plot]'.
     """
     voice = Reporter(quiet)
     if ease and through is not None:

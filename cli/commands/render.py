@@ -53,36 +53,40 @@ def command(
     output: Picture = "-",
     *,
     at: Annotated[
-        list[float] | None, typer.Option("--at", metavar="S", help="A frame at this time; may be repeated.")
+        list[float] | None, typer.Option("--at", metavar="S", help="Frame at this time in seconds; may be repeated.")
     ] = None,
     count: Annotated[
         int | None,
-        typer.Option("--frames", metavar="N", help="So many frames, evenly spaced; default 8.", min=1, max=MAX_FRAMES),
+        typer.Option(
+            "--frames", metavar="N", help="Number of frames, evenly spaced; 8 by default.", min=1, max=MAX_FRAMES
+        ),
     ] = None,
     fps: Annotated[
         float | None,
-        typer.Option("--fps", metavar="N", help="Frames per second of a moving OUT, default 24.", min=0.1),
+        typer.Option("--fps", metavar="N", help="Frames per second; 24 by default in an animated image.", min=0.1),
     ] = None,
     begin: common.From = None,
     end: common.To = None,
     clip: common.Clips = None,
     method: Annotated[
-        list[Method] | None, typer.Option("--method", help="How skin is bent; repeat to compare.  [default: lbs]")
+        list[Method] | None,
+        typer.Option("--method", help="Skinning method; may be repeated to compare.  [default: lbs]"),
     ] = None,
     heat: Annotated[
-        bool, typer.Option("--heat", help="Color the distance to the first method; of one method, to the rest pose.")
+        bool,
+        typer.Option("--heat", help="Color by the distance to the first method; with one method, to the rest pose."),
     ] = False,
     checker: Annotated[
         bool,
-        typer.Option("--checker", help="Draw squares that are fixed to the rest pose: they show twist and stretch."),
+        typer.Option("--checker", help="Draw squares fixed to the rest pose, which show twist and stretch."),
     ] = False,
-    wire: Annotated[bool, typer.Option("--wire", help="Draw the edges of the triangles.")] = False,
+    wire: Annotated[bool, typer.Option("--wire", help="Draw the edges of triangles.")] = False,
     textures: Annotated[
         bool | None,
         typer.Option(
             "--textures/--no-textures",
-            help="Textures, vertex colors and transparency, or plain colors. Default: plain with --heat, --checker and "
-            "--wire.",
+            help="Draw textures, vertex colors and transparency, or plain colors (default with --heat, "
+            "--checker and --wire).",
             show_default=False,
         ),
     ] = None,
@@ -92,26 +96,30 @@ def command(
         bool | None,
         typer.Option(
             "--follow/--no-follow",
-            help="Whether the camera goes with the figure. Default: where that travels farther than its own size.",
+            help="Move the camera with the figure (default: if it travels farther than its own size).",
             show_default=False,
         ),
     ] = None,
-    size: Annotated[int, typer.Option("--size", metavar="PX", help="Height of a frame.", min=32, max=4096)] = HEIGHT,
+    size: Annotated[
+        int, typer.Option("--size", metavar="PX", help="Height of a frame in pixels.", min=32, max=4096)
+    ] = HEIGHT,
     azimuth: Annotated[
-        float, typer.Option("--azimuth", metavar="DEG", help="Camera: from the front (+Z) toward +X.")
+        float, typer.Option("--azimuth", metavar="DEG", help="Camera angle from the front (+Z) toward +X.")
     ] = AZIMUTH,
     elevation: Annotated[
-        float, typer.Option("--elevation", metavar="DEG", help="Camera: above the horizon.", min=-89, max=89)
+        float, typer.Option("--elevation", metavar="DEG", help="Camera angle above the horizon.", min=-89, max=89)
     ] = ELEVATION,
     quiet: common.Quiet = False,
 ) -> None:
-    """Draw a clip as a filmstrip, or as a moving .webp, .gif or .apng.
+    """Draw clips as a filmstrip (.png) or as an animated image (.webp, .gif, .apng).
 
-    Meshes are skinned and flat-shaded under one camera framed on the whole motion, on a ground under the feet; a
-    skeleton without a mesh is drawn as sticks. Materials show their base color: factor, texture (PNG, JPEG, WebP) and
-    vertex colors; MASK cuts holes, BLEND is drawn in nine steps of transparency. Where a figure travels, the camera
-    goes along, and the distance stands beside the time. Several clips come one under the other, several methods in
-    rows of each; side by side in a film. Without --clip it is the first one.
+    Meshes are skinned and flat-shaded, on a ground plane below the feet; the view fits the whole motion. A skeleton
+    without a mesh is drawn as sticks. Materials show their base color: factor, texture (PNG, JPEG, WebP) and vertex
+    colors; MASK cuts holes, BLEND has nine levels of transparency. The camera follows a figure that travels, and the
+    distance is printed beside the time.
+
+    Clips are drawn one below the other, with a row per method; in an animated image, side by side. Without --clip, only
+    the first clip is drawn.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()

@@ -37,11 +37,11 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Put the keys of clips on a regular grid of frames.
+    """Resample clips to a regular grid of frames.
 
-    Frame k lies at the clip's start + k / fps; start and end stay exact. STEP tracks keep their jumps where they are,
-    and a track that never changes keeps its keys. The last line says how far any vertex moved, measured on what was
-    written.
+    Frame k is at the clip's start + k / fps; start and end stay exact. STEP tracks keep the times of their jumps, and
+    constant tracks keep their keys. The last line reports the largest error of any vertex, measured on the written
+    file.
     """
     if not fps > 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")

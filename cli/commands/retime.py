@@ -25,9 +25,9 @@ def command(
         float | None, typer.Option("--speed", metavar="N", help="Speed factor; 0.25 is four times slower.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option("--duration", metavar="S", help="Seconds from first to last key.")
+        float | None, typer.Option("--duration", metavar="S", help="New duration in seconds, from first to last key.")
     ] = None,
-    reverse: Annotated[bool, typer.Option("--reverse", help="Play it backwards.")] = False,
+    reverse: Annotated[bool, typer.Option("--reverse", help="Reverse the clip.")] = False,
     ping_pong: Annotated[bool, typer.Option("--ping-pong", help="Append the reversed clip: twice as long.")] = False,
     warp_ease: Annotated[
         str | None, typer.Option("--warp", metavar="EASE", help="Easing of time over the whole clip.")
@@ -40,10 +40,11 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Change when things happen: faster, slower, backwards, there and back, later.
+    """Change the timing of clips: speed, duration, direction, delay.
 
-    These are the clip's own seconds; a display's frames only sample them. Values stay and tangents follow by the chain
-    rule, so all but --warp is exact. In the order: --warp, --speed or --duration, --reverse, --ping-pong, --offset.
+    Times are the clip's own seconds, not frames. Values stay, and tangents are scaled by the chain rule: all changes
+    except --warp are exact. They are applied in the order --warp, --speed or --duration, --reverse, --ping-pong,
+    --offset.
     """
     if speed is None and duration is None and not (reverse or ping_pong or offset or warp_ease):
         raise UsageError("nothing to do", help="give --speed, --duration, --reverse, --ping-pong, --warp or --offset")

@@ -49,26 +49,29 @@ def command(
     output: Product = "-",
     *,
     at: Annotated[
-        list[float] | None, typer.Option("--at", metavar="S", help="A time in seconds; may be repeated.")
+        list[float] | None, typer.Option("--at", metavar="S", help="Time in seconds; may be repeated.")
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="All frames from the clip's start to its end.")
+        float | None, typer.Option("--fps", metavar="N", help="Frames per second, from the clip's start to its end.")
     ] = None,
     space: Annotated[
-        Space, typer.Option("--space", help="local: in the parent's space. world: in the scene's.")
+        Space, typer.Option("--space", help="local: relative to the parent; world: relative to the scene.")
     ] = LOCAL,
     format: Annotated[
-        Format | None, typer.Option("--format", help="Default: by OUT's ending; json for '-'.", show_default=False)
+        Format | None,
+        typer.Option(
+            "--format", help="Output format (default: from OUT's extension, json for '-').", show_default=False
+        ),
     ] = None,
     clip: common.Clips = None,
     node: common.Nodes = None,
     quiet: common.Quiet = False,
 ) -> None:
-    """Give the pose of every node at chosen times: for scripts and plots.
+    """Sample the pose of every node at chosen times, for scripts and plots.
 
-    Without --at and --fps at the clip's own key times. Before its first and after its last key a clip holds still.
-    Rotations are unit quaternions x, y, z, w. JSON and NPZ also hold morph weights and KHR_animation_pointer values;
-    NPZ holds one clip, and in world space the matrices too.
+    Without --at and --fps the times are those of the clip's own keys. Before the first key and after the last key the
+    pose is constant. Rotations are unit quaternions x, y, z, w. JSON and NPZ also contain morph weights and
+    KHR_animation_pointer values; NPZ contains one clip, and with --space world the matrices too.
     """
     if at and fps is not None:
         raise UsageError("--at and --fps exclude each other")

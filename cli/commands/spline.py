@@ -28,12 +28,15 @@ def command(
     output: common.Output = "-",
     *,
     tangents: Annotated[
-        str, typer.Option("--tangents", metavar="NAME", help="The rule for the slope at each key; see --list.")
+        str, typer.Option("--tangents", metavar="NAME", help="Tangent rule; see --list.")
     ] = DEFAULT_RULE,
-    list_rules: Annotated[bool, typer.Option("--list", help="Show all tangent rules.")] = False,
+    list_rules: Annotated[bool, typer.Option("--list", help="List all tangent rules.")] = False,
     cyclic: Annotated[
         bool,
-        typer.Option("--cyclic", help="A loop: no seam in speed; tracks must end as they start, but a root's path."),
+        typer.Option(
+            "--cyclic",
+            help="Continue the velocity across the loop; tracks must end as they start, except the root's path.",
+        ),
     ] = False,
     clip: common.Clips = None,
     node: common.Nodes = None,
@@ -42,11 +45,13 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Join keys by a smooth curve: CUBICSPLINE with tangents by a rule.
+    """Put smooth curves through keys: CUBICSPLINE with tangents by a rule.
 
-    time-aware suits most; monotone never overshoots (weights, feet on the floor); natural and bspline have continuous
-    acceleration; bspline passes keys by, and says how far. Rotations get tangents from their angular velocity. Tangents
-    that were there go; STEP tracks hold on purpose and stay. The last line says how far the motion between keys moved.
+    The rule time-aware suits most motion. monotone never overshoots: for weights, or feet on the floor. natural and
+    bspline have continuous acceleration; bspline does not pass through the keys, and its distance from them is
+    reported. Tangents of rotations follow from angular velocity.
+
+    Existing tangents are replaced; STEP tracks stay unchanged. The last line reports the largest change of the motion.
     """
     if list_rules:
         documents.write_text(_table())
@@ -77,23 +82,23 @@ def _notes(before: Clips, after: Clips) -> Iterator[str]:
         far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SHOWN_TRACKS else []
         far += [f"other values by up to {moved:.3g}"] if moved else []
         where = reader.clip_labels([(before[i].name, i) for i in found])
-        yield f"{where}: the curve passes keys by, {', '.join(far)}; --tangents natural goes through them"
+        yield f"{where}: the curve does not pass through its keys ({', '.join(far)}); --tangents natural does"
 
 
 SHOWN_TRACKS = 1e-6  # rad; smaller angles come from rounding
 
 
 _ABOUT = {
-    "time-aware": "parabola through three keys, whatever their distance; the default",
+    "time-aware": "parabola through three keys, with any spacing; the default",
     "catmull-rom": "slope from the previous to the next key",
     "centripetal": "no cusps or loops in the path; in time the speed may jump",
-    "monotone": "never leaves the range between two keys",
-    "akima": "leans to the steadier side: one odd key disturbs little",
+    "monotone": "stays between the values of two keys",
+    "akima": "weights the steadier side more: one outlier has little effect",
     "flat": "stops at every key",
     "natural": "continuous acceleration through all keys",
-    "clamped": "the same, starting and ending at rest",
+    "clamped": "the same, with velocity 0 at both ends",
     "periodic": "the same for a loop",
-    "bspline": "continuous acceleration, smoothest, passes the keys by",
+    "bspline": "continuous acceleration, smoothest; does not pass through the keys",
 }
 
 

@@ -43,7 +43,8 @@ def command(
         typer.Option(
             "--order",
             metavar="ORDER",
-            help="Of the axes as written: XYZ …, auto (each joint's farthest from lock), or 'hips=ZXY,*arm=YZX,auto'.",
+            help="Rotation order as written: XYZ …; auto: for each joint the one farthest from gimbal lock; "
+            "or 'hips=ZXY,*arm=YZX,auto'.",
         ),
     ] = DEFAULT_ORDER,
     axes: Annotated[
@@ -52,32 +53,35 @@ def command(
     ] = AxesConvention.INTRINSIC,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of the angles; BVH has degrees.")] = Unit.DEG,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="Frames per second; else the source's keys.")
+        float | None, typer.Option("--fps", metavar="N", help="Frames per second (default: the source's keys).")
     ] = None,
     angle_tolerance: Annotated[
         str | None,
         typer.Option(
             "--angle-tolerance",
             metavar="ANGLE",
-            help="CSV, JSON: error above which keys are added: 0.1deg. Default: none.",
+            help="CSV, JSON: maximum error, like 0.1deg; keys are added where it is exceeded.",
         ),
     ] = None,
     scale: Annotated[
         float | None,
-        typer.Option("--scale", metavar="N", help="BVH: meters per unit, else 0.01; no BVH holds it."),
+        typer.Option("--scale", metavar="N", help="BVH: meters per unit, 0.01 by default; the file can't store it."),
     ] = None,
     format: Annotated[
-        Format | None, typer.Option("--format", help="Default: by OUT's ending; bvh for '-'.", show_default=False)
+        Format | None,
+        typer.Option(
+            "--format", help="Output format (default: from OUT's extension, bvh for '-').", show_default=False
+        ),
     ] = None,
     clip: common.Clips = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> None:
-    """Write a clip as Euler curves that run on without jumps: BVH, or CSV or JSON curves.
+    """Write a clip as continuous Euler curves: BVH, CSV or JSON.
 
-    Every key gets the equivalent angles nearest to the key before, also through gimbal lock. BVH holds the joints of
-    the skins (or all nodes) as they were bound, angles seen from there, frames on an even grid. CSV and JSON hold every
-    node's own angles, with its rest and its parent, and are what from-euler reads.
+    Each key gets the equivalent angles closest to those of the key before, also through gimbal lock. BVH contains the
+    joints of the skins (or all nodes), with angles relative to the bind pose, on a regular grid of frames. CSV and JSON
+    contain the local transform of every node, its rest pose and its parent; from-euler reads all three.
     """
     began = time.perf_counter()
     voice = text.Reporter(quiet)

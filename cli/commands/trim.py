@@ -24,18 +24,17 @@ def command(
     *,
     start: common.From = None,
     end: common.To = None,
-    rebase: Annotated[bool, typer.Option("--rebase", help="Move what is kept to start at 0 s.")] = False,
+    rebase: Annotated[bool, typer.Option("--rebase", help="Move the start of each clip to 0 s.")] = False,
     clip: common.Clips = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Keep the part of a clip from --from to --to seconds.
+    """Keep one time range of clips, from --from to --to seconds.
 
-    Keys in between stay as they are; new keys at both ends have exactly the value and tangent that the motion has
-    there. Without --rebase the part stays at its seconds: players hold its first pose until then. --rebase moves
-    what is left of each clip to 0 s, one that starts later than --from by more than others; a note says so. --rebase
-    alone cuts nothing.
+    Keys inside the range stay unchanged; new keys at both ends have the exact value and tangent of the motion there.
+    The range keeps its times, and players show its first pose until it starts; --rebase moves the start of each clip to
+    0 s. A note lists clips that are moved by different times. --rebase alone cuts nothing.
     """
     if start is None and end is None and not rebase:
         raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")

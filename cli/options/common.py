@@ -13,10 +13,10 @@ Output = Annotated[
 ]
 Clips = Annotated[
     list[str] | None,
-    typer.Option("--clip", metavar="GLOB", help="Only clips of this name, or '#0', '#1', …; may be repeated."),
+    typer.Option("--clip", metavar="GLOB", help="Only clips with this name or index ('#0'); may be repeated."),
 ]
 Nodes = Annotated[
-    list[str] | None, typer.Option("--node", metavar="GLOB", help="Only nodes of this name; may be repeated.")
+    list[str] | None, typer.Option("--node", metavar="GLOB", help="Only nodes with this name; may be repeated.")
 ]
 
 
@@ -42,9 +42,9 @@ class Format(StrEnum):
 Report = Annotated[Format, typer.Option("--format", help="Report format: text or one JSON document.")]
 From = Annotated[float | None, typer.Option("--from", metavar="S", help="Start time in seconds.")]
 To = Annotated[float | None, typer.Option("--to", metavar="S", help="End time in seconds.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Do not write anything.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Write nothing.")]
 Quiet = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="Print only errors, warnings and products."),
+    typer.Option("--quiet", "-q", help="Print only errors, warnings and requested output."),
 ]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print more: one line per clip.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print details, such as a line per clip.")]

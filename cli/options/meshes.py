@@ -14,13 +14,17 @@ from anim.skinning.methods.registry import SKINNING_METHODS
 
 Meshes = Annotated[
     list[str] | None,
-    typer.Option("--mesh", metavar="GLOB", help="Only meshes of this name, or of their node's; may be repeated."),
+    typer.Option(
+        "--mesh", metavar="GLOB", help="Only meshes with this name, or of nodes with this name; may be repeated."
+    ),
 ]
 
 Hidden = Annotated[
     list[str] | None,
     typer.Option(
-        "--hide", metavar="GLOB", help="Leave out meshes of this name, and all on or below a node of this name."
+        "--hide",
+        metavar="GLOB",
+        help="Hide meshes with this name, and all meshes at or below nodes with this name; may be repeated.",
     ),
 ]
 Method = StrEnum("Method", [(name, name) for name in SKINNING_METHODS])  # type: ignore[misc]

@@ -52,8 +52,8 @@ def worst_of_clips(found: Sequence[CollapseFinding]) -> list[CollapseFinding]:
 def text(seen: CollapseReport, *, every: bool) -> str:
     """Return a row for the worst mesh of each clip, or for every mesh, and recommendations."""
     shown = seen.found if every else worst_of_clips(seen.found)
-    header = ["clip", "mesh", "index", f"< {LOW_INDEX}", "inverted", "at", "joints", "turn"]
-    header += [f"volume {each}" for each in seen.methods] + [f"bulge {each}" for each in seen.methods]
+    header = ["clip", "mesh", "min index", f"below {LOW_INDEX}", "inverted", "at", "joints", "angle"]
+    header += [f"min volume {each}" for each in seen.methods] + [f"max bulge {each}" for each in seen.methods]
     table = tables.text(header, [_row(each) for each in shown], left=2) + "\n" if shown else ""
     lines = "".join(f"  {line}\n" for line in recommend(seen.found, clamped=seen.clamped))
     return f"{_head(seen, every=every)}\n\n{table}{lines}"

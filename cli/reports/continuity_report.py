@@ -19,7 +19,7 @@ from cli.text import format_length, format_number, plural
 def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
     """Return the table of a clip's moving tracks, and a note on the others."""
     header = [
-        tables.escape_control(f"smoothness of {clip_name(clip.name, clip.index)}"),
+        tables.escape_control(f"continuity of {clip_name(clip.name, clip.index)}"),
         "path",
         "interp",
         "interior keys",

@@ -19,7 +19,10 @@ SCHEMA = 1
 SAME_END = 1e-6  # s; smaller differences of clip ends come from rounding
 LISTED = 5  # listed names that only one file has
 STRANGERS = "no clip and no node has the same name in both files"
-HEADER = ("clip", "joint", "vertex", "at s", "max", "%", "p99", "mean", "turn", "speed", "weights", "pointers", "end s")
+HEADER = (
+    *("clip", "joint", "vertex", "time s", "max error", "% of size", "p99", "mean"),
+    *("angle", "speed", "weights", "pointers", "end s"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +70,7 @@ def text(found: DiffReport) -> str:
 
     The first line tells if the files have no name in common.
     """
-    head = f"{STRANGERS}: what follows holds things against each other by their order\n" if found.are_strangers else ""
+    head = f"{STRANGERS}: clips and nodes are compared in their order\n" if found.are_strangers else ""
     clips = found.diff.clips
     rows = [_row(each, found.diff.diagonal) for each in clips]
     table = tables.text([*HEADER, "tracks"], rows, left=2, indent="") + "\n" if rows else ""
@@ -160,11 +163,11 @@ def _summary(found: DiffReport) -> list[str]:
     count = plural(len(found.diff.clips), "clip")
     motion = f"{count} compared, max {worst(found)}" if found.diff.clips else "no clips to compare"
     if "," in found.player:
-        return [motion, f"{old.name}, as {found.player.replace(',', ' and as ')} show it"]
+        return [motion, f"{old.name}, as shown by {found.player.replace(',', ' and ')}"]
     cost = f"animation {format_change(old.cost.total, new.cost.total)}"
     return [
         motion,
-        f"{old.name} → {new.name}: {format_change(old.size, new.size)}, {cost}, of it JSON {_json_part(found)}",
+        f"{old.name} → {new.name}: {format_change(old.size, new.size)}, {cost}, including JSON {_json_part(found)}",
     ]
 
 

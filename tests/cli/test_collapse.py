@@ -29,7 +29,7 @@ def test_a_table_with_advice(call: Call, fixture: Fixture) -> None:
     assert lines[0].endswith("tube.glb: 3 clips, 1 skinned mesh")
     header = lines[2].split("  ")
     assert header[1].strip() == "clip"
-    assert "volume lbs" in lines[2]
+    assert "min volume lbs" in lines[2]
     rows = {line.split()[0]: line for line in lines[3:6]}
     assert "0.71" in rows["twist90"]
     assert "67 %" in rows["twist90"]
@@ -37,7 +37,7 @@ def test_a_table_with_advice(call: Call, fixture: Fixture) -> None:
     assert "180° twist" in rows["twist180"]
     assert "33 %" in rows["twist180"]
     assert "90° bend" in rows["bend90"]
-    assert "  3 clips pinch; worst 0.00 in 'twist180'" in run.text
+    assert "  3 clips collapse; min index 0.00 in 'twist180'" in run.text
     assert "--method dqs" in run.text
 
 
@@ -54,7 +54,7 @@ def test_one_json_document(call: Call, fixture: Fixture) -> None:
     (method,) = mesh["methods"]
     assert method["volume_min"] == pytest.approx(1, abs=1e-3)
     assert method["bulge_max"] == pytest.approx(1, abs=1e-4)
-    assert report["advice"][0].startswith("no vertex falls below 0.7")
+    assert report["advice"][0].startswith("no index is below 0.7")
     assert report["bulge_clamp"] is False
     assert report["skinned_meshes"] == 1
 
@@ -67,17 +67,17 @@ def test_a_quarter_twist_pinches_by_its_volume(call: Call, fixture: Fixture) -> 
     assert mesh["index"] > report["low_index"]
     assert mesh["methods"][0]["volume_min"] == pytest.approx(2 / 3, abs=1e-3)
     assert report["low_volume"] == 0.9
-    assert report["advice"][0].endswith("90° at 1.00 s; 67 % of the volume is left")
+    assert report["advice"][0].endswith("90° at 1.00 s; 67 % of the volume remains")
 
 
 def test_advice_follows_what_was_measured(call: Call, fixture: Fixture, asset: object) -> None:
     man = call("collapse", asset("CesiumMan.glb"), "--method", "lbs", "--method", "dqs", "--method", "cor").text  # type: ignore[operator]
-    assert "to bake it with cor (" in man
+    assert "to bake with cor (" in man
     assert "dqs bulges" not in man
     assert man.endswith("--method cor --bulge-clamp --clip '#0'\n")
     arm = call("collapse", fixture("arm")).text
     assert "good enough" not in arm
-    assert "1 clip pinches; worst 0.71 in 'twist'" in arm
+    assert "1 clip collapses; min index 0.71 in 'twist'" in arm
     assert "bulges" not in arm
 
 

@@ -68,7 +68,7 @@ def test_the_page_is_a_row_per_clip_and_a_line_that_says_it_all(lifted: tuple[Pa
     run = call("diff", *lifted)
     lines = run.text.splitlines()
     assert run.err == ""
-    assert lines[0].split()[:4] == ["clip", "joint", "vertex", "at"]
+    assert lines[0].split()[:4] == ["clip", "joint", "vertex", "time"]
     assert lines[1].startswith("walk ")
     assert "0.5 mm" in lines[1]
     assert any(line.startswith("3 clips compared, max 0.5 mm (0.0") and "in 'walk' at '" in line for line in lines)
@@ -301,7 +301,7 @@ def test_one_file_as_two_players_show_it(fixture: Fixture, call: Call, tmp_path:
         found["max_error_m"], rel=1e-4
     )
     run = call("diff", arm, "--players", "spec,nlerp", "--plot", tmp_path / "p.svg")
-    assert "arm.glb, as spec and as nlerp show it" in run.text
+    assert "arm.glb, as shown by spec and nlerp" in run.text
     assert "arm.glb: spec → nlerp" in words((tmp_path / "p.svg").read_bytes())
 
 

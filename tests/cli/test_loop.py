@@ -39,9 +39,9 @@ def test_a_file_without_a_vertex_is_measured_at_nodes(call: Call, fixture: Fixtu
     bare = {key: value for key, value in document.json.items() if key != "meshes"}
     data = glb_of(replace(document, json={**bare, "nodes": nodes}))
     assert call("loop", "--format", "json", stdin=data).json["measured_on"] == "nodes"
-    assert "seam (nodes)" in call("loop", stdin=data).text
+    assert "loop gap (nodes)" in call("loop", stdin=data).text
     assert call("loop", fixture("biped"), "--format", "json").json["measured_on"] == "skin"
-    assert "seam (nodes)" not in call("loop", fixture("biped")).text
+    assert "loop gap (nodes)" not in call("loop", fixture("biped")).text
 
 
 def test_find_proposes_ranges(call: Call, fixture: Fixture) -> None:
@@ -53,10 +53,10 @@ def test_find_proposes_ranges(call: Call, fixture: Fixture) -> None:
 @pytest.mark.parametrize(
     ("clip", "options", "words"),
     [
-        ("walk", (), "clip 'walk': no part loops better than the whole clip"),
-        ("walk", ("--shortest", "50"), "clip 'walk': no part is as long as --shortest"),
-        ("fall", (), "clip 'fall': no part is a loop"),
-        ("pose", (), "clip 'pose': a single pose, with no part to find"),
+        ("walk", (), "clip 'walk': no time range loops better than the whole clip"),
+        ("walk", ("--shortest", "50"), "clip 'walk': no time range is as long as --shortest"),
+        ("fall", (), "clip 'fall': no time range loops"),
+        ("pose", (), "clip 'pose': a single pose, without a range to find"),
         ("nods", (), ""),
     ],
 )
@@ -70,7 +70,7 @@ def test_find_says_where_no_part_is_better(clip: str, options: tuple[str, ...], 
         data = data.replace(b'"walk"', b'"%s"' % clip.encode())
     run = call("loop", "--find", "--clip", clip, *options, stdin=data)
     assert run.code == 0, run.err
-    assert run.text.endswith(f"  {words}\n") if words else "no part" not in run.text
+    assert run.text.endswith(f"  {words}\n") if words else "no time range" not in run.text
     notes = call("loop", "--find", "--clip", clip, *options, "--format", "json", stdin=data).json["notes"]
     assert notes == ([words] if words else [])
 
@@ -134,7 +134,7 @@ def test_a_single_pose_is_called_so(call: Call, asset: Find, tmp_path: Path) -> 
     assert found["kind"] == "a single pose"
     run = call("loop", path, tmp_path / "out.glb", "--clip", "T-Pose", "--blend", "0.1")
     assert run.code == 0
-    assert "a single pose, with nothing to close: clip 'T-Pose'" in run.err
+    assert "a single pose, without a loop to close: clip 'T-Pose'" in run.err
 
 
 def _limping(walk: Path) -> bytes:
@@ -160,7 +160,7 @@ def test_a_joint_that_stays_open_is_named_and_alone_is_bent(call: Call, walk: Pa
     assert found["seam_m"] < found["largest_frame_motion_m"]
     assert "left_upper_leg" in call("loop", "--clip", "walk", stdin=limping).text
     run = call("loop", "-", "-", "--clip", "walk", stdin=limping)
-    assert "closes except at 'left_upper_leg'" in refusal(run, 2)
+    assert "is closed except at 'left_upper_leg'" in refusal(run, 2)
     assert "--blend" in help_line(run)
     closed = call("loop", "-", "--clip", "walk", "--blend", "0.3", "-q", stdin=limping).product()
     (now,) = call("loop", "--clip", "walk", "--format", "json", stdin=closed).json["loops"]

@@ -39,9 +39,9 @@ def recommend(found: Sequence[CollapseFinding], *, clamped: bool = False) -> Ite
     lbs were measured with the bulge clamp.
     """
     yield from _unusable(found)
-    pinched = sorted((each for each in found if is_collapsed(each.mesh)), key=lambda each: each.mesh.worst.index)
-    if pinched:
-        yield from _against_pinching(pinched, clamped=clamped)
+    collapsed = sorted((each for each in found if is_collapsed(each.mesh)), key=lambda each: each.mesh.worst.index)
+    if collapsed:
+        yield from _against_collapse(collapsed, clamped=clamped)
     elif found:
         yield _all_is_well(found, clamped=clamped)
     else:
@@ -70,16 +70,16 @@ def twist_joints(angle: float) -> int:
 def _all_is_well(found: Sequence[CollapseFinding], *, clamped: bool) -> str:
     meshes = [each.mesh for each in found]
     index = min(each.worst.index for each in meshes)
-    told = f"no vertex falls below {LOW_INDEX} (least {index:.3f})"
+    summary = f"no index is below {LOW_INDEX} (min {index:.3f})"
     left = _remaining_collapse(meshes)
     if left is not None and left < MIN_VOLUME_FRACTION:
-        return f"{told}; {_percent(left)} of the volume is left at worst, and no method that was measured keeps more"
+        return f"{summary}; {_percent(left)} of the volume remains at worst, and no method that was measured keeps more"
     if left is not None:
-        return f"linear blending is good enough: {told}, {_percent(left)} or more of the volume is left"
+        return f"linear blending is good enough: {summary}, {_percent(left)} or more of the volume remains"
     if any(each.closed for each in meshes):
         line = _collapse_command(found, ["lbs"], clamped=clamped)
-        return f"{told}; to see what linear blending leaves of the volume: {line}"
-    return f"linear blending is good enough: {told}"
+        return f"{summary}; to measure the volume with linear blending: {line}"
+    return f"linear blending is good enough: {summary}"
 
 
 def _remaining_collapse(meshes: list[MeshCollapse]) -> float | None:
@@ -88,40 +88,40 @@ def _remaining_collapse(meshes: list[MeshCollapse]) -> float | None:
     return min((float(each.min()) for each in volumes), default=None)
 
 
-def _against_pinching(pinched: list[CollapseFinding], *, clamped: bool) -> Iterator[str]:
-    yield _worst(pinched)
-    found = rank_methods([each.mesh for each in pinched])
+def _against_collapse(collapsed: list[CollapseFinding], *, clamped: bool) -> Iterator[str]:
+    yield _worst(collapsed)
+    found = rank_methods([each.mesh for each in collapsed])
     chosen = best_method(found)
     worse = chosen is not None and _keeps_less(found, chosen)
-    yield _no_gain(found) if worse else _bake(found, chosen, pinched, clamped=clamped)
-    yield from _share_twist(pinched)
+    yield _no_gain(found) if worse else _bake(found, chosen, collapsed, clamped=clamped)
+    yield from _distribute_twist(collapsed)
     if chosen is not None and not worse:
-        yield from _against_bulging(pinched, chosen.method, clamped=clamped)
+        yield from _against_bulging(collapsed, chosen.method, clamped=clamped)
 
 
-def _worst(pinched: list[CollapseFinding]) -> str:
-    first, clips = pinched[0], len({each.number for each in pinched})
+def _worst(collapsed: list[CollapseFinding]) -> str:
+    first, clips = collapsed[0], len({each.number for each in collapsed})
     worst, left = first.mesh.worst, _remaining_collapse([first.mesh])
-    told = "1 clip pinches" if clips == 1 else f"{clips} clips pinch"
+    summary = "1 clip collapses" if clips == 1 else f"{clips} clips collapse"
     places = f"'{worst.joint}' against '{worst.other}', {math.degrees(worst.angle):.0f}° at {worst.time:.2f} s"
-    loss = f"; {_percent(left)} of the volume is left" if left is not None and left < MIN_VOLUME_FRACTION else ""
-    return f"{told}; worst {worst.index:.2f} in '{first.clip}': {places}{loss}"
+    loss = f"; {_percent(left)} of the volume remains" if left is not None and left < MIN_VOLUME_FRACTION else ""
+    return f"{summary}; min index {worst.index:.2f} in '{first.clip}': {places}{loss}"
 
 
 def _bake(
-    found: Sequence[RankedMethod], chosen: RankedMethod | None, pinched: list[CollapseFinding], *, clamped: bool
+    found: Sequence[RankedMethod], chosen: RankedMethod | None, collapsed: list[CollapseFinding], *, clamped: bool
 ) -> str:
     if chosen is None and any(each.unusable for each in found):
         return "no other method that was measured can be used"
     if chosen is None:
-        others = _unmeasured(pinched)
-        line = _collapse_command(pinched, others, clamped=False)
-        return f"bake it with another method; to see first what {' and '.join(others)} would keep: {line}"
-    numbers = _numbers(pinched)
+        others = _unmeasured(collapsed)
+        line = _collapse_command(collapsed, others, clamped=False)
+        return f"bake with another method; to compare first with {' and '.join(others)}: {line}"
+    numbers = _numbers(collapsed)
     clips, output = choose_option(numbers), "OUT" if len(numbers) == 1 else "'OUT-{clip}.glb'"
     keeps = f" ({_keeps(found)} of the volume)" if chosen.volume is not None else ""
     method = f"--method {chosen.method}{CLAMP_OPTION if clamped else ''}"
-    return f"to bake it with {chosen.method}{keeps}: gltf-anim bake IN {output} {method}{clips}"
+    return f"to bake with {chosen.method}{keeps}: gltf-anim bake IN {output} {method}{clips}"
 
 
 def _no_gain(found: Sequence[RankedMethod]) -> str:
@@ -142,29 +142,29 @@ def _keeps(found: Sequence[RankedMethod]) -> str:
     )
 
 
-def _share_twist(pinched: list[CollapseFinding]) -> Iterator[str]:
+def _distribute_twist(collapsed: list[CollapseFinding]) -> Iterator[str]:
     """The worst twist, if any; twist joints don't help bends."""
-    worst = next((each.mesh.worst for each in pinched if each.mesh.worst.twist), None)
+    worst = next((each.mesh.worst for each in collapsed if each.mesh.worst.twist), None)
     if worst is not None and (count := twist_joints(worst.angle)) > 1:
         yield (
-            f"or share the twist among {count} joints between '{worst.joint}' and '{worst.other}' "
-            f"({_percent(math.cos(worst.angle / (2 * count)))} of the radius stays), which every player shows"
+            f"or distribute the twist over {count} joints between '{worst.joint}' and '{worst.other}' "
+            f"({_percent(math.cos(worst.angle / (2 * count)))} of the radius remains), for all players"
         )
 
 
-def _against_bulging(pinched: list[CollapseFinding], method: str, *, clamped: bool) -> Iterator[str]:
+def _against_bulging(collapsed: list[CollapseFinding], method: str, *, clamped: bool) -> Iterator[str]:
     swollen: list[tuple[MethodScore, CollapseFinding]] = []
-    for each in pinched:
+    for each in collapsed:
         linear = max((fared.bulge for fared in each.mesh.methods if fared.method == "lbs"), default=1.0)
         swollen += [(fared, each) for fared in each.mesh.methods if fared.method == method and _swells(fared, linear)]
     if swollen:
         fared, each = max(swollen, key=lambda pair: pair[0].bulge)
         yield f"{method} bulges up to {fared.bulge:.2f}× at '{fared.joint}' ({each.clip}, {fared.time:.2f} s)"
         if not clamped:
-            yield f"to see what a clamp makes of the bulge: {_collapse_command([each], [], clamped=True)}"
+            yield f"to compare with the bulge clamp: {_collapse_command([each], [], clamped=True)}"
         if others := _unmeasured([each]):
             names = " and ".join(others)
-            yield f"to see what {names} makes of it: {_collapse_command([each], others, clamped=clamped)}"
+            yield f"to compare with {names}: {_collapse_command([each], others, clamped=clamped)}"
 
 
 def _swells(fared: MethodScore, linear: float) -> bool:

@@ -24,12 +24,12 @@ class Method:
 
 
 SKINNING_METHODS: dict[str, Method] = {
-    "lbs": Method("linear blend, as every player does it; twists pinch", LinearBlend),
+    "lbs": Method("linear blend, as in every player; twisted skin collapses", LinearBlend),
     "dqs": Method(
         "dual quaternions: twists keep their volume, bends bulge a little", lambda rig, _: DualQuaternion(rig)
     ),
     "cor": Method(
-        "optimized centers of rotation: neither pinches nor bulges; slow to start",
+        "optimized centers of rotation: neither collapses nor bulges; slow to start",
         lambda rig, _: CentersOfRotation(rig),
     ),
 }

@@ -176,14 +176,14 @@ def made_up(index: float, *, closed: bool = True, **methods: tuple[float | None,
 
 def test_advice() -> None:
     (fine,) = told("y", 0)
-    assert fine.startswith("linear blending is good enough: no vertex falls below 0.7 (least 1.000), 100 %")
+    assert fine.startswith("linear blending is good enough: no index is below 0.7 (min 1.000), 100 %")
     pinched, bake_it, share = told("y", 120)
-    assert pinched.startswith("1 clip pinches; worst 0.50 in 'turn': 'lower' against 'upper', 120° at 1.00 s")
+    assert pinched.startswith("1 clip collapses; min index 0.50 in 'turn': 'lower' against 'upper', 120° at 1.00 s")
     assert bake_it == (
-        "to bake it with dqs (lbs keeps 50 %, dqs keeps 100 % of the volume): "
+        "to bake with dqs (lbs keeps 50 %, dqs keeps 100 % of the volume): "
         "gltf-anim bake IN OUT --method dqs --clip '#0'"
     )
-    assert share.startswith("or share the twist among 4 joints between 'lower' and 'upper' (97 %")
+    assert share.startswith("or distribute the twist over 4 joints between 'lower' and 'upper' (97 %")
     bent = told("x", 120)
     assert not any("twist" in line for line in bent)
     assert bent[-3].startswith("dqs bulges up to ")
@@ -196,7 +196,7 @@ def test_a_tenth_of_the_volume_is_pinching_though_no_vertex_is(angle: float, is_
     least = 1 - 2 / 3 * np.sin(np.radians(angle) / 2) ** 2
     assert (least < 0.9) == is_pinched
     first = told("y", angle)[0]
-    assert first.startswith("1 clip pinches" if is_pinched else "linear blending is good enough")
+    assert first.startswith("1 clip collapses" if is_pinched else "linear blending is good enough")
     assert f"{100 * least:.0f} %" in first
 
 
@@ -214,16 +214,16 @@ def test_what_every_method_loses_is_no_pinching() -> None:
     assert not is_collapsed(found)
     (line,) = recommend([CollapseFinding(0, "shrink", found)])
     assert "good enough" not in line
-    assert line.endswith("is left at worst, and no method that was measured keeps more")
+    assert line.endswith("remains at worst, and no method that was measured keeps more")
 
 
 def test_of_what_was_measured_the_best_is_recommended() -> None:
     """CesiumMan's figures: cor keeps more and bulges less, so nobody is told to bake dqs or to try cor."""
     lines = list(recommend([made_up(0.68, lbs=(0.94, 1.46), dqs=(0.96, 1.78), cor=(0.97, 1.57))]))
-    assert lines[1].startswith("to bake it with cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume): ")
+    assert lines[1].startswith("to bake with cor (lbs keeps 94 %, dqs keeps 96 %, cor keeps 97 % of the volume): ")
     assert lines[2:] == [
         "cor bulges up to 1.57× at 'arm' (turn, 0.50 s)",
-        "to see what a clamp makes of the bulge: gltf-anim collapse IN --method lbs --method dqs --method cor "
+        "to compare with the bulge clamp: gltf-anim collapse IN --method lbs --method dqs --method cor "
         "--bulge-clamp --clip '#0'",
     ]
 
@@ -255,15 +255,13 @@ def test_standings_are_the_worst_over_all_meshes() -> None:
 def test_only_what_was_not_measured_is_to_be_tried() -> None:
     clamp, other = told("x", 120)[-2:]
     assert clamp.endswith(": gltf-anim collapse IN --method lbs --method dqs --bulge-clamp --clip '#0'")
-    assert other == (
-        "to see what cor makes of it: gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'"
-    )
+    assert other == ("to compare with cor: gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'")
     assert told("x", 120, "lbs", "dqs", "cor")[-1].endswith("--method cor --bulge-clamp --clip '#0'")
     assert told("y", 120, "lbs")[1] == (
-        "bake it with another method; to see first what dqs and cor would keep: "
+        "bake with another method; to compare first with dqs and cor: "
         "gltf-anim collapse IN --method lbs --method dqs --method cor --clip '#0'"
     )
-    assert told("y", 120, "cor")[1].startswith("to bake it with cor (cor keeps 100 % of the volume): ")
+    assert told("y", 120, "cor")[1].startswith("to bake with cor (cor keeps 100 % of the volume): ")
     clamped = told("x", 120, "lbs", "dqs", clamped=True)
     assert clamped[1].endswith("gltf-anim bake IN OUT --method dqs --bulge-clamp --clip '#0'")
     assert not any("a clamp" in line for line in clamped)
@@ -286,11 +284,11 @@ def test_a_method_that_loses_more_than_lbs_is_not_recommended() -> None:
 def test_without_lbs_nothing_is_said_of_its_volume() -> None:
     (line,) = told("y", 90, "cor")
     assert line == (
-        "no vertex falls below 0.7 (least 0.707); to see what linear blending leaves of the volume: "
+        "no index is below 0.7 (min 0.707); to measure the volume with linear blending: "
         "gltf-anim collapse IN --method cor --method lbs --clip '#0'"
     )
     (line,) = recommend([made_up(0.8, closed=False, dqs=(None, 1.0))])
-    assert line == "linear blending is good enough: no vertex falls below 0.7 (least 0.800)"
+    assert line == "linear blending is good enough: no index is below 0.7 (min 0.800)"
 
 
 def test_the_clamp_is_that_of_bake() -> None:
