@@ -32,6 +32,7 @@ PENDING = (  # packages whose docstrings are not rewritten yet
 ADVICE = (  # modules that compose command lines, the advice of findings
     "anim/measure/inspect/",
     "anim/measure/loops/recommendations.py",
+    "anim/simulation/report.py",
     "anim/skinning/analysis/recommendations.py",
 )
 OPTION = re.compile(r"(?<![\w-])--[a-z]")
