@@ -20,9 +20,9 @@ from anim.model import Clip, Scene, VertexCache
 from anim.operations.selection import Selection
 from anim.sampling.times import frame_times
 from anim.skinning.analysis.inbetween_error import InbetweenError, inbetween_error
-from anim.skinning.analysis.method_deviation import Deviation, deviation, linear_baker
+from anim.skinning.analysis.method_deviation import Deviation, MeasuredBake, linear_baker
 from anim.skinning.bake import SPACES, Baker, bakeable_instances, prepare_bake
-from anim.skinning.uneven import uneven_joints
+from anim.skinning.uneven import UnevenScale
 from cli import text, units
 from cli.errors import UsageError
 from cli.first_run import announce_compiling
@@ -128,6 +128,7 @@ def command(
         missed: list[tuple[str, InbetweenError]] = []
         made: dict[int, Baker] = {}
         linear: Baker | None = None
+        scales: UnevenScale | None = None
         deviations: list[tuple[str, Deviation]] = []
         uneven: set[int] = set()
         for job in jobs:
@@ -145,16 +146,19 @@ def command(
                         nodes=groups[job.group][1],
                     )
                 }
-                linear = None if method is LBS else linear_baker(made[job.group], space=space.value)
+                if method is not LBS:
+                    linear = linear_baker(made[job.group], space=space.value)
+                    scales = UnevenScale(made[job.group])
             each = Clip("", ()) if job.clip is None else clips[job.clip]
             times, label = _times(each, fps), reader.clip_label(each.name, job.clip or 0)
-            if linear is not None:
-                deviations.append((label, deviation(made[job.group], linear, each, times)))
-                uneven.update(uneven_joints(made[job.group], each, times))
+            if scales is not None:
+                uneven.update(scales.joints(each, times))
             if fps is None:
                 missed.append((label, inbetween_error(made[job.group], each, times)))
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
-            cache = _turned(made[job.group].bake(each, times=times, progress=progress), up, vertex_order)
+            measured = None if linear is None else MeasuredBake(made[job.group], linear, each, times, progress)
+            baked = made[job.group].bake(each, times=times, progress=progress) if measured is None else measured.cache
+            cache = _turned(baked, up, vertex_order)
             try:
                 writing = caches.write_options(ending, given | {"max_error": _meters(max_error, cache)})
                 saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)
@@ -163,6 +167,8 @@ def command(
                 raise
             finally:
                 progress.close()
+            if measured is not None:
+                deviations.append((label, measured.deviation()))
             done.append(_Done(job.file, each.name, job.clip, job.group, len(times), cache.vertex_count, saved))
             if len(jobs) > 1:
                 voice.verbose_info(f"  {_summary(done[-1:], method.value)}")

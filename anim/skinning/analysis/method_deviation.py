@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
-from anim.model import Clip
+from anim.model import Clip, FrameChunk
 from anim.skinning.bake import Baker, prepare_bake
 
 
@@ -28,16 +30,45 @@ def linear_baker(made: Baker, *, space: str) -> Baker:
     return prepare_bake(made.scene, space=space, rigid=True, nodes=nodes, threads=made.threads)
 
 
-def deviation(made: Baker, linear: Baker, clip: Clip, times: Floats) -> Deviation:
-    """Return the deviation of `made` from `linear`, bakers of the same meshes, at `times` (F,)."""
-    size = model_size(made)
-    most = Deviation(0.0, 0.0, size)
-    both = (each.bake(clip, times=times).chunks() for each in (made, linear))
-    for ours, theirs in zip(*both, strict=True):
-        found = max_distance(ours.positions, theirs.positions)
-        at = int(found.argmax())
-        most = max(most, Deviation(float(found[at]), float(times[ours.first + at]), size))
-    return most
+class MeasuredBake:
+    """A bake whose first complete pass over its frames measures its deviation from linear blending too.
+
+    made, linear: bakers of the same meshes. times: (F,) s. progress: as by `Baker.bake`.
+    """
+
+    def __init__(
+        self,
+        made: Baker,
+        linear: Baker,
+        clip: Clip,
+        times: Floats,
+        progress: Callable[[int], None] = lambda frames: None,
+    ) -> None:
+        self._own = made.bake(clip, times=times, progress=progress)
+        self._linear = linear.bake(clip, times=times)
+        self._size = model_size(made)
+        self._found: Deviation | None = None
+        self.cache = replace(self._own, chunks=self._chunks)
+
+    def deviation(self) -> Deviation:
+        """Return the deviation; the frames are baked for it if no pass was complete."""
+        if self._found is None:
+            for _ in self._chunks():
+                pass
+        assert self._found is not None
+        return self._found
+
+    def _chunks(self) -> Iterator[FrameChunk]:
+        if self._found is not None:
+            yield from self._own.chunks()
+            return
+        most = Deviation(0.0, 0.0, self._size)
+        for chunk, linear in zip(self._own.chunks(), self._linear.chunks(), strict=True):
+            found = max_distance(chunk.positions, linear.positions)
+            at = int(found.argmax())
+            most = max(most, Deviation(float(found[at]), float(self._own.times[chunk.first + at]), self._size))
+            yield chunk
+        self._found = most
 
 
 def max_distance(positions: AnyArray, others: AnyArray) -> Floats:

@@ -7,7 +7,7 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.skinning.bake import prepare_bake
-from anim.skinning.uneven import uneven_joints
+from anim.skinning.uneven import UnevenScale
 from tests.clips import about, clip, track
 from tests.files import opened_fixture
 
@@ -25,9 +25,18 @@ def test_a_joint_with_another_factor_along_one_axis(scale: list[float], expected
         track("rotation", [0, 1], about("x", [0, 90]), node=1),
     )
     made = prepare_bake(reader.scene(opened_fixture("tube")), method="dqs")
-    assert uneven_joints(made, played, TIMES) == expected
+    assert UnevenScale(made).joints(played, TIMES) == expected
 
 
 def test_below_a_parent_that_scales_unevenly_a_joint_shears() -> None:
     played = clip(track("scale", [0], [[1, 1, 3]], node=0), track("rotation", [0, 1], about("x", [0, 45]), node=1))
-    assert uneven_joints(prepare_bake(reader.scene(opened_fixture("tube"))), played, TIMES) == (0, 1)
+    assert UnevenScale(prepare_bake(reader.scene(opened_fixture("tube")))).joints(played, TIMES) == (0, 1)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.5])
+def test_one_frame_says_as_much_as_all_where_every_node_scales_evenly(factor: float) -> None:
+    """The key that is uneven lies between frames of even ones, or there is none."""
+    keys = np.array([[1, 1, 1], [2, 2, 2 * factor], [1, 1, 1]], float)
+    played = clip(track("scale", [0, 0.5, 1], keys, node=1), track("rotation", [0, 1], about("x", [0, 90]), node=1))
+    made = prepare_bake(reader.scene(opened_fixture("tube")), method="dqs")
+    assert UnevenScale(made).joints(played, TIMES) == (() if factor == 1 else (1,))

@@ -8,7 +8,7 @@ import pytest
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene
 from anim.skinning.analysis.collapse import collapse
-from anim.skinning.analysis.method_deviation import deviation, linear_baker, model_size
+from anim.skinning.analysis.method_deviation import MeasuredBake, linear_baker, max_distance, model_size
 from anim.skinning.analysis.recommendations import CollapseFinding, recommend
 from anim.skinning.bake import prepare_bake
 from tests.clips import about, clip, track
@@ -22,7 +22,7 @@ def test_a_screw_of_a_half_turn_leaves_linear_blending_by_half_its_chord() -> No
     """Dual quaternions go along a half circle over the chord; the middle is half of the chord away from it."""
     of, played = torn()
     made = prepare_bake(of, method="dqs")
-    found = deviation(made, linear_baker(made, space="world"), played, TIMES)
+    found = MeasuredBake(made, linear_baker(made, space="world"), played, TIMES).deviation()
     assert found.distance == pytest.approx(FAR / 2, rel=0.05)
     assert found.time == 1
     assert found.distance > model_size(made) == pytest.approx(np.linalg.norm([0.2, 0.2, 1]), rel=0.01)
@@ -36,7 +36,7 @@ def test_every_frame_is_looked_at() -> None:
     places[617], turns[617] = [0, FAR, 0], 179.9
     played = clip(track("translation", times, places, node=1), track("rotation", times, about("x", turns), node=1))
     made = prepare_bake(of, method="dqs")
-    found = deviation(made, linear_baker(made, space="world"), played, times)
+    found = MeasuredBake(made, linear_baker(made, space="world"), played, times).deviation()
     assert found.distance == pytest.approx(FAR / 2, rel=0.05)
     assert found.time == times[617]
 
@@ -44,7 +44,23 @@ def test_every_frame_is_looked_at() -> None:
 def test_linear_blending_is_not_off_itself() -> None:
     of, played = torn()
     made = prepare_bake(of)
-    assert deviation(made, linear_baker(made, space="world"), played, TIMES).distance == 0
+    assert MeasuredBake(made, linear_baker(made, space="world"), played, TIMES).deviation().distance == 0
+
+
+def test_the_first_complete_pass_measures() -> None:
+    """A pass that is left, as by a format that needs one chunk only, measures nothing; later passes bake once."""
+    of, played = torn()
+    made, times = prepare_bake(of, method="dqs"), np.linspace(0, 1, 500)
+    linear = linear_baker(made, space="world")
+    passes: list[int] = []
+    measured = MeasuredBake(made, linear, played, times, passes.append)
+    next(measured.cache.chunks())
+    frames = measured.cache.load_all().positions
+    np.testing.assert_array_equal(frames, made.bake(played, times=times).load_all().positions)
+    baked = len(passes)
+    apart = max_distance(frames, linear.bake(played, times=times).load_all().positions)
+    assert measured.deviation() == (apart.max(), times[apart.argmax()], model_size(made))
+    assert len(passes) == baked
 
 
 def test_collapse_never_advises_such_a_method() -> None:
