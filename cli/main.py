@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import gc
 import importlib
+import inspect
 import os
 import signal
 import sys
@@ -147,6 +148,10 @@ COMMANDS = {
             "gltf-anim render walk.npz walk.webp --frames 24",
         ),
     ),
+    "simulate": CommandInfo(
+        "Simulate motion from forces, and bake it to keys.",
+        ("gltf-anim simulate particles walk.glb sparks.glb --node head --floor 0",),
+    ),
     "optimize": CommandInfo(
         "Make animations smaller, within an error that no vertex exceeds.",
         (
@@ -196,9 +201,14 @@ class LazyGroup(Parsing, TyperGroup):
             single = typer.Typer(add_completion=False, rich_markup_mode=None)
             single.command(cmd_name, cls=Command, epilog=epilog)(set_parsers(module.command))
         else:  # a package with a command for each kind
-            single = typer.Typer(cls=module.Group, add_completion=False, rich_markup_mode=None, no_args_is_help=True)
-            single.callback(help=module.Group.__doc__, epilog=epilog)(lambda: None)
+            single = typer.Typer(cls=module.Group, add_completion=False, rich_markup_mode=None)
+            words = inspect.cleandoc(module.Group.__doc__)
+            single.callback(help=words, epilog=epilog, subcommand_metavar="KIND [IN] [OUT]")(lambda: None)
         return typer.main.get_command(single)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; without any the help is shown."""
+        return super().parse_args(ctx, args or ["--help"])
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
         """Return the commands and options with this prefix; descriptions come from the table, without imports."""

@@ -69,7 +69,7 @@ PUBLIC = {
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors instancing materials reader vertex_colors",
     "gltf.validation": "buffer_layout channel_targets hierarchy schema",
-    "gltf.writing": "byte_ranges references reindex writer",
+    "gltf.writing": "append byte_ranges references reindex writer",
     "measure.compare": "diff name_matching",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "largest_error prover",
@@ -84,6 +84,7 @@ PUBLIC = {
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations tangent_plot track_plot "
         "track_selection"
     ),
+    "simulation.particles": "emission forces obstacles simulate solver",
     "skinning.analysis": (
         "collapse collapsed_clips inbetween_error method_deviation method_scores recommendations weight_sums"
     ),

@@ -17,7 +17,8 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 
 State: TypeAlias = tuple[Floats, Floats]
-Step: TypeAlias = Callable[["System", float, Floats, Floats, float], State]
+Scalar: TypeAlias = Floats | float  # or (P, 1), another for each point
+Step: TypeAlias = Callable[["System", Scalar, Floats, Floats, Scalar], State]
 
 
 class System(Protocol):
@@ -28,8 +29,8 @@ class System(Protocol):
     (I − h ∂a/∂v − h² ∂a/∂x) dv = h (a + h ∂a/∂x v) with the derivatives at the start of the step.
     """
 
-    def acceleration(self, time: float, x: Floats, v: Floats) -> Floats: ...
-    def solve_implicit(self, time: float, x: Floats, v: Floats, step: float) -> Floats: ...
+    def acceleration(self, time: Scalar, x: Floats, v: Floats) -> Floats: ...
+    def solve_implicit(self, time: Scalar, x: Floats, v: Floats, step: Scalar) -> Floats: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,23 +60,23 @@ class Integrator:
         return v + 0.5 * step * system.acceleration(time, x, v) if self.staggered else v
 
 
-def _explicit_euler(system: System, t: float, x: Floats, v: Floats, h: float) -> State:
+def _explicit_euler(system: System, t: Scalar, x: Floats, v: Floats, h: Scalar) -> State:
     return x + h * v, v + h * system.acceleration(t, x, v)
 
 
-def _symplectic_euler(system: System, t: float, x: Floats, v: Floats, h: float) -> State:
+def _symplectic_euler(system: System, t: Scalar, x: Floats, v: Floats, h: Scalar) -> State:
     """Also position Verlet, x₊ = 2x − x₋ + h²a, where v is (x − x₋) / h: the velocity at t − h/2."""
     v = v + h * system.acceleration(t, x, v)
     return x + h * v, v
 
 
-def _velocity_verlet(system: System, t: float, x: Floats, v: Floats, h: float) -> State:
+def _velocity_verlet(system: System, t: Scalar, x: Floats, v: Floats, h: Scalar) -> State:
     half = v + 0.5 * h * system.acceleration(t, x, v)
     x = x + h * half
     return x, half + 0.5 * h * system.acceleration(t + h, x, half)
 
 
-def _rk4(system: System, t: float, x: Floats, v: Floats, h: float) -> State:
+def _rk4(system: System, t: Scalar, x: Floats, v: Floats, h: Scalar) -> State:
     a1 = system.acceleration(t, x, v)
     v2 = v + 0.5 * h * a1
     a2 = system.acceleration(t + 0.5 * h, x + 0.5 * h * v, v2)
@@ -86,7 +87,7 @@ def _rk4(system: System, t: float, x: Floats, v: Floats, h: float) -> State:
     return x + h / 6 * (v + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
 
 
-def _implicit_euler(system: System, t: float, x: Floats, v: Floats, h: float) -> State:
+def _implicit_euler(system: System, t: Scalar, x: Floats, v: Floats, h: Scalar) -> State:
     v = v + system.solve_implicit(t, x, v, h)
     return x + h * v, v
 

@@ -15,12 +15,14 @@ import typer
 import cli.commands
 from anim.errors import RangeError
 from cli import main
+from cli.commands import simulate
 from cli.typer_options import name_options
 from tests.cli.conftest import Call
 from tests.cli.running import ROOT, built, shell
 from tests.fixtures.reading import split
 
 EXAMPLES = [(command, example) for command, row in main.COMMANDS.items() for example in row.examples]
+EXAMPLES += [("simulate", example) for row in simulate.KINDS.values() for example in row.examples]
 # Command lines that make files which examples read.
 MAKING = (
     "convert scene/walk.glb scene/walk.gltf",
@@ -59,7 +61,7 @@ def module(command: str) -> str:
 
 def test_every_command_is_a_module_and_every_module_a_command() -> None:
     folder = Path(next(iter(cli.commands.__path__)))
-    found = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    found = {path.stem for path in (*folder.glob("*.py"), *folder.glob("[a-z]*/"))} - {"__init__"}
     assert found == {module(command) for command in main.COMMANDS}
 
 

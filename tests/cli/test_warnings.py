@@ -111,6 +111,7 @@ QUIET = {  # a line for each command, and how its product on stdout begins; b"" 
     "plot": (("arm.glb", "--format", "svg"), b"<?xml"),
     "convert-cache": (("one.npz", "out.pc2"), b""),
     "render": (("arm.glb", "-", "--frames", "1"), b"\x89PNG"),
+    "simulate": (("particles", "arm.glb", "--node", "*"), b"glTF"),
     "optimize": (("arm.glb", "--effort", "fast"), b"glTF"),
     "convert": (("arm.glb",), b"glTF"),
 }

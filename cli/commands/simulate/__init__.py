@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from cli.main import CommandInfo, LazyGroup
 
-KINDS: dict[str, CommandInfo] = {}
+KINDS: dict[str, CommandInfo] = {
+    "particles": CommandInfo(
+        "Emit particles from nodes or surfaces.",
+        (
+            "gltf-anim simulate particles walk.glb sparks.glb --node head --floor 0 --rate 100",
+            "gltf-anim simulate particles walk.glb dust.glb --node '*_Foot' --drag 3 --turbulence 0.4 --loop",
+            "gltf-anim simulate particles walk.glb rain.glb --node head --drag 2 --integrator rk4 --report rain.json",
+        ),
+    ),
+}
 
 
 class Group(LazyGroup):
-    """Simulate motion from forces, and write it as keys.
+    """Simulate motion from forces, and bake it to keys.
 
-    Time is two things here: --step is the fixed step of the simulation, --fps the rate of the frames that are written.
+    Two rates: --step is the fixed time step of the simulation, --fps the rate of the frames that are written.
     """
 
     table = KINDS

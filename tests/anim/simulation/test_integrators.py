@@ -19,10 +19,10 @@ class Oscillator:
     def __init__(self, omega: float, damping: float = 0.0, gravity: float = 0.0) -> None:
         self.k, self.c, self.g = omega**2, 2 * damping * omega, gravity
 
-    def acceleration(self, time: float, x: Array, v: Array) -> Array:
+    def acceleration(self, time: Array | float, x: Array, v: Array) -> Array:
         return -self.k * x - self.c * v + self.g
 
-    def solve_implicit(self, time: float, x: Array, v: Array, step: float) -> Array:
+    def solve_implicit(self, time: Array | float, x: Array, v: Array, step: Array | float) -> Array:
         a = self.acceleration(time, x, v)
         return step * (a - step * self.k * v) / (1 + step * self.c + step**2 * self.k)
 

@@ -1,0 +1,187 @@
+"""Births of particles: when, where, and how fast they leave a node or the surface of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import NotFoundError, RangeError
+from anim.model import Clip, Scene
+from anim.sampling.sample import sample
+from anim.skinning.bake import bake
+
+VELOCITY_STEP_S = 1e-3  # half the interval of the difference quotient of an emitter's motion
+MAX_PARTICLES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Emitter:
+    """Source of particles on nodes.
+
+    nodes: indices. rate: particles per second and node. burst: per node, at the start. surface: emit from the skinned
+    mesh of each node, along its normals, instead of from the node's origin. direction: (3,) in the node's space.
+    speed: m/s. spread: rad, half the angle of the cone. lifetime: s. speed_variation, lifetime_variation: fractions,
+    uniform. inherit: fraction of the emitter's own velocity. start, end: s of the emission; None for the whole run.
+    Raises RangeError.
+    """
+
+    nodes: tuple[int, ...]
+    rate: float = 50.0
+    burst: int = 0
+    surface: bool = False
+    direction: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    speed: float = 2.0
+    spread: float = 0.35
+    lifetime: float = 1.5
+    speed_variation: float = 0.25
+    lifetime_variation: float = 0.25
+    inherit: float = 1.0
+    start: float | None = None
+    end: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, most in (("rate", np.inf), ("burst", np.inf), ("speed", np.inf), ("spread", np.pi)):
+            _check(name, getattr(self, name), 0.0, most)
+        _check("lifetime", self.lifetime, 1e-3, np.inf)
+        for name in ("speed_variation", "lifetime_variation"):
+            _check(name, getattr(self, name), 0.0, 1.0)
+        if not np.isfinite(self.direction).all() or not np.any(self.direction):
+            raise RangeError(f"direction is {self.direction} (expected a vector that isn't 0)")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Births:
+    """P particles, ordered by birth. times, deaths: (P,) s; positions (P, 3) m; velocities (P, 3) m/s."""
+
+    times: Floats
+    deaths: Floats
+    positions: Floats
+    velocities: Floats
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+
+def emit(scene: Scene, clip: Clip, emitter: Emitter, start: float, end: float, seed: int) -> Births:
+    """Return the particles born from `start` until before `end` s.
+
+    The clip is evaluated at each birth; before 0 s it has the pose of 0 s.
+    Raises NotFoundError for a node without a mesh where particles leave a surface, RangeError for over a million.
+    """
+    first = start if emitter.start is None else max(start, emitter.start)
+    last = end if emitter.end is None else min(end, emitter.end)
+    count = emitter.burst + int(np.ceil(max(last - first, 0) * emitter.rate - 1e-9))
+    if count * len(emitter.nodes) > MAX_PARTICLES:
+        raise RangeError(f"{count * len(emitter.nodes)} particles (limit {MAX_PARTICLES})")
+    times = np.concatenate(
+        [np.full(emitter.burst, first), first + np.arange(count - emitter.burst) / (emitter.rate or 1)]
+    )
+    parts = [
+        _emit_node(scene, clip, emitter, node, times, np.random.default_rng([seed, node])) for node in emitter.nodes
+    ]
+    together = [np.concatenate(each) for each in zip(*parts, strict=True)]
+    order = np.argsort(together[0], kind="stable")
+    return Births(*(each[order] for each in together))
+
+
+def repeat_births(births: Births, period: float) -> Births:
+    """Return the particles with those of as many earlier periods as live into this one: a loop without a seam."""
+    rounds = int(np.ceil(((births.deaths - births.times).max() if len(births) else 0) / period))
+    shifts = np.repeat(np.arange(-rounds, 1) * period, len(births))
+    times = np.tile(births.times, rounds + 1) + shifts
+    deaths = np.tile(births.deaths, rounds + 1) + shifts
+    return Births(
+        times, deaths, np.tile(births.positions, (rounds + 1, 1)), np.tile(births.velocities, (rounds + 1, 1))
+    )
+
+
+def _emit_node(
+    scene: Scene, clip: Clip, emitter: Emitter, node: int, times: Floats, random: np.random.Generator
+) -> tuple[Floats, Floats, Floats, Floats]:
+    count = len(times)
+    speed = emitter.speed * (1 + emitter.speed_variation * random.uniform(-1, 1, count))
+    life = emitter.lifetime * (1 + emitter.lifetime_variation * random.uniform(-1, 1, count))
+    cone = _cone(emitter.spread, random, count)
+    if emitter.surface:
+        positions, axes, own = _on_surface(scene, clip, node, times, random)
+    else:
+        positions, axes, own = _at_node(scene, clip, node, times, emitter.direction)
+    velocities = speed[:, None] * _rotate_z_to(axes, cone) + emitter.inherit * own
+    return times, times + np.maximum(life, 1e-3), positions, velocities
+
+
+def _at_node(
+    scene: Scene, clip: Clip, node: int, times: Floats, direction: Sequence[float]
+) -> tuple[Floats, Floats, Floats]:
+    """World positions, unit directions and velocities (n, 3) of a node at times (n,)."""
+    at = np.maximum(times[:, None] + np.array([-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S]), 0.0)
+    unique, inverse = np.unique(at, return_inverse=True)
+    world = sample(scene.skeleton, clip, unique, space="world").world
+    assert world is not None
+    matrices = world[:, node][inverse.reshape(at.shape)]
+    axes = matrices[:, 1, :, :3] @ (np.asarray(direction) / np.linalg.norm(direction))
+    places = matrices[:, :, :, 3]
+    span = np.maximum(at[:, 2] - at[:, 0], 1e-9)[:, None]
+    return places[:, 1], _unit(axes), (places[:, 2] - places[:, 0]) / span
+
+
+def _on_surface(
+    scene: Scene, clip: Clip, node: int, times: Floats, random: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """Uniform random points of a node's skinned mesh at times (n,), their normals, and their velocities."""
+    found = [each for each in scene.instances if each.node == node]
+    if not found or not len(found[0].mesh.faces):
+        raise NotFoundError(f"node '{scene.skeleton.names[node]}' has no surface to emit from")
+    faces = found[0].mesh.faces
+    corners = found[0].mesh.positions[faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    chosen = faces[np.searchsorted(np.cumsum(areas) / areas.sum(), random.uniform(0, 1, len(times)))]
+    u, v = np.sqrt(random.uniform(0, 1, len(times))), random.uniform(0, 1, len(times))
+    barycentric = np.stack([1 - u, u * (1 - v), u * v], axis=1)
+    points = [
+        _vertices(scene, clip, node, np.maximum(times + offset, 0.0), chosen)
+        for offset in (-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S)
+    ]
+    before, at, after = ((barycentric[:, :, None] * each).sum(axis=1) for each in points)
+    normals = np.cross(points[1][:, 1] - points[1][:, 0], points[1][:, 2] - points[1][:, 0])
+    span = (np.maximum(times + VELOCITY_STEP_S, 0) - np.maximum(times - VELOCITY_STEP_S, 0))[:, None]
+    return at, _unit(normals), (after - before) / np.maximum(span, 1e-9)
+
+
+def _vertices(scene: Scene, clip: Clip, node: int, times: Floats, chosen: Ints) -> Floats:
+    """Positions (n, 3, 3) of the vertices (n, 3) at times (n,)."""
+    unique, inverse = np.unique(times, return_inverse=True)
+    result = np.empty((len(times), 3, 3))
+    cache = bake(scene, clip, times=unique, rigid=True, nodes=[node])
+    for chunk in cache.chunks():
+        here = np.flatnonzero((inverse >= chunk.first) & (inverse < chunk.first + len(chunk.positions)))
+        result[here] = chunk.positions[inverse[here] - chunk.first][np.arange(len(here))[:, None], chosen[here]]
+    return result
+
+
+def _cone(spread: float, random: np.random.Generator, count: int) -> Floats:
+    """Unit vectors (n, 3) uniform on the cap of half angle `spread` around +Z."""
+    z = 1 - random.uniform(0, 1, count) * (1 - np.cos(spread))
+    angle = random.uniform(0, 2 * np.pi, count)
+    across = np.sqrt(np.maximum(1 - z * z, 0))
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+def _rotate_z_to(axes: Floats, vectors: Floats) -> Floats:
+    """Vectors (n, 3) rotated as +Z is to the unit axes (n, 3)."""
+    helper = np.where(np.abs(axes[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    x = _unit(np.cross(helper, axes))
+    return vectors[:, :1] * x + vectors[:, 1:2] * np.cross(axes, x) + vectors[:, 2:] * axes
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
+
+
+def _check(name: str, value: float, least: float, most: float) -> None:
+    if not (np.isfinite(value) and least <= value <= most):
+        limit = f"{least:g} to {most:g}" if np.isfinite(most) else f"at least {least:g}"
+        raise RangeError(f"{name} is {value:g} (expected {limit})")

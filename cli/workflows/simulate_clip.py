@@ -1,0 +1,81 @@
+"""Workflow of all kinds of simulation: read, choose the driving clip, simulate, write, report."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import PurePath
+
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.model import Clip, Scene
+from anim.operations.selection import Selection
+from anim.simulation.report import SimulationReport
+from cli import text
+from cli.errors import UsageError
+from cli.io import documents, scenes
+from cli.text import Reporter
+from cli.workflows.edit_clips import note_images
+
+NO_CLIP = Clip("", ())
+Simulate = Callable[[Document, Scene, Clip, int | None], tuple[Document, SimulationReport, str]]
+
+
+def simulate_clip(
+    input: str,
+    output: str,
+    clip: str | None,
+    simulate: Simulate,
+    voice: Reporter,
+    *,
+    report: str | None,
+    dry_run: bool,
+) -> None:
+    """Simulate on one clip of a file, write the file and the report, and sum up in one line on stderr.
+
+    clip: glob of the driving clip; the first clip without it. simulate: gets the document, its scene, the driving clip,
+    without tracks where the file has none, and its index; returns the document, the report, and a summary.
+    """
+    began = time.perf_counter()
+    if not dry_run:
+        documents.check_output(output)
+        if report is not None:
+            check_report(report)
+    with documents.source(input, voice) as source:
+        scene = scenes.read_scene(source.document, source.name, voice)
+        number = driving_clip(source.document, clip)
+        driver = NO_CLIP if number is None else reader.clips(source.document)[number]
+        result, found, summary = simulate(source.document, scene, driver, number)
+        size = documents.write(result, output, source, dry_run=dry_run, voice=voice)
+    if not dry_run:
+        note_images(result, source, output, voice)
+        if report is not None:
+            documents.write_text(json.dumps(found.to_json(), indent=2, ensure_ascii=False) + "\n", report)
+    name = source.name if output == documents.PIPE else output
+    took = text.format_duration(time.perf_counter() - began)
+    nothing = " (dry run: nothing written)" if dry_run else ""
+    voice.info(f"{name}  {text.format_change(source.size, size)}, {summary}, {took}{nothing}")
+    if found.advice:
+        voice.warn(found.advice)
+
+
+def driving_clip(document: Document, glob: str | None) -> int | None:
+    """Return the index of the driving clip; None for a file without clips. Raises UsageError for several."""
+    names = reader.names(document)
+    if glob is None:
+        return 0 if names else None
+    chosen = Selection((glob,)).chosen_clips(names)
+    if len(chosen) > 1:
+        listed = ", ".join(reader.clip_label(names[i], i) for i in chosen[:4])
+        raise UsageError(f"--clip '{glob}' names {len(chosen)} clips ({listed} …): one drives a simulation")
+    return chosen[0]
+
+
+def check_report(report: str) -> None:
+    """Raise UsageError unless a report can be written in this format."""
+    if PurePath(report).suffix.lower() != ".json":
+        raise UsageError(
+            f"--report {report}: a report is no {PurePath(report).suffix or 'file without ending'} (expected .json)"
+        )
+    documents.check_file(report)
