@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,23 +27,27 @@ def reference() -> str:
     context = group.make_context(main.PROGRAM, [], resilient_parsing=True)
     rows = [f"| [{name}](#{name}) | {_escaped(info.about)} |" for name, info in main.COMMANDS.items()]
     parts = [HEADER, "| command | |\n|---|---|", *rows, "", _paragraph(main.app.info.epilog)]
-    for name in main.COMMANDS:
-        parts += ["", *_section(name, group.get_command(context, name), context)]
+    for name, row in main.COMMANDS.items():
+        command = group.get_command(context, name)
+        parts += ["", *_section(name, command, row.examples, context)]
+        for kind, info in getattr(command, "table", {}).items():
+            parts += ["", *_section(f"{name} {kind}", command.get_command(context, kind), info.examples, context)]
     return "\n".join(parts) + "\n"
 
 
-def _section(name: str, command: Any, context: Any) -> Iterator[str]:
+def _section(name: str, command: Any, examples: Sequence[str], context: Any) -> Iterator[str]:
     arguments = [each for each in command.params if each.param_type_name == "argument"]
     options = [each for each in command.params if each.param_type_name == "option" and not each.hidden]
     yield f"## {name}\n"
     for paragraph in command.help.split("\n\n"):
         yield f"{_paragraph(paragraph)}\n"
-    usage = " ".join([main.PROGRAM, name, "[OPTIONS]", *map(_usage, arguments)])
+    kinds = [command.subcommand_metavar] if hasattr(command, "subcommand_metavar") else []
+    usage = " ".join([main.PROGRAM, name, "[OPTIONS]", *kinds, *map(_usage, arguments)])
     yield f"```\n{usage}\n```\n"
     yield from (f"- `{each.metavar}`: {_escaped(each.help)}" for each in arguments)
     yield from (_option(each, context) for each in options)
     yield "\n```"
-    yield from main.COMMANDS[name].examples
+    yield from examples
     yield "```"
 
 

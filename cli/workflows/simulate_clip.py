@@ -75,7 +75,5 @@ def driving_clip(document: Document, glob: str | None) -> int | None:
 def check_report(report: str) -> None:
     """Raise UsageError unless a report can be written in this format."""
     if PurePath(report).suffix.lower() != ".json":
-        raise UsageError(
-            f"--report {report}: a report is no {PurePath(report).suffix or 'file without ending'} (expected .json)"
-        )
+        raise UsageError(f"--report {report}: unsupported report format (expected .json)")
     documents.check_file(report)

@@ -91,6 +91,7 @@ class ParticleSolver:
         self._x, self._v = births.positions.copy(), births.velocities.copy()
         self._resting = np.full(len(births), -1)  # index of the flat obstacle that a particle slides or rests on
         self._normals = np.zeros_like(self._x)
+        self._asleep = np.zeros(len(births), bool)  # at rest for good
         self._keys = _Recorder()
         self._num_impacts = 0
 
@@ -111,10 +112,11 @@ class ParticleSolver:
             self._keys.add(new, births.times[new], self._x[new], self._v[new], self._v[new])
             alive, born = np.concatenate([alive, new]), num
             if len(alive):
-                begin = np.maximum(births.times[alive], start)
-                stop = np.minimum(births.deaths[alive], end)
-                self._advance(_Flight(alive, begin, stop - begin, self._x[alive], self._v[alive]))
-                max_speed = max(max_speed, self._check_speed(alive, n))
+                awake = alive[~self._asleep[alive]]
+                begin = np.maximum(births.times[awake], start)
+                stop = np.minimum(births.deaths[awake], end)
+                self._advance(_Flight(awake, begin, stop - begin, self._x[awake], self._v[awake]))
+                max_speed = max(max_speed, self._check_speed(awake, n))
                 dead = births.deaths[alive] <= end
                 gone = alive[dead]
                 self._keys.add(gone, births.deaths[gone], self._x[gone], self._v[gone], self._v[gone])
@@ -130,7 +132,8 @@ class ParticleSolver:
 
     def _check_speed(self, alive: Ints, n: int) -> float:
         with np.errstate(all="ignore"):
-            speed = float(np.sqrt(np.square(self._v[alive]).sum(axis=1).max()))
+            v = self._v[alive]
+            speed = float(np.sqrt(np.einsum("pc,pc->p", v, v).max(initial=0.0)))
         if not (speed < MAX_SPEED_M_S and np.isfinite(self._x[alive]).all()):
             raise UnstableError(f"the simulation diverges in step {n}: a particle moves at {speed:g} m/s")
         return speed
@@ -251,6 +254,8 @@ class ParticleSolver:
         t = np.minimum(stop, h)[:, None]
         x = flight.x + t * flight.v + 0.5 * t * t * total
         v = np.where(stops[:, None], 0.0, flight.v + t * total)
+        if self._forces.is_constant:
+            self._asleep[p[still | (stops & (pull <= grip))]] = True
         self._keys.add(p[stops], (flight.start + stop)[stops], x[stops], v[stops], v[stops])
         self._x[p], self._v[p] = x, v
         for k in np.unique(self._resting[p]):
