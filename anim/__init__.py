@@ -27,7 +27,7 @@ Facade
 
 Packages, from the bottom up, each imported as anim.<package>.<module>
     maths                   quaternions, matrices, Euler angles, Hermite cubics on arrays
-    model                   Clip, Track, Skeleton, Scene, Pose, VertexCache: frozen, checked once
+    model                   Clip, Track, TimeAxis, Skeleton, Scene, Pose, VertexCache: frozen, checked once
     files, gltf             paths; the JSON and buffers of glTF: reading, validation, writing
     sampling, curves        tracks and poses at times; easings, tangents, keys that follow curves
     measure                 inspect, error, diff, continuity, loops
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from anim.model import Interpolation as Interpolation
     from anim.model import Scene as Scene
     from anim.model import Skeleton as Skeleton
+    from anim.model import TimeAxis as TimeAxis
     from anim.model import Track as Track
     from anim.model import VertexCache as VertexCache
     from anim.skinning.methods.registry import SKINNING_METHODS as SKINNING_METHODS
@@ -91,7 +92,7 @@ _MODULES = {  # modules of the names, imported on first use
         "ShapeError",
         "UnsupportedError",
     ),
-    "anim.model": ("Clip", "Interpolation", "Scene", "Skeleton", "Track", "VertexCache"),
+    "anim.model": ("Clip", "Interpolation", "Scene", "Skeleton", "TimeAxis", "Track", "VertexCache"),
     "anim.skinning.methods.registry": ("SKINNING_METHODS",),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

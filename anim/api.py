@@ -281,4 +281,4 @@ def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
         return as_floats(np.atleast_1d(np.asarray(times)), "F", name="times")
     if fps is not None:
         return frame_times(clip.start, clip.end, fps=fps)
-    return np.unique(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+    return clip.key_times

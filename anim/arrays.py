@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from typing import Any, TypeAlias
-from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +18,6 @@ AnyArray: TypeAlias = NDArray[Any]
 Bytes: TypeAlias = NDArray[np.uint8]
 
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
-_CHECKED_AXES: WeakValueDictionary[int, AnyArray] = WeakValueDictionary()
 
 
 def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
@@ -47,11 +45,8 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
 def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
     """Return key times (K,) in seconds as a read-only float64 array: K ≥ 1, finite, ≥ 0, increasing.
 
-    Times are strictly increasing. The same array object is checked once only, since many tracks share one time axis.
-    Raises ShapeError, or RangeError with the index of the first invalid key.
+    Times are strictly increasing. Raises ShapeError, or RangeError with the index of the first invalid key.
     """
-    if isinstance(values, np.ndarray) and _CHECKED_AXES.get(id(values)) is values:
-        return values
     array = as_floats(values, "K", name=name)
     if len(array) == 0:
         raise RangeError(f"{name} are empty (expected at least one key)")
@@ -61,7 +56,6 @@ def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
     if len(steps) and steps.min() <= 0:
         k = int(np.argmax(steps <= 0)) + 1
         raise RangeError(f"{name} not increasing at key {k} ({array[k]:g} s after {array[k - 1]:g} s)")
-    _CHECKED_AXES[id(array)] = array
     return array
 
 

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anim.arrays import Floats
-from anim.model import FLOAT32, AccessorFormat, Clip, Interpolation, Skeleton, Track
+from anim.model import FLOAT32, AccessorFormat, Clip, Interpolation, Skeleton, TimeAxis, Track
 
 STEP, LINEAR, CUBICSPLINE = Interpolation.STEP, Interpolation.LINEAR, Interpolation.CUBICSPLINE
 
 
 def track(
     path: str,
-    times: ArrayLike,
+    times: TimeAxis | ArrayLike,
     values: ArrayLike,
     mode: Interpolation = LINEAR,
     *,

@@ -6,6 +6,7 @@ from anim.model.clip import Clip
 from anim.model.pose import Pose
 from anim.model.scene import Mesh, MeshInstance, PrimitiveRange, Scene, Skin
 from anim.model.skeleton import Skeleton
+from anim.model.time_axis import TimeAxis
 from anim.model.track import FLOAT32, AccessorFormat, Interpolation, Track, ValueKind
 
 if TYPE_CHECKING:  # imported on first use: only bakes and caches need them
@@ -25,6 +26,7 @@ __all__ = [
     "Scene",
     "Skeleton",
     "Skin",
+    "TimeAxis",
     "Track",
     "ValueKind",
     "VertexCache",

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from anim.arrays import Floats
 from anim.errors import FormatError, ShapeError
+from anim.model.time_axis import TimeAxis, merge_times
 from anim.model.track import Track
 
 
@@ -33,19 +36,24 @@ class Clip:
             raise FormatError(f"two tracks for node {node}, {path}", where=f"clip '{self.name}'" if self.name else "")
 
     @property
-    def axes(self) -> tuple[Floats, ...]:
-        """Distinct arrays of key times, in the order of the tracks."""
-        return tuple({id(track.times): track.times for track in self.tracks}.values())
+    def time_axes(self) -> tuple[TimeAxis, ...]:
+        """Distinct time axes, in the order of the tracks."""
+        return tuple(dict.fromkeys(track.time_axis for track in self.tracks))
+
+    @property
+    def key_times(self) -> Floats:
+        """Distinct key times of all tracks in seconds, increasing; 0 without tracks."""
+        return merge_times(self.time_axes) if self.tracks else np.zeros(1)
 
     @property
     def start(self) -> float:
         """Time of the first key, in seconds; 0 without tracks."""
-        return min((float(times[0]) for times in self.axes), default=0.0)
+        return min((float(track.times[0]) for track in self.tracks), default=0.0)
 
     @property
     def end(self) -> float:
         """Time of the last key, in seconds: the animation's duration in glTF, where it always starts at 0."""
-        return max((float(times[-1]) for times in self.axes), default=0.0)
+        return max((float(track.times[-1]) for track in self.tracks), default=0.0)
 
     def __repr__(self) -> str:
         return f"Clip({self.name!r}, tracks={len(self.tracks)}, start_s={self.start:.6g}, end_s={self.end:.6g})"

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from anim import arrays
 from anim.arrays import Floats
 from anim.errors import RangeError, ShapeError
+from anim.model.time_axis import TimeAxis, as_time_axis
 
 PATHS = ("translation", "rotation", "scale", "weights")
 NUM_COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}  # components per key; of weights and pointers they vary
@@ -48,12 +51,12 @@ class AccessorFormat:
 FLOAT32 = AccessorFormat()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Track:
     """Keys of one property of a node, or of the target of a JSON pointer.
 
     path: "translation", "rotation", "scale" or "weights" of `node`; "pointer" if the target is no node property.
-    times: (K,) seconds, ≥ 0, strictly increasing.
+    time_axis: key times (K,) in seconds, ≥ 0, strictly increasing; an axis is shared, an array becomes a new one.
     values: (K, C) metres, unit quaternion (x, y, z, w), factor, weight, or the pointer's own unit.
     in_tangents, out_tangents: (K, C) per second, for CUBICSPLINE only.
     pointer: the target by KHR_animation_pointer; `node` and `path` agree with it if it names a node's property.
@@ -66,34 +69,67 @@ class Track:
     node: int | None
     path: str
     interpolation: Interpolation
-    times: Floats
+    time_axis: TimeAxis
     values: Floats
-    in_tangents: Floats | None = None
-    out_tangents: Floats | None = None
-    pointer: str | None = None
-    storage: AccessorFormat = field(default=FLOAT32)
+    in_tangents: Floats | None
+    out_tangents: Floats | None
+    pointer: str | None
+    storage: AccessorFormat
+
+    def __init__(
+        self,
+        node: int | None,
+        path: str,
+        interpolation: Interpolation | str,
+        time_axis: TimeAxis | ArrayLike,
+        values: ArrayLike,
+        in_tangents: ArrayLike | None = None,
+        out_tangents: ArrayLike | None = None,
+        pointer: str | None = None,
+        storage: AccessorFormat = FLOAT32,
+    ) -> None:
+        set_field = object.__setattr__
+        set_field(self, "path", path)
+        set_field(self, "pointer", pointer)
+        set_field(self, "storage", storage)
+        if type(node) is not int or node < 0 or path not in PATHS:  # otherwise the target is valid
+            node = _node(node, path)
+        set_field(self, "node", node)
+        if type(interpolation) is not Interpolation:
+            interpolation = _interpolation(interpolation)
+        set_field(self, "interpolation", interpolation)
+        time_axis, values = as_time_axis(time_axis), arrays.as_floats(values, "K C", name="values")
+        set_field(self, "time_axis", time_axis)
+        set_field(self, "values", values)
+        shape = (len(time_axis), NUM_COMPONENTS.get(path, int(values.shape[1])))
+        if values.shape != shape:
+            raise ShapeError(f"values have shape {values.shape} (expected {shape})")
+        cubic = interpolation is Interpolation.CUBICSPLINE
+        if (in_tangents is not None) is not cubic or (out_tangents is not None) is not cubic:
+            raise ShapeError(f"{interpolation} with {'one or no' if cubic else 'in or out'} tangents")
+        set_field(self, "in_tangents", _tangents(in_tangents, shape, "in tangents"))
+        set_field(self, "out_tangents", _tangents(out_tangents, shape, "out tangents"))
 
     def __setstate__(self, state: list[Any]) -> None:
         arrays.restore_fields(self, state)
 
-    def __post_init__(self) -> None:
-        set_field = object.__setattr__
-        if type(self.node) is not int or self.node < 0 or self.path not in PATHS:  # otherwise the target is valid
-            set_field(self, "node", _node(self.node, self.path))
-        if type(self.interpolation) is not Interpolation:
-            set_field(self, "interpolation", _interpolation(self.interpolation))
-        times, values = arrays.as_key_times(self.times), arrays.as_floats(self.values, "K C", name="values")
-        set_field(self, "times", times)
-        set_field(self, "values", values)
-        shape = (len(times), NUM_COMPONENTS.get(self.path, int(values.shape[1])))
-        if values.shape != shape:
-            raise ShapeError(f"values have shape {values.shape} (expected {shape})")
-        cubic = self.interpolation is Interpolation.CUBICSPLINE
-        if (self.in_tangents is not None) is not cubic or (self.out_tangents is not None) is not cubic:
-            raise ShapeError(f"{self.interpolation} with {'one or no' if cubic else 'in or out'} tangents")
-        if self.in_tangents is not None and self.out_tangents is not None:
-            set_field(self, "in_tangents", _tangents(self.in_tangents, shape, "in tangents"))
-            set_field(self, "out_tangents", _tangents(self.out_tangents, shape, "out tangents"))
+    @property
+    def times(self) -> Floats:
+        """Key times (K,) of `time_axis`, in seconds."""
+        return self.time_axis.times
+
+    def with_keys(
+        self,
+        times: TimeAxis | ArrayLike,
+        values: ArrayLike,
+        in_tangents: ArrayLike | None = None,
+        out_tangents: ArrayLike | None = None,
+        *,
+        interpolation: Interpolation | None = None,
+    ) -> Track:
+        """Return the track with other keys, and with another interpolation if given."""
+        name, storage = interpolation or self.interpolation, self.storage
+        return Track(self.node, self.path, name, times, values, in_tangents, out_tangents, self.pointer, storage)
 
     def __eq__(self, other: object) -> bool:
         """Return whether the other track has the same keys, target and storage."""
@@ -160,11 +196,19 @@ def _interpolation(name: str) -> Interpolation:
         raise RangeError(f"interpolation is {name!r} (expected {', '.join(Interpolation)})") from None
 
 
-def _tangents(values: Floats, shape: tuple[int, int], name: str) -> Floats:
+def _tangents(values: ArrayLike | None, shape: tuple[int, int], name: str) -> Floats | None:
+    if values is None:
+        return None
     tangents = arrays.as_floats(values, "K C", name=name)
     if tangents.shape != shape:
         raise ShapeError(f"{name} have shape {tangents.shape} (expected {shape})")
     return tangents
+
+
+def share_time_axes(tracks: Iterable[Track]) -> list[Track]:
+    """Return the tracks with one axis for equal times."""
+    axes: dict[bytes, TimeAxis] = {}
+    return [replace(track, time_axis=axes.setdefault(track.times.tobytes(), track.time_axis)) for track in tracks]
 
 
 def kind_of(track: Track) -> ValueKind:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -51,15 +51,8 @@ def to_cubicspline(track: Track, pieces: CubicSegments) -> Track:
     if len(jumps):
         times, values, before, after = _insert_jump_keys(jumps, pieces, times, values, before, after)
     kept = distinct_float32(times)
-    in_tangents = before[kept]
-    return replace(
-        track,
-        interpolation=Interpolation.CUBICSPLINE,
-        times=times[kept],
-        values=values[kept],
-        in_tangents=in_tangents,
-        out_tangents=after[kept],
-    )
+    spline = Interpolation.CUBICSPLINE
+    return track.with_keys(times[kept], values[kept], before[kept], after[kept], interpolation=spline)
 
 
 def to_step(track: Track, pieces: CubicSegments) -> Track:
@@ -68,20 +61,13 @@ def to_step(track: Track, pieces: CubicSegments) -> Track:
     if track.kind is ValueKind.ROTATION:
         values = quaternion.align_signs(values)
     times = np.append(pieces.start, pieces.end[-1])
-    return with_keys(track, times, values, Interpolation.STEP)
+    return with_distinct_keys(track, times, values, Interpolation.STEP)
 
 
-def with_keys(track: Track, times: Floats, values: Floats, interpolation: Interpolation) -> Track:
+def with_distinct_keys(track: Track, times: Floats, values: Floats, interpolation: Interpolation) -> Track:
     """Return `track` with these keys and no tangents; keys with equal float32 times are removed."""
     kept = distinct_float32(times)
-    return replace(
-        track,
-        interpolation=interpolation,
-        times=times[kept],
-        values=values[kept],
-        in_tangents=None,
-        out_tangents=None,
-    )
+    return track.with_keys(times[kept], values[kept], interpolation=interpolation)
 
 
 def _align_signs(pieces: CubicSegments) -> CubicSegments:

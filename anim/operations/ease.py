@@ -14,7 +14,7 @@ from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32
 from anim.curves.fitting.easing_fit import fit_linear, fit_segments
 from anim.errors import RangeError, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
-from anim.operations.cubic_segments import to_cubicspline, to_step, with_keys
+from anim.operations.cubic_segments import to_cubicspline, to_step, with_distinct_keys
 from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
 from anim.operations.selection import track_indices
 from anim.sampling import segment
@@ -101,7 +101,7 @@ class _Job:
                 values.append(segment.evaluate(track, np.full(len(u), k), shares))
             times.append(track.times[k + 1 : k + 2])
             values.append(track.values[k + 1 : k + 2])
-        return with_keys(track, np.concatenate(times), np.concatenate(values), Interpolation.LINEAR)
+        return with_distinct_keys(track, np.concatenate(times), np.concatenate(values), Interpolation.LINEAR)
 
     def _followed(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
@@ -109,7 +109,7 @@ class _Job:
 
     def _sampled(self, track: Track, inside: Bools) -> Track:
         motion, corners, tolerance = self._motion(track, inside)
-        return with_keys(track, *linear_keys(motion, corners, tolerance=tolerance), Interpolation.LINEAR)
+        return with_distinct_keys(track, *linear_keys(motion, corners, tolerance=tolerance), Interpolation.LINEAR)
 
     def _motion(self, track: Track, inside: Bools) -> tuple[TrackFunction, Floats, float]:
         """The eased track as functions of time, its non-smooth times, and the tolerance of its approximation."""

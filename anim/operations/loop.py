@@ -66,11 +66,11 @@ def _append_first_key(track: Track, clip: Clip, end: float) -> Track:
         first = first * np.where(quaternion.dot(first, track.values[-1:]) < 0, -1.0, 1.0)
     times, values = np.append(track.times, end), np.concatenate((track.values, first))
     if track.in_tangents is None or track.out_tangents is None:
-        return replace(track, times=times, values=values)
+        return track.with_keys(times, values)
     chord = (values[-1:] - values[-2:-1]) / (times[-1] - times[-2])
     leaving = np.concatenate((track.out_tangents[:-1], track.in_tangents[-1:], np.zeros_like(chord)))
     arriving = np.concatenate((track.in_tangents, track.out_tangents[:1]))
-    return replace(track, times=times, values=values, in_tangents=arriving, out_tangents=leaving)
+    return track.with_keys(times, values, arriving, leaving)
 
 
 def _close(track: Track, clip: Clip, blend: float) -> Track:
@@ -102,13 +102,10 @@ def _close(track: Track, clip: Clip, blend: float) -> Track:
 def _without_last_jump(track: Track) -> Track:
     """Return a track without a jump between its last two keys, which the correction replaces."""
     before, after = track.in_tangents, track.out_tangents
-    return replace(
-        track,
-        times=np.append(track.times[:-2], track.times[-1]),
-        values=track.values[:-1],
-        in_tangents=None if before is None else before[:-1],
-        out_tangents=None if after is None else after[:-1],
-    )
+    times, values = np.append(track.times[:-2], track.times[-1]), track.values[:-1]
+    if before is None or after is None:
+        return track.with_keys(times, values)
+    return track.with_keys(times, values, before[:-1], after[:-1])
 
 
 def _closing_offset(track: Track, first: Floats, last: Floats) -> Floats:
@@ -158,7 +155,7 @@ class _Correction:
 
 def _correct_linear(track: Track, times: Floats, correction: _Correction) -> Track:
     values = _add_correction(track, sample(track, times), correction.value(times))
-    return replace(track, times=times, values=values)
+    return track.with_keys(times, values)
 
 
 def _times(track: Track, start: float, end: float) -> Floats:
@@ -185,4 +182,4 @@ def _correct_spline(track: Track, times: Floats, correction: _Correction) -> Tra
     if track.kind is ValueKind.ROTATION:
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0
-    return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)
+    return track.with_keys(times, values, before, after)

@@ -9,7 +9,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Track, ValueKind
+from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
 from anim.operations.selection import track_indices
 from anim.sampling import derivatives
 from anim.sampling.batch import Batch, batches
@@ -39,13 +39,13 @@ def resample(
     chosen = track_indices(clip, tracks)
     if interpolation not in INTERPOLATIONS:
         raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
-    times = key_times(frame_times(clip.start, clip.end, fps=fps))
+    axis = TimeAxis(key_times(frame_times(clip.start, clip.end, fps=fps)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
-    values = _sample_tracks([clip.tracks[i] for i in goals], times)
+    values = _sample_tracks([clip.tracks[i] for i in goals], axis.times)
     new = [_keep_keys(t, _goal(t, interpolation)) if i in chosen else t for i, t in enumerate(clip.tracks)]
     for (i, goal), sampled in zip(goals.items(), values, strict=True):
-        new[i] = _build_track(clip.tracks[i], goal, times, sampled)
+        new[i] = _build_track(clip.tracks[i], goal, axis, sampled)
     return Clip(clip.name, tuple(new))
 
 
@@ -79,13 +79,14 @@ def _is_constant(track: Track) -> bool:
 
 def _sample_tracks(tracks: list[Track], times: Floats) -> list[Floats]:
     """Values (F, C) of each track at `times`, rotations sign-continuous; tracks of one time axis form a batch."""
-    found: dict[int, Floats] = {}
+    found = [np.zeros(0)] * len(tracks)
     for batch in batches(tracks):
         values = batch.sample(times)
         if batch.kind is ValueKind.ROTATION:
             values = quaternion.align_signs(_restore_unit_keys(batch, times, values))
-        found.update((id(track), values[:, g]) for g, track in enumerate(batch.tracks))
-    return [found[id(track)] for track in tracks]
+        for g, index in enumerate(batch.numbers.tolist()):
+            found[index] = values[:, g]
+    return found
 
 
 def _restore_unit_keys(batch: Batch, times: Floats, values: Floats) -> Floats:
@@ -97,13 +98,13 @@ def _restore_unit_keys(batch: Batch, times: Floats, values: Floats) -> Floats:
     return np.where(exact[..., None], own, values)
 
 
-def _build_track(track: Track, goal: Interpolation, times: Floats, values: Floats) -> Track:
+def _build_track(track: Track, goal: Interpolation, axis: TimeAxis, values: Floats) -> Track:
     tangents: tuple[Floats | None, Floats | None] = (None, None)
-    if goal is Interpolation.CUBICSPLINE and len(times) > 1:
-        tangents = _tangents(track, times, values)
+    if goal is Interpolation.CUBICSPLINE and len(axis) > 1:
+        tangents = _tangents(track, axis.times, values)
     elif goal is Interpolation.CUBICSPLINE:
         goal = Interpolation.LINEAR
-    return Track(track.node, track.path, goal, times, values, *tangents, pointer=track.pointer, storage=track.storage)
+    return track.with_keys(axis, values, *tangents, interpolation=goal)
 
 
 def _tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:

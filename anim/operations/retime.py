@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError, check_number
-from anim.model import Clip, Interpolation, Track
+from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.operations.selection import track_indices
 
 NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
@@ -60,13 +60,13 @@ def scale_time(track: Track, start: float, factor: float) -> Track:
     """Return the track with its times scaled by `factor` about `start`."""
     times = start + (track.times - start) * factor
     if track.in_tangents is None or track.out_tangents is None:
-        return replace(track, times=times)
-    return replace(track, times=times, in_tangents=track.in_tangents / factor, out_tangents=track.out_tangents / factor)
+        return track.with_keys(times, track.values)
+    return track.with_keys(times, track.values, track.in_tangents / factor, track.out_tangents / factor)
 
 
 def shift_time(track: Track, offset: float) -> Track:
     """Return the track shifted by `offset` seconds."""
-    return replace(track, times=np.maximum(track.times + offset, 0.0))
+    return replace(track, time_axis=TimeAxis(np.maximum(track.times + offset, 0.0)))
 
 
 def reverse_track(track: Track, start: float, end: float) -> Track:
@@ -80,10 +80,8 @@ def reverse_track(track: Track, start: float, end: float) -> Track:
         return _reverse_step(track, times, start)
     values = track.values[::-1]
     if track.in_tangents is None or track.out_tangents is None:
-        return replace(track, times=times, values=values)
-    return replace(
-        track, times=times, values=values, in_tangents=-track.out_tangents[::-1], out_tangents=-track.in_tangents[::-1]
-    )
+        return track.with_keys(times, values)
+    return track.with_keys(times, values, -track.out_tangents[::-1], -track.in_tangents[::-1])
 
 
 def ping_pong_track(track: Track, start: float, end: float) -> Track:
@@ -138,7 +136,7 @@ def _reverse_step(track: Track, times: Floats, start: float) -> Track:
         shown = start if times[0] - start > JUMP_S else float(times[0])
         times = np.concatenate(([shown, max(float(times[0]), shown + JUMP_S)], times[1:]))
         values = np.concatenate((track.values[-1:], values))
-    return replace(track, times=times, values=values)
+    return track.with_keys(times, values)
 
 
 def _concatenate(track: Track, back: Track, *, drop_first: bool) -> Track:
@@ -147,7 +145,7 @@ def _concatenate(track: Track, back: Track, *, drop_first: bool) -> Track:
     times = np.concatenate((track.times, back.times[skip:]))
     values = np.concatenate((track.values, back.values[skip:]))
     if track.in_tangents is None or track.out_tangents is None:
-        return replace(track, times=times, values=values)
+        return track.with_keys(times, values)
     assert back.in_tangents is not None
     assert back.out_tangents is not None
     leaving, arriving = track.out_tangents.copy(), back.in_tangents.copy()
@@ -155,14 +153,9 @@ def _concatenate(track: Track, back: Track, *, drop_first: bool) -> Track:
         leaving[-1] = back.out_tangents[0]
     else:
         leaving[-1], arriving[0] = 0.0, 0.0
-    return replace(
-        track,
-        times=times,
-        values=values,
-        in_tangents=np.concatenate((track.in_tangents, arriving[skip:])),
-        out_tangents=np.concatenate((leaving, back.out_tangents[skip:])),
-    )
+    before, after = (track.in_tangents, arriving[skip:]), (leaving, back.out_tangents[skip:])
+    return track.with_keys(times, values, np.concatenate(before), np.concatenate(after))
 
 
 def _without_start(track: Track, first: int) -> Track:
-    return replace(track, times=track.times[first:], values=track.values[first:])
+    return track.with_keys(track.times[first:], track.values[first:])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -90,9 +89,7 @@ def _span(track: Track, clip: Clip) -> Track:
     keys = np.concatenate((keys[:1].repeat(start), keys, keys[-1:].repeat(end)))
     if len(keys) == len(track.times):
         return track
-    values = track.values[keys]
-    linear = Interpolation.LINEAR  # tangents follow
-    return replace(track, times=times, values=values, interpolation=linear, in_tangents=None, out_tangents=None)
+    return track.with_keys(times, track.values[keys], interpolation=Interpolation.LINEAR)  # tangents follow
 
 
 def _takes_tangents(track: Track) -> bool:
@@ -115,10 +112,5 @@ def _apply_rule(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
         return track
     make = apply_rotation_tangents if track.kind is ValueKind.ROTATION else apply_tangents
     keys = make(track.times, track.values, rule, cyclic=cyclic)
-    return replace(
-        track,
-        interpolation=Interpolation.CUBICSPLINE,
-        values=keys.values,
-        in_tangents=keys.in_tangents,
-        out_tangents=keys.out_tangents,
-    )
+    spline = Interpolation.CUBICSPLINE
+    return track.with_keys(track.time_axis, keys.values, keys.in_tangents, keys.out_tangents, interpolation=spline)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +15,8 @@ from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_segments
 from anim.errors import RangeError, check_type
-from anim.model import Clip, Interpolation, Track, ValueKind
-from anim.operations.cubic_segments import with_keys
+from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
+from anim.operations.cubic_segments import with_distinct_keys
 from anim.operations.ease_track import slope
 from anim.operations.selection import track_indices
 from anim.sampling import segment
@@ -62,9 +62,7 @@ def warp(
     if not last > first:
         raise RangeError(f"the range from {first:g} s to {last:g} s is empty")
     new = []
-    corners: dict[
-        tuple[int, tuple[CubicSegment, ...]], Floats
-    ] = {}  # tracks of one time axis and one map share the search for keys
+    corners: dict[tuple[TimeAxis, tuple[CubicSegment, ...]], Floats] = {}  # equal for equal axes and maps
     for i, track in enumerate(clip.tracks):
         if i not in chosen or len(track.times) == 1 or not _moves(track):
             new.append(track)
@@ -75,7 +73,7 @@ def warp(
             else float32_tolerance(track, tolerance * _extent(track))
         )
         times = _build_map(track, easing, first, last, allowed)
-        key = (id(track.times), times.cubics)
+        key = (track.time_axis, times.cubics)
         if key not in corners:
             reached = times.reaching(track.times)
             corners[key] = reached[distinct_float32(reached)]
@@ -143,10 +141,10 @@ def _warp_track(track: Track, times: TimeMap, corners: Floats, allowed: float, i
     corners = corners[inside | np.append(inside[1:], False) | np.insert(inside[:-1], 0, False)]
     if track.interpolation is Interpolation.STEP:
         values = sample(track, times.old(np.append((corners[:-1] + corners[1:]) / 2, corners[-1])))
-        return _remove_repeats(with_keys(track, corners, values, Interpolation.STEP))
+        return _remove_repeats(with_distinct_keys(track, corners, values, Interpolation.STEP))
     motion = _motion(track, times)
     if interpolation == "linear":
-        return with_keys(track, *linear_keys(motion, corners, tolerance=allowed / 2), Interpolation.LINEAR)
+        return with_distinct_keys(track, *linear_keys(motion, corners, tolerance=allowed / 2), Interpolation.LINEAR)
     return cubic_keys(track, motion, corners, tolerance=allowed / 2)
 
 
@@ -174,7 +172,7 @@ def _remove_repeats(track: Track) -> Track:
     """The STEP track without redundant keys, except for the first and the last."""
     changed = np.concatenate(([True], (np.diff(track.values, axis=0) != 0).any(axis=1)))
     changed[-1] = True
-    return replace(track, times=track.times[changed], values=track.values[changed])
+    return track.with_keys(track.times[changed], track.values[changed])
 
 
 def _extent(track: Track) -> float:

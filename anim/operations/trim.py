@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -76,7 +75,7 @@ def _trim_track(track: Track, start: float, end: float) -> Track:
     values = np.concatenate((sample(track, times[:1]), track.values[inner], sample(track, times[-1:])))
     if track.kind is ValueKind.ROTATION:
         values = quaternion.align_signs(values)
-    return replace(track, times=times, values=values)
+    return track.with_keys(times, values)
 
 
 def _changes(track: Track, start: float, end: float) -> bool:
@@ -89,9 +88,7 @@ def _changes(track: Track, start: float, end: float) -> bool:
 def _single_key(track: Track, start: float) -> Track:
     values = sample(track, np.array([start]))
     linear = Interpolation.LINEAR if track.interpolation is Interpolation.CUBICSPLINE else track.interpolation
-    return replace(
-        track, interpolation=linear, times=np.array([start]), values=values, in_tangents=None, out_tangents=None
-    )
+    return track.with_keys([start], values, interpolation=linear)
 
 
 def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Track:
@@ -106,7 +103,7 @@ def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[
     exact = np.isin(times, track.times)
     _restore(track, times, exact, values, before, after)
     before[0], after[-1] = 0.0, 0.0
-    return replace(track, times=times, values=values, in_tangents=before, out_tangents=after)
+    return track.with_keys(times, values, before, after)
 
 
 def _insert_cut_times(track: Track, times: Floats) -> Floats:

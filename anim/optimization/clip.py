@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import FLOAT32, Clip, Interpolation, Track
+from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track
 from anim.optimization.options import Drop
 from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.context import Context
@@ -160,7 +160,7 @@ class _TrackSorter:
         return own < self._bytes(lines, [track for track, _ in found.values()])
 
     def _bytes(self, track: Track, all_tracks: Sequence[Track]) -> float:
-        sharing = sum(each.times is track.times for each in all_tracks)
+        sharing = sum(each.time_axis is track.time_axis for each in all_tracks)
         axis = self._context.coding.byte_costs.axis + 4 * len(track.times)
         return value_bytes(track) + axis / sharing
 
@@ -193,7 +193,7 @@ class _TrackSorter:
 
 
 def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, tuple[Track, EncodedKeys]]:
-    axes: dict[bytes, Floats] = {}
+    axes: dict[bytes, TimeAxis] = {}
     result = {}
     for k, moving in enumerate(found.moving):
         if outcome.actions[k] == TrackAction.DROPPED:
@@ -201,23 +201,16 @@ def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, 
         stored = outcome.keys[k]
         if k in outcome.on:
             keys = outcome.on[k]
-            at = axes.setdefault(keys.tobytes(), times.key_times(found.grid[keys]))
+            at = axes.setdefault(keys.tobytes(), TimeAxis(times.key_times(found.grid[keys])))
         else:
-            at = axes.setdefault(b"", times.key_times(np.array([clip.start])))
+            at = axes.setdefault(b"", TimeAxis(times.key_times(np.array([clip.start]))))
         result[moving.index] = _new_track(clip.tracks[moving.index], at, stored), stored
     return result
 
 
-def _new_track(track: Track, at: Floats, stored: EncodedKeys) -> Track:
-    return replace(
-        track,
-        interpolation=Interpolation.LINEAR,
-        times=at,
-        values=stored.exact(),
-        in_tangents=None,
-        out_tangents=None,
-        storage=key_reduction.INT16 if stored.form in ("int16", "quaternion") else FLOAT32,
-    )
+def _new_track(track: Track, at: TimeAxis, stored: EncodedKeys) -> Track:
+    storage = key_reduction.INT16 if stored.form in ("int16", "quaternion") else FLOAT32
+    return replace(track.with_keys(at, stored.exact(), interpolation=Interpolation.LINEAR), storage=storage)
 
 
 def _with_ends(clip: Clip, every: dict[int, tuple[Track, EncodedKeys]], dropped: list[int]) -> Solution:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.model import Interpolation, Track, ValueKind
 from anim.model.track import PATHS
 
@@ -18,9 +18,10 @@ _KINDS = {path: ValueKind.ROTATION if path == "rotation" else ValueKind.VECTOR f
 
 @dataclass(frozen=True, slots=True)
 class TrackGroup:
-    """Tracks of one rule: see `rule`."""
+    """T tracks of one rule: see `rule`. numbers: (T,) indices among those given."""
 
     tracks: tuple[Track, ...]
+    numbers: Ints
 
     @property
     def path(self) -> str:

@@ -19,11 +19,10 @@ MAX_GROUP_KEYS = 4096  # of one group: temporary arrays fit into the processor's
 class ConcatenatedTracks(TrackGroup):
     """T tracks of one rule, concatenated: S keys in all.
 
-    numbers: (T,) indices of the given tracks. counts: (T,) keys of each. starts: (T,) offset of each one's first key.
+    counts: (T,) keys of each. starts: (T,) offset of each one's first key.
     times: (S,) s. values: (S, C). tangents: in and out, both (S, C) per second, for CUBICSPLINE.
     """
 
-    numbers: Ints
     counts: Ints
     starts: Ints
     times: Floats

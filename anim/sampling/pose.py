@@ -45,6 +45,7 @@ class PoseSampler:
                 where=f"clip '{clip.name}'" if clip.name else "",
             )
         self._stacks = lazy_batches(moving)
+        self._time_axes = tuple(dict.fromkeys(stack.time_axis for stack in self._stacks))
 
     def sampled(self, sample: Sampler) -> PoseSampler:
         """Return the sampler of the same clip and skeleton with another sampling function for tracks."""
@@ -61,12 +62,9 @@ class PoseSampler:
             "scale": _rest_values(self._skeleton.scale, len(at)),
         }
         weights: dict[int, Floats] = {}
-        places: dict[int, KeyInterval] = {}
+        places = {axis: find_interval(axis.times, at) for axis in self._time_axes}
         for stack in self._stacks:
-            found = places.get(id(stack.times))
-            if found is None:
-                found = places[id(stack.times)] = find_interval(stack.times, at)
-            batch, place = stack.at(found)
+            batch, place = stack.at(places[stack.time_axis])
             values = self._sample(batch, at, place)
             numbers = [track.node for track in batch.tracks if track.node is not None]
             if batch.tracks[0].path == "weights":

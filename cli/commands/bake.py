@@ -9,10 +9,9 @@ from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats
 from anim.caches.transforms import statistics, up_axis
 from anim.caches.transforms import vertex_order as orders
 from anim.gltf.reading import reader
@@ -288,4 +287,4 @@ def _count(done: list[_Done]) -> str:
 def _times(clip: Clip, fps: float | None) -> Floats:
     if fps is not None:
         return frame_times(clip.start, clip.end, fps=fps)
-    return unique_sorted(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+    return clip.key_times

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton
@@ -113,7 +113,7 @@ def _times(clip: Clip, at: list[float] | None, fps: float | None) -> Floats:
         return np.array(at, np.float64)
     if fps is not None:
         return frame_times(clip.start, clip.end, fps=fps)
-    return unique_sorted(np.concatenate(clip.axes)) if clip.axes else np.zeros(1)
+    return clip.key_times
 
 
 def _json(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> str:

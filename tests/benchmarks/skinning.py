@@ -26,9 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from anim import arrays
 from anim.arrays import Floats
-from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene, Skeleton, Skin, Track
+from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene, Skeleton, Skin, TimeAxis, Track
 from anim.sampling import sample_pose, world_matrices
 
 SIZES = {
@@ -60,14 +59,14 @@ def rig(vertices: int, joints: int, frames: int) -> tuple[Scene, Clip, Floats]:
     points = world[middle, :, 3] + random.normal(size=(vertices, 3)) * 0.05
     faces = np.arange(vertices // 3 * 3).reshape(-1, 3)
     mesh = Mesh("mesh", points, faces, near, weights, np.empty((0, vertices, 3)), np.empty(0))
-    times = arrays.as_key_times(np.arange(frames) / FPS)  # one array: tracks of a file share theirs
+    axis = TimeAxis(np.arange(frames) / FPS)  # shared by all tracks, as in a file
     tracks = []
     for j in range(joints):
-        half = 0.4 * np.sin(times[:, None] * random.uniform(1, 4) + random.uniform(0, 6, 3)) / 2
+        half = 0.4 * np.sin(axis.times[:, None] * random.uniform(1, 4) + random.uniform(0, 6, 3)) / 2
         q = np.concatenate([half, np.sqrt(1 - (half * half).sum(axis=1, keepdims=True))], axis=1)
-        tracks.append(Track(j, "rotation", Interpolation.LINEAR, times, q, None, None))
+        tracks.append(Track(j, "rotation", Interpolation.LINEAR, axis, q))
     scene = Scene(skeleton, (MeshInstance(0, mesh, Skin(np.arange(joints), inverse), np.empty(0)),))
-    return scene, Clip("clip", tuple(tracks)), times
+    return scene, Clip("clip", tuple(tracks)), axis.times
 
 
 def turns(size: str, method: str) -> dict[str, list[float]]:

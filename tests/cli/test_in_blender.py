@@ -90,7 +90,7 @@ def test_skinned_files(call: Call, asset: Find, tmp_path: Path, name: str, comma
 
 
 def _at_keys(document: Document, clip: Clip) -> VertexCache:
-    times = np.unique(np.concatenate(clip.axes))
+    times = clip.key_times
     return reorder(bake(reader.scene(document), clip, times=times, rigid=True), "blender")
 
 

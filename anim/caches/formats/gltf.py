@@ -115,7 +115,7 @@ def evaluate_document(
     chosen = clips[clip] if clips else Clip("", ())
     if not scene.vertex_count:
         raise NotFoundError("has no mesh with vertices")
-    times = frame_times(chosen.start, chosen.end, fps=fps) if fps is not None else _keys(chosen)
+    times = frame_times(chosen.start, chosen.end, fps=fps) if fps is not None else chosen.key_times
     said = f"{reader.clip_label(chosen.name, clip)}, one of {len(clips)}" if len(clips) > 1 else ""
     return replace(bake(scene, chosen, times=times, rigid=True), up=_up(document), chosen=said)
 
@@ -128,11 +128,6 @@ def directions(document: Document) -> tuple[str, ...]:
         for word, name in (("normals", "NORMAL"), ("tangents", "TANGENT"))
         if any(name in each.get("attributes", {}) for each in primitives)
     )
-
-
-def _keys(clip: Clip) -> Floats:
-    axes = clip.axes
-    return np.unique(np.concatenate(axes)) if axes else np.zeros(1)
 
 
 def _up(document: Document) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -92,14 +92,7 @@ def cubic_keys(track: Track, motion: TrackFunction, knots: Floats, *, tolerance:
         values = quaternion.align_signs(values)
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0
-    return replace(
-        track,
-        interpolation=Interpolation.CUBICSPLINE,
-        times=times,
-        values=values,
-        in_tangents=before,
-        out_tangents=after,
-    )
+    return track.with_keys(times, values, before, after, interpolation=Interpolation.CUBICSPLINE)
 
 
 def float32_tolerance(track: Track, tolerance: float) -> float:

@@ -8,9 +8,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Ints
 from anim.exchange.euler.curve import Curve, Mode
 from anim.exchange.euler.motion import EulerMotion, EulerNode
+from anim.model import TimeAxis
 
 MIN_BAKED_KEYS_PER_S = 10.0  # keys per second
 MIN_BAKED_KEYS = 4
@@ -55,10 +56,10 @@ def shift_to_zero(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
 
 
 class Float32Times:
-    """Key times rounded to float32, once per array, so that curves still share their times."""
+    """Key times rounded to float32, once per time axis."""
 
     def __init__(self) -> None:
-        self._found: dict[int, tuple[Floats, Floats, Ints]] = {}
+        self._found: dict[TimeAxis, tuple[TimeAxis, Ints]] = {}
 
     def node(self, node: EulerNode) -> EulerNode:
         """Return the node with the times of all its curves rounded."""
@@ -70,15 +71,15 @@ class Float32Times:
         )
 
     def _curve(self, curve: Curve) -> Curve:
-        found = self._found.get(id(curve.times))
+        found = self._found.get(curve.time_axis)
         if found is None:
             stored = curve.times.astype(np.float32).astype(np.float64)
             last: Ints = np.flatnonzero(np.append(np.diff(stored) > 0, True))  # of keys equal in float32
-            found = self._found[id(curve.times)] = (curve.times, stored[last], last)
-        _, times, kept = found
+            found = self._found[curve.time_axis] = TimeAxis(stored[last]), last
+        axis, kept = found
         if len(kept) == len(curve.times):
-            return replace(curve, times=times)
-        return curve.select_keys(kept, times)
+            return replace(curve, time_axis=axis)
+        return curve.select_keys(kept, axis)
 
 
 def _is_dense(curve: Curve, first: Curve) -> bool:

@@ -15,6 +15,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import RangeError, ShapeError
 from anim.exchange.euler import weighted_bezier
 from anim.maths import hermite
+from anim.model.time_axis import TimeAxis, as_time_axis
 
 WEIGHTS = ("in_weights", "out_weights")
 HANDLES = ("in_tangents", "out_tangents", *WEIGHTS)
@@ -35,12 +36,12 @@ MODES = {mode.name.lower(): mode for mode in Mode}
 class Curve:
     """Keys of a scalar, constant before the first and after the last key.
 
-    times: (K,) s, ≥ 0, strictly increasing. values: (K,) radians, metres or factors.
+    time_axis: K key times. values: (K,) radians, metres or factors.
     modes: (K,) Mode after each key. in_tangents, out_tangents: (K,) per second, for CUBIC; None without any.
     in_weights, out_weights: (K,) handle lengths as fractions of their segment, 0 … 1; None means a third.
     """
 
-    times: Floats
+    time_axis: TimeAxis
     values: Floats
     modes: NDArray[np.uint8]
     in_tangents: Floats | None = None
@@ -50,7 +51,6 @@ class Curve:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "times", arrays.as_key_times(self.times))
         for name in ("values", *HANDLES):
             given = getattr(self, name)
             if given is not None:
@@ -60,6 +60,11 @@ class Curve:
         arrays.check_shape(self.modes, str(len(self.times)), name="modes")
         if (self.modes == Mode.CUBIC).any() and (self.in_tangents is None or self.out_tangents is None):
             raise ShapeError("a cubic curve lacks tangents")
+
+    @property
+    def times(self) -> Floats:
+        """Key times (K,) in seconds."""
+        return self.time_axis.times
 
     @property
     def is_constant(self) -> bool:
@@ -79,8 +84,8 @@ class Curve:
         leaving = None if self.out_tangents is None else self.out_tangents * factor
         return replace(self, values=self.values * factor, in_tangents=arriving, out_tangents=leaving)
 
-    def select_keys(self, keys: Ints, times: Floats) -> Curve:
-        """Return the curve with these keys (K,) only, at the new times (K,)."""
+    def select_keys(self, keys: Ints, times: TimeAxis) -> Curve:
+        """Return the curve with these keys (K,) only, at the K new times."""
         parts = {name: getattr(self, name) for name in HANDLES}
         handles = {name: None if part is None else part[keys] for name, part in parts.items()}
         return Curve(times, self.values[keys], self.modes[keys], **handles)
@@ -98,9 +103,9 @@ def constant(value: float) -> Curve:
     return linear(np.zeros(1), np.array([value]))
 
 
-def linear(times: Floats, values: Floats) -> Curve:
+def linear(times: TimeAxis | Floats, values: Floats) -> Curve:
     """Return a linear curve through keys (K,)."""
-    return Curve(times, values, uniform_modes(len(times), Mode.LINEAR))
+    return Curve(as_time_axis(times), values, uniform_modes(len(times), Mode.LINEAR))
 
 
 def uniform_modes(count: int, mode: Mode) -> NDArray[np.uint8]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats, unique_sorted
 from anim.curves.fitting.adaptive_keys import TrackFunction, linear_keys
 from anim.errors import AnimError, RangeError
 from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement, curves_of, is_baked
@@ -22,6 +20,8 @@ from anim.exchange.euler.evaluate import (
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.model.time_axis import merge_times
+from anim.model.track import share_time_axes
 
 MIN_TOLERANCE = 1e-6  # rad; the resolution of float32 quaternions
 CONSTANT_TOLERANCE = 1e-9  # fraction of the skeleton's size
@@ -60,39 +60,21 @@ def from_euler(
         raise RangeError(f"tolerance is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
     bones = skeleton(motion)
     size = bounding_size(bones) or 1.0
-    stored, axes = Float32Times(), _Axes()
+    stored = Float32Times()
     tracks: list[Track] = []
     adaptive = False
     for number, node in enumerate(motion.nodes):
         on_grid = is_baked(motion, node, keys)
         adaptive |= not on_grid and any(not curve.is_constant for curve in curves_of(node))
         try:
-            tracks += _tracks(number, stored.node(node), None if on_grid else tolerance, size, axes)
+            tracks += _tracks(number, stored.node(node), None if on_grid else tolerance, size)
         except AnimError as error:
             raise error.at(f"node '{node.name}'") from None
     ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
-    return ImportedMotion(bones, Clip(name, tuple(tracks)), ends, tolerance if adaptive else None)
+    return ImportedMotion(bones, Clip(name, tuple(share_time_axes(tracks))), ends, tolerance if adaptive else None)
 
 
-class _Axes:
-    """Time axes, one array for each content, shared by tracks."""
-
-    def __init__(self) -> None:
-        self._unions: dict[tuple[int, ...], Floats] = {}
-        self._by_content: dict[bytes, Floats] = {}
-
-    def union(self, curves: Sequence[Curve]) -> Floats:
-        arrays = {id(curve.times): curve.times for curve in curves}
-        found = self._unions.get(tuple(arrays))
-        if found is None:
-            found = self._unions[tuple(arrays)] = self.shared(unique_sorted(np.concatenate([*arrays.values()])))
-        return found
-
-    def shared(self, times: Floats) -> Floats:
-        return self._by_content.setdefault(times.tobytes(), times)
-
-
-def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, axes: _Axes) -> list[Track]:
+def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float) -> list[Track]:
     """Tracks of one node; tolerance None adds no keys."""
     turning = [curve for curve in node.rotation if curve is not None]
     moving, scaling = [*node.moves.values()], [*node.scales.values()]
@@ -111,17 +93,15 @@ def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float, 
         ("scale", scaling, scale, 1.0),
     )
     tracks = [
-        _track(number, name, curves, path, None if tolerance is None else tolerance * unit, axes)
+        _track(number, name, curves, path, None if tolerance is None else tolerance * unit)
         for name, curves, path, unit in parts
         if curves
     ]
     return [track for track in tracks if not _is_rest(track, node, size)]
 
 
-def _track(
-    number: int, name: str, curves: list[Curve], path: TrackFunction, tolerance: float | None, axes: _Axes
-) -> Track:
-    knots = axes.union(curves)
+def _track(number: int, name: str, curves: list[Curve], path: TrackFunction, tolerance: float | None) -> Track:
+    knots = merge_times(curve.time_axis for curve in curves)
     changing = [curve for curve in curves if not curve.is_constant]
     stepped = bool(changing) and all((curve.modes[:-1] == Mode.STEP).all() for curve in changing)
     if stepped or tolerance is None:
@@ -129,7 +109,7 @@ def _track(
         values = quaternion.align_signs(values) if path.rotation else values
         return Track(number, name, Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
     times, values = linear_keys(path, knots, tolerance=tolerance)
-    return Track(number, name, Interpolation.LINEAR, axes.shared(times), values)
+    return Track(number, name, Interpolation.LINEAR, times, values)
 
 
 def _is_rest(track: Track, node: EulerNode, size: float) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, linear
 from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
@@ -15,7 +15,7 @@ from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD
 from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
-from anim.model import Clip, Skeleton
+from anim.model import Clip, Skeleton, TimeAxis
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.pose import world_rotations
 
@@ -117,8 +117,7 @@ def _relative_to(node: JointTransform, parent: JointTransform) -> JointTransform
 def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     """Frame times (F,) on an even grid from 0, and clip times to sample: its keys where they coincide."""
     start, end = clip.start, clip.end
-    arrays = {id(track.times): track.times for track in clip.tracks}
-    keys: Floats = unique_sorted(np.concatenate([*arrays.values()])) if arrays else np.zeros(1)
+    keys = clip.key_times
     if fps is not None:
         if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
             raise RangeError(f"fps is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
@@ -193,4 +192,5 @@ def _ancestors_outside(skeleton: Skeleton, node: int, among: Collection[int]) ->
 
 
 def _curves(times: Floats, values: Floats) -> list[Curve]:
-    return [linear(times, column) for column in values.T]
+    axis = TimeAxis(times)
+    return [linear(axis, column) for column in values.T]

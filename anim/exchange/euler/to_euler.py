@@ -16,7 +16,7 @@ from anim.exchange.euler.rotation_order import OrderRules
 from anim.exchange.formats.labels import label_of, labels, skipped_note
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
-from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling import frame_times
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
@@ -170,9 +170,9 @@ def _axes(track: Track | None, frames: Floats | None) -> dict[int, Curve]:
         return dict(enumerate(_curves(track.times, track.values, mode)))
     modes = uniform_modes(len(track.times), mode)
     parts = zip(track.values.T, track.in_tangents.T, track.out_tangents.T, strict=True)
-    return {axis: Curve(track.times, part[0], modes, part[1], part[2]) for axis, part in enumerate(parts)}
+    return {axis: Curve(track.time_axis, part[0], modes, part[1], part[2]) for axis, part in enumerate(parts)}
 
 
 def _curves(times: Floats, values: Floats, mode: Mode) -> tuple[Curve, ...]:
-    modes = uniform_modes(len(times), mode)
-    return tuple(Curve(times, column, modes) for column in values.T)
+    axis, modes = TimeAxis(times), uniform_modes(len(times), mode)
+    return tuple(Curve(axis, column, modes) for column in values.T)

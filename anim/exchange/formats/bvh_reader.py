@@ -16,6 +16,7 @@ from anim.exchange.formats.bvh_hierarchy import BvhJoint
 from anim.exchange.formats.labels import unique
 from anim.exchange.formats.text import decode_text
 from anim.maths.euler import AxesConvention
+from anim.model import TimeAxis
 
 
 class BvhPosition(StrEnum):
@@ -39,11 +40,11 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
     found = bvh_frames.read_frames(lines, start, column, sum(len(joint.channels) for joint in joints))
     names = unique([joint.name for joint in joints])
     renamed = [name for name, joint in zip(names, joints, strict=True) if name != joint.name]
-    times = np.arange(len(found.rows)) / found.fps
+    axis = TimeAxis(np.arange(len(found.rows)) / found.fps)
     nodes, first = [], 0
     for joint, name in zip(joints, names, strict=True):
         last = first + len(joint.channels)
-        nodes.append(_node(joint, name, times, found.rows[:, first:last], position))
+        nodes.append(_node(joint, name, axis, found.rows[:, first:last], position))
         first = last
     notes = found.notes + ((f"names that appear twice got numbers: {', '.join(renamed)}",) if renamed else ())
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
@@ -56,17 +57,17 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     return bvh_writer.write(motion)
 
 
-def _node(joint: BvhJoint, name: str, times: Floats, rows: Floats, position: BvhPosition) -> EulerNode:
+def _node(joint: BvhJoint, name: str, time_axis: TimeAxis, rows: Floats, position: BvhPosition) -> EulerNode:
     offset = np.array(joint.offset)
-    modes = curve.uniform_modes(len(times), Mode.LINEAR)
+    modes = curve.uniform_modes(len(time_axis), Mode.LINEAR)
     order, rotation, moves = "", list[Curve | None](), dict[int, Curve]()
     for (axis, kind), values in zip(joint.channels, rows.T, strict=True):
         if kind == "rotation":
             order += axis
-            rotation.append(Curve(times, np.radians(values), modes))
+            rotation.append(Curve(time_axis, np.radians(values), modes))
         else:
             at = "XYZ".index(axis)
-            moves[at] = Curve(times, values + (offset[at] if position == BvhPosition.ADD else 0.0), modes)
+            moves[at] = Curve(time_axis, values + (offset[at] if position == BvhPosition.ADD else 0.0), modes)
     angles = np.zeros(len(order))
     return EulerNode(
         name, joint.parent, offset, order, AxesConvention.INTRINSIC, angles, tuple(rotation), moves, end=joint.end

@@ -44,6 +44,7 @@ from anim.exchange.euler.weighted_bezier import DEFAULT_WEIGHT
 from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
 from anim.exchange.formats.node_builder import KINDS, MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
 from anim.exchange.formats.text import check_times, decode_text, error_at, parse_cell, parse_number
+from anim.model import TimeAxis
 
 __all__ = ["read", "write"]
 KeyRow = tuple[int, dict[str, str]]  # line, cells by column
@@ -188,8 +189,7 @@ def _read_frames(file: _File, drafts: _NodeBuilders, later: float) -> None:
         if not there:
             continue
         values = np.array([parse_cell(file.rows[i][1][column], file.rows[i][0], title) for i in there])
-        own = times if len(there) == len(times) else times[there]
-        draft.add(slot, Curve(own, values, uniform_modes(len(own), mode)))
+        draft.add(slot, Curve(TimeAxis(times[there]), values, uniform_modes(len(there), mode)))
 
 
 def _read_keys(file: _File, drafts: _NodeBuilders, later: float) -> None:
@@ -210,7 +210,7 @@ def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
     lines = [line for line, _ in rows]
     times = np.array([parse_cell(row["time"], line, "time") for line, row in rows])
     check_times(times, lines)
-    times = times + later
+    axis = TimeAxis(times + later)
     values = np.array([parse_cell(row["value"], line, "value") for line, row in rows])
     modes = np.zeros(len(rows), np.uint8)
     for i, (line, row) in enumerate(rows):
@@ -219,10 +219,10 @@ def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
             raise error_at(line, f"interpolation is '{word}' (expected {', '.join(MODES)})")
         modes[i] = MODES[word]
     if not (modes == Mode.CUBIC).any():
-        return Curve(times, values, modes)
+        return Curve(axis, values, modes)
     _check_tangents(rows, modes.tolist())
     arriving, leaving = (_handles(rows, key, 0.0) for key in ("in_tangent", "out_tangent"))
-    return Curve(times, values, modes, arriving, leaving, _weights(rows, "in_weight"), _weights(rows, "out_weight"))
+    return Curve(axis, values, modes, arriving, leaving, _weights(rows, "in_weight"), _weights(rows, "out_weight"))
 
 
 def _check_tangents(rows: list[KeyRow], modes: list[int]) -> None:

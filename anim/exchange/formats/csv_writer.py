@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from anim.arrays import unique_sorted
 from anim.errors import UnsupportedError
 from anim.exchange.euler.convention import axis_names
 from anim.exchange.euler.curve import HANDLES, Curve, Mode
 from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
+from anim.model.time_axis import merge_times
 
 KEY_COLUMNS = ("node", "channel", "time", "value")
 EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
@@ -51,12 +51,12 @@ def _columns(node: EulerNode, convention: Convention) -> list[Column]:
 
 def _write_frames(rows: Any, columns: list[Column]) -> None:
     rows.writerow(["time", *(f"{node}.{channel}" for node, channel, _ in columns)])
-    arrays = {id(curve.times): curve.times for _, _, curve in columns}
-    times = unique_sorted(np.concatenate([*arrays.values()])) if arrays else np.zeros(0)
+    axes = dict.fromkeys(curve.time_axis for _, _, curve in columns)
+    times = merge_times(axes)
     cells = [[_text(time)] + [""] * len(columns) for time in times.tolist()]
-    places = {key: np.searchsorted(times, axis).tolist() for key, axis in arrays.items()}
+    places = {axis: np.searchsorted(times, axis.times).tolist() for axis in axes}
     for number, (_, _, curve) in enumerate(columns, 1):
-        for place, value in zip(places[id(curve.times)], curve.values.tolist(), strict=True):
+        for place, value in zip(places[curve.time_axis], curve.values.tolist(), strict=True):
             cells[place][number] = _text(value)
     rows.writerows(cells)
 

@@ -57,6 +57,7 @@ from anim.exchange.formats.text import MAX_NUMBER
 from anim.gltf.io import json_text
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
+from anim.model import TimeAxis
 
 __all__ = ["read", "write"]
 
@@ -185,7 +186,7 @@ def _curve(about: Any, later: float, where: str) -> Curve:
                 raise FormatError(f"a cubic curve lacks {key}")
             tangents[i] = _parse_array(about, key, (count,), np.zeros(0), where)
     weights = [_parse_array(about, key, (count,), np.zeros(0), where) if key in about else None for key in WEIGHTS]
-    return Curve(times + later, values, modes, *tangents, *weights)
+    return Curve(TimeAxis(times + later), values, modes, *tangents, *weights)
 
 
 def _check_keys(about: Mapping[str, Any], known: Sequence[str], where: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
-from anim.model import Clip, Interpolation, Skeleton, Skin, Track
+from anim.model import Clip, Interpolation, Skeleton, Skin, TimeAxis, Track
 from anim.sampling import rest_pose, world_matrices
 
 MIN_OFFSET_FRACTION = 1e-3  # minimum offset of a joint from its bind position, as a fraction of the joints' size
@@ -49,12 +49,12 @@ def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
     skeleton, other: the rest poses. The clip then plays identically on both: keys replace the rest pose of `skeleton`.
     """
     animated = {(track.node, track.path) for track in clip.tracks}
-    times, tracks = np.array([clip.start]), list(clip.tracks)
+    axis, tracks = TimeAxis([clip.start]), list(clip.tracks)
     for path in ("translation", "rotation", "scale"):
         here, there = getattr(skeleton, path), getattr(other, path)
         for node in np.flatnonzero((here != there).any(axis=1)).tolist():
             if (node, path) not in animated:
-                tracks.append(Track(node, path, Interpolation.LINEAR, times, here[node][None]))
+                tracks.append(Track(node, path, Interpolation.LINEAR, axis, here[node][None]))
     return Clip(clip.name, tuple(tracks))
 
 

@@ -11,7 +11,7 @@ from anim.exchange.retarget.anchors import ancestors
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.maths import matrix, quaternion
-from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
@@ -55,6 +55,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
     wanted = world_by_node(skeleton, sample_pose(skeleton, done.clip, times))
     world = world_by_node(skeleton, sample_pose(skeleton, Clip("", (*stay, *done.clip.tracks)), times))
     tracks = {(track.node, track.path): track for track in done.clip.tracks}
+    axis = TimeAxis(times)
     for node in below:
         parent = int(skeleton.parents[node])
         top = next((up for up in ancestors(skeleton, node) if up in known), -1)
@@ -62,7 +63,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
         if top >= 0:  # world matrix of the parent after its matched joint is restored
             carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
         local = matrix.multiply(matrix.inverse(carried), wanted[node])
-        tracks |= {(node, track.path): track for track in _tracks(node, times, local)}
+        tracks |= {(node, track.path): track for track in _tracks(node, axis, local)}
     return Clip(done.clip.name, (*tracks.values(), *stay))
 
 
@@ -73,8 +74,8 @@ def _between(skeleton: Skeleton, node: int, known: set[int]) -> Iterator[int]:
         yield up
 
 
-def _tracks(node: int, times: Floats, local: Floats) -> Iterator[Track]:
+def _tracks(node: int, axis: TimeAxis, local: Floats) -> Iterator[Track]:
     translation, rotation, scale = matrix.decompose(local)[:3]
-    yield Track(node, "translation", Interpolation.LINEAR, times, translation)
-    yield Track(node, "rotation", Interpolation.LINEAR, times, quaternion.align_signs(rotation))
-    yield Track(node, "scale", Interpolation.LINEAR, times, scale)
+    yield Track(node, "translation", Interpolation.LINEAR, axis, translation)
+    yield Track(node, "rotation", Interpolation.LINEAR, axis, quaternion.align_signs(rotation))
+    yield Track(node, "scale", Interpolation.LINEAR, axis, scale)

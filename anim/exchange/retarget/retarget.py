@@ -123,9 +123,8 @@ def retarget(
 
 def _times(clip: Clip) -> tuple[Floats, Floats]:
     """All key times (T,), and the float32 times before those with a possible step."""
-    arrays = {id(track.times): track.times for track in clip.tracks}
-    steps = {id(t.times): just_before(t.times[1:]) for t in clip.tracks if t.interpolation is Interpolation.STEP}
-    return unique_sorted(np.concatenate([*arrays.values()])), np.concatenate([np.zeros(0), *steps.values()])
+    axes = dict.fromkeys(track.time_axis for track in clip.tracks if track.interpolation is Interpolation.STEP)
+    return clip.key_times, np.concatenate([np.zeros(0), *(just_before(axis.times[1:]) for axis in axes)])
 
 
 def _limit_step(times: Floats, step: float) -> Floats:

@@ -10,7 +10,7 @@ from anim.errors import AnimError, FormatError, RangeError, ShapeError
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading.accessors import FLOAT, Accessors
 from anim.gltf.validation import channel_targets
-from anim.model import AccessorFormat, Interpolation, Track
+from anim.model import AccessorFormat, Interpolation, TimeAxis, Track
 from anim.model.track import NUM_COMPONENTS
 
 INTERPOLATIONS = {name.value: name for name in Interpolation}
@@ -19,13 +19,13 @@ FRACTIONS = (5120, 5121, 5122, 5123)  # component types allowed for normalized r
 
 
 class Reader:
-    """Reader of one document's tracks; tracks on one input accessor share one array of times."""
+    """Reader of one document's tracks; tracks on one input accessor share one time axis."""
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
         self._nodes = json_array(document.json, "nodes")
         self._json = document.json
         self._accessors = accessors
-        self._times: dict[int, Floats] = {}
+        self._time_axes: dict[int, TimeAxis] = {}
         self._values: dict[int, Floats] = {}
 
     def track(self, animation: Json, number: int) -> Track | None:
@@ -47,49 +47,49 @@ class Reader:
         interpolation = INTERPOLATIONS.get(name)
         if interpolation is None:
             raise FormatError(f"interpolation is '{name}' (expected STEP, LINEAR or CUBICSPLINE)")
-        times = self._axis(sampler["input"])
+        axis = self._axis(sampler["input"])
         output = self._accessors.about(sampler["output"])
         width = self._width(node, path, output)
         cubic = interpolation is Interpolation.CUBICSPLINE
-        if cubic and len(times) < 2:
+        if cubic and len(axis) < 2:
             raise FormatError("CUBICSPLINE with one key (expected at least two)")
         values = self._values.get(sampler["output"])
         if values is None:
             values = arrays.freeze(self._accessors.unchecked(sampler["output"]))
             self._values[sampler["output"]] = values
-        rows = len(times) * (3 if cubic else 1)
+        rows = len(axis) * (3 if cubic else 1)
         if width is None:  # a pointer: an array of elements per key if the count requires it
             width = values.size // rows
         if values.size != rows * width or not width:
             raise FormatError(
                 f"output accessor {sampler['output']} has {values.size} numbers (expected {rows * (width or 1)} for "
-                f"{len(times)} keys{' with tangents' if cubic else ''} of {width or 'at least one'})"
+                f"{len(axis)} keys{' with tangents' if cubic else ''} of {width or 'at least one'})"
             )
         storage = _storage(output["componentType"], bool(output.get("normalized")), output["type"])
         if not cubic:
-            keys = values.reshape(len(times), width)
+            keys = values.reshape(len(axis), width)
             if path == "rotation":
                 _check_rotations(keys)
-            return Track(node, path, interpolation, times, keys, pointer=address, storage=storage)
-        parts = values.reshape(len(times), 3, width)
+            return Track(node, path, interpolation, axis, keys, pointer=address, storage=storage)
+        parts = values.reshape(len(axis), 3, width)
         if path == "rotation":
             _check_rotations(parts[:, 1])
         return Track(
-            node, path, interpolation, times, parts[:, 1], parts[:, 0], parts[:, 2], pointer=address, storage=storage
+            node, path, interpolation, axis, parts[:, 1], parts[:, 0], parts[:, 2], pointer=address, storage=storage
         )
 
-    def _axis(self, index: int) -> Floats:
-        found = self._times.get(index)
+    def _axis(self, index: int) -> TimeAxis:
+        found = self._time_axes.get(index)
         if found is None:
             about = self._accessors.about(index)
             if about["type"] != "SCALAR" or about["componentType"] != FLOAT:
                 got = f"{about['type']} of {about['componentType']}"
                 raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
             try:
-                found = arrays.as_key_times(arrays.freeze(self._accessors.floats(index))[:, 0])
+                found = TimeAxis(arrays.freeze(self._accessors.floats(index))[:, 0])
             except AnimError as error:
                 raise FormatError(error.problem, where=error.where, help=error.help) from None
-            self._times[index] = found
+            self._time_axes[index] = found
         return found
 
     def _width(self, node: int | None, path: str, output: Json) -> int | None:

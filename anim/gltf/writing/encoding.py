@@ -15,7 +15,7 @@ from anim.gltf.meshopt import storage
 from anim.gltf.meshopt.storage import FilteredValues
 from anim.gltf.reading.accessors import DTYPES, FLOAT, denormalized
 from anim.gltf.validation.buffer_layout import COMPONENTS
-from anim.model import AccessorFormat, Interpolation, Track
+from anim.model import AccessorFormat, Interpolation, TimeAxis, Track
 
 ELEMENTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -61,12 +61,12 @@ class AccessorData:
         return about
 
 
-def times(track: Track) -> AccessorData:
+def times(axis: TimeAxis) -> AccessorData:
     """Return the key times as float32, with min and max exact in float32 and short as text.
 
     Raises RangeError if two keys are equal in float32.
     """
-    stored = track.times.astype("<f4")
+    stored = axis.times.astype("<f4")
     if len(stored) > 1 and not (np.diff(stored) > 0).all():
         k = int(np.argmax(np.diff(stored) <= 0))
         raise RangeError(f"keys {k} and {k + 1} fall together in float32 (both at {stored[k]} s)")

@@ -21,7 +21,7 @@ from anim.gltf.validation import channel_targets
 from anim.gltf.writing import encoding, unit_rotations
 from anim.gltf.writing.encoding import AccessorData
 from anim.gltf.writing.insertion import PendingIndex, insert_accessors
-from anim.model import Clip, Interpolation, Track
+from anim.model import Clip, Interpolation, TimeAxis, Track
 
 _SAMPLER_KEYS = ("input", "output", "interpolation")
 
@@ -85,7 +85,7 @@ class _ContentPool:
         self.sources: list[set[int]] = []  # for each content, the accessors of the samplers that it replaces
         self._filtered = filtered
         self._indices: dict[AccessorData, int] = {}
-        self._axes: dict[int, int] = {}
+        self._time_axes: dict[TimeAxis, int] = {}
 
     def _add(self, content: AccessorData) -> int:
         index = self._indices.get(content)
@@ -101,12 +101,12 @@ class _ContentPool:
         """The pending index of a track's values."""
         return self._add(encoding.values(track, self._filtered.get(id(track))))
 
-    def axis(self, track: Track) -> int:
-        """The pending index of a track's times; tracks that share one array are encoded once."""
-        found = self._axes.get(id(track.times))
-        if found is None:
-            found = self._axes[id(track.times)] = self._add(encoding.times(track))
-        return found
+    def time_axis(self, track: Track) -> int:
+        """The pending index of a track's times; those of a shared axis are encoded once."""
+        axis = track.time_axis
+        if axis not in self._time_axes:
+            self._time_axes[axis] = self._add(encoding.times(axis))
+        return self._time_axes[axis]
 
 
 def _replace_animation(json: Json, animation: Json, clip: Clip, number: int, pool: _ContentPool) -> Json:
@@ -159,7 +159,7 @@ class _Samplers:
 
     def new(self, track: Track, old: int | None) -> int:
         try:
-            times, values = self._pool.axis(track), self._pool.values(track)
+            times, values = self._pool.time_axis(track), self._pool.values(track)
         except AnimError as error:
             raise error.at(_label(track)) from None
         if old is not None:

@@ -43,7 +43,7 @@ def endpoints(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], w
 
 def of_batch(batch: Batch, where: Intervals) -> tuple[Floats, Floats, Floats]:
     """Return values, slopes and second derivatives (2, C, G, U) of a batch's U tracks; rotations not normalized."""
-    at = where.on(batch.times)
+    at = where.on(batch.time_axis)
     start, end = (np.moveaxis(batch.values[k], -1, 0) for k in (at.left, at.right))  # (C, G, U)
     if batch.interpolation is Interpolation.STEP:
         nothing = np.zeros((2, *start.shape))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints, unique_sorted
-from anim.model import Clip
+from anim.model import Clip, TimeAxis
 
 LONG = 0.05  # s; longer gaps are split at all times looked at: how much a motion bends is bounded gap by gap
 
@@ -17,7 +17,7 @@ class Intervals:
 
     def __init__(self, edges: Floats) -> None:
         self.edges = edges
-        self._placed: dict[int, tuple[Floats, IntervalKeys]] = {}
+        self._placed: dict[TimeAxis, IntervalKeys] = {}
 
     @property
     def starts(self) -> Floats:
@@ -42,11 +42,11 @@ class Intervals:
         """The first interval alone."""
         return Intervals(self.edges[:2])
 
-    def on(self, keys: Floats) -> IntervalKeys:
-        """Return the intervals' positions on keys (K,) in s."""
-        if id(keys) not in self._placed:
-            self._placed[id(keys)] = keys, interval_keys(keys, self)
-        return self._placed[id(keys)][1]
+    def on(self, keys: TimeAxis) -> IntervalKeys:
+        """Return the intervals' positions on keys (K,)."""
+        if keys not in self._placed:
+            self._placed[keys] = interval_keys(keys.times, self)
+        return self._placed[keys]
 
     def number(self, at: Floats) -> Ints:
         """Return the numbers of the gaps (F,) that times `at` (F,) in s lie in, or start."""
@@ -75,7 +75,7 @@ def merge_intervals(times: Floats, *clips: Clip, longest: float = LONG) -> Inter
     The first starts at the first of the times, the last ends at the last of them. times: increasing, with all keys that
     are between them. longest: s, gaps up to this length are not split.
     """
-    axes = [axis for clip in clips for axis in clip.axes]
+    axes = [axis.times for clip in clips for axis in clip.time_axes]
     keys = unique_sorted(np.concatenate([times[:1], *axes, times[-1:]]))
     keys = keys[(keys >= times[0]) & (keys <= times[-1])]
     lengths = np.diff(keys)

@@ -95,7 +95,7 @@ def _keys(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where
             keys[..., columns], is_cubic[columns] = value, True
             cubic[..., columns] = np.stack((slope, bend))[:, :, :, None]
             continue
-        at = where.on(batch.times)
+        at = where.on(batch.time_axis)
         keys[0][..., columns] = np.moveaxis(batch.values[at.left], -1, 0)
         is_linear = batch.interpolation is Interpolation.LINEAR
         keys[1][..., columns] = np.moveaxis(batch.values[at.right], -1, 0) if is_linear else keys[0][..., columns]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Bools
-from anim.model import Clip, Scene, Skeleton
+from anim.model import Clip, Scene, Skeleton, TimeAxis
 from anim.sampling.batch import Batch, batches
 
 
@@ -49,7 +49,9 @@ def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | No
         if not moves.all():
             rest = pick_tracks(batch, ~moves)
             tangents = None if rest.tangents is None else (rest.tangents[0][:1], rest.tangents[1][:1])
-            side.still.append(replace(rest, times=rest.times[:1], values=rest.values[:1], tangents=tangents))
+            side.still.append(
+                replace(rest, time_axis=TimeAxis(rest.times[:1]), values=rest.values[:1], tangents=tangents)
+            )
     return side
 
 
@@ -72,4 +74,4 @@ def pick_tracks(batch: Batch, chosen: Bools) -> Batch:
         return batch
     tracks = tuple(track for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
     tangents = None if batch.tangents is None else (batch.tangents[0][:, chosen], batch.tangents[1][:, chosen])
-    return replace(batch, tracks=tracks, values=batch.values[:, chosen], tangents=tangents)
+    return Batch(tracks, batch.numbers[chosen], batch.time_axis, batch.values[:, chosen], tangents)

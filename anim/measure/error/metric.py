@@ -21,6 +21,7 @@ from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
 from anim.measure.error.surface import diagonal, has_vertices, surfaces
 from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
+from anim.model.time_axis import merge_times
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PoseSampler
 from anim.sampling.times import check_fps, frame_times
@@ -194,10 +195,7 @@ def _round_up(values: Floats) -> NDArray[np.float32]:
 
 def key_and_mid_times(*clips: Clip) -> Floats:
     """Return every key time of the clips and the middle of every gap, in seconds, increasing."""
-    axes = [times for clip in clips for times in clip.axes]
-    if not axes:
-        return np.zeros(1)
-    keys = unique_sorted(np.concatenate(axes))
+    keys = _key_times(clips)
     return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
 
 
@@ -223,10 +221,7 @@ def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
 
     parts: of every gap at least, ≥ 1. step: s, no part is longer; > 0.
     """
-    axes = [times for clip in clips for times in clip.axes]
-    if not axes:
-        return np.zeros(1)
-    keys = unique_sorted(np.concatenate(axes))
+    keys = _key_times(clips)
     gaps = np.diff(keys)
     counts = np.maximum(np.ceil(gaps / step).astype(np.int64), parts)
     gap = np.repeat(np.arange(len(gaps)), counts)
@@ -235,12 +230,14 @@ def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
     return unique_sorted(np.concatenate((within, keys[-1:], *_before_jumps(clips))))
 
 
+def _key_times(clips: Sequence[Clip]) -> Floats:
+    """All key times of the clips, increasing; 0 without tracks."""
+    keys = merge_times(axis for clip in clips for axis in clip.time_axes)
+    return keys if len(keys) else np.zeros(1)
+
+
 def _before_jumps(clips: Sequence[Clip]) -> list[Floats]:
     """The last moments before STEP keys, where a clip is as far off as the jump is high."""
-    steps = {
-        id(track.times): track.times
-        for clip in clips
-        for track in clip.tracks
-        if track.interpolation is Interpolation.STEP and len(track.times) > 1
-    }
-    return [np.nextafter(times[1:], 0) for times in steps.values()]
+    steps = (track for clip in clips for track in clip.tracks if track.interpolation is Interpolation.STEP)
+    axes = dict.fromkeys(track.time_axis for track in steps if len(track.times) > 1)
+    return [np.nextafter(axis.times[1:], 0) for axis in axes]

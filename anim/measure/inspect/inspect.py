@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Bools, unique_sorted
+from anim.arrays import Bools
 from anim.errors import AnimError
 from anim.gltf.document import Document, json_array
 from anim.gltf.io.lenient import BrokenFile
@@ -120,10 +120,10 @@ def _clip(
     *,
     tracks: bool,
 ) -> ClipReport:
-    start, end, axes = clip.start, clip.end, clip.axes
+    start, end = clip.start, clip.end
     counted = _with_end(clip, counted)
     stored_bytes = round(packed * cost.data)
-    estimated = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(axes))) if axes else None
+    estimated = frame_rate.estimate_frame_rate(clip.key_times)
     return ClipReport(
         index=number,
         name=clip.name,

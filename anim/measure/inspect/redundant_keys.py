@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from anim.arrays import Bools
-from anim.model import Interpolation, Track
+from anim.model import Interpolation, TimeAxis, Track
 
 AXIS_JSON = 120  # bytes that one more accessor for key times takes, about
 TIME = 4  # bytes of a key's time
@@ -21,14 +21,14 @@ def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[
     nothing, and need no axis. A key that every track on its time axis can do without goes; other keys only where a
     time axis of the track's own costs less than they take.
     """
-    common: dict[int, Bools] = {}  # by time axis: keys that no track needs
+    common: dict[TimeAxis, Bools] = {}  # by time axis: keys that no track needs
     for i, mask in given.items():
-        axis = id(tracks[i].times)
+        axis = tracks[i].time_axis
         common[axis] = common[axis] & mask if axis in common else mask
     masks = [np.zeros(len(track.times), np.bool_) for track in tracks]
     for i, own in given.items():
         if count := np.count_nonzero(own):
-            shared = common[id(tracks[i].times)]
+            shared = common[tracks[i].time_axis]
             saved = (count - np.count_nonzero(shared)) * _key_bytes(tracks[i])
             masks[i] = own if saved > AXIS_JSON + TIME * (len(own) - count) else shared
     return masks

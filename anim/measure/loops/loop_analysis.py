@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats
 from anim.measure.inspect import frame_rate
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import JointGap, Seam, SkinMotion
@@ -148,7 +148,7 @@ def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, 
     count = max(round((end - start) / step), 2)
     frames = start + step * _some(np.arange(count, dtype=np.float64))
     moved = skin.steps(clip, np.minimum(np.stack((frames, frames + step)), end), root)
-    keys = unique_sorted(np.concatenate(clip.axes))
+    keys = clip.key_times
     keys = _some(keys[(keys > start + INTERIOR_S) & (keys < end - INTERIOR_S)])
     changes = skin.velocity_changes(clip, keys, root) if len(keys) else np.zeros(1)
     return Steps(float(moved.max()), float(np.median(moved)), float(changes.max()))
@@ -161,7 +161,7 @@ def _some(numbers: Floats) -> Floats:
 
 
 def _fps(clip: Clip) -> float:
-    found = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
+    found = frame_rate.estimate_frame_rate(clip.key_times)
     return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
 
 

@@ -81,9 +81,8 @@ class Solution:
     def size(self, coding: Encoding) -> float:
         """Return the approximate number of bytes of the clip."""
         tracks, prices = self.clip.tracks, coding.byte_costs
-        axes = {id(track.times): len(track.times) for track in tracks}
         text = sum(prices.single_key if len(track.times) == 1 else prices.track for track in tracks)
-        times = sum(prices.axis + 4 * length for length in axes.values())
+        times = sum(prices.axis + 4 * len(axis) for axis in self.clip.time_axes)
         plain = sum(value_bytes(track) for track, keys in zip(tracks, self.stored, strict=True) if not keys.codes)
         return text + times + plain + coding.size([keys for keys in self.stored if keys.codes])
 

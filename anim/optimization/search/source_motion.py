@@ -11,6 +11,7 @@ from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.model.time_axis import merge_times
 from anim.optimization.options import Reference
 from anim.optimization.search import playback
 from anim.optimization.search.playback import level_world_matrices, required_levels
@@ -123,9 +124,9 @@ def analyze_source(
 
 def key_grid(tracks: Sequence[Track]) -> Floats:
     """Return all possible times of new keys (K,): the keys of all tracks, and samples of their splines."""
-    axes = [track.times for track in {id(track.times): track for track in tracks}.values()]
+    axes = [merge_times(track.time_axis for track in tracks)]
     axes += [_spline_times(track.times) for track in tracks if track.interpolation is Interpolation.CUBICSPLINE]
-    return times.key_times(np.concatenate(axes)) if axes else np.zeros(1)
+    return times.key_times(np.concatenate(axes)) if tracks else np.zeros(1)
 
 
 def measurement_times(grid: Floats, tracks: Sequence[Track]) -> Floats:

@@ -8,8 +8,6 @@ neighboring keys keep their signs.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from anim.arrays import Floats
@@ -61,14 +59,8 @@ def _is_closed(track: Track) -> bool:
 
 def single_key(track: Track) -> Track:
     """Return the first value of a track as its only key."""
-    return replace(
-        track,
-        interpolation=Interpolation.STEP if track.interpolation is Interpolation.STEP else Interpolation.LINEAR,
-        times=track.times[:1],
-        values=track.values[:1],
-        in_tangents=None,
-        out_tangents=None,
-    )
+    name = Interpolation.STEP if track.interpolation is Interpolation.STEP else Interpolation.LINEAR
+    return track.with_keys(track.times[:1], track.values[:1], interpolation=name)
 
 
 def extend(track: Track, start: float, end: float) -> Track:
@@ -80,19 +72,11 @@ def extend(track: Track, start: float, end: float) -> Track:
     inner = slice(1, None) if head and tail and len(track.times) == 1 else slice(None)  # two keys hold one value
     rows = [0] * head + list(range(len(track.times))[inner]) + [-1] * tail
     at = np.concatenate(([start] * head, track.times[inner], [end] * tail))
-    new = replace(
-        track,
-        times=at,
-        values=track.values[rows],
-        in_tangents=None,
-        out_tangents=None,
-        interpolation=Interpolation.STEP,
-    )
     if track.in_tangents is None or track.out_tangents is None:
-        return replace(new, interpolation=track.interpolation)
+        return track.with_keys(at, track.values[rows])
     arriving, leaving = track.in_tangents[rows], track.out_tangents[rows]
     if head:
         leaving[0] = arriving[1] = 0
     if tail:
         leaving[-2] = arriving[-1] = 0
-    return replace(new, interpolation=track.interpolation, in_tangents=arriving, out_tangents=leaving)
+    return track.with_keys(at, track.values[rows], arriving, leaving)

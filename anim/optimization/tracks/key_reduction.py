@@ -44,8 +44,7 @@ def _reduce(track: Track) -> Track:
 def _select_keys(track: Track, keep: Bools, interpolation: Interpolation) -> Track:
     if keep.all() and interpolation is track.interpolation:
         return track
-    times, values = track.times[keep], track.values[keep]
-    return replace(track, interpolation=interpolation, times=times, values=values, in_tangents=None, out_tangents=None)
+    return track.with_keys(track.times[keep], track.values[keep], interpolation=interpolation)
 
 
 def _single_key_or_none(track: Track) -> Track:
@@ -61,13 +60,8 @@ def _single_key_or_none(track: Track) -> Track:
         return _select_keys(track, np.arange(len(track.times)) == 0, Interpolation.LINEAR)
     assert track.in_tangents is not None
     assert track.out_tangents is not None
-    return replace(
-        track,
-        times=track.times[[0, -1]],
-        values=track.values[[0, -1]],
-        in_tangents=track.in_tangents[[0, -1]],
-        out_tangents=track.out_tangents[[0, -1]],
-    )
+    ends = [0, -1]
+    return track.with_keys(track.times[ends], track.values[ends], track.in_tangents[ends], track.out_tangents[ends])
 
 
 def _is_constant_spline(track: Track) -> bool:
@@ -117,7 +111,7 @@ def reduce_pointer_keys(track: Track, bound: float) -> Track:
         extent = 1.0
     scaled = sample(track, track.times) / (POINTER_BOUND_FRACTION * bound * extent)
     keep = greedy_keys(scaled[None], track.times)[0]
-    return reduce_lossless(replace(track, times=track.times[keep], values=track.values[keep]))
+    return reduce_lossless(track.with_keys(track.times[keep], track.values[keep]))
 
 
 def _is_straight(values: Floats, times: Floats, track: Ints, start: Ints, end: Ints) -> Bools:

@@ -54,15 +54,7 @@ def reduce_weights(
     if np.ptp(keys, axis=0).max(initial=0.0) == 0:
         keys, times = keys[:1], times[:1]
     keys, storage, stored = _encode_weights(keys, reach, QUANTIZATION_BUDGET_FRACTION * bound, packing)
-    new = replace(
-        track,
-        interpolation=Interpolation.LINEAR,
-        times=times,
-        values=keys,
-        in_tangents=None,
-        out_tangents=None,
-        storage=storage,
-    )
+    new = replace(track.with_keys(times, keys, interpolation=Interpolation.LINEAR), storage=storage)
     return new, stored, _displacement(sample(new, grid) - values, reach)
 
 

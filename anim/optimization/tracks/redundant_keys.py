@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, as_key_times
+from anim.arrays import Bools
 from anim.measure.inspect.track_statistics import removable_keys
 from anim.model import Clip, Skeleton, Track
+from anim.model.track import share_time_axes
 from anim.optimization.options import Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import EncodedKeys
@@ -38,9 +38,8 @@ def _is_exact(track: Track, request: Request) -> bool:
 
 def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -> list[tuple[Track, EncodedKeys]]:
     """The tracks without redundant keys; those that lose none keep their `EncodedKeys`."""
-    axes: dict[bytes, Floats] = {}
     while True:  # a removed key can make others necessary
-        tracks = _share_axes([track for track, _ in pairs], axes)
+        tracks = share_time_axes(track for track, _ in pairs)  # as in the file
         masks = [_alternate_keys(mask) for mask in removable_keys(tracks, skeleton)]
         if not any(mask.any() for mask in masks):
             return [(track, stored) for track, (_, stored) in zip(tracks, pairs, strict=True)]
@@ -48,14 +47,6 @@ def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -
             (_select_keys(track, ~mask), stored.select_keys(~mask)) if mask.any() else (track, stored)
             for track, (_, stored), mask in zip(tracks, pairs, masks, strict=True)
         ]
-
-
-def _share_axes(tracks: Sequence[Track], axes: dict[bytes, Floats]) -> list[Track]:
-    """The tracks with equal times in one array, as in one accessor of the file."""
-    shared = [axes.setdefault(track.times.tobytes(), as_key_times(track.times)) for track in tracks]
-    return [
-        track if track.times is axis else replace(track, times=axis) for track, axis in zip(tracks, shared, strict=True)
-    ]
 
 
 def _alternate_keys(mask: Bools) -> Bools:
@@ -71,9 +62,7 @@ def _alternate_keys(mask: Bools) -> Bools:
 
 def _select_keys(track: Track, keep: Bools) -> Track:
     arriving, leaving = (None if part is None else part[keep] for part in (track.in_tangents, track.out_tangents))
-    return replace(
-        track, times=track.times[keep], values=track.values[keep], in_tangents=arriving, out_tangents=leaving
-    )
+    return track.with_keys(track.times[keep], track.values[keep], arriving, leaving)
 
 
 def _changed_solution(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats
 from anim.errors import NotFoundError
 from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
@@ -147,7 +147,7 @@ def _scale(track: Track, signs: Floats) -> Track:
 
 
 def _rate(clip: Clip) -> float | None:
-    estimated = frame_rate.estimate_frame_rate(unique_sorted(np.concatenate(clip.axes))) if clip.axes else None
+    estimated = frame_rate.estimate_frame_rate(clip.key_times)
     if estimated is None or estimated.regular < MIN_GRID_FRACTION or estimated.fps < MIN_FPS:
         return None
     return estimated.fps

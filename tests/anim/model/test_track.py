@@ -94,7 +94,7 @@ def test_targets() -> None:
 @pytest.mark.parametrize("word", Interpolation)
 def test_an_interpolation_may_be_its_word(word: str) -> None:
     sides = (np.zeros((2, 3)),) * 2 if word == "CUBICSPLINE" else ()
-    made = Track(0, "translation", str(word), [0, 1], [[0, 0, 0], [2, 4, 6]], *sides)  # type: ignore[arg-type]
+    made = Track(0, "translation", str(word), [0, 1], [[0, 0, 0], [2, 4, 6]], *sides)
     assert made.interpolation is Interpolation(word)
 
 

@@ -11,7 +11,7 @@ import pytest
 from anim.arrays import Floats
 from anim.curves.easing.table import parse
 from anim.errors import RangeError
-from anim.model import Clip, Track
+from anim.model import Clip, TimeAxis, Track
 from anim.operations.retime import retime
 from anim.operations.time_warp import warp
 from anim.sampling.track import sample
@@ -89,7 +89,7 @@ def test_refusals(options: dict[str, float], words: str) -> None:
 @pytest.mark.parametrize("printed", ["-0.0416667", "-0.04166667", "-0.0417", "-0.042", "-0.04166", "-0.041666668"])
 def test_an_offset_by_a_start_as_it_is_printed_leads_to_0(printed: str) -> None:
     start = float(np.float32(1 / 24))
-    track = replace(TRACKS["linear"], times=TRACKS["linear"].times + start)
+    track = replace(TRACKS["linear"], time_axis=TimeAxis(TRACKS["linear"].times + start))
     new = retime(Clip("", (track,)), offset=float(printed)).tracks[0]
     np.testing.assert_allclose(new.times, TRACKS["linear"].times, atol=1e-15)
     assert new.times[0] == 0

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from anim.errors import RangeError
 from anim.model import Clip, Track
+from anim.operations.retime import shift_time
 from anim.operations.trim import trim
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
@@ -80,7 +79,7 @@ def test_nothing_left_is_refused() -> None:
 @pytest.mark.parametrize("track", TRACKS.values(), ids=TRACKS)
 def test_rebase_alone_moves_all_keys_and_cuts_none(track: Track) -> None:
     late = np.float64(np.float32(1 / 24))
-    clip = Clip("", (replace(track, times=track.times + late), replace(ANCHOR, times=ANCHOR.times + late)))
+    clip = Clip("", (shift_time(track, late), shift_time(ANCHOR, late)))
     new = trim(clip, rebase=True)
     assert new.start == 0
     np.testing.assert_allclose(new.tracks[0].times, track.times, atol=1e-15)

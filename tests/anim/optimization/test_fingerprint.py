@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from anim.gltf.document import Document
+from anim.model import TimeAxis
 from anim.optimization.writing import KEY, add_mark, has_mark
 from tests.clips import STEP, clip, track
 
@@ -25,7 +26,7 @@ def test_a_mark_for_these_clips_and_options_only() -> None:
     assert not has_mark(marked, CLIPS, "other options")
     (only,) = CLIPS[0].tracks
     others = (
-        replace(only, values=2 * only.values), replace(only, times=2 * only.times), replace(only, node=1),
+        replace(only, values=2 * only.values), replace(only, time_axis=TimeAxis(2 * only.times)), replace(only, node=1),
         replace(only, interpolation=STEP), replace(only, path="translation"),
     )  # fmt: skip
     for other in others:

@@ -10,7 +10,7 @@ import pytest
 
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
-from anim.model import Clip, Scene
+from anim.model import Clip, Scene, TimeAxis
 from anim.optimization.options import PLAYERS, Bounds, Reference
 from anim.optimization.verification import Verification, verify
 from anim.sampling import players
@@ -65,7 +65,7 @@ def test_keys_only() -> None:
 
 def test_other_ends_never_hold() -> None:
     (only,) = SLIDE.tracks
-    later = clip(replace(only, times=np.array([0, 0.5, 1.0000001])))
+    later = clip(replace(only, time_axis=TimeAxis([0, 0.5, 1.0000001])))
     found = _verdict(SLIDE, later, Bounds(10.0, 0.0))
     assert (found.usage, found.holds) == (math.inf, False)
 

@@ -50,7 +50,7 @@ def test_clips_that_differ_are_found() -> None:
     track, *others = solution.clip.tracks
     changes = (
         {"values": np.nextafter(track.values, np.inf)},
-        {"times": track.times + 1},
+        {"time_axis": track.times + 1},
         {"node": 1 - (track.node or 0)},
     )
     for change in changes:

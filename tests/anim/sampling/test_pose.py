@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from anim import arrays
 from anim.arrays import Floats
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
 from anim.gltf.reading import reader
-from anim.model import Clip, Skeleton
+from anim.model import Clip, Skeleton, TimeAxis
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.batch import lazy_batches
 from anim.sampling.players import PLAYERS, sampler
@@ -157,15 +156,16 @@ def test_stretches_of_time_are_the_whole(name: str) -> None:
 
 
 def test_keys_are_stacked_where_they_are_needed_and_all_in_the_end() -> None:
-    times = arrays.as_key_times(np.arange(100))
-    moving = [track("translation", times, np.tile(times[:, None], 3), node=node) for node in (0, 1)]
+    axis = TimeAxis(np.arange(100))
+    times = axis.times
+    moving = [track("translation", axis, np.tile(times[:, None], 3), node=node) for node in (0, 1)]
     (stack,) = lazy_batches(moving)
     for low in range(0, 200, 10):
         at = np.linspace(low % 100 + 0.5, low % 100 + 3.5, 5)
-        batch, place = stack.at(find_interval(stack.times, at))
+        batch, place = stack.at(find_interval(times, at))
         assert len(batch.times) == 5
         assert batch.sample(at, place)[:, 1, 2].tolist() == at.tolist()
-    seen = [len(stack.at(find_interval(stack.times, np.array([low + 0.5])))[0].times) for low in range(60)]
+    seen = [len(stack.at(find_interval(times, np.array([low + 0.5])))[0].times) for low in range(60)]
     assert (seen[0], seen[-1]) == (2, 100)
     (fresh,) = lazy_batches(moving)
     assert len(fresh.at(find_interval(times, times[:60]))[0].times) == 100, "half of them at once"

@@ -16,7 +16,7 @@ from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import OFFSETS, EulerMotion, EulerNode, Pivots
 from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, AxesConvention
-from anim.model import Interpolation, Track
+from anim.model import Interpolation, TimeAxis, Track
 from anim.sampling.track import sample
 
 CONVENTIONS = [(order, frame) for order in ORDERS for frame in AxesConvention]
@@ -62,7 +62,7 @@ def _random_curves(seed: int) -> list[Curve]:
         values = random.uniform(-np.pi, np.pi, count) * random.choice([1, 1, 6], count)
         values[random.random(count) < 0.3] = np.pi / 2 + random.choice([0, 1e-9, 1e-3])
         modes = random.choice([Mode.LINEAR, Mode.CUBIC], count).astype(np.uint8)
-        curves.append(Curve(times, values, modes, random.normal(size=count), random.normal(size=count)))
+        curves.append(Curve(TimeAxis(times), values, modes, random.normal(size=count), random.normal(size=count)))
     return curves
 
 
@@ -117,14 +117,14 @@ def test_axes_with_keys_of_their_own_are_each_evaluated() -> None:
 
 
 def test_steps_stay_steps() -> None:
-    step = Curve(np.array((0.0, 0.5, 1.0)), np.radians((0, 90, 30)), uniform_modes(3, Mode.STEP))
+    step = Curve(TimeAxis((0.0, 0.5, 1.0)), np.radians((0, 90, 30)), uniform_modes(3, Mode.STEP))
     track = _track(_node([step, None, None]))
     assert track.interpolation is Interpolation.STEP
     np.testing.assert_array_equal(track.times, (0, 0.5, 1))
 
 
 def test_a_step_beside_a_line_jumps_within_a_float32() -> None:
-    step = Curve(np.array((0.0, 0.5, 1.0)), np.radians((0, 90, 30)), uniform_modes(3, Mode.STEP))
+    step = Curve(TimeAxis((0.0, 0.5, 1.0)), np.radians((0, 90, 30)), uniform_modes(3, Mode.STEP))
     node = _node([step, linear(np.array((0.0, 1.0)), np.radians((0.0, 60.0))), None])
     track = _track(node)
     at = np.linspace(0, 0.9999, 5000)
@@ -162,7 +162,7 @@ def test_keys_that_fall_together_in_float32_are_one() -> None:
 def test_a_cubic_that_comes_back_moves_all_the_same() -> None:
     """Equal values, but tangents that lead away: 0.75 m / 4 at 0.5 s."""
     keys = np.array((0.0, 1.0))
-    swing = Curve(keys, np.zeros(2), uniform_modes(2, Mode.CUBIC), np.array((0, -0.75)), np.array((0.75, 0)))
+    swing = Curve(TimeAxis(keys), np.zeros(2), uniform_modes(2, Mode.CUBIC), np.array((0, -0.75)), np.array((0.75, 0)))
     assert not swing.is_constant
     track = _track(_node([swing, None, None]))
     assert quaternion.rotation_vector(sample(track, np.array([0.5])))[0, 0] == pytest.approx(0.75 / 4, abs=TOLERANCE)
@@ -202,7 +202,7 @@ def test_pre_and_post_rotation_and_pivots_are_fbxs() -> None:
 
 def test_a_cubic_translation_is_followed() -> None:
     cubic = Curve(
-        np.array((0.0, 1.0)), np.array((0.0, 1.0)), uniform_modes(2, Mode.CUBIC), np.zeros(2), np.array((4.0, 0))
+        TimeAxis((0.0, 1.0)), np.array((0.0, 1.0)), uniform_modes(2, Mode.CUBIC), np.zeros(2), np.array((4.0, 0))
     )
     node = EulerNode("a", -1, np.zeros(3), "XYZ", AxesConvention.INTRINSIC, np.zeros(3), (None,) * 3, {1: cubic})
     track = _track(node, 1e-3, path="translation")

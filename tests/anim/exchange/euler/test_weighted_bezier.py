@@ -10,6 +10,7 @@ from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 from anim.exchange.euler.weighted_bezier import parameter
 from anim.maths.euler import AxesConvention
+from anim.model import TimeAxis
 from anim.sampling.track import sample
 
 HANDLES = [(1 / 3, 1 / 3), (0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.9, 0.7), (0.02, 0.98), (0.5, 0.25)]
@@ -18,7 +19,7 @@ HANDLES = [(1 / 3, 1 / 3), (0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.9, 0.7), (0.02
 def _curve(leaving: float, arriving: float) -> Curve:
     """From 1 at 2 s with slope 3 to −2 at 6 s with slope −1."""
     return Curve(
-        np.array((2.0, 6.0)), np.array((1.0, -2.0)), uniform_modes(2, Mode.CUBIC),
+        TimeAxis((2.0, 6.0)), np.array((1.0, -2.0)), uniform_modes(2, Mode.CUBIC),
         np.array((0.0, -1.0)), np.array((3.0, 0.0)), np.array((0.3, arriving)), np.array((leaving, 0.3)),
     )  # fmt: skip
 
@@ -38,7 +39,7 @@ def test_it_is_the_bezier_curve_through_its_handles(leaving: float, arriving: fl
 def test_a_third_is_the_plain_cubic() -> None:
     at = np.linspace(2, 6, 1001)
     weighted = _curve(1 / 3, 1 / 3)
-    plain = Curve(weighted.times, weighted.values, weighted.modes, weighted.in_tangents, weighted.out_tangents)
+    plain = Curve(weighted.time_axis, weighted.values, weighted.modes, weighted.in_tangents, weighted.out_tangents)
     np.testing.assert_allclose(evaluate(weighted, at), evaluate(plain, at), atol=1e-12)
 
 

@@ -21,7 +21,7 @@ from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.maths.euler import AxesConvention
 from anim.measure.error.metric import ErrorMetric
-from anim.model import Clip, Scene, Skeleton, Skin
+from anim.model import Clip, Scene, Skeleton, Skin, TimeAxis
 from anim.sampling import sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, recorded
 from tests.clips import track
@@ -63,8 +63,7 @@ def _written(scene: Scene, clip: Clip, kind: str, fps: float | None) -> Imported
 
 def _from_zero(clip: Clip) -> Clip:
     """The clip with its first key at 0 s, where a BVH begins."""
-    later = {id(each.times): each.times - clip.start for each in clip.tracks}
-    return Clip(clip.name, tuple(replace(each, times=later[id(each.times)]) for each in clip.tracks))
+    return Clip(clip.name, tuple(replace(each, time_axis=TimeAxis(each.times - clip.start)) for each in clip.tracks))
 
 
 def _error(scene: Scene, clip: Clip, kind: str, fps: float | None) -> float:

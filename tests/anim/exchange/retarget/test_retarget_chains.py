@@ -16,7 +16,7 @@ from anim.exchange.retarget.apply import apply_to_character
 from anim.exchange.retarget.retarget import GroundMode
 from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
-from anim.model import Interpolation, Scene, Track
+from anim.model import Interpolation, Scene, TimeAxis, Track
 from anim.sampling import frame_times, sample_pose, world_matrices
 from anim.sampling.pose import world_rotations
 from anim.sampling.times import key_times
@@ -55,7 +55,7 @@ def _keyed(name: str, parent: int, *degrees: tuple[float, ...], mode: Mode = Mod
     curves = []
     for values in degrees:
         times = np.array([2.0 * key for key in range(len(values))])
-        curves.append(Curve(times, np.radians(values), uniform_modes(len(values), mode)))
+        curves.append(Curve(TimeAxis(times), np.radians(values), uniform_modes(len(values), mode)))
     offset = np.array((float(parent >= 0), 0, 0))
     return EulerNode(name, parent, offset, "XYZ", AxesConvention.INTRINSIC, np.zeros(3), tuple(curves))
 

@@ -13,7 +13,7 @@ from anim.gltf.document import Document
 from anim.gltf.meshopt import storage
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.model import Clip, Track
+from anim.model import Clip, TimeAxis, Track
 from fixtures.broken.pieces import animated, glb, text
 from tests.anim.gltf.meshopt.packing import exponents, quaternions
 from tests.anim.gltf.writing.documents import check_same
@@ -57,7 +57,9 @@ def _target(each: Track) -> str:
 
 def as_float32(clip: Clip) -> Clip:
     """Return the clip with times as a file holds them."""
-    return Clip(clip.name, tuple(replace(each, times=each.times.astype(np.float32)) for each in clip.tracks))
+    return Clip(
+        clip.name, tuple(replace(each, time_axis=TimeAxis(each.times.astype(np.float32))) for each in clip.tracks)
+    )
 
 
 def packed_walk(extension: str, *, keys: int = KEYS) -> tuple[Clip, Document]:

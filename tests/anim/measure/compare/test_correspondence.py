@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.measure.error.metric import NOISE, ErrorMetric, dense_times
-from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton
+from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, TimeAxis
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened_fixture
 
@@ -189,7 +189,7 @@ def _same_as_plain(scene: Scene, other: Scene, before: Clip, after: Clip) -> Err
 
 
 def _slower(before: Clip) -> Clip:
-    return Clip(before.name, tuple(replace(each, times=1.05 * each.times) for each in before.tracks))
+    return Clip(before.name, tuple(replace(each, time_axis=TimeAxis(1.05 * each.times)) for each in before.tracks))
 
 
 def _quantized(instance: MeshInstance) -> MeshInstance:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -109,4 +108,4 @@ def _changed(random: np.random.Generator, of: Track, off: float) -> Track:
         values *= (1 + 3e-5 * random.normal(size=(len(values), 1))) / np.linalg.norm(values, axis=1, keepdims=True)
     sides = (None if each is None else each[keep] for each in (of.in_tangents, of.out_tangents))
     arriving, leaving = sides
-    return replace(of, times=of.times[keep], values=values, in_tangents=arriving, out_tangents=leaving)
+    return of.with_keys(of.times[keep], values, arriving, leaving)

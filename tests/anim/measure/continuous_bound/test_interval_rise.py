@@ -77,7 +77,7 @@ def test_what_has_no_bound_is_infinite() -> None:
 @pytest.mark.parametrize("player", ["spec", "three", "raw", "nlerp"])
 def test_every_stretch_keeps_its_own_bound(player: str) -> None:
     of, before, after = pair(3, modes=(LINEAR,), wild=(0.3,))
-    times = np.unique(np.concatenate([np.linspace(0, 1, 60), *before.axes, *after.axes]))
+    times = np.unique(np.concatenate([np.linspace(0, 1, 60), before.key_times, after.key_times]))
     ruler = ErrorMetric(of)
     found = _rises(of, before, after, times, player)
     limits = np.concatenate(ruler.sample_errors(before, after, times, player=player).limits)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +72,7 @@ def _coarser(of: Track, step: int) -> Track:
     values = np.round(of.values[keep] * 32767) / 32767 if of.path == "rotation" else of.values[keep]
     sides = (None if each is None else each[keep] for each in (of.in_tangents, of.out_tangents))
     arriving, leaving = sides
-    return replace(of, times=of.times[keep], values=values, in_tangents=arriving, out_tangents=leaving)
+    return of.with_keys(of.times[keep], values, arriving, leaving)
 
 
 @pytest.mark.parametrize("turning_first", [True, False])

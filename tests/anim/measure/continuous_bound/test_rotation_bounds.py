@@ -36,7 +36,7 @@ def test_no_derivative_exceeds_its_majorant(seed: int, player: str, share: float
     of, before, after = pair(seed, modes=(STEP, LINEAR, LINEAR, CUBICSPLINE))
     where = merge_intervals(dense_times(before, after), before, after)
     where = Intervals(where.edges[np.concatenate(([True], np.diff(where.edges) > 1e-4))])  # differences need room
-    if len(where) < 1 or not {t for each in (before, after) for t in np.concatenate(each.axes)} <= set(where.edges):
+    if len(where) < 1 or not {t for each in (before, after) for t in each.key_times} <= set(where.edges):
         return
     with np.errstate(all="ignore"):
         found = world_bounds(*partition_tracks((of, of), (before, after)), where, players=[player])

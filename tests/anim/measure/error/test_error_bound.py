@@ -11,7 +11,7 @@ import pytest
 from anim.gltf.reading import reader
 from anim.measure.error.metric import NOISE, SLACK, ErrorMetric, dense_times
 from anim.measure.error.surface import diagonal
-from anim.model import Clip, Scene, Track
+from anim.model import Clip, Scene, TimeAxis, Track
 from anim.operations.resample import resample
 from tests.anim.measure.error.brute_force import Find, brute, clip_of, with_track
 from tests.clips import clip, track
@@ -95,7 +95,7 @@ def _one_key(before: Clip) -> Clip:
 
 
 def _late(before: Clip) -> Clip:
-    return Clip(before.name, tuple(replace(each, times=each.times + 0.02) for each in before.tracks))
+    return Clip(before.name, tuple(replace(each, time_axis=TimeAxis(each.times + 0.02)) for each in before.tracks))
 
 
 CHANGES: dict[str, Callable[[Clip], Clip]] = {

@@ -16,7 +16,7 @@ from anim.measure.error import metric
 from anim.measure.error.displacement import MorphedDisplacement
 from anim.measure.error.metric import ErrorMetric, dense_times, key_and_mid_times
 from anim.measure.error.statistics import FRAMES, SLACK, Peak, speed_error, statistics
-from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Track
+from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, TimeAxis, Track
 from anim.operations.resample import resample
 from anim.sampling.times import frame_times
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
@@ -34,7 +34,7 @@ def versions(request: pytest.FixtureRequest) -> tuple[Scene, Clip, Clip]:
     """A skinned scene, a clip of it made linear, and that a little slower."""
     document = opened_fixture(request.param)
     before = resample(reader.clips(document)[0], fps=11)
-    slower = tuple(replace(each, times=1.1 * each.times) for each in before.tracks)
+    slower = tuple(replace(each, time_axis=TimeAxis(1.1 * each.times)) for each in before.tracks)
     return reader.scene(document), before, Clip(before.name, slower)
 
 
@@ -153,7 +153,7 @@ def test_bounds_hold_where_skin_is_morphed_too(asset: Find) -> None:
     """No vertex is farther, or faster, than the search says, which goes through a few of them only."""
     document = opened_path(asset("BitmojiRun.glb"))
     before = reader.clips(document)[0]
-    slower = Clip("", tuple(replace(each, times=1.07 * each.times) for each in before.tracks))
+    slower = Clip("", tuple(replace(each, time_axis=TimeAxis(1.07 * each.times)) for each in before.tracks))
     ruler = ErrorMetric(reader.scene(document))
     times = frame_times(0.0, slower.end, fps=60)
     found = ruler.error_at(before, slower, times), speed_error(ruler, before, slower, fps=60)

@@ -75,7 +75,7 @@ def test_gaps_that_reach_further_than_the_motion_are_no_loop() -> None:
 
 def test_all_joints_one_frame_short_are_open_by_one_frame() -> None:
     whole = _swinging()
-    short = clip(*(replace(each, times=each.times[:-1], values=each.values[:-1]) for each in whole.tracks))
+    short = clip(*(each.with_keys(each.times[:-1], each.values[:-1]) for each in whole.tracks))
     found = analyze_loop(CHAIN, short)
     assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
     assert len(found.joints) == 3

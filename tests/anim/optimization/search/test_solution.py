@@ -35,7 +35,7 @@ def test_values_as_stored() -> None:
 def test_axes_count_once() -> None:
     times = np.array([0.0, 1, 2])
     one, other = (track(path, times, np.eye(3), node=0) for path in ("translation", "scale"))
-    apart, shared = _solution(clip(one, other)), _solution(clip(one, replace(other, times=one.times)))
+    apart, shared = _solution(clip(one, other)), _solution(clip(one, replace(other, time_axis=one.time_axis)))
     assert shared.size(CORE) == 2 * PRICE.track + 2 * 36 + PRICE.axis + 12
     assert apart.size(CORE) - shared.size(CORE) == PRICE.axis + 12
 
@@ -47,6 +47,6 @@ def test_single_keys_are_cheaper() -> None:
 
 def test_filtered_tracks_count_as_the_codec_has_them() -> None:
     (keys,) = encode_all([TURNS.values], [("quaternion", 10)])
-    both = clip(TURNS, replace(LINES, times=TURNS.times))
+    both = clip(TURNS, replace(LINES, time_axis=TURNS.time_axis))
     found = Solution(both, (keys, EncodedKeys(LINES.values, "as it is")), ()).size(EXT)
     assert found == 2 * PRICE.track + PRICE.axis + 12 + 36 + EXT.size([keys])
