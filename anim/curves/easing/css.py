@@ -10,13 +10,11 @@ import numpy as np
 from anim.arrays import Floats
 from anim.curves.easing.function import CubicSegment, Easing, format_call
 from anim.errors import RangeError
+from anim.maths import bezier
 
 JUMPS = ("jump-start", "jump-end", "jump-both", "jump-none")
 MAX_STEPS = 10_000  # above the frame count of one easing on any display
 HANDLE_TOLERANCE = 1e-12  # distance of handles from 1/3 and 2/3 below which the Bézier is a cubic of time
-SOLVER_TOLERANCE = 4e-16  # a step, or a relative error, below this is rounding
-MAX_SOLVER_ITERATIONS = 60  # bisection alone takes 46; Newton's method about 3
-NUM_START_VALUES = 128  # start values of the solver
 
 
 def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") -> Easing:
@@ -32,10 +30,10 @@ def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") 
         raise RangeError(f"y1 and y2 are {y1:g} and {y2:g} (expected finite numbers)")
 
     def value(u: Floats) -> Floats:
-        return _bernstein(_parameter(u, x1, x2), y1, y2)
+        return bezier.evaluate(bezier.parameter(u, x1, x2), y1, y2)
 
     def derivative(u: Floats) -> Floats:
-        return _slope(_parameter(u, x1, x2), (x1, y1), (x2, y2))
+        return _slope(bezier.parameter(u, x1, x2), (x1, y1), (x2, y2))
 
     exact = None
     if max(abs(x1 - 1 / 3), abs(x2 - 2 / 3)) < HANDLE_TOLERANCE:
@@ -75,34 +73,10 @@ def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
     return Easing(name or f"steps({count}, {jump})", value, np.zeros_like, breaks, tuple(exact))
 
 
-def _parameter(u: Floats, x1: float, x2: float) -> Floats:
-    """Return s (any shape) with x(s) = u: Newton's method with bisection as a safeguard (x never decreases)."""
-    goal = np.asarray(u, dtype=np.float64).ravel()
-    grid = np.linspace(0, 1, NUM_START_VALUES + 1)
-    table = _bernstein(grid, x1, x2)
-    at = np.clip(np.searchsorted(table, goal, side="right") - 1, 0, NUM_START_VALUES - 1)
-    low, high, solution = grid[at], grid[at + 1], np.interp(goal, table, grid)
-    open_ones = np.arange(goal.size)
-    for _ in range(MAX_SOLVER_ITERATIONS):
-        s, least, most = solution[open_ones], low[open_ones], high[open_ones]
-        off, rate = _bernstein(s, x1, x2) - goal[open_ones], _bernstein_slope(s, x1, x2)
-        least, most = np.where(off <= 0, s, least), np.where(off >= 0, s, most)
-        step = s - off / np.where(rate > 0, rate, 1.0)
-        inside = (rate > 0) & (step >= least) & (step <= most)
-        following = np.where(off == 0, s, np.where(inside, step, (least + most) / 2))
-        solution[open_ones], low[open_ones], high[open_ones] = following, least, most
-        open_ones = open_ones[
-            (np.abs(following - s) > SOLVER_TOLERANCE) & (np.abs(off) > SOLVER_TOLERANCE * goal[open_ones])
-        ]
-        if not open_ones.size:
-            break
-    return solution.reshape(np.shape(u))
-
-
 def _slope(s: Floats, first: tuple[float, float], second: tuple[float, float]) -> Floats:
     """Return dy/dx at s; at the ends that of the first handle of non-zero length."""
-    run = _bernstein_slope(s, first[0], second[0])
-    rise = _bernstein_slope(s, first[1], second[1])
+    run = bezier.slope(s, first[0], second[0])
+    rise = bezier.slope(s, first[1], second[1])
     upright = np.where(rise == 0, 0.0, np.copysign(np.inf, rise))
     with np.errstate(over="ignore"):  # a denormal x difference counts as vertical
         slope = np.where(run > 0, rise / np.where(run > 0, run, 1.0), upright)
@@ -115,14 +89,3 @@ def _handle_slope(near: tuple[float, float], far: tuple[float, float]) -> float:
     """Return the slope towards the nearest control point distinct from the end point."""
     x, y = next(handle for handle in (near, far, (1.0, 1.0)) if handle != (0, 0))
     return y / x if x else float(np.copysign(np.inf, y))
-
-
-def _bernstein(s: Floats, p1: float, p2: float) -> Floats:
-    """Return the coordinate at s of the Bézier 0, p1, p2, 1; exactly 0 and 1 at the ends."""
-    r = 1 - s
-    return 3 * r * r * s * p1 + 3 * r * s * s * p2 + s * s * s
-
-
-def _bernstein_slope(s: Floats, p1: float, p2: float) -> Floats:
-    r = 1 - s
-    return 3 * r * r * p1 + 6 * r * s * (p2 - p1) + 3 * s * s * (1 - p2)

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError, ShapeError
-from anim.exchange.euler import weighted_bezier
-from anim.maths import hermite
+from anim.maths import bezier, hermite
 from anim.model.time_axis import TimeAxis, as_time_axis
 
 WEIGHTS = ("in_weights", "out_weights")
+DEFAULT_WEIGHT = 1 / 3  # of a segment; with both handles of this length the cubic equals `maths.hermite`
 HANDLES = ("in_tangents", "out_tangents", *WEIGHTS)
 
 
@@ -92,7 +92,7 @@ class Curve:
 
     def weights(self, left: Ints, right: Ints) -> tuple[Floats, Floats]:
         """Return the handle lengths after keys `left` and before keys `right`, as fractions of the segment."""
-        third = np.full(len(self.times), weighted_bezier.DEFAULT_WEIGHT)
+        third = np.full(len(self.times), DEFAULT_WEIGHT)
         leaving = third if self.out_weights is None else self.out_weights
         arriving = third if self.in_weights is None else self.in_weights
         return leaving[left], arriving[right]
@@ -137,9 +137,16 @@ def evaluate(curve: Curve, at: Floats, *, before: bool = False) -> Floats:
         if curve.in_weights is None and curve.out_weights is None:
             values = np.where(cubic, hermite.evaluate(u, start, leaving, end, arriving), values)
         else:
-            bent = weighted_bezier.evaluate(u, start, leaving, end, arriving, curve.weights(left, right))
-            values = np.where(cubic, bent, values)
+            first, second = curve.weights(left, right)
+            s = bezier.parameter(u, first, 1 - second)
+            points = (start, start + first * leaving, end - second * arriving, end)
+            values = np.where(cubic, _bezier(s, *points), values)
     return values
+
+
+def _bezier(s: Floats, p0: Floats, p1: Floats, p2: Floats, p3: Floats) -> Floats:
+    r = 1 - s
+    return r**3 * p0 + 3 * s * r * r * p1 + 3 * s * s * r * p2 + s**3 * p3
 
 
 def travel(curve: Curve, a: Floats, b: Floats) -> Floats:

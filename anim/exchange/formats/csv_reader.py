@@ -38,9 +38,8 @@ from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import PartialConvention, merge_strict, parse_convention, require_complete
-from anim.exchange.euler.curve import MODES, Curve, Mode, uniform_modes
+from anim.exchange.euler.curve import DEFAULT_WEIGHT, MODES, Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import Convention, EulerMotion
-from anim.exchange.euler.weighted_bezier import DEFAULT_WEIGHT
 from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
 from anim.exchange.formats.node_builder import KINDS, MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
 from anim.exchange.formats.text import check_times, decode_text, error_at, parse_cell, parse_number

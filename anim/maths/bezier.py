@@ -1,0 +1,45 @@
+"""Coordinates of cubic Bézier curves from 0 to 1, and their parameter by time: CSS easings, weighted tangents."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+
+TOLERANCE = 4e-16  # a step, or a relative error, below this is rounding
+MAX_ITERATIONS = 60  # bisection alone takes 53; Newton's method about 5
+
+
+def evaluate(s: Floats, p1: Floats | float, p2: Floats | float) -> Floats:
+    """Return the coordinate at s of the Bézier 0, p1, p2, 1; exactly 0 and 1 at the ends."""
+    r = 1 - s
+    return np.asarray(3 * r * r * s * p1 + 3 * r * s * s * p2 + s * s * s)
+
+
+def slope(s: Floats, p1: Floats | float, p2: Floats | float) -> Floats:
+    """Return the derivative of `evaluate` by s."""
+    r = 1 - s
+    return np.asarray(3 * r * r * p1 + 6 * r * s * (p2 - p1) + 3 * s * s * (1 - p2))
+
+
+def parameter(time: Floats, x1: Floats | float, x2: Floats | float) -> Floats:
+    """Return s with evaluate(s, x1, x2) = time, all of them 0 … 1 and of any shape: then time never decreases.
+
+    Newton's method with bisection as a safeguard.
+    """
+    full = np.broadcast_arrays(np.asarray(time, np.float64), x1, x2)
+    goal, p1, p2 = (each.ravel() for each in full)
+    low, high, solution = np.zeros(goal.size), np.ones(goal.size), goal.copy()
+    left = np.arange(goal.size)
+    for _ in range(MAX_ITERATIONS):
+        s, a, b = solution[left], p1[left], p2[left]
+        error, rate = evaluate(s, a, b) - goal[left], slope(s, a, b)
+        least, most = np.where(error <= 0, s, low[left]), np.where(error >= 0, s, high[left])
+        step = s - error / np.where(rate > 0, rate, 1.0)
+        inside = (rate > 0) & (step >= least) & (step <= most)
+        following = np.where(error == 0, s, np.where(inside, step, (least + most) / 2))
+        solution[left], low[left], high[left] = following, least, most
+        left = left[(np.abs(following - s) > TOLERANCE) & (np.abs(error) > TOLERANCE * goal[left])]
+        if not left.size:
+            break
+    return solution.reshape(full[0].shape)
