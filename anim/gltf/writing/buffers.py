@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.meshopt import fallback_buffer
-from anim.gltf.writing import byte_ranges, compaction, references
+from anim.gltf.writing import byte_ranges, compaction
 from anim.gltf.writing.buffer_views import View
 from anim.gltf.writing.byte_ranges import OffsetMap
 from anim.gltf.writing.references import References
@@ -40,7 +40,7 @@ def rebuild_buffers(
     extension: of the compressed ones among `new`.
     """
     json = document.json
-    frozen = references.frozen_buffers(json)
+    frozen = outside.frozen_buffers
     imagined = fallback_buffer.drop_data(json, document.buffers, frozen)
     movable = {i for i, buffer in enumerate(document.buffers) if buffer.has_data} - frozen | imagined
     shift = compaction.offset_maps(document, freed, unused, outside, movable)

@@ -29,10 +29,14 @@ _Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its p
 
 @dataclass(frozen=True, slots=True)
 class References:
-    """Indices of accessors and views with references outside the replaced animations."""
+    """Indices of accessors and views with references outside the replaced animations.
+
+    frozen_buffers: those that unknown extensions refer to directly: their bytes must not move.
+    """
 
     accessors: frozenset[int]
     views: frozenset[int]
+    frozen_buffers: frozenset[int]
 
 
 def references_outside(json: Json, replaced: Iterable[int]) -> References:
@@ -48,19 +52,15 @@ def references_outside(json: Json, replaced: Iterable[int]) -> References:
             accessors |= {sampler["input"], sampler["output"]}
     views = {image["bufferView"] for image in json_array(json, "images") if "bufferView" in image}
     views |= set(_of_draco(json))
-    unknown = unknown_indices(json)
-    return References(frozenset(accessors | unknown), frozenset(views | unknown))
+    parts = [part for _, part in unknown_extensions(json)]
+    unknown = {number for part in parts for number in _whole_numbers(part)}
+    frozen = {part["buffer"] for part in _objects(parts) if type(part.get("buffer")) is int}
+    return References(frozenset(accessors | unknown), frozenset(views | unknown), frozenset(frozen))
 
 
 def unknown_indices(json: Json) -> set[int]:
     """Return all whole numbers in unknown extensions: each may be an index of an accessor or view."""
     return {number for _, part in unknown_extensions(json) for number in _whole_numbers(part)}
-
-
-def frozen_buffers(json: Json) -> set[int]:
-    """Return the buffers that unknown extensions refer to directly: their bytes must not move."""
-    parts = [part for _, part in unknown_extensions(json)]
-    return {part["buffer"] for part in _objects(parts) if type(part.get("buffer")) is int}
 
 
 def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
