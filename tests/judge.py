@@ -91,7 +91,7 @@ def judge(truth: Path, other: Path, *, rate: float = RATE) -> Verdict:
     """
     if reason := missing():
         raise RuntimeError(reason)
-    command = ["node", str(SCRIPTS[0]), str(_package()), str(truth), str(other), str(rate)]
+    command = ["node", str(SCRIPTS[0]), str(package()), str(truth), str(other), str(rate)]
     run = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False)
     if run.returncode:
         raise RuntimeError(f"{other.name}: {run.stderr.decode(errors='replace').strip()}")
@@ -100,7 +100,7 @@ def judge(truth: Path, other: Path, *, rate: float = RATE) -> Verdict:
 
 def vertices(file: Path, *, clip: int, time: float) -> NDArray[np.float32]:
     """Return all vertices (V, 3) at a time of a clip, in world space, in the order in which three.js meets them."""
-    command = ["node", str(SCRIPTS[0].with_name("vertices.mjs")), str(_package()), str(file), str(clip), str(time)]
+    command = ["node", str(SCRIPTS[0].with_name("vertices.mjs")), str(package()), str(file), str(clip), str(time)]
     run = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=True)
     return np.frombuffer(run.stdout, np.float32).reshape(-1, 3)
 
@@ -137,13 +137,14 @@ def missing() -> str:
     """Return why the judge can't sit here, or "" if it can."""
     if shutil.which("node") is None:
         return "node is not installed"
-    if _package() is None:
+    if package() is None:
         return "three is not installed (npm install three, or set GLTF_THREE_DIR)"
     return ""
 
 
 @cache
-def _package() -> Path | None:
+def package() -> Path | None:
+    """Return the folder of the npm package `three`, None where it is absent."""
     given = (os.environ.get(name) for name in ("GLTF_THREE_DIR", "GLTF_VALIDATOR_DIR"))
     for root in (*(Path(each).resolve() for each in given if each), ROOT):
         for folder in (root, root / "three", root / "node_modules" / "three"):

@@ -26,7 +26,8 @@ LEVELS = (
     {"asset"},
     {"api"},
 )
-NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning"), ("simulation", "skinning")}
+NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning")}
+NEIGHBORS |= {("simulation", "skinning"), ("simulation", "operations")}
 LEVEL = {package: level for level, packages in enumerate(LEVELS) for package in packages}
 
 MODULES = sorted(path for path in (ROOT / "anim").rglob("*.py") if path.name != "__main__.py")  # which runs the command
@@ -68,7 +69,7 @@ PUBLIC = {
     "gltf.io": "container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors instancing materials reader vertex_colors",
-    "gltf.validation": "buffer_layout channel_targets hierarchy schema",
+    "gltf.validation": "buffer_layout channel_targets hierarchy rules schema",
     "gltf.writing": "append byte_ranges references reindex writer",
     "measure.compare": "diff name_matching",
     "measure.continuity": "continuity knots",

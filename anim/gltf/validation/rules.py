@@ -127,6 +127,12 @@ def numbers(count: int | None) -> Check:
     return check_numbers
 
 
+def number(value: Any) -> None:
+    """Check a finite number."""
+    if (type(value) is not float and type(value) is not int) or not -MAX_NUMBER < value < MAX_NUMBER:
+        raise FormatError(f"is {_name(value)} (expected a finite number)")
+
+
 def text(value: Any) -> None:
     """Check a string."""
     if type(value) is not str:

@@ -84,7 +84,7 @@ def found_by_three(document: Document, folder: Path) -> dict[int, Floats]:
     """Return the numbers of each accessor that animations use as three.js decodes them. folder: for a file."""
     path = folder / "seen.glb"
     path.write_bytes(glb_of(document))
-    command = ["node", str(ACCESSORS), str(judge._package()), str(path)]
+    command = ["node", str(ACCESSORS), str(judge.package()), str(path)]
     run = subprocess.run(command, capture_output=True, check=True, timeout=judge.TIMEOUT)
     return {int(number): np.array(values, np.float64) for number, values in json.loads(run.stdout).items()}
 

@@ -1,0 +1,100 @@
+"""Spring bones: chains of joints that follow the motion of their parents late."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from anim.simulation.spring_bones.colliders import ORIGIN, Collider, Vector, check_quantity, check_vector
+
+DEFAULT_STIFFNESS = 1.0  # VRMC_springBone's schema, as all defaults here
+DEFAULT_DRAG = 0.5
+DEFAULT_DAMPING_RATIO = 0.3  # a few visible oscillations
+MAX_FORCE = 1e6  # of stiffness and gravity; far above what can be seen, far below what overflows
+MIN_FREQUENCY_HZ, MAX_FREQUENCY_HZ = 1e-3, 1e6
+MAX_DAMPING_RATIO = 1e6
+DOWN: Vector = (0.0, -1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SpringParameters:
+    """Parameters of a joint, constant in time.
+
+    stiffness: speed in m/s by which the tail returns to its rest direction, ≥ 0. drag: fraction of the tail's velocity
+    lost in each step, 0 … 1. gravity: (3,) in m/s, power times direction, in world space.
+    hit_radius: of the tail against colliders, in metres, ≥ 0.
+    frequency: Hz of an angular spring that takes the place of stiffness and drag, or None; damping_ratio belongs to it:
+    0 oscillates for ever, from 1 on nothing overshoots. Its gravity is an acceleration in m/s².
+    Raises RangeError for values out of range, NaN included.
+    """
+
+    stiffness: float = DEFAULT_STIFFNESS
+    drag: float = DEFAULT_DRAG
+    gravity: Vector = ORIGIN
+    hit_radius: float = 0.0
+    frequency: float | None = None
+    damping_ratio: float = DEFAULT_DAMPING_RATIO
+
+    def __post_init__(self) -> None:
+        check_quantity(self.stiffness, "stiffness", least=0.0, most=MAX_FORCE)
+        check_quantity(self.drag, "drag", least=0.0, most=1.0)
+        object.__setattr__(self, "gravity", check_vector(self.gravity, "gravity"))
+        check_quantity(max(map(abs, self.gravity)), "gravity", least=0.0, most=MAX_FORCE)
+        check_quantity(self.hit_radius, "hit radius", least=0.0)
+        check_quantity(self.damping_ratio, "damping ratio", least=0.0, most=MAX_DAMPING_RATIO)
+        if self.frequency is not None:
+            check_quantity(self.frequency, "frequency", least=MIN_FREQUENCY_HZ, most=MAX_FREQUENCY_HZ)
+
+
+@dataclass(frozen=True, slots=True)
+class SpringJoint:
+    """A joint that rotates, and its tail: the point whose motion is simulated.
+
+    node: index of the rotating node. tail: index of a descendant, or None.
+    tail_offset: (3,) m, the tail in the joint's space if there is no such node.
+    """
+
+    node: int
+    tail: int | None
+    parameters: SpringParameters
+    tail_offset: Vector = ORIGIN
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tail_offset", check_vector(self.tail_offset, "tail offset"))
+
+
+@dataclass(frozen=True, slots=True)
+class SpringChain:
+    """Joints from the root to the tip, with the colliders that they collide with.
+
+    colliders: indices into `SpringBones.colliders`, in the order of their evaluation.
+    center: node in whose space inertia is evaluated, None for world space.
+    """
+
+    name: str
+    joints: tuple[SpringJoint, ...]
+    colliders: tuple[int, ...] = ()
+    center: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SpringBones:
+    """All spring chains and colliders of a file.
+
+    notes: lines about what a file states and this library does otherwise.
+    """
+
+    chains: tuple[SpringChain, ...]
+    colliders: tuple[Collider, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """Nodes of all joints that rotate, in the order of the chains."""
+        return tuple(joint.node for chain in self.chains for joint in chain.joints)
+
+
+def chain_label(chains: Sequence[SpringChain], index: int) -> str:
+    """Return the label of a chain for messages: "spring 2 'ponytail'"."""
+    name = chains[index].name
+    return f"spring {index} '{name}'" if name else f"spring {index}"

@@ -1,0 +1,132 @@
+"""Collisions of tails with colliders, for many joints at once.
+
+Each joint meets its colliders one after another, in their order: round k holds the k-th collider of every joint.
+Source: VRMC_springBone 1.0 and VRMC_springBone_extended_collider 1.0, reference implementations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.simulation.spring_bones.colliders import Collider, ColliderShape
+
+TINY = 1e-300  # a divisor for vectors without length, so that their direction is 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Round:
+    """One collider for each of R joints: joint (R,), row of the collider's table (R,), and its constants (R, 1)."""
+
+    joint: Ints
+    row: Ints
+    radius: Floats
+    hit_radius: Floats
+    side: Floats  # 1 outside, −1 inside
+    is_plane: Bools
+
+
+class Collisions:
+    """Colliders of the joints of one batch."""
+
+    def __init__(
+        self, colliders: Sequence[Collider], chosen: Sequence[Sequence[int]], hit_radius: Floats, rows: Ints
+    ) -> None:
+        """Prepare the rounds.
+
+        chosen: for each joint (m) the indices of its colliders. hit_radius: (m,). rows: (C,) of the colliders' nodes in
+        the world matrices.
+        """
+        used = sorted({index for each in chosen for index in each})
+        table = [colliders[index] for index in used]
+        self._nodes = rows[used]
+        self._points = np.zeros((len(table), 4, 2))  # offset as a point; from it to the tail as a direction
+        self._normals = np.zeros((len(table), 3))
+        self._points[:, 3, 0] = 1
+        for i, each in enumerate(table):
+            self._points[i, :3, 0] = each.offset
+            if each.shape is ColliderShape.CAPSULE:
+                self._points[i, :3, 1] = np.subtract(each.tail, each.offset)
+            if each.shape is ColliderShape.PLANE:
+                self._normals[i] = each.normal
+        self._planes = np.flatnonzero(self._normals.any(axis=1))
+        position = {index: i for i, index in enumerate(used)}
+        own = [[position[index] for index in each] for each in chosen]
+        self._rounds = [_round(table, own, hit_radius, k) for k in range(max(map(len, chosen)))]
+
+    def resolve(self, world: Floats, head: Floats, length: Floats, tail: Floats) -> Floats:
+        """Return the tails (m, 3) pushed out of all colliders, at their distance `length` (m, 1) from `head` (m, 3)."""
+        matrices = world[self._nodes]
+        points = np.matmul(matrices, self._points)
+        normals = self._world_normals(matrices)
+        for each in self._rounds:
+            own = tail[each.joint]
+            direction, distance = _separation(each, own, points[each.row], normals[each.row] if len(normals) else None)
+            hit = distance[:, 0] < 0
+            if hit.any():
+                joint = each.joint[hit]
+                moved = own[hit] - direction[hit] * distance[hit] - head[joint]
+                tail = tail.copy()
+                tail[joint] = head[joint] + moved * (length[joint] / np.maximum(norms(moved), TINY))
+        return np.asarray(tail)
+
+    def _world_normals(self, matrices: Floats) -> Floats:
+        """Unit normals (C, 3) of planes in world space, 0 for other shapes; no rows without planes."""
+        if not len(self._planes):
+            return np.zeros((0, 3))
+        normals = np.zeros((len(matrices), 3))
+        linear = matrices[self._planes, :, :3]
+        carried = np.matmul(cofactors(linear), self._normals[self._planes, :, None])[..., 0]
+        mirror = np.sign(np.linalg.det(linear))[:, None]
+        normals[self._planes] = mirror * carried / np.maximum(norms(carried), TINY)
+        return normals
+
+
+def _round(table: Sequence[Collider], own: Sequence[Sequence[int]], hit_radius: Floats, k: int) -> _Round:
+    """The k-th collider of every joint that has so many. own: for each joint the rows of its colliders in `table`."""
+    joints = np.array([i for i, each in enumerate(own) if len(each) > k])
+    rows = np.array([each[k] for each in own if len(each) > k])
+    met = [table[row] for row in rows]
+    return _Round(
+        joints,
+        rows,
+        np.array([[each.radius] for each in met]),
+        hit_radius[joints][:, None],
+        np.array([[-1.0 if each.inside else 1.0] for each in met]),
+        np.array([[each.shape is ColliderShape.PLANE] for each in met]),
+    )
+
+
+def _separation(each: _Round, tail: Floats, points: Floats, normals: Floats | None) -> tuple[Floats, Floats]:
+    """Unit directions (R, 3) away from the colliders, and distances (R, 1), negative in a collision."""
+    delta = tail - points[..., 0]
+    along = points[..., 1]
+    square = (along * along).sum(axis=-1, keepdims=True)
+    fraction = (along * delta).sum(axis=-1, keepdims=True) / np.maximum(square, TINY)
+    delta_axis = delta - along * np.clip(fraction, 0, 1)
+    length = norms(delta_axis)
+    direction = delta_axis * (each.side / np.maximum(length, TINY))
+    distance = each.side * (length - each.radius) - each.hit_radius
+    if normals is None:
+        return direction, distance
+    height = (delta * normals).sum(axis=-1, keepdims=True) - each.hit_radius
+    return np.where(each.is_plane, normals, direction), np.where(each.is_plane, height, distance)
+
+
+def norms(vectors: Floats) -> Floats:
+    """Return the lengths (..., 1) of vectors (..., 3)."""
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None])
+
+
+def cofactors(matrices: Floats) -> Floats:
+    """Return the cofactor matrices (..., 3, 3) of the linear parts of (..., 3, 4): det · inverse transposed."""
+    wide = matrices[..., _ROWS, _COLUMNS]
+    first, last = slice(1, 4), slice(2, 5)
+    return np.asarray(wide[..., first, first] * wide[..., last, last] - wide[..., first, last] * wide[..., last, first])
+
+
+_COLUMNS = np.array([0, 1, 2, 0, 1])
+_ROWS = _COLUMNS[:, None]

@@ -1,0 +1,106 @@
+"""Check of spring bones against a skeleton: nodes, chains, centers and colliders fit together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.errors import AnimError, FormatError, NotFoundError, UnsupportedError
+from anim.maths import matrix
+from anim.model import Skeleton
+from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
+
+
+def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
+    """Raise an error, with the chain's label, unless the chains can be simulated on `skeleton`.
+
+    Every node exists; a joint belongs to one chain, and its tail is one of its descendants; a center is the first joint
+    or an ancestor of it; a collider is not moved by a joint that collides with it. Raises FormatError otherwise, and
+    UnsupportedError for a joint with a sheared matrix, which no rotation can animate.
+    """
+    owners: dict[int, int] = {}
+    for i, collider in enumerate(bones.colliders):
+        if collider.node is not None:
+            _check_node(skeleton, collider.node, f"collider {i}")
+    for i, chain in enumerate(bones.chains):
+        try:
+            _check_chain(skeleton, bones, chain)
+        except AnimError as error:
+            raise error.at(chain_label(bones.chains, i)) from None
+        for joint in chain.joints:
+            if (other := owners.setdefault(joint.node, i)) != i:
+                raise FormatError(
+                    f"{skeleton.label(joint.node)} is a joint of {chain_label(bones.chains, other)} and of "
+                    f"{chain_label(bones.chains, i)} (expected one spring for each joint)"
+                )
+
+
+def _check_chain(skeleton: Skeleton, bones: SpringBones, chain: SpringChain) -> None:
+    seen: set[int] = set()
+    for joint in chain.joints:
+        _check_joint(skeleton, joint)
+        if joint.node in seen:
+            raise FormatError(f"{skeleton.label(joint.node)} is a joint twice (expected once)")
+        seen.add(joint.node)
+        below = skeleton.descendants(joint.node)
+        for index in chain.colliders:
+            _check_collider(skeleton, bones, index, joint, below)
+    if chain.center is not None and chain.joints:
+        _check_node(skeleton, chain.center, "center")
+        if not skeleton.descendants(chain.center)[chain.joints[0].node]:
+            raise FormatError(
+                f"center is {skeleton.label(chain.center)} (expected {skeleton.label(chain.joints[0].node)} or one of "
+                "its ancestors)"
+            )
+
+
+def _check_joint(skeleton: Skeleton, joint: SpringJoint) -> None:
+    _check_node(skeleton, joint.node, "joint")
+    if joint.node in skeleton.sheared:
+        raise UnsupportedError(f"{skeleton.label(joint.node)} has a sheared matrix, which no rotation can animate")
+    if joint.tail is None:
+        return
+    _check_node(skeleton, joint.tail, "joint")
+    if joint.tail == joint.node or not skeleton.descendants(joint.node)[joint.tail]:
+        raise FormatError(
+            f"{skeleton.label(joint.tail)} follows {skeleton.label(joint.node)} (expected one of its descendants)"
+        )
+
+
+def _check_collider(skeleton: Skeleton, bones: SpringBones, index: int, joint: SpringJoint, below: Bools) -> None:
+    if not 0 <= index < len(bones.colliders):
+        raise FormatError(f"there is no collider {index} (there are {len(bones.colliders)}, from 0 on)")
+    collider = bones.colliders[index]
+    if collider.node is not None and below[collider.node]:
+        raise FormatError(
+            f"{skeleton.label(joint.node)} collides with collider {index}, which it moves itself: the collider is on "
+            f"{skeleton.label(collider.node)}",
+            help="put the collider on a node above the spring's joints, or take it out of the spring's colliders",
+        )
+
+
+def _check_node(skeleton: Skeleton, node: int, what: str) -> None:
+    if not 0 <= node < len(skeleton):
+        raise NotFoundError(f"there is no node {node} for a {what} (the file has {len(skeleton)}, from 0 on)")
+
+
+def moving_nodes(skeleton: Skeleton, bones: SpringBones) -> Bools:
+    """Return a mask (N,) of the nodes that a spring moves: its joints and everything below."""
+    found = np.zeros(len(skeleton), np.bool_)
+    found[list(bones.nodes)] = True
+    for level in skeleton.levels()[1:]:
+        found[level] |= found[skeleton.parents[level]]
+    return found
+
+
+def tail_at_rest(skeleton: Skeleton, joint: SpringJoint) -> Floats:
+    """Return the tail (3,) of a joint in its own space, at rest."""
+    if joint.tail is None:
+        return np.array(joint.tail_offset)
+    point: Floats = skeleton.translation[joint.tail]
+    node = int(skeleton.parents[joint.tail])
+    while node != joint.node:
+        local = matrix.from_trs(skeleton.translation[node], skeleton.rotation[node], skeleton.scale[node])
+        point = matrix.apply(local, point[None])[0]
+        node = int(skeleton.parents[node])
+    return point

@@ -1,0 +1,142 @@
+"""Clip → clip with the motion of spring bones: timing, warm-up, and loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anim.arrays import Floats, freeze
+from anim.errors import RangeError, check_number
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.sampling.times import distinct_float32, frame_times
+from anim.simulation.spring_bones.chain_globs import drop_inert_joints
+from anim.simulation.spring_bones.chains import SpringBones
+from anim.simulation.spring_bones.hierarchy import check_hierarchy
+from anim.simulation.spring_bones.loop import MAX_ROUNDS, LoopedMotion, run_loop
+from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
+from anim.simulation.steps import Steps
+
+DEFAULT_STEP_S = 1 / 60  # the rate of players: drag is per step, so another step is another motion
+MIN_LOOP_STEPS = 2
+STEP_TOLERANCE = 1e-9  # of a step: rounding of n · step
+
+
+@dataclass(frozen=True, slots=True)
+class SpringOptions:
+    """Timing of a simulation, in seconds.
+
+    duration: None for the length of the clip. step: of the simulation. warm_up: simulated before 0 s at the pose of
+    0 s. loop: close the loop of `duration`; the step is then the nearest that divides it. fps: of the keys.
+    """
+
+    duration: float | None = None
+    step: float = DEFAULT_STEP_S
+    warm_up: float = 0.0
+    loop: bool = False
+    fps: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class SpringResult:
+    """The clip with the springs' rotation tracks, and the run's figures.
+
+    joints: nodes of the joints, in the order of the chains. replaced: those that had a rotation track before.
+    step: in seconds, as simulated. num_steps: from 0 s on, in one round of a loop. loop: of the loop, None for none.
+    max_rotation: rad, largest rotation of a joint from its rest. max_speed: m/s, of a tail. notes: lines for the user.
+    """
+
+    clip: Clip
+    joints: tuple[int, ...]
+    replaced: tuple[int, ...]
+    step: float
+    num_steps: int
+    duration: float
+    max_rotation: float
+    max_speed: float
+    loop: LoopedMotion | None = None
+    notes: tuple[str, ...] = ()
+
+
+def simulate_springs(
+    skeleton: Skeleton, clip: Clip, bones: SpringBones, options: SpringOptions = SpringOptions()
+) -> SpringResult:
+    """Return the clip with rotation tracks for the joints of all chains, as they follow its motion.
+
+    clip: the driver, evaluated at every step; without tracks it is the rest pose. Its other tracks stay as they are;
+    rotation tracks of joints are replaced. Keys are LINEAR, at the steps or at `fps` frames per second, with an exact
+    end.
+    Raises FormatError for chains that don't fit the skeleton, RangeError for times out of range, and UnstableError
+    where numbers get too large.
+    """
+    check_hierarchy(skeleton, bones)
+    chains, notes = drop_inert_joints(skeleton, bones.chains)
+    bones = replace(bones, chains=chains)
+    duration = clip.end if options.duration is None else options.duration
+    steps, looped, motion = _run(skeleton, clip, bones, options, duration)
+    frames = frame_times(0.0, duration, fps=options.fps)
+    frames = frames[distinct_float32(frames)]
+    rotations = _resample(motion.rotations, frames / steps.step_s)
+    if looped is not None:
+        rotations[-1] = np.where(quaternion.dot(rotations[-1], rotations[0])[:, None] < 0, -1.0, 1.0) * rotations[0]
+    replaced = [track.node for track in clip.tracks if track.path == "rotation" and track.node in bones.nodes]
+    deflection = quaternion.angle_between(motion.rotations, skeleton.rotation[list(bones.nodes)])
+    speeds = np.sqrt((np.diff(motion.tails, axis=0) ** 2).sum(axis=-1)) / steps.step_s
+    return SpringResult(
+        _merge(clip, bones.nodes, freeze(frames.astype(np.float32).astype(np.float64)), rotations),
+        bones.nodes,
+        tuple(node for node in replaced if node is not None),
+        steps.step_s,
+        steps.num_steps,
+        duration,
+        float(deflection.max(initial=0.0)),
+        float(speeds.max(initial=0.0)),
+        looped,
+        (*bones.notes, *notes),
+    )
+
+
+def _run(
+    skeleton: Skeleton, clip: Clip, bones: SpringBones, options: SpringOptions, duration: float
+) -> tuple[Steps, LoopedMotion | None, SpringMotion]:
+    """The steps, and the motion at each of them, from 0 s to the first at or after the duration."""
+    check_number(duration, "duration")
+    if not duration > 0:
+        raise RangeError(
+            f"duration is {duration:g} s (expected more than 0)", help="choose `duration`, since the clip has no length"
+        )
+    steps = Steps(options.step, duration, options.warm_up)
+    if options.loop:
+        num_steps = max(round(duration / options.step), MIN_LOOP_STEPS)
+        steps = Steps(duration / num_steps, duration, options.warm_up)
+    solver = SpringSolver(skeleton, clip, bones, step=steps.step_s)
+    solver.start(0.0)
+    if steps.num_warm_up_steps:
+        solver.run(np.zeros(steps.num_warm_up_steps))
+    if options.loop:
+        looped = run_loop(solver, steps)
+        return steps, looped, looped.motion
+    return steps, None, solver.run(steps.times())
+
+
+def _resample(rotations: Floats, at: Floats) -> Floats:
+    """Rotations (F, J, 4) at fractional steps (F,) of rotations (S, J, 4), along the shorter arcs, signs continuous."""
+    left = np.minimum(np.floor(at + STEP_TOLERANCE).astype(np.int64), len(rotations) - 1)
+    right = np.minimum(left + 1, len(rotations) - 1)
+    fraction = np.clip(at - left, 0.0, 1.0)
+    fraction[fraction < STEP_TOLERANCE] = 0.0  # a step's own rotation stays as it is
+    return quaternion.align_signs(quaternion.slerp(rotations[left], rotations[right], fraction[:, None]))
+
+
+def _merge(clip: Clip, nodes: tuple[int, ...], times: Floats, rotations: Floats) -> Clip:
+    """The clip with these rotation tracks, in place of those that it has for the nodes, or after all others."""
+    new = {
+        node: Track(node, "rotation", Interpolation.LINEAR, times, rotations[:, j].copy())
+        for j, node in enumerate(nodes)
+    }
+    tracks = [new.pop(track.node) if track.path == "rotation" and track.node in new else track for track in clip.tracks]
+    return Clip(clip.name, (*tracks, *new.values()))
+
+
+__all__ = ["MAX_ROUNDS", "SpringOptions", "SpringResult", "simulate_springs"]

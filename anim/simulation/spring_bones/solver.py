@@ -1,0 +1,156 @@
+"""Step loop of spring bones: the driver first, then level by level all joints side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import UnstableError
+from anim.maths import matrix
+from anim.model import Clip, Skeleton
+from anim.simulation.spring_bones.batch import Batch
+from anim.simulation.spring_bones.chains import SpringBones
+from anim.simulation.spring_bones.driver import Driver, DriverChunk
+from anim.simulation.spring_bones.plan import Level, Plan, make_plan
+
+CHUNK_STEPS = 256  # driver steps evaluated together; more needs more memory and hardly saves time
+
+
+@dataclass(frozen=True, slots=True)
+class SpringMotion:
+    """Motion of J joints, in the order of the chains, at S steps.
+
+    rotations: (S, J, 4) local. tails: (S, J, 3) in world space, in metres.
+    """
+
+    rotations: Floats
+    tails: Floats
+
+
+class SpringSolver:
+    """Simulation of checked chains, driven by a clip.
+
+    step: seconds, > 0. Every call of `run` continues from the state that the last one left.
+    """
+
+    def __init__(self, skeleton: Skeleton, clip: Clip, bones: SpringBones, *, step: float) -> None:
+        self._plan = make_plan(skeleton, bones)
+        self._driver = Driver(skeleton, clip, frozenset(bones.nodes), self._plan.driven)
+        self._levels = [_LevelSolver(skeleton, bones, level, self._plan, step) for level in self._plan.levels]
+        self._num_joints = len(bones.nodes)
+        self._bases = _base_rows(skeleton, bones, self._plan)
+        self._centers = _driven_centers(bones, self._plan)
+        self._world = np.zeros((self._plan.num_rows, 3, 4))
+        self._world[-1] = np.eye(3, 4)  # of the scene
+
+    def start(self, time: float) -> None:
+        """Set all joints to rest, without velocity, in the driver's pose at `time` seconds."""
+        chunk = self._load(np.array([time]))
+        self._world[: len(self._plan.driven)] = chunk.world[0]
+        for level in self._levels:
+            level.start(self._world)
+
+    def run(self, times: Floats) -> SpringMotion:
+        """Advance by one step to each of the times (S,), and return the motion.
+
+        Raises UnstableError at the first value that is not finite.
+        """
+        motion = SpringMotion(np.empty((len(times), self._num_joints, 4)), np.empty((len(times), self._num_joints, 3)))
+        driven = len(self._plan.driven)
+        for first in range(0, len(times), CHUNK_STEPS):
+            part = times[first : first + CHUNK_STEPS]
+            chunk = self._load(part)
+            with np.errstate(over="ignore", invalid="ignore"):
+                for frame in range(len(part)):
+                    self._world[:driven] = chunk.world[frame]
+                    for level in self._levels:
+                        level.advance(self._world, frame, motion, first + frame)
+            _check_finite(motion, times, first, first + len(part))
+        return motion
+
+    def jump(self, before: float, after: float) -> None:
+        """Carry the state along as the driver jumps from one time to another, seconds.
+
+        Tails move rigidly with the node that their chain is attached to: a driver that ends elsewhere than it starts,
+        as with root motion, does not shake them.
+        """
+        ends = self._driver.at(np.array([before, after])).world
+        scene = np.eye(3, 4)[None]
+        world_before, world_after = (np.concatenate((each, scene)) for each in ends)
+        moved = matrix.multiply(world_after[self._bases], matrix.inverse(world_before[self._bases]))
+        loose = self._centers < -1  # centers that a spring moves: they carry their state themselves
+        moved[loose] = np.eye(3, 4)
+        rows = np.where(loose, -1, self._centers)
+        for level in self._levels:
+            level.transform(moved, world_before[rows], world_after[rows])
+
+    def _load(self, times: Floats) -> DriverChunk:
+        chunk = self._driver.at(times)
+        for level in self._levels:
+            level.load(chunk)
+        return chunk
+
+
+class _LevelSolver:
+    """Batches and followers of one level."""
+
+    def __init__(self, skeleton: Skeleton, bones: SpringBones, level: Level, plan: Plan, step: float) -> None:
+        self._batches = [Batch(skeleton, batch, bones.colliders, plan, step) for batch in level.batches]
+        self._followers = np.array(level.followers, np.int64)
+        self._rows = plan.rows[self._followers]
+        self._parents = plan.rows[skeleton.parents[self._followers]]
+
+    def load(self, chunk: DriverChunk) -> None:
+        self._local = np.swapaxes(chunk.local[self._followers], 0, 1)
+        for batch in self._batches:
+            batch.load(chunk)
+
+    def start(self, world: Floats) -> None:
+        self._follow(world, 0)
+        for batch in self._batches:
+            batch.start(world)
+
+    def advance(self, world: Floats, frame: int, motion: SpringMotion, at: int) -> None:
+        self._follow(world, frame)
+        for batch in self._batches:
+            motion.rotations[at, batch.indices] = batch.advance(world, frame)
+            motion.tails[at, batch.indices] = batch.tails
+
+    def transform(self, moved: Floats, before: Floats, after: Floats) -> None:
+        for batch in self._batches:
+            at = batch.indices
+            batch.transform(moved[at], before[at], after[at])
+
+    def _follow(self, world: Floats, frame: int) -> None:
+        if len(self._followers):
+            world[self._rows] = matrix.multiply(world[self._parents], self._local[frame])
+
+
+def _base_rows(skeleton: Skeleton, bones: SpringBones, plan: Plan) -> Ints:
+    """The row (J,) of each joint's nearest ancestor that no spring moves; −1, the scene, if there is none."""
+    driven = set(plan.driven.tolist())
+    rows = []
+    for node in bones.nodes:
+        base = int(skeleton.parents[node])
+        while base >= 0 and base not in driven:
+            base = int(skeleton.parents[base])
+        rows.append(int(plan.rows[base]) if base >= 0 else -1)
+    return np.array(rows, np.int64)
+
+
+def _driven_centers(bones: SpringBones, plan: Plan) -> Ints:
+    """The row (J,) of each joint's center; −1 for the scene, −2 for a center that a spring moves."""
+    centers = [chain.center for chain in bones.chains for _ in chain.joints]
+    rows = [-1 if each is None else int(plan.rows[each]) for each in centers]
+    return np.array([row if row < len(plan.driven) else -2 for row in rows], np.int64)
+
+
+def _check_finite(motion: SpringMotion, times: Floats, first: int, end: int) -> None:
+    wrong = ~np.isfinite(motion.rotations[first:end]).all(axis=(1, 2))
+    if wrong.any():
+        raise UnstableError(
+            f"the springs diverge at {times[first + int(wrong.argmax())]:.4g} s: numbers are too large",
+            help="smaller `stiffness` and `gravity`, or `frequency` and `damping_ratio`, which are always stable",
+        )

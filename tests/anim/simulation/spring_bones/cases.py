@@ -1,0 +1,77 @@
+"""Files with spring bones, and a root that sways, for several tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.maths import quaternion
+from anim.model import Clip, Skeleton, Track
+from anim.simulation.spring_bones.chains import SpringBones
+from anim.simulation.spring_bones.read import read_spring_bones
+from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
+from tests.anim.simulation.spring_bones import plain_loop
+from tests.clips import LINEAR
+
+STEP = 1 / 60
+ROOT = 0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A file, and the positions (F, 3) and rotations (F, 4) of its root at every step."""
+
+    document: Document
+    positions: Floats
+    rotations: Floats
+
+    @property
+    def skeleton(self) -> Skeleton:
+        return reader.skeleton(self.document)
+
+    @property
+    def bones(self) -> SpringBones:
+        return read_spring_bones(self.document)
+
+    @property
+    def times(self) -> Floats:
+        return STEP * np.arange(float(len(self.positions)))
+
+    @property
+    def clip(self) -> Clip:
+        translation = Track(ROOT, "translation", LINEAR, self.times, self.positions)
+        return Clip("sway", (translation, Track(ROOT, "rotation", LINEAR, self.times, self.rotations)))
+
+    def simulate(self, step: float = STEP) -> SpringMotion:
+        """Return our motion at the times of all steps."""
+        solver = SpringSolver(self.skeleton, self.clip, self.bones, step=step)
+        solver.start(0.0)
+        return solver.run(self.times)
+
+    def plain(self, *, faults: bool) -> tuple[list[int], Floats]:
+        """Return the joints and their rotations by the plain loop."""
+
+        def pose(rig: plain_loop.Rig, frame: int) -> None:
+            rig.positions[ROOT], rig.rotations[ROOT] = self.positions[frame], self.rotations[frame]
+
+        return plain_loop.simulate(self.document.json, pose, len(self.positions), STEP, faults=faults)
+
+
+def swaying(document: Document, num_frames: int = 241) -> Case:
+    """Return a case whose root moves sideways and up by 20 and 5 cm, and turns by 34°."""
+    skeleton = reader.skeleton(document)
+    times = np.arange(num_frames) * STEP
+    none = 0 * times
+    way = np.stack([0.2 * np.sin(2 * np.pi * times), 0.05 * np.sin(4 * np.pi * times), none], axis=-1)
+    turn = quaternion.from_rotation_vector(np.stack([none, 0.6 * np.sin(1.4 * np.pi * times), none], axis=-1))
+    return Case(document, skeleton.translation[ROOT] + way, quaternion.multiply(turn, skeleton.rotation[ROOT]))
+
+
+def chord(nodes: tuple[int, ...], ours: Floats, other_nodes: list[int], theirs: Floats) -> float:
+    """Return the largest difference of a component of two motions (F, J, 4), whatever the signs."""
+    theirs = theirs[:, [other_nodes.index(node) for node in nodes]]
+    return float(np.minimum(np.abs(ours - theirs).max(axis=-1), np.abs(ours + theirs).max(axis=-1)).max())

@@ -1,0 +1,224 @@
+"""Spring bones read from VRM 1.0, VRM 0.x and JSON: values, defaults, and refusals with their position."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.errors import AnimError, FormatError, NotFoundError
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.model import Skeleton
+from anim.simulation.spring_bones.chains import SpringBones, SpringJoint, SpringParameters
+from anim.simulation.spring_bones.colliders import Collider, ColliderShape
+from anim.simulation.spring_bones.json_reader import read_spring_file
+from anim.simulation.spring_bones.read import read_spring_bones
+from tests.anim.simulation.spring_bones.test_simulate import rig
+from tests.files import opened_fixture, opened_path
+
+SPRINGS, EXTENDED = "VRMC_springBone", "VRMC_springBone_extended_collider"
+NODES = [{"name": "a", "children": [1]}, {"name": "b", "translation": [0, 0, -2], "children": [2]}, {"name": "c"}]
+
+
+def stated(name: str, extension: Any, nodes: list[Any] = NODES) -> SpringBones:
+    """Read the extension of a file of three nodes below each other."""
+    content = {"asset": {"version": "2.0"}, "nodes": copy.deepcopy(nodes), "extensions": {name: extension}}
+    return read_spring_bones(Document(content, ()))
+
+
+def vrm1(**fields: Any) -> SpringBones:
+    return stated(SPRINGS, {"specVersion": "1.0", "springs": [{"joints": [{"node": 0}, {"node": 1}]}], **fields})
+
+
+# VRM 1.0.
+
+
+def test_the_fixture_has_every_kind_of_collider() -> None:
+    bones = read_spring_bones(opened_fixture("springs"))
+    kinds = [(each.shape.value, each.inside) for each in bones.colliders[:5]]
+    assert kinds == [("sphere", False), ("capsule", False), ("plane", False), ("sphere", True), ("capsule", True)]
+    assert [len(chain.joints) for chain in bones.chains] == [4, 4, 4, 4, 4, 3, 4, 4, 4, 4, 2]
+    assert bones.chains[7].center == 0
+    assert bones.notes == ()
+
+
+def test_defaults_are_those_of_the_schema() -> None:
+    (chain,) = vrm1().chains
+    assert chain.joints == (SpringJoint(0, 1, SpringParameters(1.0, 0.5, (0, 0, 0), 0.0)),)
+    assert (chain.name, chain.colliders, chain.center) == ("", (), None)
+
+
+def test_an_extended_collider_replaces_its_fallback() -> None:
+    plane = {"shape": {"plane": {"offset": [0, 1, 0]}}}
+    fallback = {"node": 0, "shape": {"sphere": {"radius": 9}}}
+    versions = {"1.0": "plane", "1.0-draft": "plane", "7.0": "sphere"}
+    for version, shape in versions.items():
+        own = {**fallback, "extensions": {EXTENDED: {"specVersion": version, **plane}}}
+        bones = vrm1(colliders=[own])
+        assert bones.colliders[0].shape == shape
+        assert bool(bones.notes) == (shape == "sphere")
+
+
+def test_angle_limits_are_noted() -> None:
+    limited = {"node": 0, "extensions": {"VRMC_springBone_limit": {}}}
+    bones = vrm1(springs=[{"joints": [limited, {"node": 1}]}])
+    assert bones.notes == ("angle limits (VRMC_springBone_limit) are not evaluated",)
+
+
+def test_a_spring_of_one_joint_has_nothing_to_swing() -> None:
+    with pytest.raises(NotFoundError, match="the file has no spring bones"):
+        vrm1(springs=[{"joints": [{"node": 0}]}])
+
+
+def joints(**fields: Any) -> list[Any]:
+    return [{"joints": [{"node": 0, **fields}, {"node": 1}]}]
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"springs": 3}, "extensions.VRMC_springBone.springs: is 3 (expected an array)"),
+        ({"springs": [{}]}, "springs[0]: has no 'joints'"),
+        ({"springs": joints(node=7)}, "springs[0].joints[0].node: is 7 (the file has 3 nodes)"),
+        ({"springs": joints(stiffness="1")}, "springs[0].joints[0].stiffness: is a string (expected a finite number)"),
+        ({"springs": joints(dragForce=2)}, "springs[0].joints[0]: drag is 2 (expected 0 to 1)"),
+        ({"springs": joints(hitRadius=-1)}, "springs[0].joints[0]: hit radius is -1 (expected 0 or more)"),
+        ({"springs": joints(gravityDir=[0, 1])}, "gravityDir: has 2 numbers (expected 3)"),
+        ({"springs": [{"joints": [], "colliderGroups": [0]}]}, "is 0 (the file has 0 collider groups)"),
+        ({"colliders": [{"node": 0}]}, "colliders[0]: has no 'shape'"),
+        (
+            {"colliders": [{"node": 0, "shape": {}}]},
+            "colliders[0].shape: has no shape (expected one of sphere, capsule)",
+        ),
+        ({"colliders": [{"node": 0, "shape": {"sphere": {"radius": -2}}}]}, "colliders[0]: radius is -2"),
+        ({"colliderGroups": [{"colliders": [1]}]}, "colliderGroups[0].colliders[0]: is 1 (the file has 0 colliders)"),
+    ],
+)
+def test_invalid_extensions_are_refused_with_their_position(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        vrm1(**fields)
+    assert words in str(caught.value)
+
+
+# VRM 0.x.
+
+
+def test_a_real_vrm_0_file(asset: Callable[[str], Path]) -> None:
+    document = opened_path(asset("vrm/Godette.vrm"))
+    bones = read_spring_bones(document)
+    assert len(bones.chains) == 8
+    assert len(bones.nodes) == 16
+    assert bones.chains[0].joints[0].parameters == SpringParameters(2.5, 0.4, (0, 0, 0), 0.02)
+    assert [len(chain.colliders) for chain in bones.chains] == [2, 2, 2, 2, 2, 0, 0, 0]
+    assert bones.colliders[0].offset[2] == pytest.approx(0.04, abs=1e-6)  # its z is opposite to that of glTF
+    skeleton = reader.skeleton(document)
+    for chain in bones.chains:
+        last = chain.joints[-1]
+        assert last.tail is None
+        assert np.linalg.norm(last.tail_offset) == pytest.approx(0.07)
+        assert np.cross(last.tail_offset, skeleton.translation[last.node]) == pytest.approx(0, abs=1e-6)
+
+
+def vrm0(**group: Any) -> SpringBones:
+    return stated("VRM", {"secondaryAnimation": {"boneGroups": [{"bones": [0], **group}]}})
+
+
+def test_every_node_below_a_bone_is_a_joint() -> None:
+    (chain,) = vrm0(gravityPower=2, gravityDir={"x": 0, "y": -1, "z": 0.5}, comment="skirt", center=-1).chains
+    assert [(joint.node, joint.tail) for joint in chain.joints] == [(0, 1), (1, 2), (2, None)]
+    assert chain.name == "skirt"
+    assert chain.center is None
+    assert chain.joints[0].parameters == SpringParameters(1.0, 0.4, (0, -2, -1), 0.02)
+
+
+@pytest.mark.parametrize(
+    ("group", "words"),
+    [
+        ({"bones": [5]}, "boneGroups[0].bones[0]: is 5 (the file has 3 nodes)"),
+        ({"dragForce": -1}, "boneGroups[0]: drag is -1"),
+        ({"colliderGroups": [0]}, "colliderGroups[0]: is 0 (the file has 0 collider groups)"),
+    ],
+)
+def test_an_invalid_vrm_0_file_is_refused(group: dict[str, Any], words: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        vrm0(**group)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("extension", [3, {}, {"secondaryAnimation": None}, {"secondaryAnimation": {}}])
+def test_a_vrm_0_file_without_springs_has_none(extension: Any) -> None:
+    with pytest.raises(NotFoundError, match="the file has no spring bones") as caught:
+        stated("VRM", extension)
+    assert "`chain`" in caught.value.help
+
+
+# JSON of our own.
+
+
+def parsed(content: dict[str, Any], skeleton: Skeleton | None = None) -> SpringBones:
+    data = json.dumps({"schema": "spring-bones/1", **content}).encode()
+    return read_spring_file(data, skeleton or rig(), skin_joints={0, 1, 2, 3, 5, 6})
+
+
+def test_a_file_of_all_keys() -> None:
+    bones = parsed(
+        {
+            "colliders": [
+                {"name": "body", "node": "Body", "sphere": {"offset": [0, 0, 1], "radius": 0.5, "inside": True}},
+                {"name": "floor", "plane": {"normal": [0, 1, 0]}},
+            ],
+            "chains": [
+                {"name": "tail", "root": "Tail*", "stiffness": 2, "drag": 0.1, "gravity": 0.5, "hit_radius": 0.05},
+                {"root": "Ear.L", "frequency": 3, "damping_ratio": 0.2, "gravity": [1, 0, 0], "colliders": ["floor"]},
+                {"joints": ["Body", "Ear.R"], "center": "Body", "colliders": []},
+            ],
+        }
+    )
+    tail, ear, body = bones.chains
+    assert bones.colliders[0] == Collider(0, ColliderShape.SPHERE, (0, 0, 1), radius=0.5, inside=True, name="body")
+    assert bones.colliders[1].node is None
+    assert [joint.node for joint in tail.joints] == [1, 2, 3]
+    assert tail.name == "tail"
+    assert tail.colliders == (0, 1)
+    assert tail.joints[0].parameters == SpringParameters(2, 0.1, (0, -0.5, 0), 0.05)
+    assert ear.colliders == (1,)
+    assert ear.joints[0].parameters == SpringParameters(gravity=(1, 0, 0), frequency=3, damping_ratio=0.2)
+    assert body.joints == (SpringJoint(0, 6, SpringParameters()),)
+    assert (body.center, body.colliders) == (0, ())
+
+
+@pytest.mark.parametrize(
+    ("content", "kind", "words"),
+    [
+        ({}, FormatError, "has no chains"),
+        ({"schema": "x", "chains": [{}]}, FormatError, "schema is 'x' (expected 'spring-bones/1')"),
+        ({"chain": []}, FormatError, "unknown key 'chain'"),
+        ({"chains": [{"root": "Tail1", "stifness": 1}]}, FormatError, "chains[0]: unknown key 'stifness'"),
+        ({"chains": [{}]}, FormatError, "chains[0]: has neither root nor joints"),
+        ({"chains": [{"root": "Tail1", "joints": ["Body", "Ear.L"]}]}, FormatError, "has both root and joints"),
+        ({"chains": [{"joints": ["Body"]}]}, FormatError, "chains[0]: has fewer than two joints"),
+        ({"chains": [{"root": "Tial1"}]}, NotFoundError, "chains[0]: no node matches 'Tial1'"),
+        ({"chains": [{"joints": ["Ear*", "Body"]}]}, FormatError, "'Ear*' matches 2 nodes (expected one)"),
+        ({"chains": [{"root": "Tail1", "drag": 3}]}, FormatError, "chains[0]: drag is 3 (expected 0 to 1)"),
+        ({"chains": [{"root": "Tail1", "gravity": "x"}]}, FormatError, "chains[0].gravity: is a string"),
+        ({"chains": [{"root": "Tail1", "colliders": ["x"]}]}, NotFoundError, "no collider matches 'x'"),
+        ({"colliders": [{"node": "Body"}], "chains": [{"root": "Tail1"}]}, FormatError, "colliders[0]: has no shape"),
+    ],
+)
+def test_an_invalid_file_is_refused_with_its_position(
+    content: dict[str, Any], kind: type[AnimError], words: str
+) -> None:
+    with pytest.raises(kind) as caught:
+        parsed(content)
+    assert words in str(caught.value)
+
+
+def test_text_that_is_no_json_is_refused() -> None:
+    with pytest.raises(FormatError, match="JSON is broken at line 1"):
+        read_spring_file(b"{", rig())
