@@ -20,13 +20,24 @@ BLEND_FPS = 30.0  # of the added keys
 MIN_INTERVAL_S = 1e-5  # s, between two keys
 
 
-def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None) -> Clip:
-    """Return the clip with its first pose appended as a frame: for a loop that lacks its last frame."""
+def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None, root: int = -1) -> Clip:
+    """Return the clip with its first pose appended as a frame: for a loop that lacks its last frame.
+
+    root: node that travels, −1 for none: its translation doesn't return to its start but continues over the added
+    frame, at the mean of its speeds at the end and at the start.
+    (x = 0, 1, 2 at 0, 1, 2 s; fps 1) → 0, 1, 2, 0; of the root 0, 1, 2, 3
+    """
     chosen = track_indices(clip, tracks)
     check_fps(fps)
     end = clip.end + 1 / fps
     return Clip(
-        clip.name, tuple(_append_first_key(t, clip, end) if i in chosen else t for i, t in enumerate(clip.tracks))
+        clip.name,
+        tuple(
+            _append_key(track, clip, end, travels=track.node == root and track.path == "translation")
+            if i in chosen
+            else track
+            for i, track in enumerate(clip.tracks)
+        ),
     )
 
 
@@ -58,19 +69,26 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> C
     return Clip(clip.name, tuple(_close(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
-def _append_first_key(track: Track, clip: Clip, end: float) -> Track:
+def _append_key(track: Track, clip: Clip, end: float, *, travels: bool) -> Track:
     if len(track.times) == 1 or track.times[-1] < clip.end - 1e-6:
         return track
-    first = sample(track, np.array([clip.start]))
+    last = _continue_travel(track, clip, end) if travels else sample(track, np.array([clip.start]))
     if track.kind is ValueKind.ROTATION:
-        first = first * np.where(quaternion.dot(first, track.values[-1:]) < 0, -1.0, 1.0)
-    times, values = np.append(track.times, end), np.concatenate((track.values, first))
+        last = last * np.where(quaternion.dot(last, track.values[-1:]) < 0, -1.0, 1.0)
+    times, values = np.append(track.times, end), np.concatenate((track.values, last))
     if track.in_tangents is None or track.out_tangents is None:
         return track.with_keys(times, values)
     chord = (values[-1:] - values[-2:-1]) / (times[-1] - times[-2])
     leaving = np.concatenate((track.out_tangents[:-1], track.in_tangents[-1:], np.zeros_like(chord)))
     arriving = np.concatenate((track.in_tangents, track.out_tangents[:1]))
     return track.with_keys(times, values, arriving, leaving)
+
+
+def _continue_travel(track: Track, clip: Clip, end: float) -> Floats:
+    """Return the value (1, C) at `end`, after the last key: the added frame is between the end's and the start's."""
+    before = rates(track, np.array([clip.end]), before=True)[0]
+    after = rates(track, np.array([clip.start]), before=False)[0]
+    return _extrapolate(track, track.values[-1], (before + after) / 2, end - clip.end)[None]
 
 
 def _close(track: Track, clip: Clip, blend: float) -> Track:
@@ -92,9 +110,7 @@ def _close(track: Track, clip: Clip, blend: float) -> Track:
     if track.in_tangents is not None:
         return _correct_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
     last_piece = float(times[-1] - times[-2])
-    before_last = _closing_offset(
-        track, _extrapolate_back(track, first, speed, last_piece), sample(track, times[-2:-1])[0]
-    )
+    before_last = _closing_offset(track, _extrapolate(track, first, speed, -last_piece), sample(track, times[-2:-1])[0])
     slope = _end_slope(gap, before_last, blend, last_piece)
     return _correct_linear(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
 
@@ -114,11 +130,11 @@ def _closing_offset(track: Track, first: Floats, last: Floats) -> Floats:
     return first - last
 
 
-def _extrapolate_back(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
-    """Return the value some seconds before `value` at constant speed."""
+def _extrapolate(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
+    """Return the value some seconds after `value` at constant speed."""
     if track.kind is ValueKind.ROTATION:
-        return quaternion.multiply(value, quaternion.from_rotation_vector(-seconds * speed))
-    return value - seconds * speed
+        return quaternion.multiply(value, quaternion.from_rotation_vector(seconds * speed))
+    return value + seconds * speed
 
 
 def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -> Floats:

@@ -69,9 +69,9 @@ def command(
     to the next, and "velocity step" the largest change of velocity at a key inside the clip: a much smaller gap is
     hardly visible.
 
-    With OUT, a clip that is open by one frame gets the missing frame. --blend closes any gap of value and velocity; if
-    only some joints are open, it changes only these. --find lists the time ranges that loop best, for trim, and names
-    the clips in which no range loops better than the whole clip.
+    With OUT, a clip that is open by one frame gets the missing frame, in which root motion continues. --blend closes
+    any gap of value and velocity; if only some joints are open, it changes only these. --find lists the time ranges
+    that loop best, for trim, and names the clips in which no range loops better than the whole clip.
     """
     selection = Selection(clip or ())
     voice = Reporter(quiet, verbose)
@@ -121,15 +121,15 @@ def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float |
     root = root_motion_node(skin.skeleton, clip)
     found = judge_range(skin, clip, root=root)
     if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
-        clip = closing.append_first_frame(clip, fps=found.fps, tracks=tracks)
+        clip = closing.append_first_frame(clip, fps=found.fps, tracks=tracks, root=root)
     elif found.kind is not LoopKind.CLOSED and blend is None:
         raise UsageError(_problem(found), help=HELP)
     if blend is None:
         return clip
     if found.kind is LoopKind.CLOSED_EXCEPT:
         tracks &= closing.open_tracks(clip)
-    carried = {i for i, track in enumerate(clip.tracks) if track.node == root and track.path == "translation"}
-    return closing.loop(clip, blend=blend, tracks=tracks - carried)
+    travel = {i for i, track in enumerate(clip.tracks) if track.node == root and track.path == "translation"}
+    return closing.loop(clip, blend=blend, tracks=tracks - travel)
 
 
 def _problem(found: Loop) -> str:

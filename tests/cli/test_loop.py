@@ -13,6 +13,7 @@ from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.maths import quaternion
 from anim.model import Clip
+from anim.sampling.track import sample
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import built, help_line, refusal
 from tests.clips import LINEAR, about, track
@@ -82,6 +83,46 @@ def test_an_open_loop_gets_its_missing_frame(call: Call, fixture: Fixture) -> No
     found = call("loop", "--clip", "walk", "--format", "json", stdin=closed).json["loops"][0]
     assert found["kind"] == "closed"
     assert found["end_s"] == pytest.approx(1.0, abs=1e-5)
+
+
+def _walking_on(*, flies_back: bool = False) -> bytes:
+    """The biped's walk, whose hips travel at 2 m/s; or fly back to their start in the last frame."""
+    document = opened(built("biped"))
+    number = next(i for i, clip in enumerate(reader.clips(document)) if clip.name == "walk")
+    clip = reader.clips(document)[number]
+    times = np.arange(25) / 24
+    tracks = []
+    for each in clip.tracks:
+        if each.path == "translation":
+            values = sample(each, times) + np.array([0, 0, 2.0]) * times[:, None]
+            values[-1] = values[0 if flies_back else -1]
+            each = replace(each, times=times, values=values, interpolation=LINEAR, in_tangents=None, out_tangents=None)
+        tracks.append(each)
+    return glb_of(writer.replace_clips(document, {number: Clip(clip.name, tuple(tracks))}))
+
+
+def test_a_traveling_figure_walks_on_in_the_frame_that_was_missing(call: Call) -> None:
+    """Its root flew back to the start."""
+    cut = call("trim", "--clip", "walk", "--to", "0.9583333", "-q", stdin=_walking_on()).product()
+    for options in ((), ("--blend", "0.2")):
+        closed = call("loop", "-", "-", "--clip", "walk", *options, "-q", stdin=cut).product()
+        clip = next(each for each in clips_of(closed) if each.name == "walk")
+        root = next(each for each in clip.tracks if each.path == "translation")
+        start, half, end = sample(root, np.array([0, 23.5 / 24, 1.0]))[:, 2]
+        assert half - start == pytest.approx(2 * 23.5 / 24, abs=0.01)
+        assert end - start == pytest.approx(2, abs=0.01)
+        found = call("loop", "--clip", "walk", "--format", "json", stdin=closed).json
+        assert found["loops"][0]["travel_m"] == pytest.approx(2, abs=0.01)
+        assert found["advice"] == []
+
+
+def test_a_velocity_gap_alone_is_named(call: Call) -> None:
+    """A root that flies back in the last frame closes in pose, at 46 m/s; only a column of the table showed it."""
+    back = _walking_on(flies_back=True)
+    report = call("loop", "--clip", "walk", "--format", "json", stdin=back).json
+    assert report["loops"][0]["kind"] == "closed"
+    assert "closed in pose, with a velocity gap" in report["advice"][0]
+    assert "closed in pose, with a velocity gap" in call("loop", "--clip", "walk", stdin=back).text
 
 
 @pytest.mark.parametrize("ending", ["glb", "gltf"])

@@ -8,26 +8,37 @@ from anim.measure.loops.loop_analysis import Loop, LoopKind
 from anim.model import Clip
 
 BLEND_S = 0.25  # over which a seam is closed, where the clip is four times as long or more
+MAX_VELOCITY_GAP = 3.0  # of the median speed of the fastest vertex; a larger one shows as a jerk
+MIN_VELOCITY_GAP_M_S = 1e-3  # m/s; rounding of static clips is below
 
 _WORDS = {
     LoopKind.OPEN_BY_ONE_FRAME: "to add the last frame that is missing",
     LoopKind.CLOSED_EXCEPT: "to bend the joints that stay open",
     LoopKind.NOT_A_LOOP: "if it is to loop",
+    LoopKind.CLOSED: f"closed in pose, with a velocity gap of more than {MAX_VELOCITY_GAP:g} times the usual speed",
 }
 
 
 def recommend(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
-    """Yield a line for each kind of whole clips that don't close. found: the clips' numbers, and verdicts.
+    """Yield a line for each kind of whole clips that don't close in pose or speed. found: clip numbers, verdicts.
 
     advice([(0, lacking_its_last_frame)]) → "to add the last frame that is missing: gltf-anim loop IN OUT --clip '#0'"
     """
     for kind, words in _WORDS.items():
-        of_kind = [(number, each) for number, each in found if each.kind is kind]
+        of_kind = [(number, each) for number, each in found if each.kind is kind and _is_open(each)]
         if of_kind:
             durations = [each.end - each.start for _, each in of_kind]
             blend = "" if kind is LoopKind.OPEN_BY_ONE_FRAME else _blend(durations)
             clips = "".join(f" --clip '#{number}'" for number, _ in of_kind)  # all: others must stay as they are
             yield f"{words}: gltf-anim loop IN OUT{blend}{clips}"
+
+
+def _is_open(loop: Loop) -> bool:
+    """True unless the end meets the start in pose and speed."""
+    usual_speed = loop.inside.typical * loop.fps
+    return loop.kind is not LoopKind.CLOSED or loop.speed_seam > max(
+        MAX_VELOCITY_GAP * usual_speed, MIN_VELOCITY_GAP_M_S
+    )
 
 
 def closing_command(clip: Clip, number: int) -> str:

@@ -49,6 +49,19 @@ def test_without_its_last_frame_it_is_open_by_one() -> None:
     assert judged(SCENE, closed).seam < 1e-6
 
 
+def test_a_root_travels_on_in_the_appended_frame() -> None:
+    """It went back to its start within one frame."""
+    times = np.arange(24) / 24
+    ahead = np.stack((2 * times, 0.03 * np.sin(4 * np.pi * times), 0 * times), axis=1)
+    clip = Clip("", (track("translation", times, ahead, LINEAR, node=0), track("translation", times, ahead, node=1)))
+    root, other = append_first_frame(clip, fps=24, root=0).tracks
+    np.testing.assert_allclose(root.values[-1], [2, 0, 0], atol=0.003)
+    np.testing.assert_allclose(sample(root, np.array([23.5 / 24]))[0, 0], 2 * 23.5 / 24, atol=1e-9)
+    np.testing.assert_array_equal(other.values[-1], other.values[0])
+    spline_root = append_first_frame(spline(clip), fps=24, root=0).tracks[0]
+    np.testing.assert_allclose(spline_root.values[-1], [2, 0, 0], atol=0.003)
+
+
 def test_half_a_walk_is_no_loop() -> None:
     assert judged(SCENE, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
 
