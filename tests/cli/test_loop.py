@@ -96,7 +96,7 @@ def _walking_on(*, flies_back: bool = False) -> bytes:
         if each.path == "translation":
             values = sample(each, times) + np.array([0, 0, 2.0]) * times[:, None]
             values[-1] = values[0 if flies_back else -1]
-            each = replace(each, times=times, values=values, interpolation=LINEAR, in_tangents=None, out_tangents=None)
+            each = track(each.path, times, values, LINEAR, node=each.node)
         tracks.append(each)
     return glb_of(writer.replace_clips(document, {number: Clip(clip.name, tuple(tracks))}))
 
