@@ -26,7 +26,6 @@ PENDING = (  # packages whose docstrings are not rewritten yet
     "anim/measure/continuity/",
     "anim/measure/continuous_bound/",
     "anim/measure/error/",
-    "anim/measure/inspect/",
     "anim/measure/loops/",
 )
 ADVICE = (  # modules that compose command lines, the advice of findings

@@ -1,6 +1,6 @@
-"""Facts about clips and skins → findings: what a person should know, and do.
+"""Findings on clips and skins, from their reports, each with advice.
 
-Where a command of ours does what is advised, its line is given, with IN and OUT for the files.
+Advice is a command line with IN and OUT for the files, if one of the commands does it.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from anim.gltf.reading import reader
 from anim.measure.inspect.file_findings import Finding, Severity
 from anim.measure.inspect.report import ClipReport, SkinReport
 
-MANY_INFLUENCES = 4  # what most players evaluate per vertex
-IRREGULAR = 0.9  # share of keys on the grid below which a rate is no rate
-LATE_S = 5e-4  # a start nearer to 0 s is 0: what rounding leaves, and no display shows it
-USUAL_FPS = 60.0  # the rate that is advised where clips have none of their own
+MAX_USUAL_INFLUENCES = 4  # influences per vertex that most players evaluate
+MIN_REGULAR_FRACTION = 0.9  # fraction of keys on the grid below which a frame rate is not reliable
+MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display shows them
+DEFAULT_FPS = 60.0  # advised for clips without a frame rate of their own
 
 
 def clip_findings(clips: Iterable[ClipReport]) -> Iterator[Finding]:
@@ -33,25 +33,25 @@ def clip_findings(clips: Iterable[ClipReport]) -> Iterator[Finding]:
 
 
 def choose_option(numbers: Collection[int]) -> str:
-    """Return the options that choose clips by their numbers, where they are few: else all clips.
+    """Return the options that select clips by index; "" if they are too many to list.
 
-    choosing([0, 2]) → " --clip '#0' --clip '#2'"
+    choose_option([0, 2]) → " --clip '#0' --clip '#2'"
     """
     return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= reader.MAX_LISTED_CLIPS else ""
 
 
 def skin_findings(skins: Iterable[SkinReport]) -> Iterator[Finding]:
-    """Yield what is wrong with each skin."""
+    """Yield the findings on each skin."""
     for skin in skins:
         where = reader.clip_label(skin.name, skin.index, "skin")
         if skin.unused_joints:
             problem = f"{skin.unused_joints} of {skin.joints} joints move no vertex"
-            advice = "unless something hangs on them, leave them out where the skin is made"
+            advice = "if nothing is attached to them, leave them out where the skin is made"
             yield Finding("unused-joints", Severity.INFO, where, problem, advice)
         if skin.off_sums:
-            problem = f"weights of {skin.off_sums} vertices don't add up to 1, off by up to {skin.worst_sum_error:.2g}"
+            problem = f"weights of {skin.off_sums} vertices do not add up to 1 (error up to {skin.worst_sum_error:.2g})"
             yield Finding("weight-sums", Severity.WARNING, where, problem, "normalize weights where the mesh is made")
-        if skin.most_influences is not None and skin.most_influences > MANY_INFLUENCES:
+        if skin.most_influences is not None and skin.most_influences > MAX_USUAL_INFLUENCES:
             problem = f"up to {skin.most_influences} influences per vertex"
             advice = "many players use the first four only: limit them where the mesh is made"
             yield Finding("many-influences", Severity.WARNING, where, problem, advice)
@@ -59,9 +59,11 @@ def skin_findings(skins: Iterable[SkinReport]) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """count: how often a clip has the fault. problem: words on the clips that have it, and how often they do.
+    """Rule of a finding.
 
-    advice: what to do; {fps} is the clips' own rate, {finer} twice that, {clips} chooses them where they are few.
+    count: number of faults in a clip. problem: text from the clips with the fault and their total count. advice: text
+    with
+    {fps} for the clips' frame rate, {finer} for twice that, {clips} for the options that select them.
     """
 
     name: str
@@ -90,8 +92,8 @@ def _range(seconds: list[float]) -> str:
 
 
 def _rate(clips: list[ClipReport]) -> int:
-    """Frames per second that put a key at every key of the clips, where those lie on a grid; else a usual rate."""
-    rates = [clip.frame_rate_fps or USUAL_FPS for clip in clips]
+    """Smallest whole frame rate with a frame at every key of the clips, else DEFAULT_FPS."""
+    rates = [clip.frame_rate_fps or DEFAULT_FPS for clip in clips]
     return math.ceil(max(rates) - 1e-3)
 
 
@@ -130,7 +132,7 @@ _CLIP_RULES: tuple[_Rule, ...] = (
     _Rule(
         "no-effect-tracks",
         Severity.INFO,
-        lambda clip: clip.no_effect_tracks - (clip.no_effect_tracks == sum(clip.tracks.values())),  # one must stay
+        lambda clip: clip.no_effect_tracks - (clip.no_effect_tracks == sum(clip.tracks.values())),  # one stays
         _counted("track equals the rest pose", "tracks equal the rest pose"),
         "unless players blend clips: gltf-anim optimize IN OUT --drop rest",
     ),
@@ -154,14 +156,14 @@ _CLIP_RULES: tuple[_Rule, ...] = (
     _Rule(
         "late-start",
         Severity.INFO,
-        lambda clip: clip.start_s > LATE_S,
+        lambda clip: clip.start_s > MIN_LATE_START_S,
         _late,
         "if unintended: gltf-anim trim IN OUT --rebase",
     ),
     _Rule(
         "irregular-keys",
         Severity.INFO,
-        lambda clip: clip.frame_rate_regular is not None and clip.frame_rate_regular < IRREGULAR,
+        lambda clip: clip.frame_rate_regular is not None and clip.frame_rate_regular < MIN_REGULAR_FRACTION,
         _irregular,
         "normal for sparse keys; for a grid: gltf-anim resample IN OUT --fps 30{clips}",
     ),

@@ -1,4 +1,4 @@
-"""Findings: what is not as it should be, under a name, with what to do about it."""
+"""Findings on the structure of a file: stable names, severities, and advice."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from anim.gltf.reading import reader
 from anim.gltf.validation import buffer_layout, channel_targets, hierarchy
 from anim.gltf.validation.schema import TOP_ARRAYS
 
-INVALID = "invalid"  # the finding for what other commands refuse
-LISTED = 10  # faults of one file
+INVALID = "invalid"  # finding for input that other commands refuse
+MAX_LISTED_FAULTS = 10  # maximum number of listed faults of a file
 
 
 class Severity(StrEnum):
-    """How bad: not legal glTF, and a player may refuse it or go wrong; likely wrong; wasteful or worth knowing."""
+    """Severity: invalid glTF, which players may refuse; a likely mistake; a waste or a remark."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -26,7 +26,10 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """name: stable, in kebab-case. where: the part of the file. problem: what was seen. advice: what to do."""
+    """One finding.
+
+    name: stable, in kebab-case. where: part of the file. problem: the observation. advice: the remedy.
+    """
 
     name: str
     severity: Severity
@@ -36,17 +39,17 @@ class Finding:
 
 
 def fault_findings(faults: Sequence[AnimError]) -> Iterator[Finding]:
-    """Yield what makes other commands refuse a file; of many faults, the first ones."""
-    for fault in faults[:LISTED]:
-        advice = fault.help or "mend it where the file was made; other commands refuse it"
+    """Yield a finding for each of the first faults for which other commands refuse a file."""
+    for fault in faults[:MAX_LISTED_FAULTS]:
+        advice = fault.help or "fix it where the file is made; other commands refuse it"
         yield Finding(INVALID, Severity.ERROR, fault.where or "file", fault.problem, advice)
-    if len(faults) > LISTED:
-        problem = f"{len(faults) - LISTED} more faults"
-        yield Finding(INVALID, Severity.ERROR, "file", problem, "mend the first ones, and look again")
+    if len(faults) > MAX_LISTED_FAULTS:
+        problem = f"{len(faults) - MAX_LISTED_FAULTS} more faults"
+        yield Finding(INVALID, Severity.ERROR, "file", problem, "fix the first ones, and inspect again")
 
 
 def document_findings(document: Document) -> Iterator[Finding]:
-    """Yield faults of the file's structure that leave its meaning clear, so that no command refuses it."""
+    """Yield findings on faults of structure for which no command refuses a file."""
     json = document.json
     for key in sorted(TOP_ARRAYS):
         if json.get(key) == []:
@@ -66,11 +69,11 @@ def document_findings(document: Document) -> Iterator[Finding]:
             Severity.ERROR,
             where,
             problem,
-            "every command that writes the file takes it apart: gltf-anim convert IN OUT",
+            "to decompose the matrix: gltf-anim convert IN OUT",
         )
     for name in json.get("extensionsRequired", ()):
         if name not in KNOWN_REQUIRED:
-            problem = f"{name} is required and not known here"
+            problem = f"{name} is required but not supported here"
             yield Finding("unknown-extension", Severity.WARNING, "extensionsRequired", problem, _PASSES)
 
 
@@ -81,14 +84,16 @@ KNOWN_REQUIRED = frozenset(
     KHR_texture_basisu KHR_texture_transform
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
-_PASSES = "it passes through untouched; check the result in a viewer that knows it"
+_PASSES = "it stays unchanged; check the result in a viewer that supports it"
 
 
 def _of_accessors(json: Json) -> Iterator[Finding]:
     for i, accessor in enumerate(json_array(json, "accessors")):
         if accessor.get("normalized") and accessor["componentType"] in (5125, 5126):
             where, problem = f"accessor {i}", "floats are marked normalized"
-            yield Finding("normalized-float", Severity.ERROR, where, problem, "drop the mark where the file is made")
+            yield Finding(
+                "normalized-float", Severity.ERROR, where, problem, "leave the property out where the file is made"
+            )
         if accessor["type"] not in buffer_layout.COMPONENTS:
             problem = f"type is '{accessor['type']}'"
             advice = "use one of glTF's types where the file is made"
@@ -96,15 +101,15 @@ def _of_accessors(json: Json) -> Iterator[Finding]:
 
 
 def badly_stored(json: Json) -> frozenset[int]:
-    """Return the numbers of the clips whose keys are stored as glTF doesn't allow, or with samplers that nobody uses.
+    """Return the indices of clips with unused samplers, or with keys stored against the specification.
 
-    Commands that edit clips write those anew, also where no key changes.
+    Commands that edit clips rewrite them, even if no key changes.
     """
     faults = (_unbounded, _strided, _idle)
     return frozenset(i for i, each in enumerate(json_array(json, "animations")) if any(f(json, each) for f in faults))
 
 
-_REWRITE = "to write them anew and change nothing else: gltf-anim retime IN OUT --speed 1"
+_REWRITE = "to rewrite them without other changes: gltf-anim retime IN OUT --speed 1"
 
 
 def _of_samplers(json: Json) -> Iterator[Finding]:
@@ -115,31 +120,31 @@ def _of_samplers(json: Json) -> Iterator[Finding]:
             yield Finding("unused-samplers", Severity.INFO, where, f"{len(idle)} samplers in no channel", _REWRITE)
         ignored = sum(channel_targets.channel_target(channel) is None for channel in animation["channels"])
         if ignored:
-            problem = f"{ignored} channels without a target that is known"
-            yield Finding("ignored-channels", Severity.INFO, where, problem, "players skip them; they are kept")
+            problem = f"{ignored} channels with an unknown target"
+            yield Finding("ignored-channels", Severity.INFO, where, problem, "players skip them; they stay unchanged")
     unbounded, strided = (set().union(*(fault(json, each) for each in clips)) for fault in (_unbounded, _strided))
     if unbounded:
         problem = f"{len(unbounded)} key time accessors without min and max"
         yield Finding("missing-bounds", Severity.ERROR, "animations", problem, _REWRITE)
     if strided:
-        problem = f"{len(strided)} accessors lie in views with byteStride"
+        problem = f"{len(strided)} accessors are in views with byteStride"
         yield Finding("strided-animation", Severity.ERROR, "animations", problem, _REWRITE)
 
 
 def _idle(json: Json, animation: Json) -> set[int]:
-    """Samplers of a clip that no channel uses."""
+    """Indices of a clip's samplers without a channel."""
     del json
     return set(range(len(animation["samplers"]))) - {channel["sampler"] for channel in animation["channels"]}
 
 
 def _unbounded(json: Json, animation: Json) -> set[int]:
-    """Accessors of key times without min and max."""
+    """Indices of a clip's accessors of key times without min and max."""
     accessors = json_array(json, "accessors")
     return {n for s in animation["samplers"] if not {"min", "max"} <= accessors[n := s["input"]].keys()}
 
 
 def _strided(json: Json, animation: Json) -> set[int]:
-    """Accessors of a clip in views with a byteStride, which only vertices may have."""
+    """Indices of a clip's accessors in buffer views with byteStride, which is for vertex attributes."""
     accessors, views = json_array(json, "accessors"), json_array(json, "bufferViews")
     named = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
     return {n for n in named if _has_stride(accessors[n], views)}
@@ -152,7 +157,7 @@ def _of_clip_names(json: Json) -> Iterator[Finding]:
     for name, numbers in by_name.items():
         if name and len(numbers) > 1:
             problem = f"{len(numbers)} clips have this name (numbers {', '.join(map(str, numbers))})"
-            advice = f"players that look for the name find one of them; here '#{numbers[-1]}' is the last; rename it"
+            advice = f"players find one of them by this name (here the last is '#{numbers[-1]}'); rename it"
             yield Finding("duplicate-clip-names", Severity.WARNING, f"clip '{name}'", problem, advice)
 
 
@@ -173,15 +178,15 @@ def _of_skins(json: Json) -> Iterator[Finding]:
             yield Finding("no-common-root", Severity.ERROR, where, problem, "put them under one node where it is made")
         elif "skeleton" in skin and skin["skeleton"] not in common:
             problem = f"skeleton names node {skin['skeleton']}, which is not above all joints"
-            advice = "players ignore the property; drop it where the skin is made"
+            advice = "players ignore the property; leave it out where the skin is made"
             yield Finding("skeleton-hint", Severity.WARNING, where, problem, advice)
         accessor = skin.get("inverseBindMatrices")
         if accessor is not None and _has_stride(
             json_array(json, "accessors")[accessor], json_array(json, "bufferViews")
         ):
-            problem = "inverse bind matrices lie in a view with byteStride"
+            problem = "inverse bind matrices are in a view with byteStride"
             yield Finding(
-                "strided-matrices", Severity.ERROR, where, problem, "give them a view of their own where it is made"
+                "strided-matrices", Severity.ERROR, where, problem, "give them a separate view where it is made"
             )
 
 

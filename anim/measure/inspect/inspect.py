@@ -1,4 +1,4 @@
-"""What is in a file, and is it healthy? Facts per clip, track and skin, and findings that say what to do."""
+"""Inspection of a file: reports on clips, tracks and skins, and findings with advice."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def inspect(
     tracks: bool = False,
     broken: BrokenFile | None = None,
 ) -> Facts:
-    """Return the facts of a document.
+    """Return the report on a document.
 
-    file_bytes: the size that shares refer to. chosen: numbers of the clips to look at, None for all.
-    tracks: list every track too. broken: what is wrong with a document that is only a part of its file.
-    Clips that can't be read become faults and findings, vertices that can't be read a finding.
+    file_bytes: size of the file, for fractions of it. chosen: indices of the clips to report, None for all.
+    tracks: report every track too. broken: the faults of a file of which the document is only a part.
+    Unreadable clips become faults and findings, unreadable vertices become a finding.
     """
     json = document.json
     accessors = Accessors(document)
@@ -100,7 +100,7 @@ def inspect(
 
 
 def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]) -> list[Seam]:
-    """The seams of whole clips, as `loop` measures them."""
+    """Loop gaps of whole clips, measured like those of `loop`."""
     roots = (root_motion.root_motion_node(skin.skeleton, clip) for clip in clips)
     parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
     return skin.seams(parts, groups)
@@ -159,8 +159,8 @@ def _clip(
 
 
 def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
-    """The facts, with the key at the clip's end not redundant where only constant tracks have one."""
-    end = clip.end  # found once: it goes through all tracks
+    """The statistics, without a redundant key at the clip's end if only constant tracks have one there."""
+    end = clip.end  # computed once: it is a search over all tracks
     at_end = [i for i, track in enumerate(clip.tracks) if track.times[-1] == end]
     if end <= clip.start or not all(counted.constant[i] and counted.redundant[i] for i in at_end):
         return counted
@@ -174,8 +174,11 @@ def _splines(clip: Clip) -> Bools:
 
 
 def _repeating(clip: Clip, counted: TrackStats) -> int:
-    """How many tracks say one value again and again; where nothing else moves, one of them holds the clip's end."""
-    needed = np.where(_splines(clip), 2, 1)  # keys; a spline has two at least
+    """Number of constant tracks with unneeded keys.
+
+    If no other track has a key at the clip's end, one of them is needed.
+    """
+    needed = np.where(_splines(clip), 2, 1)  # keys; a spline needs two
     several = np.array([len(track.times) for track in clip.tracks], np.int64) > needed
     count = int((counted.constant & ~counted.no_effect & several).sum())
     return max(count - 1, 0) if counted.constant.all() and clip.end > clip.start else count
@@ -233,7 +236,7 @@ def _skin(number: int, document: Document, scene: Scene | None) -> SkinReport:
 
 
 def _useful(instances: list[MeshInstance], joints: list[int], skeleton: Skeleton) -> set[int]:
-    """Joints of a skin that carry a vertex, and those above them."""
+    """Joints of a skin that influence a vertex, and their ancestors."""
     useful: set[int] = set()
     for instance in instances:
         carrying = set(instance.mesh.joints[instance.mesh.weights > 0].tolist())

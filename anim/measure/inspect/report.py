@@ -1,4 +1,4 @@
-"""What `inspect` finds out about a file, its clips, tracks and skins: plain numbers, units in their names."""
+"""Report of `inspect` on a file, its clips, tracks and skins: numbers with units in their names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from anim.measure.inspect.file_findings import Finding
 
 @dataclass(frozen=True, slots=True)
 class TrackReport:
-    """One track: what it moves, its keys, and what they tell (see `measure.tracks`)."""
+    """One track: its target, keys, and statistics (see `track_statistics`)."""
 
     target: str
     path: str
@@ -29,15 +29,16 @@ class TrackReport:
 
 @dataclass(frozen=True, slots=True)
 class ClipReport:
-    """One clip. duration_s: from its first to its last key; players count from 0 to end_s.
+    """One clip. duration_s: from the first to the last key; players count from 0 to end_s.
 
-    frame_rate_fps, frame_rate_regular: the estimate and the share of keys on its grid; None where it is open.
-    data_bytes, stored_bytes, json_bytes: its numbers decoded, its part of them as they are stored (compressed or not),
-    and its JSON; share: the last two as a share of the file. What clips share counts in each.
-    repeating_tracks: constant, of several keys, and neither at rest nor needed to hold the clip's end.
+    frame_rate_fps, frame_rate_regular: the estimate, and the fraction of keys on its grid; None for too few keys.
+    data_bytes, stored_bytes, json_bytes: size of its values decoded, its part of them as stored (compressed or not),
+    and its
+    JSON; share: fraction of the file that the last two take. Data shared by clips counts in each.
+    repeating_tracks: constant tracks with several keys that neither equal the rest pose nor define the clip's end.
     sign_flips_in_splines: those of sign_flips that are on CUBICSPLINE tracks.
-    root_*: the root's way. seam_m, seam_speed_m_per_s: from end to start, the way of a root that travels taken off;
-    seam_measured_on: "skin", or "nodes" where no vertices can be read.
+    root_*: motion of the root. seam_m, seam_speed_m_per_s: loop gap and velocity gap without root motion;
+    seam_measured_on: "skin", or "nodes" if no vertices can be read.
     """
 
     index: int
@@ -74,10 +75,10 @@ class ClipReport:
 
 @dataclass(frozen=True, slots=True)
 class SkinReport:
-    """One skin on the meshes that use it; None where their vertices can't be read.
+    """One skin with the meshes that use it; None for values of unreadable vertices.
 
-    unused_joints: neither carry a vertex nor have a joint below them that does. most_influences: of any vertex.
-    off_sums: vertices whose weights don't sum to 1, and by how much at worst.
+    unused_joints: joints that influence no vertex, and none of whose descendants does. most_influences: of any vertex.
+    off_sums: number of vertices with weights that do not add up to 1; worst_sum_error: the largest deviation.
     """
 
     index: int
@@ -93,9 +94,10 @@ class SkinReport:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """A whole file. animation_*_bytes: numbers decoded, as stored, and JSON; what clips share counts once.
+    """Report on a file.
 
-    faults: for which commands refuse the file; what they concern is left out of the rest.
+    animation_*_bytes: values decoded, values as stored, and JSON; data shared by clips counts once.
+    faults: reasons for which other commands refuse the file; the parts concerned are absent from the report.
     """
 
     generator: str

@@ -1,4 +1,4 @@
-"""Where a clip leads: how far its root travels."""
+"""Root motion of clips."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from anim.model import Clip, Skeleton
 from anim.sampling.concatenation import ConcatenatedTracks
 from anim.sampling.pose import world_by_node
 
-ONWARD = 0.7
+MIN_DISPLACEMENT_PER_PATH = 0.7
 
 
 @dataclass(frozen=True, slots=True)
 class RootMotion:
-    """The way of a clip's root from start to end.
+    """Displacement of a clip's root from start to end.
 
-    root: number of the node whose way was taken, −1 where no translation moves. distance: m. speed: m/s.
+    root: index of the node, −1 if no translation changes. distance: m. speed: m/s.
     """
 
     root: int
@@ -37,10 +37,10 @@ def root_motions(
     *,
     figure: AbstractSet[int] | None = None,
 ) -> list[RootMotion]:
-    """Return one RootMotion per clip; a clip without time between start and end has none.
+    """Return the RootMotion of each clip; none for clips of zero duration.
 
-    groups: the tracks of all clips, `joined`, for callers that have them.
-    figure: nodes of which one can be the root, see `figure_nodes`; None for all.
+    groups: the tracks of all clips from `concatenate`, if the caller has them.
+    figure: nodes that can be the root, see `figure_nodes`; None for all.
     """
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
@@ -52,9 +52,9 @@ def root_motions(
 
 
 def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
-    """Return the nodes that carry what a file shows: the joints of its skins and what is above them.
+    """Return the nodes that carry the visible content: the joints of all skins and their ancestors.
 
-    Of a file without skins the nodes of its default scene, all where it has none.
+    Without skins, the nodes of the default scene; without a default scene, all nodes.
     """
     above = {int(joint) for skin in json.get("skins", ()) for joint in skin["joints"]}
     if above:
@@ -72,27 +72,27 @@ def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
 
 
 def root_motion_node(skeleton: Skeleton, clip: Clip) -> int:
-    """Return the node whose way carries a character along, −1 where none does.
+    """Return the index of the node whose translation moves a character along, −1 without one.
 
-    It is the moved node nearest to the root, if others hang on it and its way leads somewhere: at least ONWARD of the
-    length of its path lies between its ends.
+    It is the translated node nearest to the root, if it has descendants and its displacement is at least 0.7 of the
+    length of its path.
     """
     root = _root(clip, _depths(skeleton)) if len(skeleton) else -1
     return root if _leads(skeleton, clip, root) else -1
 
 
 def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
-    """Whether the keys of a root's translation lead somewhere, and others hang on it."""
+    """Return whether the translation keys of a root have a net displacement, and the root has descendants."""
     if root < 0 or not (skeleton.parents == root).any():
         return False
     path = next(t.values for t in clip.tracks if t.node == root and t.path == "translation")
     steps = np.diff(path, axis=0)
     length = float(np.sqrt((steps * steps).sum(axis=1)).sum())
-    return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > ONWARD * length
+    return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > MIN_DISPLACEMENT_PER_PATH * length
 
 
 def _travel(clip: Clip, away: Floats, depth: Floats, figure: AbstractSet[int] | None) -> RootMotion:
-    """away: (N, 3) from start to end."""
+    """Root motion of one clip. away: displacement (N, 3) from start to end."""
     duration = clip.end - clip.start
     if duration <= 0:
         return RootMotion(-1, 0.0, 0.0)
@@ -102,7 +102,7 @@ def _travel(clip: Clip, away: Floats, depth: Floats, figure: AbstractSet[int] | 
 
 
 def _root(clip: Clip, depth: Floats, figure: AbstractSet[int] | None = None) -> int:
-    """The moved node nearest to the root of the hierarchy: what carries a character along."""
+    """The translated node nearest to the root of the hierarchy."""
     tracks = {track.node: track for track in clip.tracks if track.path == "translation" and track.node is not None}
     from_root = sorted(
         (node for node in tracks if figure is None or node in figure), key=lambda node: (depth[node], node)

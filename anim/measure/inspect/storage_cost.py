@@ -1,4 +1,4 @@
-"""What animations cost: the bytes of their numbers, and of the JSON that describes them."""
+"""Storage cost of animations: bytes of their values, and of the JSON for them."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from anim.gltf.writing.references import views_of
 
 @dataclass(frozen=True, slots=True)
 class StorageCost:
-    """Bytes of stored numbers (decoded size where compressed), and of JSON: channels, samplers, accessors, views."""
+    """Bytes of stored values (compressed: decoded), and of JSON: channels, samplers, accessors, views."""
 
     data: int
     json: int
 
     @property
     def total(self) -> int:
-        """Both together."""
+        """Bytes of both."""
         return self.data + self.json
 
 
 def storage_costs(document: Document) -> tuple[list[StorageCost], StorageCost]:
-    """Return what each animation costs alone, and what all cost together: there, what several share counts once."""
+    """Return the cost of each animation alone, and of all together, where shared data counts once."""
     content = document.json
     accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
     alone: list[StorageCost] = []

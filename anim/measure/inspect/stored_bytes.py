@@ -1,4 +1,4 @@
-"""How many bytes of a file hold the numbers of its animations, as they are stored: compressed, shared, overlapping."""
+"""Bytes of animation values as they are stored: compressed, shared, overlapping."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from anim.gltf.writing.references import references_outside, views_of
 
 
 def stored_bytes(document: Document) -> int:
-    """Return the bytes that only animations take in the buffers; of compressed views the compressed ones."""
+    """Return the bytes that only animations use in the buffers; the compressed size of compressed views."""
     content = document.json
     clips = json_array(content, "animations")
     samplers = [sampler for animation in clips for sampler in animation["samplers"]]

@@ -1,4 +1,4 @@
-"""What a track's keys tell about it: does it move anything, which keys say nothing, which steps are dangerous."""
+"""Statistics of keys: constant tracks, redundant keys, wide steps, rotations not of unit length."""
 
 from __future__ import annotations
 
@@ -13,23 +13,30 @@ from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Interpolation, Skeleton, Track, ValueKind
 from anim.sampling.concatenation import ConcatenatedTracks, concatenate
 
-FLOAT32 = 2.0**-22  # relative; twice the spacing of float32, within which two stored values are the same
-REDUNDANT = 1e-6  # of a track's range: a key this close to what its neighbors give says nothing
-UNIT = 1e-3  # a quaternion whose length is further off 1 than this was not meant
-UNIT_BYTE = 0.00769  # the same for quaternions in normalized bytes, by the Khronos validator
-STEPS = {5120: 127, 5121: 255, 5122: 32767, 5123: 65535}  # from 0 to 1, of normalized integers by component type
-WIDE_STEP = np.radians(170.0)  # rad; from here on players disagree about which way round is shorter
+FLOAT32_TOLERANCE = 2.0**-22  # relative; twice the spacing of float32: values closer than this are equal
+KEY_TOLERANCE_PER_RANGE = 1e-6  # fraction of a track's range: tolerance of interpolated keys
+UNIT_TOLERANCE = 1e-3  # tolerance of a quaternion's length
+BYTE_UNIT_TOLERANCE = 0.00769  # the same for quaternions in normalized bytes, from the Khronos validator
+MAX_INTEGERS = {
+    5120: 127,
+    5121: 255,
+    5122: 32767,
+    5123: 65535,
+}  # integer for 1.0 by component type, of normalized integers
+WIDE_STEP_RAD = np.radians(170.0)  # rad; from here on players disagree on the shorter arc
 
 
 @dataclass(frozen=True, slots=True)
 class TrackStats:
-    """Facts about T tracks; arrays (T,).
+    """Statistics of T tracks; arrays (T,).
 
-    constant: never changes. no_effect: constant, and the node rests there anyway. redundant: keys that could go and
-    save bytes by that (see `removable`): the steps between those that stay are not wide, and players that don't
-    normalize rotations show the same. Of constants one stays, of splines two.
-    non_unit, flips, wide: keys with a length off 1, sign changes from key to key (not under STEP), steps of 170° or
-    more (under LINEAR alone), of rotations.
+    constant: never changes. no_effect: constant, and equal to the rest pose. redundant: keys whose removal saves bytes
+    (see
+    `removable_keys`) without creating wide steps or changing the motion in players that do not normalize rotations; of
+    constant tracks one key is needed, of splines two.
+    non_unit, flips, wide: number of rotation keys that are not of unit length, of sign changes from key to key (not
+    under
+    STEP), of steps of 170° or more (under LINEAR only).
     widest: largest step in rad.
     """
 
@@ -42,19 +49,19 @@ class TrackStats:
     widest: Floats
 
     def __getitem__(self, part: slice) -> TrackStats:
-        """Return the facts about some of the tracks."""
+        """Return the statistics of some of the tracks."""
         return TrackStats(*(getattr(self, each.name)[part] for each in fields(self)))
 
 
 def stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> TrackStats:
-    """Return the facts about tracks that were `joined`, in the order that they had before."""
+    """Return the statistics of concatenated tracks, in the tracks' original order."""
     result, masks = _all_stats(groups, skeleton)
     result.redundant[:] += np.array([np.count_nonzero(mask) for mask in masks], np.int64)
     return result
 
 
 def removable_keys(tracks: Sequence[Track], skeleton: Skeleton) -> list[Bools]:
-    """Return which keys (K,) of each track could go and save bytes by that, for tracks that move; none of constants.
+    """Return masks (K,) of the keys of each track whose removal saves bytes; False for constant tracks.
 
     (keys at 0, 1, 2 s with the values 0, 5, 10) → [False, True, False]
     """
@@ -62,7 +69,7 @@ def removable_keys(tracks: Sequence[Track], skeleton: Skeleton) -> list[Bools]:
 
 
 def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
-    """Return how many keys of each track are rotations off unit length, beyond what their storage excuses."""
+    """Return the number of rotation keys of each track that are not of unit length within rounding."""
     found = [0] * len(tracks)
     turning = [i for i, track in enumerate(tracks) if track.kind is ValueKind.ROTATION]
     if not turning:
@@ -77,13 +84,15 @@ def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
 
 
 def _unit_error(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[int]) -> Bools:
-    """Which of all keys' lengths (S,) are off 1 by more than is usual for how their tracks are stored."""
+    """Mask (S,) of keys with a length that differs from 1 by more than the rounding of their storage."""
     bytes_only = np.array([track.storage.component_type in (5120, 5121) for track in tracks])
-    return np.asarray(np.abs(lengths - 1) > np.repeat(np.where(bytes_only, UNIT_BYTE, UNIT), counts))
+    return np.asarray(
+        np.abs(lengths - 1) > np.repeat(np.where(bytes_only, BYTE_UNIT_TOLERANCE, UNIT_TOLERANCE), counts)
+    )
 
 
 def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tuple[TrackStats, list[Bools]]:
-    """The facts, with redundant keys of constants only, and which keys of all other tracks are redundant."""
+    """The statistics, with redundant keys of constant tracks only, and redundant keys of all others."""
     count = sum(len(group.tracks) for group in groups)
     result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
     tracks: dict[int, Track] = {}
@@ -95,7 +104,7 @@ def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tupl
 
 
 def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, given: dict[int, Bools]) -> None:
-    """Put the facts about a group into `result`, and which keys of tracks that move could go into `given`."""
+    """Write the statistics of a group into `result`, masks of its tracks' interpolated keys into `given`."""
     values = group.values
     if group.kind is ValueKind.ROTATION:
         values = _step_angles(group, result)
@@ -110,7 +119,7 @@ def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, gi
 
 
 def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:
-    """The rotations (S, 4) at unit length, signs aligned within each track; what is counted goes into `result`."""
+    """The rotations (S, 4) at unit length with aligned signs; their counts are written into `result`."""
     lengths = np.sqrt(quaternion.dot(group.values, group.values))
     values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
     dots = np.ones(len(values))  # of each key with the one before it; the first of a track has none
@@ -118,10 +127,10 @@ def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:
     dots[group.starts] = 1.0
     angles = 2 * np.arccos(np.minimum(np.abs(dots), 1.0))
     result.non_unit[group.numbers] = _sums(group, _unit_error(lengths, group.tracks, group.counts))
-    if group.interpolation is not Interpolation.STEP:  # which never is on the way from one key to the next
+    if group.interpolation is not Interpolation.STEP:  # STEP never interpolates between keys
         result.flips[group.numbers] = _sums(group, dots < 0)
     if group.interpolation is Interpolation.LINEAR:
-        result.wide[group.numbers] = _sums(group, angles > WIDE_STEP)
+        result.wide[group.numbers] = _sums(group, angles > WIDE_STEP_RAD)
     result.widest[group.numbers] = _largest(group, angles)
     return values * np.cumprod(np.where(dots < 0, -1.0, 1.0))[:, None]
 
@@ -130,10 +139,10 @@ def _same_values(group: ConcatenatedTracks, values: Floats) -> Bools:
     least, most = _extent(group, values)
     first = values[group.starts]
     off = np.maximum(most - first, first - least).max(axis=1)
-    same: Bools = off <= FLOAT32 * _sizes(least, most)
+    same: Bools = off <= FLOAT32_TOLERANCE * _sizes(least, most)
     if group.tangents is not None:
         arriving, leaving = (_widest(each) for each in group.tangents)
-        arriving[group.starts] = 0.0  # what leads to the first key and away from the last is never played
+        arriving[group.starts] = 0.0  # the tangents before the first and after the last key are not used
         leaving[group.starts + group.counts - 1] = 0.0
         same &= (_largest(group, arriving) == 0) & (_largest(group, leaving) == 0)
     return same
@@ -152,7 +161,7 @@ def _at_rest(group: ConcatenatedTracks, constant: Bools, skeleton: Skeleton) -> 
 
 
 def _redundant(group: ConcatenatedTracks, values: Floats, constant: Bools) -> Bools:
-    """Which keys (S,) inside a track that moves what is around them gives anyway."""
+    """Mask (S,) of inner keys of moving tracks that are interpolated by their neighbors."""
     of_track = np.repeat(np.arange(len(constant)), group.counts)
     inner = ~constant[of_track]
     inner[group.starts] = inner[group.starts + group.counts - 1] = False
@@ -162,12 +171,14 @@ def _redundant(group: ConcatenatedTracks, values: Floats, constant: Bools) -> Bo
 
 
 def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints) -> Bools:
-    """For each of the keys `at` (A,), none at an end of its track, whether the keys next to it give it."""
+    """Mask (A,) of the inner keys at indices `at` (A,) that are interpolated by their neighbors."""
     before, here, after = values[at - 1], values[at], values[at + 1]
     if group.interpolation is Interpolation.STEP:
         return np.asarray(_widest(here - before) == 0)
     least, most = _extent(group, values)
-    allowed = (REDUNDANT * (most - least).max(axis=1) + FLOAT32 * _sizes(least, most))[of_track[at]]
+    allowed = (KEY_TOLERANCE_PER_RANGE * (most - least).max(axis=1) + FLOAT32_TOLERANCE * _sizes(least, most))[
+        of_track[at]
+    ]
     duration = group.times[at + 1] - group.times[at - 1]
     u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
@@ -176,14 +187,14 @@ def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, 
         between = before + u[:, None] * (after - before)
         return np.asarray(_widest(here - between) <= allowed)
     same = _widest(here - quaternion.slerp(before, after, u)) <= allowed
-    narrow = quaternion.dot(before, after) > np.cos(WIDE_STEP / 2)
+    narrow = quaternion.dot(before, after) > np.cos(WIDE_STEP_RAD / 2)
     return np.asarray(same & narrow & _same_lengths(group, of_track, at, u, allowed))
 
 
 def _same_lengths(group: ConcatenatedTracks, of_track: Ints, at: Ints, u: Floats, allowed: Floats) -> Bools:
-    """Whether quaternions as stored are as long as between their neighbors, but for rounding to integers."""
+    """Return whether stored quaternions have the length interpolated from their neighbors."""
     before, here, after = (np.sqrt(quaternion.dot(q, q)) for q in (group.values[at + k] for k in (-1, 0, 1)))
-    steps = np.array([STEPS.get(track.storage.component_type, np.inf) for track in group.tracks])
+    steps = np.array([MAX_INTEGERS.get(track.storage.component_type, np.inf) for track in group.tracks])
     off = np.abs(here - (before + u * (after - before)))
     return np.asarray(off <= allowed + 2 / steps[of_track[at]])
 
@@ -194,23 +205,23 @@ def _is_interpolated_cubic(
     arriving, leaving = tangents
     piece = (values[at - 1], duration * leaving[at - 1], values[at + 1], duration * arriving[at + 1])
     off = _widest(values[at] - hermite.evaluate(u, *piece))
-    slope = hermite.first_derivative(u, *piece)  # per u of the joined piece: as large as the values
+    slope = hermite.first_derivative(u, *piece)  # per u of the combined segment: as large as the values
     bend = np.maximum(_widest(duration * arriving[at] - slope), _widest(duration * leaving[at] - slope))
     return np.asarray((off <= allowed) & (bend <= 10 * allowed))
 
 
 def _sums(group: ConcatenatedTracks, counted: Bools) -> Ints:
-    """How many keys of each track (T,) count."""
+    """Number of marked keys of each track (T,)."""
     return np.add.reduceat(counted, group.starts, dtype=np.int64)
 
 
 def _largest(group: ConcatenatedTracks, sizes: Floats) -> Floats:
-    """The largest number at any key of each track (T,)."""
+    """Maximum over the keys of each track (T,)."""
     return np.maximum.reduceat(sizes, group.starts)
 
 
 def _extent(group: ConcatenatedTracks, values: Floats) -> tuple[Floats, Floats]:
-    """The least and the greatest value (T, C) of each track."""
+    """Minimum and maximum value (T, C) of each track."""
     return np.minimum.reduceat(values, group.starts), np.maximum.reduceat(values, group.starts)
 
 
@@ -219,5 +230,8 @@ def _sizes(least: Floats, most: Floats) -> Floats:
 
 
 def _widest(vectors: Floats) -> Floats:
-    """The largest component (S,) of each vector (S, C), without sign: by rows, since an axis of 3 or 4 is slow."""
+    """Largest absolute component (S,) of each vector (S, C).
+
+    By rows: reductions over an axis of 3 or 4 are slow.
+    """
     return np.asarray(np.abs(vectors.T, order="C").max(axis=0))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.measure.inspect.frame_rate import RATES, FrameRate, estimate_frame_rate
+from anim.measure.inspect.frame_rate import USUAL_FPS, FrameRate, estimate_frame_rate
 
 
-@pytest.mark.parametrize("fps", RATES.tolist())
+@pytest.mark.parametrize("fps", USUAL_FPS.tolist())
 def test_every_usual_rate_is_known_again_from_float32_times(fps: float) -> None:
     times = (np.arange(40) / fps).astype(np.float32).astype(np.float64)
     assert estimate_frame_rate(times) == FrameRate(fps, 1.0)
