@@ -115,6 +115,8 @@ def command(
         voice.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
     for words in _ambiguous(one.file, other.file, chosen):
         voice.warn(words)
+    for words in () if report.are_strangers else found.warnings:
+        voice.warn(f"{other.file.name}: {words}")
     if format is Format.JSON:
         documents.write_text(diff_report.as_json(report, warnings=voice.warnings))
     elif not quiet:
@@ -156,6 +158,8 @@ def _opened(path: str, voice: Reporter) -> _Side:
         accessors = Accessors(document)
         clips = reader.clips(document, accessors)
         scene = scenes.read_scene(document, source.name, voice, accessors=accessors)
+        if scene.instances and reader.is_default_scene_empty(document):
+            voice.warn(f"{source.name}: the default scene has no mesh, most players show nothing")
         cost = StorageCost(stored_bytes(document), storage_costs(document)[1].json)
         return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
 

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from anim.gltf.reading.reader import clip_name
-from anim.measure.compare.diff import ClipDiff, Diff
+from anim.measure.compare.diff import END_TOLERANCE_S, ClipDiff, Diff
 from anim.measure.error.statistics import Peak
 from anim.measure.inspect.storage_cost import StorageCost
 from cli import tables
 from cli.text import format_change, format_length, format_number, format_speed, plural
 
 SCHEMA = 1
-SAME_END = 1e-6  # s; smaller differences of clip ends come from rounding
 LISTED = 5  # listed names that only one file has
 STRANGERS = "no clip and no node has the same name in both files"
 HEADER = (
@@ -118,7 +117,7 @@ def worst(found: DiffReport) -> str:
 def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
     error, found = each.error, each.statistics
     moved = bool(error.max_error)
-    ends = f"{each.end_old:.4g} → {each.end_new:.4g}" if abs(each.end_old - each.end_new) > SAME_END else ""
+    ends = f"{each.end_old:.4g} → {each.end_new:.4g}" if abs(each.end_old - each.end_new) > END_TOLERANCE_S else ""
     changed = [f"−{len(each.missing)}"] * bool(each.missing) + [f"+{len(each.added)}"] * bool(each.added)
     return [
         clip_name(each.name, each.old)

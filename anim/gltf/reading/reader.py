@@ -134,6 +134,20 @@ def depth_first(json: Json) -> Iterator[int]:
         stack.extend(reversed(nodes[node].get("children", ())))
 
 
+def is_default_scene_empty(document: Document) -> bool:
+    """Return whether no mesh is below a root of the default scene: `scene`, else the first; False without scenes."""
+    nodes, scenes = json_array(document.json, "nodes"), json_array(document.json, "scenes")
+    if not scenes:
+        return False
+    stack = list(scenes[document.json.get("scene", 0)].get("nodes", ()))
+    while stack:
+        node = nodes[stack.pop()]
+        if "mesh" in node:
+            return False
+        stack.extend(node.get("children", ()))
+    return True
+
+
 def clip_label(name: str, number: int, what: str = "clip") -> str:
     """Return a label for messages: "clip 'walk'", or "clip #3" for an unnamed clip (or another `what`)."""
     return f"{what} '{name}'" if name else f"{what} {clip_name(name, number)}"

@@ -16,9 +16,10 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.compare import name_matching
+from anim.measure.compare.deformation import same_influences, same_targets
 from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
-from anim.model import MeshInstance, Scene, Skin
+from anim.model import Mesh, MeshInstance, Scene, Skin
 from anim.sampling import rest_pose as rest
 from anim.sampling.pose import local_by_node
 
@@ -34,12 +35,17 @@ class Correspondence:
 
     nodes: (N,) for each node of the first scene its number in the second, −1 where it has none.
     surfaces: of the first scene, with what carries them in the second, None where it is the same scene.
-    by_vertex: whether all meshes agree vertex by vertex.
+    by_vertex: whether all meshes agree vertex by vertex, with their joints, weights and morph targets.
+    unskinned: names of meshes with a skin in the first scene only. reweighted: names of meshes whose vertices agree,
+    but not their joints, weights or morph targets. has_meshes: False if only the first scene has vertices.
     """
 
     nodes: Ints
     surfaces: Sequence[tuple[Surface, Binding | None]]
     by_vertex: bool = True
+    unskinned: tuple[str, ...] = ()
+    reweighted: tuple[str, ...] = ()
+    has_meshes: bool = True
 
 
 def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
@@ -54,12 +60,28 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
     instances = [instance for instance in scene.instances if len(instance.mesh.positions)]
     if not instances:
         return Correspondence(pairing.nodes, [(surface, pairing.by_nodes(surface)) for surface in surfaces])
-    partners = [pairing.partner(k, instance) for k, instance in enumerate(instances)]
-    found = [
-        (surface, pairing.carried(surface, instance, partner))
-        for surface, instance, partner in zip(surfaces, instances, partners, strict=True)
-    ]
-    return Correspondence(pairing.nodes, found, all(partner is not None for partner in partners))
+    found: list[tuple[Surface, Binding | None]] = []
+    unskinned, reweighted, by_vertex = [], [], True
+    for number, (surface, instance) in enumerate(zip(surfaces, instances, strict=True)):
+        partner = pairing.partner(number, instance)
+        bare = pairing.unskinned(number, instance) if partner is None else None
+        if bare is not None:
+            unskinned.append(surface.name)
+        carried = (
+            pairing.carried(surface, instance, partner) if bare is None else pairing.rigid(surface, instance, bare)
+        )
+        found.append((surface, carried))
+        if partner is not None and not _deform_alike(instance, partner, carried):
+            reweighted.append(surface.name)
+        by_vertex = by_vertex and partner is not None
+    return Correspondence(
+        pairing.nodes,
+        found,
+        by_vertex and not reweighted,
+        tuple(unskinned),
+        tuple(reweighted),
+        pairing.has_meshes,
+    )
 
 
 class _SceneMatcher:
@@ -76,10 +98,41 @@ class _SceneMatcher:
 
     def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
         """The instance of the other scene that has the same vertices: on the same node, of the same name, in order."""
+        skinned = instance.skin is not None
+        choices = [each for each in self._choices(number, instance) if (each.skin is not None) is skinned]
+        return next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
+
+    def unskinned(self, number: int, instance: MeshInstance) -> MeshInstance | None:
+        """A skinned instance's partner without skin: of the same vertices, or on the node of the same name."""
+        if instance.skin is None:
+            return None
+        choices = [each for each in self._choices(number, instance) if each.skin is None]
+        found = next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
+        there = self._on_node.get(int(self.nodes[instance.node]))
+        name = self._scene.skeleton.names[instance.node]
+        if found is None and there in choices and there and name and name == self._other.skeleton.names[there.node]:
+            return there
+        return found
+
+    @property
+    def has_meshes(self) -> bool:
+        """Whether the other scene has vertices."""
+        return bool(self._new)
+
+    def rigid(self, surface: Surface, instance: MeshInstance, bare: MeshInstance) -> Binding:
+        """A skinned surface carried by the node of its mesh, which lost the skin in the other scene."""
+        points, others = instance.mesh.positions, bare.mesh.positions
+        space = _space(points, others) if _agree(instance.mesh, bare.mesh) else _space_of_boxes(points, others)
+        bind = np.broadcast_to(NOWHERE if space is None else space, surface.bind.shape)
+        found = Binding(np.full(len(surface.nodes), bare.node, np.int64), bind, bare.node, surface.rest_weights)
+        return replace(found, rest_weights=bare.weights) if len(bare.weights) == len(surface.rest_weights) else found
+
+    def _choices(self, number: int, instance: MeshInstance) -> list[MeshInstance]:
+        """Instances of the other scene that may be a given one: on the same node, of the same name, in order."""
         choices = [self._on_node.get(int(self.nodes[instance.node]))]
         choices.append(self._new[self._named[number]] if self._named[number] >= 0 else None)
         choices.append(self._new[number] if len(self._new) == len(self._named) else None)
-        return next((each for each in choices if each is not None and _agree(instance, each)), None)
+        return [each for each in choices if each is not None]
 
     def carried(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         """What carries an instance's surface in the other scene."""
@@ -158,10 +211,20 @@ class _SceneMatcher:
         return children[0] if len(children) == 1 else None
 
 
-def _agree(old: MeshInstance, new: MeshInstance) -> bool:
+def _deform_alike(old: MeshInstance, new: MeshInstance, carried: Binding) -> bool:
+    """Whether two instances of the same vertices have the same joints, weights and morph targets."""
+    space = _space(old.mesh.positions, new.mesh.positions)
+    if not same_targets(old.mesh, new.mesh, space):
+        return False
+    if old.skin is None or new.skin is None:
+        return True
+    return same_influences(old.mesh, carried.nodes, new.mesh, new.skin.joints)
+
+
+def _agree(old: Mesh, new: Mesh) -> bool:
     """Whether both have the same vertices in the same order, be it in another mesh space."""
-    a, b = old.mesh.positions, new.mesh.positions
-    if len(a) != len(b) or (old.skin is None) is not (new.skin is None):
+    a, b = old.positions, new.positions
+    if len(a) != len(b):
         return False
     space = _space(a, b)
     rest = np.linalg.norm(matrix.apply(space, a) - b, axis=1).max()

@@ -10,11 +10,15 @@ import numpy as np
 
 from anim.arrays import Ints
 from anim.measure.compare import name_matching
+from anim.measure.compare.correspondence import Correspondence
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import FPS, ErrorMetric, MotionError, dense_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair
+
+END_TOLERANCE_S = 1e-6  # smaller differences of clip ends come from rounding
+MAX_LISTED = 3  # names in a sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +49,8 @@ class Diff:
 
     diagonal: m, of the old scene's bounding box. clips: worst first. missing_clips, added_clips: numbers of those that
     only the old or only the new file has. missing_nodes, added_nodes: names of nodes likewise.
-    by_vertex: whether every mesh has the same vertices in both files; where not, the old ones are carried by the new
-    joints all the same.
+    by_vertex: whether every mesh has the same vertices, weights and morph targets in both files; where not, the old
+    ones are carried by the new joints. warnings: differences beyond those that distances state, a sentence each.
     """
 
     diagonal: float
@@ -56,6 +60,7 @@ class Diff:
     missing_nodes: tuple[str, ...]
     added_nodes: tuple[str, ...]
     by_vertex: bool
+    warnings: tuple[str, ...] = ()
 
     @property
     def max_error(self) -> float:
@@ -102,7 +107,40 @@ def diff(
         _names(ruler.scene, np.flatnonzero(nodes < 0)),
         _names(ruler.other, np.setdiff1d(np.arange(len(ruler.other.skeleton)), nodes)),
         ruler.pairs.by_vertex,
+        (*_mesh_warnings(ruler.pairs), *_end_warnings(found)),
     )
+
+
+def _mesh_warnings(pairs: Correspondence) -> Iterator[str]:
+    """Yield sentences on meshes that the second file deforms differently."""
+    if not pairs.has_meshes:
+        yield "the second file has no vertices: the first one's are measured as its joints move them"
+    if pairs.unskinned:
+        yield f"{_listed(pairs.unskinned)} no skin in the second file: measured as the node of the mesh moves it"
+    if pairs.reweighted:
+        yield (
+            f"{_listed(pairs.reweighted)} other joints, weights or morph targets in the second file: "
+            "the first one's are measured"
+        )
+
+
+def _end_warnings(clips: Sequence[ClipDiff]) -> Iterator[str]:
+    """Yield a sentence on clips that end at another time."""
+    ends = [each for each in clips if abs(each.end_old - each.end_new) > END_TOLERANCE_S]
+    if ends:
+        first, more = ends[0], f" (and {len(ends) - 1} more)" if len(ends) > 1 else ""
+        yield (
+            f"clip '{first.name}' ends at {first.end_new:.6g} s instead of {first.end_old:.6g} s{more}: "
+            "as a loop it repeats at another time"
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names of meshes and the verb: "mesh 'body' has", "meshes 'body', 'hair' and 3 more have"."""
+    if len(names) == 1:
+        return f"mesh '{names[0]}' has"
+    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    return "meshes " + ", ".join(f"'{name}'" for name in names[:MAX_LISTED]) + f"{more} have"
 
 
 def _compare_clips(

@@ -12,6 +12,7 @@ from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.measure.error.metric import NOISE, ErrorMetric, dense_times
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, TimeAxis
+from tests.anim.measure.error.brute_force import brute
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened_fixture
 
@@ -113,6 +114,54 @@ def test_a_rest_pose_that_moved_is_motion_unless_a_track_says_so() -> None:
     assert ruler.error(constant, clip()).max_error == pytest.approx(0, abs=1e-12)
     assert ruler.error(clip(), clip()).max_error > 0.1
     assert ruler.pairs.by_vertex
+
+
+# Lost skins
+
+
+@pytest.mark.parametrize("is_quantized", [False, True])
+def test_a_mesh_that_lost_its_skin_is_carried_by_its_node(
+    skinned: tuple[Scene, Clip, Clip], is_quantized: bool
+) -> None:
+    """Players then show the mesh as its node places it, quantized or not: by brute force the same distance."""
+    scene, before, _ = skinned
+    kept = tuple(map(_quantized, scene.instances)) if is_quantized else scene.instances
+    bare = replace(scene, instances=tuple(replace(each, skin=None) for each in kept))
+    ruler, times = ErrorMetric(scene, bare), dense_times(before)
+    expected = brute(scene, before, before, times, other=bare)
+    assert expected > 0.1 * ruler.diagonal
+    assert ruler.error_at(before, before, times).max_error == pytest.approx(expected, rel=2e-3)
+    assert ruler.pairs.unskinned == tuple(each.mesh.name for each in scene.instances)
+    assert not ruler.pairs.by_vertex
+
+
+def test_one_lost_skin_is_not_replaced_by_another_meshs() -> None:
+    document = opened_fixture("biped")
+    scene, before = reader.scene(document), reader.clips(document)[0]
+    (body,) = scene.instances
+    node = len(scene.skeleton)
+    nodes = _with_root(scene.skeleton, "coat")
+    coat = replace(body, node=node, mesh=replace(body.mesh, name="coat"))
+    both = Scene(nodes, (body, coat))
+    ruler = ErrorMetric(both, Scene(nodes, (body, replace(coat, skin=None))))
+    assert ruler.pairs.unskinned == ("coat",)
+    assert ruler.error(before, before).place == "coat"
+
+
+def test_a_mesh_on_a_node_of_the_same_name_lost_its_skin_whatever_its_vertices(
+    skinned: tuple[Scene, Clip, Clip],
+) -> None:
+    scene, before, _ = skinned
+    bare = tuple(replace(_fewer(each), skin=None) for each in scene.instances)
+    ruler = ErrorMetric(scene, replace(scene, instances=bare))
+    assert ruler.pairs.unskinned
+    assert ruler.error(before, before).max_error > 0.1 * ruler.diagonal
+
+
+def test_without_any_mesh_joints_carry_the_first_scenes(skinned: tuple[Scene, Clip, Clip]) -> None:
+    scene, before, after = skinned
+    ruler = _same_as_plain(scene, replace(scene, instances=()), before, after)
+    assert not ruler.pairs.has_meshes
 
 
 # Rigid meshes
@@ -237,6 +286,17 @@ def _renumbered(scene: Scene, moved: Clip) -> tuple[Scene, Clip]:
     )
     tracks = tuple(replace(each, node=last - each.node) for each in moved.tracks if each.node is not None)
     return Scene(nodes, instances), Clip(moved.name, tracks)
+
+
+def _with_root(nodes: Skeleton, name: str) -> Skeleton:
+    """The nodes and one more, without a parent."""
+    return Skeleton(
+        (*nodes.names, name),
+        np.append(nodes.parents, -1),
+        np.vstack((nodes.translation, [[0, 0, 0]])),
+        np.vstack((nodes.rotation, [[0, 0, 0, 1]])),
+        np.vstack((nodes.scale, [[1, 1, 1]])),
+    )
 
 
 def _renamed(nodes: Skeleton, number: int) -> tuple[str, ...]:

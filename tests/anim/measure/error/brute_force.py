@@ -37,15 +37,19 @@ def points_on_a_node(points: list[list[float]], *, targets: list[list[list[float
     return Scene(skeleton([-1]), (MeshInstance(0, mesh, None, np.zeros(len(moved))),))
 
 
-def brute(scene: Scene, before: Clip, after: Clip, times: Floats) -> float:
-    """Return the largest distance of any vertex, or node where there are none, between two clips at these times."""
-    old, new = sample_pose(scene.skeleton, before, times), sample_pose(scene.skeleton, after, times)
-    worlds = [_fourth_row(world_matrices(scene.skeleton, each)) for each in (old, new)]
+def brute(scene: Scene, before: Clip, after: Clip, times: Floats, *, other: Scene | None = None) -> float:
+    """Return the largest distance of any vertex, or node where there are none, between two clips at these times.
+
+    other: the scene of the second clip, with the same vertices.
+    """
+    scenes = scene, other or scene
+    old, new = (sample_pose(one.skeleton, clip, times) for one, clip in zip(scenes, (before, after), strict=True))
+    worlds = [_fourth_row(world_matrices(one.skeleton, pose)) for one, pose in zip(scenes, (old, new), strict=True)]
     worst = 0.0
-    for instance in scene.instances:
+    for first, second in zip(*(one.instances for one in scenes), strict=True):
         for frame in range(len(times)):
-            a = _vertices(instance, worlds[0][frame], _weights(old, instance, frame))
-            b = _vertices(instance, worlds[1][frame], _weights(new, instance, frame))
+            a = _vertices(first, worlds[0][frame], _weights(old, first, frame))
+            b = _vertices(second, worlds[1][frame], _weights(new, second, frame))
             worst = max(worst, float(np.linalg.norm(a - b, axis=1).max(initial=0)))
     return worst
 
