@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from anim.gltf.document import Document
-from anim.gltf.meshopt import storage
+from anim.gltf.meshopt.storage import FilteredValues, attach_codes
 from anim.gltf.writing import reindex, writer
 from anim.model import Clip, Track
 from anim.optimization.options import Packing
 from anim.optimization.search.plan import Solution
+from anim.optimization.tracks.quantization import EncodedKeys
 
 FILTERS = {"quaternion": "QUATERNION", "exponent": "EXPONENTIAL"}  # meshopt's names of EncodedKeys.form
 KEY = "gltf-anim"
@@ -21,17 +22,17 @@ KEY = "gltf-anim"
 
 def write_solutions(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
     """Return the document with the clips indexed in `solutions` in place of its own; no unused accessors."""
-    clips = {i: each.clip for i, each in sorted(solutions.items())}
-    if not packing.extension:
-        return reindex.drop_placeholders(writer.replace_clips(document, clips))
-    filtered = {
-        id(track): storage.FilteredValues(FILTERS[stored.form], stored.codes)
-        for each in solutions.values()
-        for track, stored in zip(each.clip.tracks, each.stored, strict=True)
-        if stored.form in FILTERS
+    clips = {
+        i: replace(each.clip, tracks=tuple(map(_with_codes, each.clip.tracks, each.stored)))
+        for i, each in sorted(solutions.items())
     }
-    how = storage.compress_document(packing.extension, filtered)
-    return reindex.drop_placeholders(writer.replace_clips(document, clips, packing=how))
+    return reindex.drop_placeholders(writer.replace_clips(document, clips, extension=packing.extension))
+
+
+def _with_codes(track: Track, stored: EncodedKeys) -> Track:
+    if stored.form not in FILTERS:
+        return track
+    return attach_codes(track, FilteredValues(FILTERS[stored.form], stored.codes))
 
 
 def changed_clips(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) -> list[int]:

@@ -45,8 +45,8 @@ def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: R
 
 def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) -> None:
     """Warn of the vertices left out because only nodes move them."""
-    kept = {id(each) for each in bakeable_instances(scene, nodes=nodes)}
-    lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if id(each) not in kept]
+    kept = set(bakeable_instances(scene, nodes=nodes))
+    lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if each not in kept]
     if lost:
         count = sum(len(each.mesh.positions) for each in lost)
         voice.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import fixtures
-from anim.gltf.meshopt.storage import compress_document
 from anim.gltf.writing import writer
 from anim.model import Clip
 from tests.cli.conftest import Call, Find, Fixture
@@ -109,8 +108,9 @@ def test_bytes_of_compressed_keys_are_those_in_the_file(call: Call) -> None:
     values = np.zeros((5000, 3))
     values[:, 0] = np.arange(5000) // 100
     moving = track("translation", np.arange(5000) / 64, values)
-    packing = compress_document("EXT_meshopt_compression", {})
-    document = writer.replace_clips(opened(built("gltf_embedded")), {0: Clip("slide", (moving,))}, packing=packing)
+    document = writer.replace_clips(
+        opened(built("gltf_embedded")), {0: Clip("slide", (moving,))}, extension="EXT_meshopt_compression"
+    )
     data = glb_of(document)
     facts = only(call, data)
     assert facts["animation_data_bytes"] == 5000 * (4 + 12) > len(data)

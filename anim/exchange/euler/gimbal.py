@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from anim.arrays import Floats
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, Pivots
 from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, AxesConvention
-from anim.model import Clip, Interpolation, Track
+from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.sampling.track import sample
 
 NEAR_LOCK_RAD = np.radians(5.0)  # from lock: rates are amplified 23 times there
@@ -48,11 +49,8 @@ def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
     between them. Pre and post rotations are removed: the three angles are between them.
     Source: the Jacobian's singular values are 1, √(1 + s), √(1 − s), s the cosine of the distance from lock.
     """
-    turning = [(t.node, t) for t in clip.tracks if t.path == "rotation" and t.node is not None]
     rows = []
-    for times, nodes, values in _stack_angles(
-        [_check_times(motion, node, t) for node, t in turning if _can_lock(motion, node)]
-    ):
+    for times, nodes, values in _stack_angles(motion, clip):
         by_order = {order: euler.gimbal_distance(values, order=order) for order in ORDERS}
         nearest = {order: distance.min(axis=0) for order, distance in by_order.items()}
         for i, node in enumerate(nodes):
@@ -66,39 +64,39 @@ def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
     return tuple(row for _, row in sorted(rows, key=lambda each: each[0]))
 
 
-def _can_lock(motion: EulerMotion, node: int) -> bool:
-    return motion.nodes[node].order in ORDERS
+def _stack_angles(motion: EulerMotion, clip: Clip) -> Iterator[tuple[Floats, list[int], Floats]]:
+    """Yield tracks of one time axis: times (K,), node indices, rotations (K, G, 4) of angles, sized for CPU caches."""
+    groups: dict[tuple[TimeAxis, bool], list[tuple[int, Track]]] = {}
+    for track in clip.tracks:
+        if track.path == "rotation" and track.node is not None and motion.nodes[track.node].order in ORDERS:
+            groups.setdefault((track.time_axis, _keys_suffice(track)), []).append((track.node, track))
+    for (axis, at_keys), group in groups.items():
+        times = axis.times if at_keys else _check_times(axis.times)
+        count = max(MAX_BATCH_QUATERNIONS // len(times), 1)
+        for start in range(0, len(group), count):
+            part = group[start : start + count]
+            turns = [
+                _without_pivots(motion.nodes[node].pivots, track.values if at_keys else sample(track, times))
+                for node, track in part
+            ]
+            yield times, [node for node, _ in part], np.stack(turns, axis=1)
 
 
-def _check_times(motion: EulerMotion, node: int, track: Track) -> tuple[int, Floats, Floats]:
-    """Node, times and rotations of its angles: at the track's keys, or with SAMPLES_PER_INTERVAL more per interval."""
-    if len(track.times) > SUFFICIENT_KEYS or track.interpolation is Interpolation.STEP or len(track.times) == 1:
-        return node, track.times, _stats_of_angles(motion.nodes[node].pivots, track.values)
+def _keys_suffice(track: Track) -> bool:
+    return len(track.times) > SUFFICIENT_KEYS or track.interpolation is Interpolation.STEP or len(track.times) == 1
+
+
+def _check_times(keys: Floats) -> Floats:
+    """Keys with SAMPLES_PER_INTERVAL more times per interval."""
     shares = np.arange(SAMPLES_PER_INTERVAL + 1) / (SAMPLES_PER_INTERVAL + 1)
-    pieces = track.times[:-1, None] + np.diff(track.times)[:, None] * shares
-    at = np.append(pieces.ravel(), track.times[-1])
-    return node, at, _stats_of_angles(motion.nodes[node].pivots, sample(track, at))
+    return np.append((keys[:-1, None] + np.diff(keys)[:, None] * shares).ravel(), keys[-1])
 
 
-def _stats_of_angles(pivots: Pivots, q: Floats) -> Floats:
+def _without_pivots(pivots: Pivots, q: Floats) -> Floats:
     """R (K, 4) from Rpre · R · Rpost⁻¹."""
     if pivots is NO_PIVOTS:
         return q
     return quaternion.multiply(quaternion.multiply(quaternion.conjugate(pivots.pre_rotation), q), pivots.post_rotation)
-
-
-def _stack_angles(tracks: list[tuple[int, Floats, Floats]]) -> list[tuple[Floats, list[int], Floats]]:
-    """Tracks on one time axis, stacked: times (K,), node indices, values (K, G, 4), sized for CPU caches."""
-    groups: dict[int, list[tuple[int, Floats, Floats]]] = {}
-    for track in tracks:
-        groups.setdefault(id(track[1]), []).append(track)
-    stacked = []
-    for group in groups.values():
-        count = max(MAX_BATCH_QUATERNIONS // len(group[0][1]), 1)
-        for start in range(0, len(group), count):
-            part = group[start : start + count]
-            stacked.append((part[0][1], [node for node, _, _ in part], np.stack([v for _, _, v in part], axis=1)))
-    return stacked
 
 
 def _row(

@@ -1,10 +1,9 @@
-"""Storage options for new animation data: plain, or compressed by a meshopt extension."""
+"""Values in the form of meshopt's filters."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from anim.errors import RangeError, ShapeError
 from anim.gltf.meshopt import codec
 from anim.gltf.reading.accessors import denormalized
 from anim.gltf.validation.buffer_layout import MESHOPT
+from anim.model import Track
 
 STRIDES = {"QUATERNION": 8}  # bytes per encoded element; the others have 4 per component
 
@@ -35,31 +35,26 @@ class FilteredValues:
             raise ShapeError(f"{len(self.codes)} bytes of codes are no whole number of elements ({self.name})")
 
 
-@dataclass(frozen=True, slots=True)
-class AccessorStorage:
-    """Storage of new accessors.
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class EncodedTrack(Track):
+    """Track with its values in the form of a meshopt filter too: see `attach_codes`."""
 
-    extension: meshopt extension of compressed views; empty for plain views only.
-    filtered: codes by id() of the track with the decoded values; other tracks are stored unfiltered.
-    """
+    codes: FilteredValues
 
-    extension: str = ""
-    filtered: Mapping[int, FilteredValues] = field(default_factory=lambda: MappingProxyType({}))
-
-
-UNCOMPRESSED = AccessorStorage()
+    def __init__(self, *, codes: FilteredValues, **of_track: Any) -> None:
+        Track.__init__(self, **of_track)  # super() finds no class with slots
+        object.__setattr__(self, "codes", codes)
 
 
-def compress_document(extension: str, filtered: Mapping[int, FilteredValues]) -> AccessorStorage:
-    """Return storage that compresses views by a meshopt extension where that is smaller.
+def attach_codes(track: Track, codes: FilteredValues) -> EncodedTrack:
+    """Return the track with codes of its values, which the writer stores in place of them."""
+    return EncodedTrack(**{each.name: getattr(track, each.name) for each in fields(Track)}, codes=codes)
 
-    extension: "EXT_meshopt_compression" or "KHR_meshopt_compression".
-    filtered: by id(track), for the tracks (those objects, which must stay alive) given to `replace_clips`.
-    Raises RangeError for another extension.
-    """
-    if extension not in MESHOPT:
+
+def check_extension(extension: str) -> None:
+    """Raise RangeError unless `extension` is one of meshopt's, or empty for none."""
+    if extension and extension not in MESHOPT:
         raise RangeError(f"extension '{extension}' is not known (expected {' or '.join(MESHOPT)})")
-    return AccessorStorage(extension, filtered)
 
 
 def decompress_document(filtered: FilteredValues, columns: int) -> Floats:

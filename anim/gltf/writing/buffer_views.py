@@ -10,7 +10,6 @@ import numpy as np
 from anim.gltf.document import Json
 from anim.gltf.io import json_text
 from anim.gltf.meshopt import codec, stream_order
-from anim.gltf.meshopt.storage import AccessorStorage
 from anim.gltf.writing.encoding import AccessorData
 
 TYPICAL_OFFSET_BYTES = 10_000  # typical offset or length, to estimate the cost of its digits
@@ -56,12 +55,12 @@ class _Stream:
     members: tuple[int, ...]
 
 
-def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> Layout:
+def lay_out_views(contents: Sequence[AccessorData], extension: str, overhead: int) -> Layout:
     """Return the layout of all contents: one plain view, and compressed views where they are smaller.
 
     overhead: bytes of the first compressed view besides its own JSON and data.
     """
-    streams = _choose_streams(contents, packing, overhead) if packing.extension else []
+    streams = _choose_streams(contents, extension, overhead) if extension else []
     apart = {i for stream in streams for i in stream.members}
     rest = tuple(i for i in range(len(contents)) if i not in apart)
     if rest:
@@ -76,13 +75,13 @@ def lay_out_views(contents: Sequence[AccessorData], packing: AccessorStorage, ov
     return Layout(tuple(each.view for each in streams), tuple(places[i] for i in range(len(contents))))
 
 
-def _choose_streams(contents: Sequence[AccessorData], packing: AccessorStorage, overhead: int) -> list[_Stream]:
+def _choose_streams(contents: Sequence[AccessorData], extension: str, overhead: int) -> list[_Stream]:
     """The compressed streams that give the fewest bytes of data and JSON in total."""
     groups: dict[tuple[str, int], list[int]] = {}
     for i, content in enumerate(contents):
         groups.setdefault(_kind(content), []).append(i)
-    streams = [s for members in groups.values() for s in _streams(contents, members, packing.extension)]
-    gains = [stream.view.length - _price(stream.view, packing.extension) for stream in streams]
+    streams = [s for members in groups.values() for s in _streams(contents, members, extension)]
+    gains = [stream.view.length - _price(stream.view, extension) for stream in streams]
     good = [stream for stream, gain in zip(streams, gains, strict=True) if gain > 0]
     # If nothing remains for the plain view, its JSON is saved too.
     candidates = [([], 0), (good, sum(gain for gain in gains if gain > 0) - overhead)]

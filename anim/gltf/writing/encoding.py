@@ -12,7 +12,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError, ShapeError
 from anim.gltf.document import Json
 from anim.gltf.meshopt import storage
-from anim.gltf.meshopt.storage import FilteredValues
+from anim.gltf.meshopt.storage import EncodedTrack, FilteredValues
 from anim.gltf.reading.accessors import DTYPES, FLOAT, denormalized
 from anim.gltf.validation.buffer_layout import COMPONENTS
 from anim.model import AccessorFormat, Interpolation, TimeAxis, Track
@@ -73,17 +73,18 @@ def times(axis: TimeAxis) -> AccessorData:
     return AccessorData(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
 
 
-def values(track: Track, filtered: FilteredValues | None = None) -> AccessorData:
+def values(track: Track) -> AccessorData:
     """Return the values, with tangents for CUBICSPLINE in glTF's order: in, value, out per key.
 
-    Integers of the track's storage type if they reproduce every value, else float32.
-    filtered: codes of the same values. Raises ShapeError if they decode to different values.
+    Integers of the track's storage type if they reproduce every value, else float32. Raises ShapeError if the codes of
+    an `EncodedTrack` decode to different values.
     """
     rows = track.values
     if track.interpolation is Interpolation.CUBICSPLINE and track.in_tangents is not None:
         assert track.out_tangents is not None
         rows = np.stack((track.in_tangents, rows, track.out_tangents), axis=1)
     element = ELEMENTS.get(track.path) or track.storage.element or BY_WIDTH.get(rows.shape[-1], "SCALAR")
+    filtered = track.codes if isinstance(track, EncodedTrack) else None
     storage = track.storage if filtered is None else DECODED[filtered.name]
     stored = _quantize(rows, storage)
     integers = stored.dtype.kind != "f"

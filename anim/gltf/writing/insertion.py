@@ -8,7 +8,6 @@ from types import MappingProxyType
 
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.meshopt import fallback_buffer
-from anim.gltf.meshopt.storage import UNCOMPRESSED, AccessorStorage
 from anim.gltf.writing import buffer_views, compaction, references
 from anim.gltf.writing.buffers import rebuild_buffers
 from anim.gltf.writing.encoding import AccessorData
@@ -26,7 +25,7 @@ def insert_accessors(
     animations: Sequence[Json],
     replaced: Set[int],
     contents: Sequence[AccessorData],
-    packing: AccessorStorage = UNCOMPRESSED,
+    extension: str = "",
     sources: Sequence[Set[int]] = (),
 ) -> Document:
     """Return the document with these animations and the accessors of `contents`.
@@ -40,8 +39,8 @@ def insert_accessors(
     freed = _accessors_of(document.json, replaced) | placeholders(document.json)
     freed = freed - outside.accessors - _referenced_accessors(animations)
     unused = compaction.unused_views(document, freed, outside) | empty_views(document.json, outside)
-    layout = buffer_views.lay_out_views(contents, packing, fallback_buffer.overhead(document.json, packing.extension))
-    store = rebuild_buffers(document, freed, unused, outside, layout.views, packing.extension)
+    layout = buffer_views.lay_out_views(contents, extension, fallback_buffer.overhead(document.json, extension))
+    store = rebuild_buffers(document, freed, unused, outside, layout.views, extension)
 
     view_slots = IndexAllocator(len(old_views), unused, [0] * len(store.views))
     views = [compaction.relocate_view(view, store.shift) for view in old_views]
@@ -67,7 +66,7 @@ def insert_accessors(
     _set_list(json, "accessors", accessors)
     _set_list(json, "bufferViews", views)
     _set_list(json, "buffers", store.described)
-    fallback_buffer.name_extensions(json, document.json, packing.extension)
+    fallback_buffer.name_extensions(json, document.json, extension)
     return Document(json, store.buffers, document.chunks, document.indent)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,19 +10,20 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import AnimError, RangeError
 from anim.gltf.document import Document
+from anim.gltf.meshopt.storage import EncodedTrack
 from anim.gltf.reading import reader
 from anim.model import Clip, Track
 
 MAX_LENGTH_ERROR = 0.00769  # deviation of a length from 1, by the Khronos validator: the rounding of normalized bytes
 
 
-def normalize_new(document: Document, clips: Mapping[int, Clip], *, skipped: Container[int]) -> Mapping[int, Clip]:
+def normalize_new(document: Document, clips: Mapping[int, Clip]) -> Mapping[int, Clip]:
     """Return the clips, by index, with unit rotations; tracks that were not unit in the file are kept.
 
-    skipped: ids of tracks to keep unchanged. Raises RangeError for a rotation of length 0.
+    `EncodedTrack`s are kept too. Raises RangeError for a rotation of length 0.
     """
     off = {
-        i: [n for n, track in enumerate(clip.tracks) if id(track) not in skipped and _has_non_unit_keys(track)]
+        i: [n for n, t in enumerate(clip.tracks) if not isinstance(t, EncodedTrack) and _has_non_unit_keys(t)]
         for i, clip in clips.items()
     }
     if not any(off.values()):

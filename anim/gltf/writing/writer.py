@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError, check_type
 from anim.gltf.document import Document, Json, copy_json, json_array
-from anim.gltf.meshopt.storage import UNCOMPRESSED, AccessorStorage, FilteredValues
+from anim.gltf.meshopt.storage import check_extension
 from anim.gltf.reading import reader
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import channel_targets
@@ -26,9 +26,7 @@ from anim.model import Clip, Interpolation, TimeAxis, Track
 _SAMPLER_KEYS = ("input", "output", "interpolation")
 
 
-def replace_clips(
-    document: Document, clips: Mapping[int, Clip], *, packing: AccessorStorage = UNCOMPRESSED
-) -> Document:
+def replace_clips(document: Document, clips: Mapping[int, Clip], *, extension: str = "") -> Document:
     """Return a new document with the animations in `clips` replaced, by index; others are unchanged.
 
     Its JSON is a copy, which can be edited without changing the old document. Without clips the document itself is
@@ -38,7 +36,8 @@ def replace_clips(
     get one, and their nodes TRS instead of a `matrix`. Names, extras and extensions of animations, channels and
     samplers are kept; name, extras and index of an accessor if its keys replace those of exactly one.
     Rotation keys are normalized, with their tangents, unless the track was not unit in the document before.
-    packing: storage of the new values, see `AccessorStorage`.
+    extension: meshopt extension that compresses new views where that is smaller, empty for none. An `EncodedTrack` is
+    stored as its codes.
     Raises RangeError for keys equal in float32, a zero rotation, no remaining channel, or a weight count other than the
     node's morph targets; NotFoundError for an unknown animation or node.
     replace_clips(document, {0: clip}): the first animation becomes `clip`
@@ -51,13 +50,14 @@ def replace_clips(
     clips = {_check_index(number, count): clip for number, clip in clips.items()}
     for clip in clips.values():
         check_type(clip, Clip, "a clip")
-    clips = unit_rotations.normalize_new(document, clips, skipped=packing.filtered)
-    pool = _ContentPool(packing.filtered)
+    check_extension(extension)
+    clips = unit_rotations.normalize_new(document, clips)
+    pool = _ContentPool()
     animations = [
         _replace_animation(document.json, animation, clips[i], i, pool) if i in clips else animation
         for i, animation in enumerate(json_array(document.json, "animations"))
     ]
-    written = insert_accessors(document, animations, set(clips), pool.contents, packing, pool.sources)
+    written = insert_accessors(document, animations, set(clips), pool.contents, extension, pool.sources)
     return replace(written, json=copy_json(expand_matrices(written.json)[0]))
 
 
@@ -80,10 +80,9 @@ def _check_index(number: object, count: int) -> int:
 class _ContentPool:
     """Contents of new accessors, without duplicates; samplers refer to them by PendingIndex."""
 
-    def __init__(self, filtered: Mapping[int, FilteredValues]) -> None:
+    def __init__(self) -> None:
         self.contents: list[AccessorData] = []
         self.sources: list[set[int]] = []  # for each content, the accessors of the samplers that it replaces
-        self._filtered = filtered
         self._indices: dict[AccessorData, int] = {}
         self._time_axes: dict[TimeAxis, int] = {}
 
@@ -99,7 +98,7 @@ class _ContentPool:
 
     def values(self, track: Track) -> int:
         """The pending index of a track's values."""
-        return self._add(encoding.values(track, self._filtered.get(id(track))))
+        return self._add(encoding.values(track))
 
     def time_axis(self, track: Track) -> int:
         """The pending index of a track's times; those of a shared axis are encoded once."""

@@ -166,10 +166,10 @@ class _SceneMatcher:
     def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         """What carries a skinned surface: joints of the skin that has most of them, the others by their nodes."""
         plain = self.by_nodes(surface)
-        skins = {id(each.skin): each.skin for each in self._new if each.skin is not None}
+        skins = dict.fromkeys(each.skin for each in self._new if each.skin is not None)
         if partner is not None and partner.skin is not None:
-            skins = {id(partner.skin): partner.skin}
-        matched = [(new, self._joints(skin, new)) for new in skins.values()]
+            skins = {partner.skin: None}
+        matched = [(new, self._joints(skin, new)) for new in skins]
         if not matched:
             return plain
         new, joints = max(matched, key=lambda each: int((each[1] >= 0).sum()))

@@ -111,5 +111,5 @@ def _children(skeleton: Skeleton) -> dict[int, list[int]]:
 
 def _skins(scene: Scene) -> list[Ints]:
     """Joints (J,) of the skins that are used, each once, in order."""
-    unique = {id(i.skin): i.skin.joints for i in scene.instances if i.skin is not None}
-    return list(unique.values())
+    skins = dict.fromkeys(each.skin for each in scene.instances if each.skin is not None)
+    return [skin.joints for skin in skins]

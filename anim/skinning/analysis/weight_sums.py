@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from anim.model import MeshInstance
+from anim.model import Mesh, MeshInstance
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +38,16 @@ def unnormalized_weights(instances: Iterable[MeshInstance]) -> list[WeightSums]:
 
     Sums that differ from 1 only by rounding don't count: 8 bits leave up to 4/255 of four weights.
     """
-    found: dict[int, WeightSums] = {}
+    found: dict[Mesh, WeightSums] = {}
     for instance in instances:
         mesh = instance.mesh
         sums = mesh.weight_sums
-        if instance.skin is None or sums is None or id(mesh) in found:
+        if instance.skin is None or sums is None or mesh in found:
             continue
         some = sums[(sums != 1) & (sums > 0)]
         least, most = (float(some.min()), float(some.max())) if len(some) else (0.0, 0.0)
         name = mesh.name or f"node {instance.node}"
-        found[id(mesh)] = WeightSums(name, int((sums != 1).sum()), int((sums == 0).sum()), least, most)
+        found[mesh] = WeightSums(name, int((sums != 1).sum()), int((sums == 0).sum()), least, most)
     return list(found.values())
 
 

@@ -17,7 +17,7 @@ import pytest
 from anim.arrays import Floats
 from anim.gltf.document import Document, Json
 from anim.gltf.meshopt import storage
-from anim.gltf.meshopt.storage import FilteredValues
+from anim.gltf.meshopt.storage import EncodedTrack, FilteredValues, attach_codes
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import FLOAT32, AccessorFormat, Clip, Interpolation, Track
@@ -30,22 +30,23 @@ ROOT = Path(__file__).resolve().parents[4]
 ACCESSORS = ROOT / "tests" / "threejs" / "accessors.mjs"
 
 
-def quaternions(track: Track, bits: int = 12) -> tuple[Track, FilteredValues]:
-    """Return a rotation as the quaternion filter keeps it, and the filter's codes."""
+def quaternions(track: Track, bits: int = 12) -> EncodedTrack:
+    """Return a rotation as the quaternion filter keeps it, with the filter's codes."""
     unit = track.values / np.linalg.norm(track.values, axis=1, keepdims=True)
     filtered = FilteredValues("QUATERNION", meshopt.encode_filter_quat(unit.astype(np.float32), 8, bits).tobytes())
-    return replace(track, values=storage.decompress_document(filtered, 4), storage=INT16), filtered
+    return attach_codes(replace(track, values=storage.decompress_document(filtered, 4), storage=INT16), filtered)
 
 
-def exponents(track: Track, power: int = -12) -> tuple[Track, FilteredValues]:
-    """Return a track in multiples of 2 ** power, tangents too, and the exponential filter's codes of it."""
+def exponents(track: Track, power: int = -12) -> EncodedTrack:
+    """Return a track in multiples of 2 ** power, tangents too, with the exponential filter's codes of it."""
     parts = [part for part in (track.in_tangents, track.values, track.out_tangents) if part is not None]
     whole = [np.rint(part * 2.0**-power) for part in parts]
     filtered = FilteredValues("EXPONENTIAL", exponent_codes(np.stack(whole, axis=1), power))
     kept = [each * 2.0**power for each in whole]
     if len(kept) == 1:
-        return replace(track, values=kept[0], storage=FLOAT32), filtered
-    return replace(track, in_tangents=kept[0], values=kept[1], out_tangents=kept[2], storage=FLOAT32), filtered
+        return attach_codes(replace(track, values=kept[0], storage=FLOAT32), filtered)
+    made = track.with_keys(track.time_axis, kept[1], kept[0], kept[2])
+    return attach_codes(replace(made, storage=FLOAT32), filtered)
 
 
 def exponent_codes(mantissa: Floats, power: int) -> bytes:
@@ -53,25 +54,22 @@ def exponent_codes(mantissa: Floats, power: int) -> bytes:
     return ((mantissa.astype(np.int64) & 0xFFFFFF) | ((power & 255) << 24)).astype("<u4").tobytes()
 
 
-def filtered_clips(clips: Sequence[Clip]) -> tuple[dict[int, Clip], dict[int, FilteredValues]]:
-    """Return all clips by number with rotations and vectors as the filters keep them, and the codes by id(track)."""
-    codes: dict[int, FilteredValues] = {}
+def filtered_clips(clips: Sequence[Clip]) -> dict[int, Clip]:
+    """Return all clips by number with rotations and vectors as the filters keep them."""
     new = {}
     for number, clip in enumerate(clips):
         tracks = []
         for track in clip.tracks:
             spline = track.interpolation is Interpolation.CUBICSPLINE
-            made, filtered = quaternions(track) if track.path == "rotation" and not spline else exponents(track)
-            codes[id(made)] = filtered
-            tracks.append(made)
+            tracks.append(quaternions(track) if track.path == "rotation" and not spline else exponents(track))
         new[number] = Clip(clip.name, tuple(tracks))
-    return new, codes
+    return new
 
 
 def packed(document: Document, extension: str) -> tuple[dict[int, Clip], Document]:
     """Return the clips of a document as filters keep them, and the document with those."""
-    clips, codes = filtered_clips(reader.clips(document))
-    return clips, writer.replace_clips(document, clips, packing=storage.compress_document(extension, codes))
+    clips = filtered_clips(reader.clips(document))
+    return clips, writer.replace_clips(document, clips, extension=extension)
 
 
 def streams(document: Document, extension: str) -> list[Json]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from anim.errors import RangeError, ShapeError
 from anim.gltf.meshopt import storage
-from anim.gltf.meshopt.storage import FilteredValues
+from anim.gltf.meshopt.storage import FilteredValues, attach_codes
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.writing import writer
@@ -52,17 +52,15 @@ def test_any_codes_come_back_as_what_they_decode_to(extension: str, data: st.Dat
     bits = data.draw(st.integers(4, 16))
     numbers = st.lists(st.floats(-1, 1, width=32), min_size=4 * count, max_size=4 * count)
     unit = np.reshape(data.draw(numbers), (count, 4)) + np.array((0, 0, 0, 3))
-    turn, turn_codes = quaternions(track("rotation", np.arange(count), unit), bits)
+    turn = quaternions(track("rotation", np.arange(count), unit), bits)
     power = data.draw(st.integers(-60, 60))
     whole = data.draw(st.lists(st.integers(-(2**23) + 1, 2**23 - 1), min_size=3 * count, max_size=3 * count))
     mantissa = np.reshape(whole, (count, 3)).astype(float)
     move = track("translation", np.arange(count), mantissa * 2.0**power)
     filler = [exponents(track("scale", np.arange(200), np.ones((200, 3)), node=node)) for node in (0, 1)]
-    codes = {id(turn): turn_codes, id(move): FilteredValues("EXPONENTIAL", exponent_codes(mantissa, power))}
-    codes |= {id(each): filtered for each, filtered in filler}
-    clip = Clip("walk", (turn, move, *(each for each, _ in filler)))
-    packing = storage.compress_document(extension, codes)
-    after = opened(glb_of(writer.replace_clips(of_nodes(2), {0: clip}, packing=packing)))
+    codes = FilteredValues("EXPONENTIAL", exponent_codes(mantissa, power))
+    clip = Clip("walk", (turn, attach_codes(move, codes), *filler))
+    after = opened(glb_of(writer.replace_clips(of_nodes(2), {0: clip}, extension=extension)))
     assert "EXPONENTIAL" in [stream.get("filter") for stream in streams(after, extension)]
     found = {each.target: each for each in reader.clips(after)[0].tracks}
     for each in clip.tracks:
@@ -97,26 +95,25 @@ def test_the_validator_finds_no_error(extension: str, asset: Find) -> None:
 
 
 def test_codes_of_other_values_are_refused() -> None:
-    made, filtered = quaternions(track("rotation", TIMES, SMOOTH))
-    wrong = replace(made, values=made.values[::-1])
-    packing = storage.compress_document(EXTENSIONS[0], {id(wrong): filtered})
+    made = quaternions(track("rotation", TIMES, SMOOTH))
+    wrong = attach_codes(made.with_keys(made.time_axis, made.values[::-1]), made.codes)
     with pytest.raises(ShapeError, match="rotation of node 0: values are not what their QUATERNION codes decode to"):
-        writer.replace_clips(of_nodes(1), {0: Clip("walk", (wrong,))}, packing=packing)
+        writer.replace_clips(of_nodes(1), {0: Clip("walk", (wrong,))}, extension=EXTENSIONS[0])
 
 
 @pytest.mark.parametrize("path", ["rotation", "translation"])
 def test_codes_of_another_length_or_kind_are_refused(path: str) -> None:
     values = SMOOTH if path == "rotation" else SMOOTH[:, :3]
-    made, filtered = exponents(track(path, TIMES, values))
-    for wrong in (FilteredValues("EXPONENTIAL", filtered.codes[:-4]), FilteredValues("QUATERNION", filtered.codes)):
-        packing = storage.compress_document(EXTENSIONS[0], {id(made): wrong})
+    made = exponents(track(path, TIMES, values))
+    codes = made.codes.codes
+    for wrong in (FilteredValues("EXPONENTIAL", codes[:-4]), FilteredValues("QUATERNION", codes)):
         with pytest.raises(ShapeError, match="codes decode to"):
-            writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, packing=packing)
+            writer.replace_clips(of_nodes(1), {0: Clip("walk", (attach_codes(made, wrong),))}, extension=EXTENSIONS[0])
 
 
 def test_what_a_packing_can_not_be() -> None:
     with pytest.raises(RangeError, match="extension 'ACME_zip'"):
-        storage.compress_document("ACME_zip", {})
+        writer.replace_clips(of_nodes(1), {0: Clip("walk", ())}, extension="ACME_zip")
     with pytest.raises(RangeError, match="filter 'OCTAHEDRAL'"):
         FilteredValues("OCTAHEDRAL", bytes(8))
     for name, codes in (("QUATERNION", bytes(12)), ("EXPONENTIAL", bytes(3)), ("EXPONENTIAL", b"")):
@@ -126,11 +123,11 @@ def test_what_a_packing_can_not_be() -> None:
 
 def test_decoded_quaternions_by_closed_form() -> None:
     """The three smallest of the components from their codes, the largest from the unit length."""
-    made, filtered = quaternions(track("rotation", TIMES, SMOOTH), 16)
+    made = quaternions(track("rotation", TIMES, SMOOTH), 16)
     unit = SMOOTH / np.linalg.norm(SMOOTH, axis=1, keepdims=True)
-    np.testing.assert_allclose(storage.decompress_document(filtered, 4), unit, atol=1e-4)
-    rows = np.frombuffer(filtered.codes, "<i2").reshape(-1, 4).astype(float)
+    np.testing.assert_allclose(storage.decompress_document(made.codes, 4), unit, atol=1e-4)
+    rows = np.frombuffer(made.codes.codes, "<i2").reshape(-1, 4).astype(float)
     three = rows[:, :3] / np.sqrt(2) / (rows[:, 3:].astype(int) | 3)
     largest = np.sqrt(1 - (three**2).sum(axis=1))
-    np.testing.assert_allclose(storage.decompress_document(filtered, 4)[:, 3], largest, atol=1.01 / 32767)
+    np.testing.assert_allclose(storage.decompress_document(made.codes, 4)[:, 3], largest, atol=1.01 / 32767)
     assert AccessorFormat(5122, normalized=True) == made.storage

@@ -8,7 +8,6 @@ import meshopt
 import numpy as np
 import pytest
 
-from anim.gltf.meshopt import storage
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Clip
@@ -108,30 +107,26 @@ def test_packing_never_costs_bytes(name: str, extension: str, asset: Find) -> No
 def test_calm_tracks_lie_together_where_that_is_smaller() -> None:
     """Tracks of noise and at rest in turn: sorted, the codec's groups are all the one or all the other."""
     calm = np.tile((0.0, 0.0, 0.0, 1.0), (10, 1))
-    tracks, codes = [], {}
+    tracks = []
     for node in range(40):
         wild = RNG.normal(size=(10, 4))
-        made, filtered = quaternions(
-            track("rotation", np.arange(10), wild if node % 2 else calm + 1e-3 * node, node=node)
-        )
-        tracks.append(made)
-        codes[id(made)] = filtered
-    packing = storage.compress_document(EXTENSIONS[0], codes)
-    after = writer.replace_clips(of_nodes(40), {0: Clip("walk", tuple(tracks))}, packing=packing)
-    rows = np.frombuffer(b"".join(codes[id(each)].codes for each in tracks), np.uint8).reshape(-1, 8)
+        rows = wild if node % 2 else calm + 1e-3 * node
+        tracks.append(quaternions(track("rotation", np.arange(10), rows, node=node)))
+    after = writer.replace_clips(of_nodes(40), {0: Clip("walk", tuple(tracks))}, extension=EXTENSIONS[0])
+    stored = np.frombuffer(b"".join(each.codes.codes for each in tracks), np.uint8).reshape(-1, 8)
     (stream,) = streams(after, EXTENSIONS[0])
-    assert stream["byteLength"] < len(meshopt.encode_gltf_buffer(rows, "ATTRIBUTES", 0))
+    assert stream["byteLength"] < len(meshopt.encode_gltf_buffer(stored, "ATTRIBUTES", 0))
     check_clips({0: Clip("walk", tuple(tracks))}, after)
 
 
 def test_equal_values_share_an_accessor_and_take_the_codes_of_either() -> None:
     bare = track("translation", TIMES, np.rint(64 * SMOOTH[:, :3]) / 64 + 0.0)
-    made, filtered = exponents(replace(bare, node=1), -6)
+    made = exponents(replace(bare, node=1), -6)
     np.testing.assert_array_equal(made.values, bare.values)
     after = writer.replace_clips(
         of_nodes(2),
         {0: Clip("walk", (bare, made))},
-        packing=storage.compress_document(EXTENSIONS[0], {id(made): filtered}),
+        extension=EXTENSIONS[0],
     )
     assert [channel["sampler"] for channel in after.json["animations"][0]["channels"]] == [0, 0]
     assert [stream["filter"] for stream in streams(after, EXTENSIONS[0])] == ["EXPONENTIAL"]
@@ -139,16 +134,14 @@ def test_equal_values_share_an_accessor_and_take_the_codes_of_either() -> None:
 
 def test_splines_are_filtered_with_their_tangents() -> None:
     rows = SMOOTH[:, :3]
-    made, filtered = exponents(track("translation", TIMES, rows, CUBICSPLINE, tangents=(rows - 1, rows + 1)))
-    packing = storage.compress_document(EXTENSIONS[0], {id(made): filtered})
-    after = writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, packing=packing)
+    made = exponents(track("translation", TIMES, rows, CUBICSPLINE, tangents=(rows - 1, rows + 1)))
+    after = writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, extension=EXTENSIONS[0])
     assert [stream["count"] for stream in streams(after, EXTENSIONS[0])] == [3 * KEYS]
     check_clips({0: Clip("walk", (made,))}, after)
 
 
 def test_negative_zeros_do_no_harm() -> None:
-    made, filtered = exponents(track("translation", TIMES, -1e-9 * np.ones((KEYS, 3))))
+    made = exponents(track("translation", TIMES, -1e-9 * np.ones((KEYS, 3))))
     assert np.signbit(made.values).all()
-    packing = storage.compress_document(EXTENSIONS[0], {id(made): filtered})
-    after = writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, packing=packing)
+    after = writer.replace_clips(of_nodes(1), {0: Clip("walk", (made,))}, extension=EXTENSIONS[0])
     assert not reader.clips(after)[0].tracks[0].values.any()

@@ -10,7 +10,6 @@ import numpy as np
 
 import fixtures
 from anim.gltf.document import Document
-from anim.gltf.meshopt import storage
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Clip, TimeAxis, Track
@@ -64,8 +63,7 @@ def as_float32(clip: Clip) -> Clip:
 
 def packed_walk(extension: str, *, keys: int = KEYS) -> tuple[Clip, Document]:
     """Return a clip of one rotation and one translation, and a file of one node that it is packed into."""
-    turn, turn_codes = quaternions(track("rotation", TIMES[:keys], SMOOTH[:keys]))
-    move, move_codes = exponents(track("translation", TIMES[:keys], SMOOTH[:keys, :3]))
+    turn = quaternions(track("rotation", TIMES[:keys], SMOOTH[:keys]))
+    move = exponents(track("translation", TIMES[:keys], SMOOTH[:keys, :3]))
     clip = Clip("walk", (turn, move))
-    packing = storage.compress_document(extension, {id(turn): turn_codes, id(move): move_codes})
-    return clip, writer.replace_clips(of_nodes(1), {0: clip}, packing=packing)
+    return clip, writer.replace_clips(of_nodes(1), {0: clip}, extension=extension)
