@@ -122,6 +122,7 @@ COMMANDS = {
             "gltf-anim plot walk.glb walk.svg --compare walk30.glb --path rotation",
             "gltf-anim plot --ease smoothstep --ease 'cubic-bezier(.2,0,0,1)' eases.svg",
             "gltf-anim plot --through 0,0.9,0.2,1 --tangents catmull-rom --tangents natural curve.svg",
+            "gltf-anim plot --integrators --omega 20 --step 1/60 stability.png",
         ),
     ),
     "collapse": CommandInfo(

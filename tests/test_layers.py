@@ -82,7 +82,8 @@ PUBLIC = {
     "optimization.search": "plan",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (
-        "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations tangent_plot track_plot "
+        "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations stability_plot tangent_plot "
+        "track_plot "
         "track_selection"
     ),
     "simulation.particles": "emission forces obstacles simulate solver",

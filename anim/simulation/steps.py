@@ -30,10 +30,10 @@ class Steps:
     warm_up_s: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (("step", self.step_s), ("duration", self.duration_s), ("warm-up", self.warm_up_s)):
+        for name, value in (("step", self.step_s), ("duration", self.duration_s), ("warm_up", self.warm_up_s)):
             check_number(value, name)
             if not math.isfinite(value) or value < 0 or (value == 0 and name == "step"):
-                raise RangeError(f"{name} is {value:g} s (expected {'above 0' if name == 'step' else 'at least 0'})")
+                raise RangeError(f"`{name}` is {value:g} s (expected {'above 0' if name == 'step' else 'at least 0'})")
         if (self.duration_s + self.warm_up_s) / self.step_s > MAX_STEPS:
             raise RangeError(f"more than {MAX_STEPS} steps of {self.step_s:g} s")
 

@@ -17,13 +17,20 @@ from anim.operations.selection import Selection
 from anim.show.plots import track_plot as tracks
 from anim.show.plots.easing_plot import easing_plot
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
+from anim.show.plots.stability_plot import stability_plot
 from anim.show.plots.tangent_plot import tangent_plot as curves_through
 from anim.show.plots.track_selection import TrackSelection, select_tracks
 from anim.show.plots.track_selection import compare as compared
+from anim.simulation.comparison import compare_integrators
+from anim.simulation.mass_spring import oscillator
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
+from cli.options.simulation import parse_seconds
 from cli.text import Reporter, format_bytes, plural
+
+NUM_PERIODS = 10  # of the oscillator
+MAX_STEPS = 100_000  # of it
 
 
 class Format(StrEnum):
@@ -65,6 +72,17 @@ def command(
             "--tangents", metavar="NAME", help="Tangent rule for --through, or linear or step; may be repeated."
         ),
     ] = None,
+    integrators: Annotated[
+        bool, typer.Option("--integrators", help="Draw an oscillator by every time integrator, instead of tracks.")
+    ] = False,
+    omega: Annotated[
+        float | None,
+        typer.Option("--omega", metavar="N", help="Angular frequency in rad/s, for --integrators.", show_default="20"),
+    ] = None,
+    step: Annotated[
+        str | None,
+        typer.Option("--step", metavar="S", help="Time step in seconds, for --integrators.", show_default="1/60"),
+    ] = None,
     format: Annotated[
         Format | None,
         typer.Option("--format", help="Output format (default: from OUT's extension, else png).", show_default=False),
@@ -95,19 +113,25 @@ def command(
     and the difference.
 
     --ease draws easings side by side: f(t), its slope f′(t), and dots at equal time steps. --through draws curves
-    through values, one second apart unless given as time:value, with their overshoot and continuity. The same input and
-    options give the same bytes. Requires matplotlib: pip install 'gltf-anim[plot]'.
+    through values, one second apart unless given as time:value, with their overshoot and continuity. --integrators
+    draws one oscillator by every time integrator: its energy over ten periods, the amplitude gained per step against
+    ω·h, and the motion in phase space. The same input and options give the same bytes. Requires matplotlib: pip install
+    'gltf-anim[plot]'.
     """
     voice = Reporter(quiet)
     if ease and through is not None:
         raise UsageError("--ease and --through exclude each other")
     if tangents and through is None:
         raise UsageError("--tangents needs --through (expected values for the curve to go through)")
-    alone = bool(ease) or through is not None
+    if integrators and (ease or through is not None):
+        raise UsageError("--integrators excludes --ease and --through")
+    if not integrators and (omega is not None or step is not None):
+        raise UsageError("--omega and --step need --integrators")
+    alone = bool(ease) or through is not None or integrators
     if alone and (compare is not None or clip or node or path or euler or components):
         raise UsageError(
             "--clip, --node, --path, --compare, --euler and --components need tracks, "
-            "but --ease and --through read no file"
+            "but --ease, --through and --integrators read no file"
         )
     if euler is not None and components:
         raise UsageError("--euler and --components exclude each other")
@@ -117,6 +141,8 @@ def command(
     documents.check_binary(output)
     if ease:
         picture = easing_plot([parse(name) for name in ease], kind=kind)
+    elif integrators:
+        picture = _oscillator(20.0 if omega is None else omega, step or "1/60", kind)
     elif through is not None:
         times, values = _keys(through)
         picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
@@ -125,6 +151,20 @@ def command(
     documents.write_bytes([np.frombuffer(picture, np.uint8)], output)
     if output != documents.PIPE:
         voice.info(f"{output}  {format_bytes(len(picture))}")
+
+
+def _oscillator(omega: float, step: str, kind: str) -> bytes:
+    """Picture of an undamped oscillator, ten periods long, by all integrators."""
+    seconds = parse_seconds(step, "--step")
+    system = oscillator(omega)
+    x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    duration = max(NUM_PERIODS * 2 * np.pi / omega, 2 * seconds)
+    if duration / seconds > MAX_STEPS:
+        raise UsageError(
+            f"--step {step} is {duration / seconds:.3g} steps in {NUM_PERIODS} periods (limit {MAX_STEPS})"
+        )
+    runs = compare_integrators(system, x, np.zeros_like(x), step=seconds, duration=duration)
+    return stability_plot(runs, omega_h=omega * seconds, step=seconds, springs=system.springs, kind=kind)
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:

@@ -131,6 +131,17 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
     assert {"catmull-rom", "0.5", "2 s"} <= set(timed)
 
 
+def test_integrators_of_an_oscillator(call: Call) -> None:
+    said = words(call("plot", "--integrators", "--omega", "20", "--step", "1/9", "--format", "svg").product())
+    title = next(each for each in said if each.startswith("Step 1/9 s, ω·h = 2.22: "))
+    assert title.endswith("diverge; rk4, implicit-euler do not")
+    assert any(each.startswith("Largest stable steps of this system: verlet 1/10 s, rk4 1/7.071 s") for each in said)
+    assert {"verlet", "rk4", "explicit-euler", "this run"} <= set(said) | {each.split("\n")[0] for each in said}
+    calm = words(call("plot", "--integrators", "--format", "svg").product())
+    assert any(each.startswith("Step 1/60 s, ω·h = 0.33: explicit-euler (2.20 s) diverges") for each in calm)
+    assert call("plot", "--integrators").product() == call("plot", "--integrators").product()
+
+
 @pytest.mark.parametrize(
     ("args", "code", "words"),
     [
@@ -149,6 +160,11 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
         (["--ease", "linear", "--through", "0,1", "out.png"], 2, "exclude each other"),
         (["--ease", "linear", "--clip", "x", "out.png"], 2, "read no file"),
         (["--tangents", "natural", "biped.glb", "out.png"], 2, "--tangents needs --through"),
+        (["--omega", "3", "biped.glb", "out.png"], 2, "need --integrators"),
+        (["--integrators", "--ease", "linear", "out.png"], 2, "excludes --ease"),
+        (["--integrators", "--omega", "0", "out.png"], 2, "--omega is 0 rad/s"),
+        (["--integrators", "--step", "0", "out.png"], 2, "--step is '0'"),
+        (["--integrators", "--step", "1e-9", "out.png"], 2, "limit 100000"),
         (["--through", "0,x", "out.png"], 2, "can't read '0,x'"),
         (["--through", "0:1,2", "out.png"], 2, "all of them with a time or none"),
         (["--through", "1", "out.png"], 2, "two or more values"),

@@ -49,7 +49,7 @@ class Emitter:
         for name in ("speed_variation", "lifetime_variation"):
             _check(name, getattr(self, name), 0.0, 1.0)
         if not np.isfinite(self.direction).all() or not np.any(self.direction):
-            raise RangeError(f"direction is {self.direction} (expected a vector that isn't 0)")
+            raise RangeError(f"`direction` is {self.direction} (expected a vector that isn't 0)")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,4 +184,4 @@ def _unit(vectors: Floats) -> Floats:
 def _check(name: str, value: float, least: float, most: float) -> None:
     if not (np.isfinite(value) and least <= value <= most):
         limit = f"{least:g} to {most:g}" if np.isfinite(most) else f"at least {least:g}"
-        raise RangeError(f"{name} is {value:g} (expected {limit})")
+        raise RangeError(f"`{name}` is {value:g} (expected {limit})")

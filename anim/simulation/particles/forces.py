@@ -36,9 +36,11 @@ class Forces:
         for name in ("linear_drag", "quadratic_drag", "turbulence", "turbulence_size"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0) or (name == "turbulence_size" and value == 0):
-                raise RangeError(f"{name} is {value:g} (expected a number of at least 0)")
+                raise RangeError(f"`{name}` is {value:g} (expected a number of at least 0)")
         if (any(self.wind) or self.turbulence) and not (self.linear_drag or self.quadratic_drag):
-            raise RangeError("wind moves particles by drag, and drag is 0", help="give a drag, such as 1 per second")
+            raise RangeError(
+                "`wind` and `turbulence` act by drag, and drag is 0", help="give a drag, such as 1 per second"
+            )
 
     @property
     def is_constant(self) -> bool:

@@ -31,9 +31,9 @@ class Contact:
 
     def __post_init__(self) -> None:
         if not 0 <= self.restitution <= 1:
-            raise RangeError(f"restitution is {self.restitution:g} (expected 0 to 1)")
+            raise RangeError(f"`restitution` is {self.restitution:g} (expected 0 to 1)")
         if not (np.isfinite(self.friction) and self.friction >= 0):
-            raise RangeError(f"friction is {self.friction:g} (expected a number of at least 0)")
+            raise RangeError(f"`friction` is {self.friction:g} (expected a number of at least 0)")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,209 @@
+"""Plot of one system by every integrator: energy over time, gain per step against ω·h, and the motion itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.show.plots.figure import FAINT, HAIR, INK, SMALL, SOFT, TEXT, TITLE, Figure, separate_labels, style
+from anim.simulation.comparison import IntegratorRun
+from anim.simulation.integrators import INTEGRATORS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLORS = {
+    "explicit-euler": "#d55e00",
+    "symplectic-euler": "#e69f00",
+    "verlet": "#009e73",
+    "velocity-verlet": "#56b4e9",
+    "rk4": "#0072b2",
+    "implicit-euler": "#7a7f87",
+}
+SHOWN = ("explicit-euler", "verlet", "implicit-euler")  # drawn as poses: gains, keeps, loses energy
+THICK, THIN = 2.0, 1.2
+NUM_POSES = 9
+VERLET_LIMIT = 2.0  # ω·h
+MAX_OMEGA_H, MIN_GAIN, MAX_GAIN = 3.4, 0.5, 1.6
+WIDTH, LEFT, HEAD, GAP = 11.6, 0.65, 0.95, 0.6  # inches
+CURVES, LOG, CHANGE, POSES = 6.3, 1.75, 1.45, 2.6
+LABELS = 1.75  # of the curves, at their right
+
+
+def stability_plot(runs: Sequence[IntegratorRun], *, omega_h: float, step: float, springs: Ints, kind: str) -> bytes:
+    """Return the plot as the bytes of a PNG or SVG file. Its title states the result of these runs.
+
+    runs: of all integrators. omega_h: of the stiffest part. springs: (S, 2) pairs of points to draw; with one spring
+    the motion is drawn in phase space. Raises UnsupportedError where matplotlib is not installed.
+    """
+    with style(kind):
+        sheet = Figure(WIDTH, HEAD + LOG + 0.25 + CHANGE + GAP + 0.3 + POSES + 0.25)
+        sheet.text(LEFT - 0.4, 0.35, _title(runs, omega_h, step), fontsize=TITLE + 2, weight="bold")
+        sheet.text(LEFT - 0.4, 0.6, _subtitle(omega_h, step), color=SOFT)
+        _draw_energy(sheet, runs)
+        _draw_gain(sheet, omega_h)
+        top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
+        width = (WIDTH - LEFT - 0.2) / len(SHOWN)
+        shown = [run for name in SHOWN for run in runs if run.name == name]
+        span = _span(shown, springs)
+        for i, run in enumerate(shown):
+            _draw_motion(sheet, run, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
+        return sheet.render(kind)
+
+
+def _title(runs: Sequence[IntegratorRun], omega_h: float, step: float) -> str:
+    gone = [f"{run.name} ({run.diverged_at:.2f} s)" for run in runs if run.diverged_at is not None]
+    stable = [run.name for run in runs if run.diverged_at is None]
+    result = f"{', '.join(gone)} diverge{'s' if len(gone) == 1 else ''}" if gone else "no integrator diverges"
+    if gone and stable:
+        result += f"; {', '.join(stable)} {'does' if len(stable) == 1 else 'do'} not" if len(stable) < len(gone) else ""
+    return f"Step {_seconds(step)}, ω·h = {omega_h:.2f}: {result}"
+
+
+def _subtitle(omega_h: float, step: float) -> str:
+    if omega_h <= 0:
+        return ""
+    limits = [f"{name} {_seconds(step * INTEGRATORS[name].limit / omega_h)}" for name in ("verlet", "rk4")]
+    return f"Largest stable steps of this system: {', '.join(limits)}; implicit-euler any, explicit-euler none."
+
+
+def _seconds(step: float) -> str:
+    return f"1/{1 / step:.4g} s" if step < 1 else f"{step:.3g} s"
+
+
+def _draw_energy(sheet: Figure, runs: Sequence[IntegratorRun]) -> None:
+    width = CURVES - LEFT - LABELS
+    high = sheet.panel(LEFT, HEAD, width, LOG)
+    low = sheet.panel(LEFT, HEAD + LOG + 0.25, width, CHANGE)
+    end = max(float(run.times[-1]) for run in runs) or 1.0
+    for run in runs:
+        look = {"color": COLORS[run.name], "linewidth": THICK if run.name in SHOWN else THIN}
+        factor = run.energies / run.energies[0]
+        high.semilogy(run.times, np.maximum(factor, 1e-3), **look)
+        low.plot(run.times, 100 * (factor - 1), **look)
+        if run.diverged_at is not None:
+            high.plot(run.times[-1:], factor[-1:], "x", color=COLORS[run.name], markersize=8, markeredgewidth=2)
+    high.set_ylim(0.3, 2e6)
+    high.set_xlim(0, end)
+    high.set_xticklabels([])
+    low.set_xlim(0, end)
+    changes = [0.0, *(c for run in runs if _keeps_energy(run) for c in 110 * (run.energies / run.energies[0] - 1))]
+    low.set_ylim(max(min(-12, *changes), -60), min(max(6, *changes), 60))
+    high.minorticks_off()
+    low.axhline(0, color=HAIR, linewidth=0.8)
+    low.set_xlabel("seconds", fontsize=SMALL, color=SOFT)
+    sheet.text(LEFT, HEAD - 0.1, "Energy, factor of the start", fontsize=TEXT)
+    sheet.text(LEFT, HEAD + LOG + 0.2, "the same, % gained or lost", fontsize=SMALL, color=SOFT)
+    _draw_labels(sheet, runs, LEFT + width + 0.12)
+
+
+def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float) -> None:
+    """The name and result of each run, in the order of its energy, beside the curves."""
+    order = sorted(runs, key=lambda run: -(1e9 - run.diverged_at if run.diverged_at else run.energy_change))
+    heights = separate_labels([HEAD + 0.1 + 0.44 * i for i in range(len(order))], 0.44, HEAD, HEAD + LOG + CHANGE)
+    for run, y in zip(order, heights, strict=True):
+        sheet.text(x, y, run.name, color=COLORS[run.name], weight="bold")
+        words = f"diverges at {run.diverged_at:.2f} s" if run.diverged_at is not None else _change(run)
+        sheet.text(x, y + 0.15, words, fontsize=SMALL, color=SOFT)
+
+
+def _keeps_energy(run: IntegratorRun) -> bool:
+    """True for a run of a symplectic integrator that doesn't diverge: its energy oscillates about the start's."""
+    return run.diverged_at is None and INTEGRATORS[run.name].limit == VERLET_LIMIT
+
+
+def _change(run: IntegratorRun) -> str:
+    if _keeps_energy(run):
+        change = 100 * (run.energies / run.energies[0] - 1)
+        words = f"within {change.min():+.2g} … {change.max():+.2g} %"
+    else:
+        words = f"{100 * run.energy_change:+.3g} % after {run.times[-1]:.2g} s"
+    return words.replace("-", "−")
+
+
+def _draw_gain(sheet: Figure, omega_h: float) -> None:
+    left = CURVES + 0.45
+    height = LOG + 0.25 + CHANGE
+    axes = sheet.panel(left, HEAD, WIDTH - left - 0.25, height)
+    w = np.linspace(1e-3, MAX_OMEGA_H, 500)
+    for name, method in INTEGRATORS.items():
+        if name != "velocity-verlet":  # the same curve as verlet
+            dotted = ":" if name == "symplectic-euler" else "-"
+            axes.plot(
+                w, method.gain(w), color=COLORS[name], linewidth=THICK if name in SHOWN else THIN, linestyle=dotted
+            )
+    axes.axhspan(1, MAX_GAIN, color="#d55e00", alpha=0.06, linewidth=0)
+    axes.text(0.06, MAX_GAIN - 0.06, "grows", fontsize=SMALL, color="#a33")
+    axes.text(0.06, MIN_GAIN + 0.03, "fades", fontsize=SMALL, color=SOFT)
+    for limit, words in ((2.0, "2: verlet, symplectic-euler"), (float(2 * np.sqrt(2)), "2√2: rk4")):
+        axes.axvline(limit, color=HAIR, linewidth=0.8)
+        axes.text(
+            limit - 0.03, MIN_GAIN + 0.03, words, fontsize=SMALL, rotation=90, ha="right", va="bottom", color=SOFT
+        )
+    if omega_h <= MAX_OMEGA_H:
+        axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
+        for name in SHOWN:
+            gain = float(INTEGRATORS[name].gain(np.array(omega_h)))
+            axes.plot([omega_h], [min(gain, MAX_GAIN)], "o", color=COLORS[name], markersize=5, clip_on=False)
+        axes.text(omega_h + 0.05, MIN_GAIN + 0.1, f"this run\nω·h = {omega_h:.2f}", fontsize=SMALL)
+    axes.set_xlim(0, MAX_OMEGA_H)
+    axes.set_ylim(MIN_GAIN, MAX_GAIN)
+    axes.set_xlabel("ω·h: angular frequency of the stiffest part × step", fontsize=SMALL, color=SOFT)
+    sheet.text(left, HEAD - 0.1, "Amplitude gained per step", fontsize=TEXT)
+
+
+def _span(runs: Sequence[IntegratorRun], springs: Ints) -> tuple[Floats, float]:
+    """Center and half size of the motion's pictures, from the start and what stays near it."""
+    drawn = [_drawn(run, springs)[:1] for run in runs] + [
+        _drawn(run, springs) for run in runs if run.diverged_at is None
+    ]
+    points = np.concatenate([each.reshape(-1, 2) for each in drawn])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (low + high) / 2, 0.6 * float((high - low).max()) or 1.0
+
+
+def _drawn(run: IntegratorRun, springs: Ints) -> Floats:
+    """Points (n, P, 2) to draw: x and y, or in phase space position and velocity of the one moving point."""
+    if len(springs) > 1:
+        return run.positions[..., :2]
+    omega = np.abs(run.velocities[:, -1, 0]).max() / max(float(np.abs(run.positions[:, -1, 0]).max()), 1e-300)
+    return np.stack([run.positions[:, -1:, 0], run.velocities[:, -1:, 0] / max(float(omega), 1e-300)], axis=-1)
+
+
+def _draw_motion(
+    sheet: Figure, run: IntegratorRun, springs: Ints, place: tuple[float, float, float], span: tuple[Floats, float]
+) -> None:
+    x, y, width = place
+    points = _drawn(run, springs)
+    last = len(run.times) - 1
+    phase = len(springs) <= 1
+    until = min(last, int(np.searchsorted(run.times, 1.0)) if not phase else last)
+    what = "phase space: velocity against position" if phase else f"0 to {run.times[until]:.2f} s"
+    wide = sheet.text(x, y - 0.12, run.name, color=COLORS[run.name], weight="bold")
+    sheet.text(x + wide + 0.1, y - 0.12, what, fontsize=SMALL, color=SOFT)
+    axes = sheet.panel(x, y, width, POSES)
+    axes.grid(visible=False)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for side in axes.spines.values():
+        side.set_visible(True)
+        side.set_color(FAINT)
+    center, half = span
+    ratio = width / POSES
+    axes.set_xlim(center[0] - half * max(ratio, 1), center[0] + half * max(ratio, 1))
+    axes.set_ylim(center[1] - half * max(1 / ratio, 1), center[1] + half * max(1 / ratio, 1))
+    if phase:
+        axes.plot(points[:, 0, 0], points[:, 0, 1], color=COLORS[run.name], linewidth=0.9)
+        axes.plot(points[:1, 0, 0], points[:1, 0, 1], "o", color=INK, markersize=4)
+        return
+    _draw_poses(axes, points[np.linspace(0, until, NUM_POSES).astype(int)], springs, COLORS[run.name])
+
+
+def _draw_poses(axes: Axes, poses: Floats, springs: Ints, color: str) -> None:
+    for i, pose in enumerate(poses):
+        alpha = 0.15 + 0.85 * i / (NUM_POSES - 1)
+        for a, b in springs.tolist():
+            axes.plot(pose[[a, b], 0], pose[[a, b], 1], "-o", color=color, markersize=2, linewidth=1, alpha=alpha)
