@@ -101,7 +101,7 @@ class MassSpring:
         total = np.bincount(self.springs.ravel(), np.repeat(self.stiffness, 2), minlength=len(self.masses))
         return float(np.sqrt((2 * total * self._inverse_masses).max(initial=0.0)))
 
-    def strain(self, x: Floats) -> Floats:
+    def elongation(self, x: Floats) -> Floats:
         """Return the relative elongation (S,) of all springs."""
         return np.asarray(self._directions(x)[1] / np.maximum(self.rest_lengths, MIN_LENGTH_M) - 1)
 

@@ -97,7 +97,7 @@ def test_a_hanging_rope_is_stretched_by_the_weight_below() -> None:
     damped = MassSpring(system.masses, system.springs, system.rest_lengths, system.stiffness, np.full(7, 5.0), drag=2.0)
     *_, (end, _) = integrate(damped, "implicit-euler", x, np.zeros_like(x), 0.02, 3000)
     expected = 0.1 * G * np.arange(7, 0, -1) / 200.0 / 0.2
-    np.testing.assert_allclose(damped.strain(end), expected, rtol=1e-5)
+    np.testing.assert_allclose(damped.elongation(end), expected, rtol=1e-5)
 
 
 def test_the_bound_of_frequencies_holds_and_is_near_for_a_rope() -> None:
