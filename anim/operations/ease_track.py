@@ -11,7 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.easing.table import EASINGS
 from anim.curves.fitting.easing_fit import fit_segments
-from anim.curves.fitting.rotation_fit import ANGLE_STEP_RAD, RotationFit, rotation_segments_for
+from anim.curves.fitting.rotation_fit import ANGLE_STEP_RAD, RotationFit, fit_rotation
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track, ValueKind
 from anim.operations.cubic_segments import JUMP_S, CubicSegments, join_segments
@@ -124,7 +124,7 @@ def _rotation_segments(track: Track, left: Ints, easing: Easing, tolerance: floa
     shared = np.ceil(angle / ANGLE_STEP_RAD)
     parts = []
     for group in (np.flatnonzero(shared == each) for each in sorted(set(shared.tolist()))):
-        fitted = rotation_segments_for(easing, float(angle[group].max()), tolerance)
+        fitted = fit_rotation(easing, float(angle[group].max()), tolerance)
         parts.append(_ease_rotations(track, q, left[group], turn[group], easing.value(fitted.u), fitted))
     return parts
 

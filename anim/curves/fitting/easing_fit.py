@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import CubicSegment, Easing, Function, evaluate
+from anim.curves.easing.function import CubicSegment, Easing, Function
 from anim.curves.fitting.hermite_fit import SAMPLES, SAMPLING_SAFETY_FACTOR, FitTarget, fit_end_slopes, fit_errors
 from anim.curves.fitting.subdivision import subdivide
 
@@ -55,12 +55,6 @@ def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) ->
         return np.asarray(np.abs(f(u) - chord).max(axis=1) * SAMPLING_SAFETY_FACTOR)
 
     return np.array(subdivide(chord_errors, (0.0, *breakpoints, 1.0), tolerance))
-
-
-def fit_error(f: Function, pieces: tuple[CubicSegment, ...]) -> float:
-    """Return the greatest sampled |error| of cubics that cover 0 … 1 against f."""
-    u = np.concatenate([p.start + (p.end - p.start) * SAMPLES for p in pieces])
-    return float(np.abs(evaluate(pieces, u) - f(u)).max() * SAMPLING_SAFETY_FACTOR)
 
 
 def _difference(fitted: Floats, true: Floats) -> Floats:

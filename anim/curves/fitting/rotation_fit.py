@@ -11,52 +11,9 @@ from anim.arrays import Floats, freeze
 from anim.curves.easing.function import Easing
 from anim.curves.fitting.hermite_fit import FitTarget, fit_end_slopes, fit_errors
 from anim.curves.fitting.subdivision import subdivide
-from anim.errors import RangeError
-from anim.maths import quaternion as quat
 
 MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, the chord of unit quaternions gets short
 ANGLE_STEP_RAD = np.pi / 32  # fits are shared by angles up to the next multiple
-
-
-@dataclass(frozen=True, slots=True)
-class RotationKeys:
-    """Keys of a rotation: u (K,) from 0 to 1, unit quaternions (K, 4) in one hemisphere, tangents (K, 4) per u.
-
-    The tangents before the first and after the last key are 0. error: greatest angle in rad from the exact one.
-    """
-
-    u: Floats
-    rotations: Floats
-    in_tangents: Floats
-    out_tangents: Floats
-    error: float
-
-
-def fit_rotation(q0: Floats, q1: Floats, easing: Easing, tolerance: float) -> RotationKeys:
-    """Return the fewest CUBICSPLINE keys that rotate q0 to q1 (4,) along the shorter arc with an easing.
-
-    tolerance: the greatest angle from the eased slerp, radians, 1e-7 or more; the result's `error` is the actual one.
-    No segment rotates by more than 120°. The result's signs follow q0's, so its last key may be −q1. Tangents are
-    ½ q ⊗ ω, ω = axis · θ · e′(u); divide them by the segment's duration.
-    Raises RangeError for a tolerance out of range, or for steps, which need a STEP sampler.
-    90° with smoothstep at 0.1° → 4 keys
-    """
-    if easing.stepped:
-        raise RangeError(f"'{easing.name}' jumps (expected a continuous ease; write STEP keys)")
-    turn = quat.rotation_vector(quat.multiply(quat.conjugate(q0), q1))
-    angle = float(np.sqrt(turn @ turn))
-    ends, rate0, rate1, error = fit_rotation_segments(
-        easing, float(np.ceil(angle / ANGLE_STEP_RAD)) * ANGLE_STEP_RAD, tolerance
-    )
-    if angle > 0:
-        error = _error(easing, angle, ends, rate0, rate1)
-    if error > tolerance:
-        ends, rate0, rate1, error = fit_rotation_segments(easing, angle, tolerance)
-    rotations = quat.multiply(q0, quat.from_rotation_vector(easing.value(ends)[:, None] * turn))
-    rotations[0], rotations[-1] = q0, q1 if quat.dot(q0, q1) >= 0 else -q1
-    in_tangents = quat.derivative(rotations, np.append(0.0, rate1)[:, None] * turn)
-    out_tangents = quat.derivative(rotations, np.append(rate0, 0.0)[:, None] * turn)
-    return RotationKeys(ends, rotations, in_tangents, out_tangents, error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,19 +29,21 @@ class RotationFit:
     error: float
 
 
-def rotation_segments_for(easing: Easing, angle: float, tolerance: float) -> RotationFit:
-    """Return the fewest cubics for a rotation by `angle` radians; angles are rounded up to multiples of π/32."""
-    rounded = float(np.ceil(angle / ANGLE_STEP_RAD)) * ANGLE_STEP_RAD
-    return RotationFit(*fit_rotation_segments(easing, rounded, tolerance))
+def fit_rotation(easing: Easing, angle: float, tolerance: float) -> RotationFit:
+    """Return the fewest cubics for a rotation by `angle` radians; angles are rounded up to multiples of π/32.
+
+    tolerance: the greatest angle from the eased slerp, radians, 1e-7 or more. No segment rotates by more than 120°.
+    90° with smoothstep at 0.1° → 4 keys
+    """
+    return _fit(easing, float(np.ceil(angle / ANGLE_STEP_RAD)) * ANGLE_STEP_RAD, tolerance)
 
 
 @lru_cache(maxsize=1024)
-def fit_rotation_segments(easing: Easing, angle: float, tolerance: float) -> tuple[Floats, Floats, Floats, float]:
-    """Return key u (K,), start and end rates e′ (K − 1,) of the segments, and the greatest error as an angle."""
+def _fit(easing: Easing, angle: float, tolerance: float) -> RotationFit:
     edges = (0.0, *easing.breakpoints, 1.0)
     if angle == 0:
         none = np.zeros(len(edges) - 1)
-        return freeze(np.array(edges)), none, none, 0.0
+        return RotationFit(freeze(np.array(edges)), none, none, 0.0)
     path = _circle(easing, angle)
 
     def turn_errors(a: Floats, b: Floats) -> Floats:
@@ -93,11 +52,7 @@ def fit_rotation_segments(easing: Easing, angle: float, tolerance: float) -> tup
 
     ends = freeze(np.array(subdivide(turn_errors, edges, tolerance)))
     rate0, rate1 = fit_end_slopes(path, ends[:-1], ends[1:])
-    return ends, rate0, rate1, _error(easing, angle, ends, rate0, rate1)
-
-
-def _error(easing: Easing, angle: float, ends: Floats, rate0: Floats, rate1: Floats) -> float:
-    return float(fit_errors(_circle(easing, angle), ends[:-1], ends[1:], (rate0, rate1)).max())
+    return RotationFit(ends, rate0, rate1, float(fit_errors(path, ends[:-1], ends[1:], (rate0, rate1)).max()))
 
 
 def _circle(easing: Easing, angle: float) -> FitTarget:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -11,11 +12,13 @@ from scipy.spatial.transform import Rotation
 from anim.arrays import Floats
 from anim.curves.easing.function import evaluate
 from anim.curves.easing.table import EASINGS, parse
-from anim.curves.fitting.easing_fit import fit_cubic, fit_error, fit_linear, fit_segments
-from anim.curves.fitting.rotation_fit import RotationKeys, fit_rotation
+from anim.curves.fitting.easing_fit import fit_cubic, fit_linear, fit_segments
 from anim.errors import RangeError
 from anim.maths import hermite
 from anim.maths import quaternion as quat
+from anim.model import Track
+from anim.operations.cubic_segments import CubicSegments
+from anim.operations.ease_track import ease_segments
 
 MANY = np.linspace(0, 1, 1001)
 CURVED = [name for name, ease in EASINGS.items() if ease.exact is None]
@@ -46,7 +49,6 @@ def test_cubics_stay_within_the_tolerance(name: str) -> None:
     u = np.concatenate([p.start + (p.end - p.start) * MANY for p in pieces])
     worst = np.abs(evaluate(pieces, u) - ease.value(u)).max()
     assert worst <= 1e-3
-    assert fit_error(ease.value, pieces) == pytest.approx(worst, rel=0.03)
     assert [p.start for p in pieces[1:]] == [p.end for p in pieces[:-1]]
     assert set(ease.breakpoints) <= {p.end for p in pieces}
 
@@ -119,15 +121,18 @@ def turned(degrees: float) -> Floats:
     return np.asarray(-(Rotation.from_quat(START) * Rotation.from_rotvec(np.radians(degrees) * AXIS)).as_quat())
 
 
-def worst_angle(keys: RotationKeys, name: str, degrees: float) -> float:
+def turn(degrees: float, name: str, tolerance: float) -> CubicSegments:
+    """Return the eased segments from START to `turned(degrees)`, within a second."""
+    track = Track(0, "rotation", "LINEAR", [0, 1], np.stack((START, turned(degrees))))
+    return ease_segments(track, np.ones(1, bool), EASINGS[name], 1e-3, tolerance)
+
+
+def worst_angle(found: CubicSegments, name: str, degrees: float) -> float:
     """Return the greatest angle in radians between what a player shows and the eased turn made with scipy."""
     worst = 0.0
-    ease = EASINGS[name]
-    for k in range(len(keys.u) - 1):
-        h = keys.u[k + 1] - keys.u[k]
-        ends = keys.rotations[k], h * keys.out_tangents[k], keys.rotations[k + 1], h * keys.in_tangents[k + 1]
-        shown = Rotation.from_quat(hermite.evaluate(MANY[:, None], *ends))
-        angle = np.radians(degrees) * ease.value(keys.u[k] + h * MANY)
+    for a, b, v0, v1, m0, m1 in zip(*(getattr(found, each.name) for each in fields(found)), strict=True):
+        shown = Rotation.from_quat(hermite.evaluate(MANY[:, None], v0, (b - a) * m0, v1, (b - a) * m1))
+        angle = np.radians(degrees) * EASINGS[name].value(a + (b - a) * MANY)
         true = Rotation.from_quat(START) * Rotation.from_rotvec(angle[:, None] * AXIS)
         worst = max(worst, float((shown.inv() * true).magnitude().max()))
     return worst
@@ -137,37 +142,28 @@ def worst_angle(keys: RotationKeys, name: str, degrees: float) -> float:
 @pytest.mark.parametrize("name", ["linear", "smoothstep", "ease", "back-out", "bounce-out", "elastic-out", "circ-in"])
 def test_turns_stay_within_the_tolerance(name: str, degrees: float) -> None:
     tolerance = np.radians(0.1)
-    keys = fit_rotation(START, turned(degrees), EASINGS[name], tolerance)
-    worst = worst_angle(keys, name, degrees)
-    assert worst <= keys.error + 1e-9 <= tolerance + 1e-9
-    np.testing.assert_allclose(np.linalg.norm(keys.rotations, axis=1), 1, atol=1e-15)
-    assert (quat.dot(keys.rotations[:-1], keys.rotations[1:]) > 0).all()
-    steps = quat.angle_between(keys.rotations[:-1], keys.rotations[1:])
+    found = turn(degrees, name, tolerance)
+    assert worst_angle(found, name, degrees) <= tolerance + 1e-9
+    for ends in (found.value0, found.value1):
+        np.testing.assert_allclose(np.linalg.norm(ends, axis=1), 1, atol=1e-15)
+    assert (quat.dot(found.value0, found.value1) > 0).all()
+    steps = quat.angle_between(found.value0, found.value1)
     assert np.degrees(steps.max()) <= 120 + 1e-6
 
 
 @pytest.mark.parametrize(("degrees", "tolerance", "pieces"), [(90, 0.1, 3), (90, 0.01, 4), (179, 0.1, 4)])
 def test_smoothstep_turn_needs_few_pieces(degrees: float, tolerance: float, pieces: int) -> None:
-    keys = fit_rotation(START, turned(degrees), EASINGS["smoothstep"], np.radians(tolerance))
-    assert len(keys.u) - 1 <= pieces
+    assert len(turn(degrees, "smoothstep", np.radians(tolerance)).start) <= pieces
 
 
-def test_turn_starts_and_ends_where_asked() -> None:
-    keys = fit_rotation(START, turned(70), EASINGS["sine-in-out"], 1e-3)
-    np.testing.assert_array_equal(keys.rotations[0], START)
-    np.testing.assert_array_equal(keys.rotations[-1], -turned(70))
-    assert not keys.in_tangents[0].any()
-    assert not keys.out_tangents[-1].any()
+def test_turn_starts_and_ends_at_the_keys() -> None:
+    found = turn(70, "sine-in-out", 1e-3)
+    np.testing.assert_allclose(found.value0[0], START, atol=1e-15)
+    np.testing.assert_allclose(found.value1[-1], -turned(70), atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["linear", "ease", "circ-out", "bounce-in"])
 def test_no_turn(name: str) -> None:
-    keys = fit_rotation(START, -START, EASINGS[name], 1e-3)
-    np.testing.assert_allclose(keys.rotations, np.tile(START, (len(keys.u), 1)), atol=1e-15)
-    np.testing.assert_allclose(keys.out_tangents, 0, atol=1e-12)
-    assert keys.error < 1e-12
-
-
-def test_steps_do_not_turn() -> None:
-    with pytest.raises(RangeError, match="jumps"):
-        fit_rotation(START, turned(10), parse("steps(3)"), 1e-3)
+    found = turn(0, name, 1e-3)
+    np.testing.assert_allclose(found.value0, np.tile(START, (len(found.start), 1)), atol=1e-15)
+    np.testing.assert_allclose(found.slope0, 0, atol=1e-12)
