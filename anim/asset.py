@@ -16,7 +16,7 @@ from anim.arguments import check_binary_file, check_function, file_path, glob_li
 from anim.arrays import Bytes
 from anim.clip_list import Clips
 from anim.errors import AnimError, RangeError, ShapeError
-from anim.files import links
+from anim.files import resolver
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
 from anim.gltf.document import Document, json_array
@@ -172,7 +172,7 @@ def _bytes_of(file: RawBytes | BinaryIO) -> Bytes:
 
 def _check_ending(path: str) -> None:
     ending = PurePath(path).suffix.lower()
-    target = links.resolve_links(Path(path))
+    target = resolver.resolve_links(Path(path))
     if ending in container.SUFFIXES or (target.exists() and not target.is_file() and not target.is_dir()):  # /dev/null
         return
     near = difflib.get_close_matches(ending, container.SUFFIXES, n=1)

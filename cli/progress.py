@@ -1,9 +1,11 @@
-"""Progress bar on stderr for work that takes longer than a second; none if stderr is no terminal."""
+"""Progress of long work on stderr, if that is a terminal: a bar, and a line while kernels compile."""
 
 from __future__ import annotations
 
 import sys
 import time
+
+from cli.text import Reporter
 
 PATIENCE = 1.0  # s, before the bar is shown
 PAUSE = 0.1  # s, between two updates
@@ -43,3 +45,13 @@ class Progress:
             sys.stderr.write("\r" + " " * self._length + "\r")
             sys.stderr.flush()
             self._length = 0
+
+
+def announce_compiling(voice: Reporter) -> None:
+    """Report the compilation of kernels to a terminal if the user's cache folder has none yet."""
+    if voice.quiet or sys.stderr is None or not sys.stderr.isatty():
+        return
+    from anim.skinning.kernels.jit import is_compiled
+
+    if not is_compiled():
+        voice.info("compiling kernels (first run only)")

@@ -38,7 +38,6 @@ OPENING = {  # modules of the library that may open a path
     "anim/asset.py",
     "anim/caches/cache_file.py",
     "anim/files/atomic.py",
-    "anim/files/links.py",
     "anim/files/resolver.py",
     "anim/gltf/io/gltf_files.py",
     "anim/gltf/io/images.py",
@@ -65,10 +64,12 @@ PUBLIC = {
         "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"
     ),
     "exchange.formats": "bvh_reader registry",
-    "exchange.retarget": "aliases apply bind_pose ground_contact joint_roles rest_alignment retained_tracks retarget",
+    "exchange.retarget": (
+        "apply bind_pose ground_contact joint_matching joint_roles rest_alignment retained_tracks retarget"
+    ),
     "gltf.io": "container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
-    "gltf.reading": "accessors instancing materials reader vertex_colors",
+    "gltf.reading": "accessors materials reader vertex_colors",
     "gltf.validation": "buffer_layout channel_targets hierarchy rules schema",
     "gltf.writing": "append byte_ranges references reindex writer",
     "measure.compare": "diff name_matching",

@@ -9,7 +9,7 @@ from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.registry import CACHE_FORMATS, writer_for
 from anim.caches.storage import suffix
 from anim.errors import RangeError, not_written
-from anim.files import links
+from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
 from anim.model import VertexCache
 
@@ -28,7 +28,7 @@ def save(cache: VertexCache, path: str, options: WriteOptions = DEFAULTS) -> Wri
     for each in fields(options):
         if each.name not in takes and getattr(options, each.name) != getattr(DEFAULTS, each.name):
             raise RangeError(f"{each.name} does not apply to {ending}")
-    place = links.resolve_links(Path(path))
+    place = resolver.resolve_links(Path(path))
     staged = AtomicOutputs(place.parent, place.name)
     try:
         written = write(cache, staged, options)

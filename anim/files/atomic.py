@@ -19,7 +19,7 @@ from typing import BinaryIO
 
 from anim.arrays import Bytes
 from anim.errors import OutputError, not_written
-from anim.files import links, signals
+from anim.files import resolver, signals
 
 MAX_PREFIX_LENGTH = 40  # characters of the target name in a temporary name, so that long names remain valid
 BLOCK_BYTES = 1 << 24  # copied or compared at a time
@@ -43,7 +43,7 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     So errors of this file (no permission, a full disk) are raised before the block. Other than regular files are
     written before it.
     """
-    target, temporary = links.resolve_links(path), None
+    target, temporary = resolver.resolve_links(path), None
     with temporary_files() as made:
         with name_errors(path):
             check_writable(path)

@@ -1,4 +1,4 @@
-"""Read files by path, or by relative address confined to a folder: memory-mapped."""
+"""Read files by path, or by relative address confined to a folder: memory-mapped; links."""
 
 from __future__ import annotations
 
@@ -92,3 +92,15 @@ def locate(folder: Path, address: str) -> Path:
     if not regular:
         raise FormatError(f"'{address}' is no file")
     return path
+
+
+def resolve_links(path: Path) -> Path:
+    """Return the target of a link, existing or not; any other path unchanged.
+
+    A link to a target outside the file system (/dev/stdin, which may be a pipe) is unchanged, too.
+    resolve_links(s/q.gltf → ../real/q.gltf) → /…/real/q.gltf
+    """
+    if not os.path.islink(path):
+        return path
+    real = os.path.realpath(path)
+    return path if os.path.exists(path) and not os.path.exists(real) else Path(real)

@@ -157,8 +157,19 @@ class Track:
 
     @property
     def kind(self) -> ValueKind:
-        """Type of the values, see `kind_of`."""
-        return kind_of(self)
+        """Type of the values.
+
+        A pointer that ends in "/rotation" and has four components is a quaternion; integers that are not normalized
+        under STEP are bools or integers of the object model (KHR_animation_pointer allows nothing else for those).
+        """
+        if self.path == "rotation":
+            return ValueKind.ROTATION
+        if self.pointer is None:
+            return ValueKind.VECTOR
+        if self.pointer.endswith("/rotation") and self.values.shape[1] == 4:
+            return ValueKind.ROTATION
+        integers = self.storage.component_type != 5126 and not self.storage.normalized
+        return ValueKind.DISCRETE if integers and self.interpolation is Interpolation.STEP else ValueKind.VECTOR
 
     def __repr__(self) -> str:
         target = f"node={self.node}, {self.path}" if self.pointer is None else repr(self.pointer)
@@ -209,19 +220,3 @@ def share_time_axes(tracks: Iterable[Track]) -> list[Track]:
     """Return the tracks with one axis for equal times."""
     axes: dict[bytes, TimeAxis] = {}
     return [replace(track, time_axis=axes.setdefault(track.times.tobytes(), track.time_axis)) for track in tracks]
-
-
-def kind_of(track: Track) -> ValueKind:
-    """Return the type of the values of `track`.
-
-    A pointer that ends in "/rotation" and has four components is a quaternion; integers that are not normalized
-    under STEP are bools or integers of the object model (KHR_animation_pointer allows nothing else for those).
-    """
-    if track.path == "rotation":
-        return ValueKind.ROTATION
-    if track.pointer is None:
-        return ValueKind.VECTOR
-    if track.pointer.endswith("/rotation") and track.values.shape[1] == 4:
-        return ValueKind.ROTATION
-    integers = track.storage.component_type != 5126 and not track.storage.normalized
-    return ValueKind.DISCRETE if integers and track.interpolation is Interpolation.STEP else ValueKind.VECTOR

@@ -53,6 +53,11 @@ def key_times(seconds: Floats) -> Floats:
     return arrays.freeze(arrays.unique_sorted(np.asarray(seconds, np.float64).astype(np.float32).astype(np.float64)))
 
 
+def just_before(times: Floats) -> Floats:
+    """Return the float32 times before times (T,) in seconds, not below 0."""
+    return np.nextafter(times.astype(np.float32), np.float32(0)).astype(np.float64)
+
+
 def distinct_float32(seconds: Floats) -> Ints:
     """Return the indices of a subset of non-decreasing times (K,) that strictly increases as float32.
 

@@ -24,12 +24,11 @@ from anim.skinning.bake import SPACES, Baker, bakeable_instances, prepare_bake
 from anim.skinning.uneven import UnevenScale
 from cli import text, units
 from cli.errors import UsageError
-from cli.first_run import announce_compiling
 from cli.io import cache_files, documents, output_names, scenes
 from cli.io.cache_files import SavedCache
 from cli.options import caches, common, meshes
 from cli.options.meshes import ABOUT, Method
-from cli.progress import Progress
+from cli.progress import Progress, announce_compiling
 from cli.reports import bake_notes
 from cli.text import Reporter, plural
 

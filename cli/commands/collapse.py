@@ -16,12 +16,11 @@ from anim.show.plots.collapse_plot import collapse_plot as picture_of
 from anim.skinning.analysis.collapse import Comparison
 from anim.skinning.analysis.recommendations import CollapseFinding
 from cli.errors import UsageError
-from cli.first_run import announce_compiling
 from cli.io import documents, scenes
 from cli.options import common, meshes
 from cli.options.common import Format
 from cli.options.meshes import Method
-from cli.progress import Progress
+from cli.progress import Progress, announce_compiling
 from cli.reports import collapse_report
 from cli.reports.collapse_report import CollapseReport
 from cli.text import Reporter, format_bytes

@@ -16,10 +16,9 @@ from anim.caches.transforms import vertex_order as orders
 from anim.model import FrameChunk, VertexCache
 from cli import text, units
 from cli.errors import UsageError
-from cli.first_run import announce_compiling
 from cli.io import cache_files, documents
 from cli.options import caches, common
-from cli.progress import Progress
+from cli.progress import Progress, announce_compiling
 
 Cache = Annotated[
     str,

@@ -29,10 +29,10 @@ from anim.show.filmstrip.clips import FilmstripClip, FrameSelection
 from anim.show.filmstrip.filmstrip import HEIGHT, ViewOptions
 from cli import text
 from cli.errors import UsageError
-from cli.first_run import announce_compiling
 from cli.io import cache_files, documents, scenes
 from cli.options import common, meshes
 from cli.options.meshes import Method
+from cli.progress import announce_compiling
 
 EXTENSIONS = (".png", *image_file.ANIMATED_FORMATS)
 FRAMES, FPS = 8, 24.0

@@ -15,7 +15,7 @@ from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.storage import suffix
 from anim.errors import AnimError, FormatError, OutputError, not_written
-from anim.files import links
+from anim.files import resolver
 from anim.model import VertexCache
 from cli import text
 from cli.errors import UsageError
@@ -159,7 +159,7 @@ def orphans_note(path: str, written: Sequence[str], ending: str) -> tuple[str, .
     """Return the note on frames of an earlier sequence beside those written to `path`."""
     if CACHE_FORMATS[ending].files is not Files.FRAMES:
         return ()
-    target, there = links.resolve_links(Path(path)), []
+    target, there = resolver.resolve_links(Path(path)), []
     with suppress(OSError):
         there = os.listdir(target.parent)
     notes = []

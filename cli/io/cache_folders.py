@@ -16,7 +16,7 @@ import numpy as np
 from anim.caches.registry import HEAD
 from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError
-from anim.files import links
+from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
 from cli.errors import UsageError
 from cli.io import documents
@@ -33,7 +33,7 @@ def inputs(path: str, stack: ExitStack) -> CacheFolder:
 def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     """Return the outputs for `path` and its companion files; `away`: a folder for temporary files."""
     is_pipe = path == documents.PIPE
-    place = links.resolve_links(Path(path))
+    place = resolver.resolve_links(Path(path))
     folder = Path(away) if dry_run or is_pipe else place.parent
     return AtomicOutputs(folder, "stdout" if is_pipe else place.name)
 
@@ -49,7 +49,7 @@ class CacheFolder:
     """Input files of one folder."""
 
     def __init__(self, path: Path) -> None:
-        path = links.resolve_links(path)
+        path = resolver.resolve_links(path)
         self.main = path.name
         self.sizes: dict[str, int] = {}
         self._folder = path.parent

@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from anim.errors import AnimError, FormatError, OutputError
-from anim.files import links, resolver
+from anim.files import resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, uri
 from anim.gltf.io.source import Opener, Source, glb_chunks, open_bytes, open_file, write_file
@@ -143,7 +143,7 @@ def check_output(path: str) -> None:
     check_binary(path)
     if path == PIPE or (ending := Path(path).suffix).lower() in ("", *container.SUFFIXES):
         return
-    target = links.resolve_links(Path(path))
+    target = resolver.resolve_links(Path(path))
     if target.exists() and not target.is_file():
         return
     near = difflib.get_close_matches(ending.lower(), container.SUFFIXES, n=1)
@@ -171,7 +171,7 @@ def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
         raise UsageError("the output has an empty name")
     output_names.check_placeholders(path, placeholders)
     try:
-        target = links.resolve_links(Path(path))
+        target = resolver.resolve_links(Path(path))
         if target.is_dir():
             raise UsageError(f"{path}: is a folder (expected a file name)")
         if not target.parent.is_dir():

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.instancing import EXTENSION, instanced_nodes
+from anim.gltf.reading.reader import EXTENSION, instanced_nodes
 from anim.model import Scene
 from anim.skinning.analysis.weight_sums import unnormalized_weights
 from cli.text import Reporter

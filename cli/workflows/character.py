@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass, replace
 
 from anim.errors import NotFoundError
-from anim.exchange.retarget import aliases
+from anim.exchange.retarget import joint_matching
 from anim.exchange.retarget.apply import apply_to_character, matchable_nodes
 from anim.exchange.retarget.joint_roles import read_vrm_roles
 from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks, scaled_ancestors
@@ -103,7 +103,7 @@ def pairs(path: str | None) -> dict[str, str]:
     if path is None:
         return {}
     with documents.content(path, ending=".csv") as (data, _):
-        return aliases.read(data.tobytes())
+        return joint_matching.read_aliases(data.tobytes())
 
 
 def named(made: ConversionReport, document: Document, *, name: str | None, replaced: int | None) -> ConversionReport:

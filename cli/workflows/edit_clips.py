@@ -13,6 +13,7 @@ from anim.gltf.document import Document
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.reader import clip_name
 from anim.gltf.writing import writer
 from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
@@ -24,11 +25,12 @@ from anim.operations.selection import Selection
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
-from cli.reports.clip_lengths import clip_lengths
+from cli.text import format_span, format_time, plural
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by index in the file
 DRY = " (dry run: nothing written)"
+LISTED = 3  # clips listed with their durations; of more the sum
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,3 +201,16 @@ def note_images(document: Document, source: Source, output: str, voice: text.Rep
     if output != documents.PIPE and not source.is_in_folder(output):
         for note in image_notes.notes(document, source.folder, copied=True):
             voice.info(note)
+
+
+def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
+    """Return the duration of every clip that changed it: "'walk' 1 s → 4 s"; of many clips the sum; else "".
+
+    before, after: clips of a file by index. Of a clip that starts after 0 s the time span is given: "0.5–1.5 s".
+    """
+    spans = {i: [format_span(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
+    changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
+    if len(changed) <= LISTED:
+        return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())
+    sums = (sum(clips[i].end for i in changed) for clips in (before, after))
+    return f"{plural(len(changed), 'clip')} {' → '.join(map(format_time, sums))} in all"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from anim.errors import OutputError
-from anim.files import links
+from anim.files import resolver
 from cli.errors import UsageError
 from cli.io import documents
 
@@ -16,7 +16,7 @@ def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypat
     def refused(path: Path) -> Path:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(links, "resolve_links", refused)
+    monkeypatch.setattr(resolver, "resolve_links", refused)
     with pytest.raises(OutputError, match="permission denied"):
         documents.check_file("closed/out.glb")
 

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from anim.skinning.kernels import jit
-from cli.first_run import announce_compiling
+from cli.progress import announce_compiling
 from cli.text import Reporter
 
 

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from cli.reports.clip_lengths import clip_lengths
 from cli.text import format_duration, format_span, format_time
+from cli.workflows.edit_clips import clip_lengths
 from tests.cli.conftest import Call, Fixture
 from tests.clips import clip, track
 

@@ -12,7 +12,7 @@ from anim.arrays import Floats, Ints, unique_sorted
 from anim.errors import RangeError
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track
-from anim.sampling.times import distinct_float32
+from anim.sampling.times import distinct_float32, just_before
 
 CUBIC_SAMPLES = np.array(
     [0.03, 0.11, 0.21, 0.32, 0.43, 0.5, 0.57, 0.68, 0.79, 0.89, 0.97]
@@ -69,7 +69,7 @@ def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tu
 
     times = refine(_split_by_travel(motion, knots), count)
     values = motion.values(times, False)
-    earlier = np.nextafter(times[1:].astype(np.float32), np.float32(0)).astype(np.float64)
+    earlier = just_before(times[1:])
     arriving = motion.values(times[1:], True)
     jumps = np.flatnonzero((_distance(motion, arriving, values[1:]) > JUMP_TOLERANCE) & (earlier > times[:-1]))
     times = np.insert(times, jumps + 1, earlier[jumps])

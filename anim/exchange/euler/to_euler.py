@@ -18,7 +18,7 @@ from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling import frame_times
-from anim.sampling.times import key_times
+from anim.sampling.times import just_before, key_times
 from anim.sampling.track import sample
 
 LOCK_TOLERANCE_RAD = 1e-6  # rad; uncertainty of a lock in a file's float32 quaternions
@@ -156,7 +156,7 @@ def _interval_errors(track: Track, times: Floats, angles: Floats, order: str, fr
     straight = angles[:-1] + (angles[1:] - angles[:-1]) * u[..., None]
     true = sample(track, at.ravel()).reshape(*at.shape, 4)
     made = euler.to_quaternion(straight, order=order, frame=frame)
-    jumps = np.nextafter(times[:-1].astype(np.float32), np.float32(np.inf)) >= times[1:]
+    jumps = just_before(times[1:]) <= times[:-1]
     return np.where(jumps, 0.0, quaternion.angle_between(made, true).max(axis=0))
 
 

@@ -1,17 +1,21 @@
-"""Match the joints of a character with those of a motion's skeleton."""
+"""Match the joints of a character with those of a motion's skeleton, by name, role or alias file."""
 
 from __future__ import annotations
 
+import csv
 import difflib
+import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
-from anim.errors import NotFoundError
+from anim.errors import FormatError, NotFoundError
 from anim.exchange.formats.labels import labels
+from anim.exchange.formats.text import decode_text, error_at
 from anim.exchange.retarget.joint_names import normalize_names
 from anim.exchange.retarget.joint_roles import joint_roles
+from anim.gltf.io import json_text
 from anim.model import Skeleton
 
 MatchReason: TypeAlias = Callable[[int], int | None]  # from a source node to its target node, None without one
@@ -136,3 +140,29 @@ def _match_by_name(
 def _suggest(name: str, names: Mapping[str, int]) -> str:
     found = difflib.get_close_matches(name, names, n=1)
     return f"did you mean '{found[0]}'?" if found else ""
+
+
+def read_aliases(data: bytes) -> dict[str, str]:
+    """Return target names by source name, from a JSON object or from CSV lines "source,target".
+
+    An empty target omits the joint; in CSV, lines that begin with # are comments. Raises FormatError with the line.
+    b"LeftArm,upperarm.l\\nLFingers,\\n" → {"LeftArm": "upperarm.l", "LFingers": ""}
+    """
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{":
+        content = json_text.parse(data)
+        for name, other in content.items():
+            if not isinstance(other, str):
+                raise FormatError(f"'{name}' has {other!r} (expected the name of a node)")
+        return content
+    found: dict[str, str] = {}
+    rows = csv.reader(io.StringIO(decode_text(data)), strict=True)
+    try:
+        for cells in rows:
+            if not cells or cells[0].startswith("#"):
+                continue
+            if len(cells) != 2 or not cells[0].strip():
+                raise error_at(rows.line_num, f"{len(cells)} columns (expected source,target)")
+            found[cells[0].strip()] = cells[1].strip()
+    except csv.Error as error:
+        raise error_at(rows.line_num, f"broken CSV ({error})") from None
+    return found

@@ -17,10 +17,11 @@ from anim.exchange.retarget.ground_contact import find_soles, ground_offset, has
 from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.pose_transfer import PoseTransfer, TargetMotion, build_transfer
 from anim.exchange.retarget.rest_alignment import Measure
-from anim.exchange.retarget.step_keys import as_linear, as_step, inside_interval, is_step, just_before
+from anim.exchange.retarget.step_keys import as_linear, as_step, inside_interval, is_step
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import rest_pose, world_matrices
+from anim.sampling.times import just_before
 
 MAX_CONTACT_DURATION_S = 86_400.0  # limit of a motion sampled for contacts, 30 times a second and more
 CONSTANT_TOLERANCE = 1e-7  # rad, factor, and fraction of the target's size: rounding of a constant

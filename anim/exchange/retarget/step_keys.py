@@ -7,13 +7,9 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
+from anim.sampling.times import just_before
 
 ROUNDING_TOLERANCE = 1e-11  # relative; rounding of constant float64 values
-
-
-def just_before(times: Floats) -> Floats:
-    """Return the float32 times before times (T,) in seconds."""
-    return np.nextafter(times.astype(np.float32), np.float32(0)).astype(np.float64)
 
 
 def inside_interval(knots: Floats) -> Floats:

@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from anim.errors import OutputError
-from anim.files import atomic, links, signals
+from anim.files import atomic, resolver, signals
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container, unused_buffers
 
@@ -40,7 +40,7 @@ def write(
     its URI. note: called with a line about old buffers that are not removed. Links are followed: the files are written
     to the link's target folder.
     """
-    named, path = path, links.resolve_links(path)
+    named, path = path, resolver.resolve_links(path)
     if path.exists() and not path.is_file():
         raise OutputError(f"{named}: is no plain file (a .gltf needs a folder for its buffers)", help="write a .glb")
     with nullcontext() if dry_run else atomic.lock_folder(path.parent):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from anim.errors import FormatError
-from anim.files import links, resolver
+from anim.files import resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, json_text, uri
 
@@ -35,7 +35,8 @@ class Source:
 
     def is_in_folder(self, output: str) -> bool:
         """Return True if `output` is in the same folder, so that relative URIs remain valid."""
-        return self.folder is not None and links.resolve_links(Path(output)).parent.resolve() == self.folder.resolve()
+        folder = resolver.resolve_links(Path(output)).parent
+        return self.folder is not None and folder.resolve() == self.folder.resolve()
 
     def bytes_of(self, document: Document) -> Bytes | None:
         """Return the input's bytes if the document is unchanged since it was read, else None."""
@@ -56,7 +57,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     opener: converts bytes to a document. If the file is replaced while its buffers are opened, it is opened again.
     Raises FormatError.
     """
-    real = links.resolve_links(Path(path))
+    real = resolver.resolve_links(Path(path))
     for _ in range(MAX_OPEN_ATTEMPTS):
         before = _stamp(real)
         data, buffers = resolver.map_file(real), resolver.CompanionFiles(real.parent)
@@ -109,7 +110,7 @@ def write_file(
 
     copies: dict[Path, Bytes] = {}
     if source is not None and source.folder is not None and not source.is_in_folder(path):
-        document, copies = images.copy_images(document, source.folder, links.resolve_links(Path(path)).parent)
+        document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
     if not dry_run:
         images.write_copies(copies)

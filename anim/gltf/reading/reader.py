@@ -7,15 +7,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import AnimError, FormatError, ShapeError
-from anim.gltf.document import Document, Json, json_array
-from anim.gltf.reading import animations, instancing, node_matrix
+from anim.errors import AnimError, FormatError, ShapeError, UnsupportedError
+from anim.gltf.document import Document, Json, json_array, node_label
+from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import Meshes
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin
 
 MAX_LISTED_CLIPS = 3  # clips in a message
+EXTENSION = "EXT_mesh_gpu_instancing"
 
 
 def skeleton(document: Document) -> Skeleton:
@@ -87,12 +88,12 @@ def scene(
     """Return the skeleton and its meshes, nodes depth-first in the order of the file's scenes.
 
     normals, tangents: read those of vertices and morph targets too. A mesh with EXT_mesh_gpu_instancing is included
-    once, on its node (`instancing.instanced_nodes`).
+    once, on its node (`instanced_nodes`).
     Raises UnsupportedError if vertices cannot be read: Draco without the package DracoPy, an unknown compression,
     EXT_mesh_gpu_instancing where the file requires it.
     """
     _check(document)
-    instancing.check_not_required(document)
+    check_not_required(document)
     accessors = accessors or Accessors(document)
     meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
@@ -209,3 +210,21 @@ def _unit(rotation: list[float], node: int) -> Floats:
     if length == 0:
         raise FormatError("rotation is zero (expected a unit quaternion)", where=f"nodes[{node}]")
     return q / length
+
+
+def instanced_nodes(json: Json) -> list[int]:
+    """Return the indices of the nodes with mesh instances."""
+    nodes = enumerate(json_array(json, "nodes"))
+    return [i for i, node in nodes if "mesh" in node and EXTENSION in node.get("extensions", {})]
+
+
+def check_not_required(document: Document) -> None:
+    """Raise UnsupportedError if the file requires mesh instancing.
+
+    An error bound of one instance does not hold for the others.
+    """
+    json = document.json
+    if EXTENSION in json.get("extensionsRequired", ()) and (found := instanced_nodes(json)):
+        raise UnsupportedError(
+            f"{node_label(json, found[0])} has copies of its mesh by {EXTENSION}, which is required and not read here"
+        )

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from anim.arrays import Bools
+from anim.gltf.validation.buffer_layout import COMPONENT_SIZES
 from anim.model import Interpolation, TimeAxis, Track
 
 AXIS_JSON_BYTES = 120  # approximate size of the JSON of an accessor for key times
 TIME_BYTES = 4  # bytes of a key's time
-COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
 
 def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[Bools]:
@@ -38,4 +38,4 @@ def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[
 
 def _key_bytes(track: Track) -> int:
     rows = 3 if track.interpolation is Interpolation.CUBICSPLINE else 1
-    return int(rows * track.values.shape[1] * COMPONENT_BYTES[track.storage.component_type])
+    return int(rows * track.values.shape[1] * COMPONENT_SIZES[track.storage.component_type])

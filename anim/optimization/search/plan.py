@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from anim.arrays import Bools, Floats, Ints
+from anim.gltf.validation.buffer_layout import COMPONENT_SIZES
 from anim.model import Clip, Interpolation, Track
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
 
 COMPONENTS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # values per key
-SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes, by glTF's component type
 
 
 class TrackAction(IntEnum):
@@ -89,4 +89,4 @@ class Solution:
 
 def value_bytes(track: Track) -> int:
     """Return the bytes of a track's values, tangents included, in its storage format."""
-    return COMPONENTS[track.interpolation] * SIZES[track.storage.component_type] * track.values.size
+    return COMPONENTS[track.interpolation] * COMPONENT_SIZES[track.storage.component_type] * track.values.size

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from anim.errors import FormatError, NotFoundError
-from anim.exchange.retarget import aliases
+from anim.exchange.retarget import joint_matching
 from anim.exchange.retarget.joint_matching import JointMatch, match_joints
 from anim.exchange.retarget.joint_names import JointName, normalize_names
 from anim.exchange.retarget.joint_roles import MIDDLE, SIDED, joint_roles, read_vrm_roles
@@ -194,11 +194,11 @@ def test_an_alias_of_nothing_is_refused() -> None:
 
 def test_alias_files() -> None:
     expected = {"LeftArm": "upperarm.l", "LFingers": ""}
-    assert aliases.read(b"# arms\nLeftArm, upperarm.l\n\nLFingers,\n") == expected
-    assert aliases.read(b'{"LeftArm": "upperarm.l", "LFingers": ""}') == expected
+    assert joint_matching.read_aliases(b"# arms\nLeftArm, upperarm.l\n\nLFingers,\n") == expected
+    assert joint_matching.read_aliases(b'{"LeftArm": "upperarm.l", "LFingers": ""}') == expected
     with pytest.raises(FormatError, match="line 2: 3 columns"):
-        aliases.read(b"a,b\na,b,c\n")
+        joint_matching.read_aliases(b"a,b\na,b,c\n")
     with pytest.raises(FormatError, match="'a' has 1"):
-        aliases.read(b'{"a": 1}')
+        joint_matching.read_aliases(b'{"a": 1}')
     with pytest.raises(FormatError, match="line 2: broken CSV"):
-        aliases.read(b'a,b\nc,"d')
+        joint_matching.read_aliases(b'a,b\nc,"d')
