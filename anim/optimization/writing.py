@@ -9,7 +9,7 @@ from dataclasses import replace
 from anim.gltf.document import Document
 from anim.gltf.meshopt.storage import FilteredValues, attach_codes
 from anim.gltf.writing import reindex, writer
-from anim.model import Clip
+from anim.model import Clip, Track
 from anim.optimization.options import Packing
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import EncodedKeys
