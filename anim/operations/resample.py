@@ -71,7 +71,7 @@ def _holds(track: Track, goal: Interpolation) -> bool:
 
 
 def _is_constant(track: Track) -> bool:
-    same = bool((track.values == track.values[0]).all())
+    same = bool(np.count_nonzero(track.values == track.values[0]) == track.values.size)
     if track.in_tangents is None or track.out_tangents is None:
         return same
     return same and not track.in_tangents[1:].any() and not track.out_tangents[:-1].any()

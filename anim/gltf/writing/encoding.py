@@ -17,6 +17,7 @@ from anim.gltf.reading.accessors import DTYPES, FLOAT, denormalized
 from anim.gltf.validation.buffer_layout import COMPONENTS
 from anim.model import AccessorFormat, Interpolation, TimeAxis, Track
 
+MAX_PLAIN_SQUARE = 1e76  # sum of squares; float32 holds every number of rows with a smaller one
 ELEMENTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 BY_WIDTH = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 DECODED = {
@@ -99,6 +100,9 @@ def _quantize(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
         integers = _integers(rows, np.dtype(DTYPES[storage.component_type]), storage.normalized)
         if integers is not None:
             return integers
+    flat = rows.reshape(-1)
+    if flat.dot(flat) < MAX_PLAIN_SQUARE:  # a fast proof that no value is too large
+        return rows.astype("<f4")
     with np.errstate(over="ignore"):
         stored: NDArray[Any] = rows.astype("<f4")
     if np.isinf(stored).any():

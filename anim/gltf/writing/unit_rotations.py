@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ def normalize_new(document: Document, clips: Mapping[int, Clip]) -> Mapping[int,
     `EncodedTrack`s are kept too. Raises RangeError for a rotation of length 0.
     """
     off = {
-        i: [n for n, t in enumerate(clip.tracks) if not isinstance(t, EncodedTrack) and _has_non_unit_keys(t)]
+        i: _non_unit_tracks(clip, [n for n, t in enumerate(clip.tracks) if not isinstance(t, EncodedTrack)])
         for i, clip in clips.items()
     }
     if not any(off.values()):
@@ -38,13 +38,16 @@ def _non_unit_targets(document: Document) -> dict[int, set[tuple[int | None, str
         clips = reader.clips(document)
     except AnimError:  # unreadable animations are replaced as a whole
         return {}
-    return {i: {track.target for track in clip.tracks if _has_non_unit_keys(track)} for i, clip in enumerate(clips)}
+    return {
+        i: {clip.tracks[n].target for n in _non_unit_tracks(clip, range(len(clip.tracks)))}
+        for i, clip in enumerate(clips)
+    }
 
 
 def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | None, str]]) -> Clip:
     tracks = list(clip.tracks)
     for n in off:
-        lengths = _lengths(tracks[n])
+        lengths = _lengths(tracks[n].values)
         if not lengths.all():
             where = f"{reader.clip_label(clip.name, number)}, rotation of node {tracks[n].node}"
             raise RangeError(f"key {int(lengths.argmin())} is zero (expected a unit quaternion)", where=where)
@@ -53,12 +56,21 @@ def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | 
     return replace(clip, tracks=tuple(tracks))
 
 
-def _has_non_unit_keys(track: Track) -> bool:
-    return track.path == "rotation" and bool((np.abs(_lengths(track) - 1) > MAX_LENGTH_ERROR).any())
+def _non_unit_tracks(clip: Clip, chosen: Iterable[int]) -> list[int]:
+    """The chosen tracks of a clip with rotations off unit length; all in one array, since tracks are many and short."""
+    rotations = [n for n in chosen if clip.tracks[n].path == "rotation"]
+    if not rotations:
+        return []
+    counts = [len(clip.tracks[n].times) for n in rotations]
+    off = np.abs(_lengths(np.concatenate([clip.tracks[n].values for n in rotations])) - 1) > MAX_LENGTH_ERROR
+    if not off.any():
+        return []
+    has_any = np.logical_or.reduceat(off, np.cumsum([0, *counts[:-1]]))
+    return [n for n, found in zip(rotations, has_any.tolist(), strict=True) if found]
 
 
-def _lengths(track: Track) -> Floats:
-    lengths: Floats = np.sqrt(np.einsum("kc,kc->k", track.values, track.values))
+def _lengths(rotations: Floats) -> Floats:
+    lengths: Floats = np.sqrt(np.einsum("kc,kc->k", rotations, rotations))
     return lengths
 
 

@@ -14,20 +14,18 @@ AXIS_JSON_BYTES = 120  # approximate size of the JSON of an accessor for key tim
 TIME_BYTES = 4  # bytes of a key's time
 
 
-def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> list[Bools]:
-    """Return masks (K,) of the keys of each track whose removal makes the file smaller.
+def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> dict[int, Bools]:
+    """Return masks (K,) of the keys whose removal makes the file smaller, by index of the tracks that have any.
 
     given: masks (K,) of the keys that are interpolated by their neighbors, by index of the track; constant tracks are
-    absent
-    and need no time axis. A key that no track on its time axis needs is removed; other keys only if a separate time
-    axis
-    costs less than they do.
+    absent and need no time axis. A key that no track on its time axis needs is removed; other keys only if a separate
+    time axis costs less than they do.
     """
     common: dict[TimeAxis, Bools] = {}  # by time axis: keys that no track needs
     for i, mask in given.items():
         axis = tracks[i].time_axis
         common[axis] = common[axis] & mask if axis in common else mask
-    masks = [np.zeros(len(track.times), np.bool_) for track in tracks]
+    masks = {}
     for i, own in given.items():
         if count := np.count_nonzero(own):
             shared = common[tracks[i].time_axis]

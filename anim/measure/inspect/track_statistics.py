@@ -56,7 +56,8 @@ class TrackStats:
 def stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> TrackStats:
     """Return the statistics of concatenated tracks, in the tracks' original order."""
     result, masks = _all_stats(groups, skeleton)
-    result.redundant[:] += np.array([np.count_nonzero(mask) for mask in masks], np.int64)
+    for i, mask in masks.items():
+        result.redundant[i] += np.count_nonzero(mask)
     return result
 
 
@@ -65,7 +66,8 @@ def removable_keys(tracks: Sequence[Track], skeleton: Skeleton) -> list[Bools]:
 
     (keys at 0, 1, 2 s with the values 0, 5, 10) → [False, True, False]
     """
-    return _all_stats(concatenate(tracks), skeleton)[1]
+    masks = _all_stats(concatenate(tracks), skeleton)[1]
+    return [masks[i] if i in masks else np.zeros(len(track.times), np.bool_) for i, track in enumerate(tracks)]
 
 
 def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
@@ -91,8 +93,8 @@ def _unit_error(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[in
     )
 
 
-def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tuple[TrackStats, list[Bools]]:
-    """The statistics, with redundant keys of constant tracks only, and redundant keys of all others."""
+def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tuple[TrackStats, dict[int, Bools]]:
+    """The statistics, with redundant keys of constant tracks only, and masks of those of others that have any."""
     count = sum(len(group.tracks) for group in groups)
     result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
     tracks: dict[int, Track] = {}

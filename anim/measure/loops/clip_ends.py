@@ -28,7 +28,8 @@ DIFFERENCES = np.array(
     float,
 )
 SPEED = 1  # its row
-WITHOUT_FRAME = DIFFERENCES[:2]  # for parts that no motion per frame is asked of: there the others are 0, or the first
+TIMES_WITHOUT_FRAME = [0, 1, 2, 5, 6, 7]
+WITHOUT_FRAME = DIFFERENCES[:2, TIMES_WITHOUT_FRAME]  # where all parts have the frame 0: the others are 0, or the first
 STEP_TIME_INDEX = [0, 1, 1, 3, 4, 6, 6, 7]  # when a STEP track is looked at: it has no speed
 
 
@@ -71,16 +72,21 @@ class EndPoses:
 
 
 def poses_around_ends(
-    skeleton: Skeleton, parts: Sequence[LoopRange], groups: Sequence[ConcatenatedTracks] | None = None
+    skeleton: Skeleton,
+    parts: Sequence[LoopRange],
+    groups: Sequence[ConcatenatedTracks] | None = None,
+    *,
+    has_frame: bool = True,
 ) -> list[EndPoses]:
     """Return each range around its ends, the way of its root taken off.
 
-    groups: the tracks of all their clips, `joined`, for callers that have them.
+    groups: the tracks of all their clips, `joined`, for callers that have them. has_frame: False for the times of
+    WITHOUT_FRAME only.
     """
-    times = np.array([part.times() for part in parts])
-    whole, weights = poses_of_clips(
-        skeleton, [part.clip for part in parts], times, held=times[:, STEP_TIME_INDEX], groups=groups
-    )
+    every = np.array([part.times() for part in parts])
+    chosen = slice(None) if has_frame else TIMES_WITHOUT_FRAME
+    times, held = every[:, chosen], every[:, STEP_TIME_INDEX][:, chosen]
+    whole, weights = poses_of_clips(skeleton, [part.clip for part in parts], times, held=held, groups=groups)
     world = world_by_node(skeleton, whole)
     world = world.reshape(len(skeleton), *times.shape, 3, 4)
     for i, part in enumerate(parts):
@@ -126,5 +132,5 @@ def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:
 
 
 def differences(values: Floats, axis: int, wanted: Floats = DIFFERENCES) -> Floats:
-    """Return differences of values along the axis of their times. wanted: rows of DIFFERENCES."""
+    """Return differences of values along the axis of their times. wanted: (D, T), or WITHOUT_FRAME."""
     return np.asarray(np.moveaxis(np.tensordot(wanted, values, (1, axis)), 0, axis))

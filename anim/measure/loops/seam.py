@@ -172,8 +172,9 @@ class SkinMotion:
         """
         if not parts or not len(self._every):
             return [Seam() for _ in parts]
-        seen = clip_ends.poses_around_ends(self.skeleton, parts, groups)
-        wanted = clip_ends.DIFFERENCES if any(part.frame for part in parts) else clip_ends.WITHOUT_FRAME
+        has_frame = any(part.frame for part in parts)
+        seen = clip_ends.poses_around_ends(self.skeleton, parts, groups, has_frame=has_frame)
+        wanted = clip_ends.DIFFERENCES if has_frame else clip_ends.WITHOUT_FRAME
         count = max(AT_ONCE // (3 * len(wanted) * len(self._every)), 1)
         return [
             seam
@@ -182,7 +183,7 @@ class SkinMotion:
         ]
 
     def _seams(self, seen: Sequence[EndPoses], parts: Sequence[LoopRange], wanted: Floats) -> list[Seam]:
-        """wanted: (D, T), rows of DIFFERENCES."""
+        """wanted: (D, T), DIFFERENCES or WITHOUT_FRAME."""
         worlds = np.stack([each.world for each in seen], axis=1)  # (N, parts, T, 3, 4)
         differences = clip_ends.differences(worlds, 2, wanted)
         squares = self._squares(differences.reshape(len(self.skeleton), -1, 3, 4)).reshape(

@@ -22,7 +22,8 @@ def _mask(keys: int, *given: int) -> np.ndarray:
 
 
 def _counts(tracks: list[Track], given: dict[int, Bools]) -> list[int]:
-    return [int(mask.sum()) for mask in redundant_keys(tracks, given)]
+    found = redundant_keys(tracks, given)
+    return [int(found[i].sum()) if i in found else 0 for i in range(len(tracks))]
 
 
 def test_alone_on_its_axis_every_key_that_is_given_goes() -> None:
