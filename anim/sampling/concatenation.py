@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.model import Track
-from anim.sampling.alike import Rule, Tangents, TrackGroup, rule, stack_values
+from anim.sampling.batch import Rule, Tangents, TrackGroup, rule, stack_values
 from anim.sampling.track import KeyInterval, interpolate
 
 MAX_GROUP_KEYS = 4096  # of one group: temporary arrays fit into the processor's cache

@@ -28,7 +28,7 @@ from anim.show.plots.figure import (
     style,
     text_width,
 )
-from anim.show.plots.panels import plain
+from anim.show.plots.panel_axes import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import Interpolation, Track, ValueKind
-from anim.show.plots import polylines
+from anim.show.plots import panel_axes, polylines
 from anim.show.plots.figure import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, format_number, separate_labels
+from anim.show.plots.panel_axes import ROUND_ANGLES
 from anim.show.plots.polylines import Polyline
 from anim.show.plots.rotations import (
     COMPONENTS,
@@ -32,7 +33,6 @@ MAX_COLORED = 6  # components in color; the others are in the background
 TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px between keys, least values for each kind of mark
 MAX_RANGE_RATIO = 4.0  # times the widest range; values further apart are drawn relative to their first key
 NAME_SPACING_PX = 12.5  # px between names of components
-ROUND, ROUND_ANGLES = (1.0, 2.0, 2.5, 5.0, 10.0), (1.0, 1.5, 3.0, 4.5, 9.0, 10.0)  # steps of ticks
 DEGREES = 180 / math.pi
 UNITS = ((1e6, "µm", 1e-4), (1e3, "mm", 5e-2))  # factor, name, and the length in m below which it is used
 
@@ -54,33 +54,6 @@ def labels(each: PlotTrack) -> list[str]:
     return [each.labels[c] for c in _colored(each)]
 
 
-def span(each: PlotTrack) -> tuple[float, float]:
-    """Return the first and last drawn time, in seconds: those of the clip."""
-    return (each.start, each.end) if each.end > each.start else (each.start - 0.5, each.start + 0.5)
-
-
-def time_axis(axes: Axes, each: PlotTrack, *, labeled: bool) -> None:
-    """Mark seconds below the last panel, with fine ticks for frames if they fit."""
-    from matplotlib.ticker import FixedLocator, MaxNLocator
-
-    low, high = span(each)
-    width = _size(axes)[0]
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=max(int(width / 80), 3), steps=list(ROUND)))
-    axes.set_xlim(low, high)
-    if not labeled:
-        axes.tick_params(axis="x", labelbottom=False)
-        return
-    ticks = [t for t in axes.get_xticks() if low - 1e-9 <= t <= high + 1e-9]
-    axes.set_xticks(
-        ticks, [f"{format_number(t)} s" if i == len(ticks) - 1 else format_number(t) for i, t in enumerate(ticks)]
-    )
-    axes.tick_params(axis="x", which="major", length=4, width=0.6, color=SOFT)
-    frames = (high - low) * each.fps if each.fps is not None else 0.0
-    if each.fps is not None and 2 <= frames <= width / 3:
-        axes.xaxis.set_minor_locator(FixedLocator((low + np.arange(int(frames + 1.001)) / each.fps).tolist()))
-        axes.tick_params(axis="x", which="minor", length=2.2, width=0.5, color=HAIR)
-
-
 def _value(axes: Axes, each: PlotTrack) -> str:
     """Draw values: those of the second file over those of the first, with keys and handles of the topmost."""
     front = each.other or each.track
@@ -93,8 +66,8 @@ def _value(axes: Axes, each: PlotTrack) -> str:
     if top.risers is not None:
         _draw_lines(axes, each, top.risers, origin, linewidth=0.6, alpha=0.5)
     is_plain = front.interpolation is Interpolation.CUBICSPLINE and not each.is_in_degrees
-    handles = is_plain and _spacing(axes, each) >= HANDLES
-    _limits(axes, each, curves, origin, handles=handles)
+    handles = is_plain and panel_axes.key_spacing(axes, each) >= HANDLES
+    panel_axes.limit_values(axes, each, curves, origin, handles=handles)
     _mark_lock(axes, each)
     if handles:
         _handles(axes, each, front, origin)
@@ -105,7 +78,13 @@ def _value(axes: Axes, each: PlotTrack) -> str:
 
 def _angle(axes: Axes, each: PlotTrack) -> str:
     start = each.rest if each.is_in_degrees else each.track.values[0]
-    _single(axes, [polylines.angle_line(track, start) for track in _tracks(each)], DEGREES, INK, steps=ROUND_ANGLES)
+    _single(
+        axes,
+        [polylines.angle_line(track, start) for track in _tracks(each)],
+        DEGREES,
+        INK,
+        steps=ROUND_ANGLES,
+    )
     return "angle from rest, °" if each.is_in_degrees else "angle from the first key, °"
 
 
@@ -232,25 +211,6 @@ def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **l
         axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **chosen)
 
 
-def _limits(axes: Axes, each: PlotTrack, curves: Sequence[RotationCurve], origin: Floats, *, handles: bool) -> None:
-    """Set the limits for all values, and for handles unless they would flatten the curve."""
-    from matplotlib.ticker import MaxNLocator
-
-    values = np.concatenate([part for curve in curves for part in (curve.line.values, curve.keys)]) - origin
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    size = max(high - low, 1e-4 * max(abs(low), abs(high)), 1e-6)
-    if high - low < size:
-        low, high = (low + high - size) / 2, (low + high + size) / 2
-    if handles:
-        tips = polylines.handles(each.other or each.track)[1][:, 1] - origin
-        low, high = max(min(low, float(tips.min())), low - size / 2), min(max(high, float(tips.max())), high + size / 2)
-    pad = 0.07 * (high - low)
-    axes.set_ylim(low - pad, high + pad)
-    steps = ROUND_ANGLES if each.is_in_degrees and high - low > 4 else ROUND
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=list(steps)))
-    plain(axes)
-
-
 def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:
     colored = _colored(each)
     times, values = polylines.handles(front)
@@ -266,7 +226,7 @@ def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:
 
 def _keys(axes: Axes, each: PlotTrack, times: Floats, values: Floats) -> None:
     """Draw keys as dots, or as a row of fine ticks at the bottom if they are too dense."""
-    spacing = _spacing(axes, each)
+    spacing = panel_axes.key_spacing(axes, each)
     if spacing < DOTS:
         low, high = axes.get_ylim()
         if spacing >= TOO_DENSE:
@@ -283,7 +243,7 @@ def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
     """Write names of components at the right ends of their curves; of equal ones the first is on top."""
     colored = _colored(each)
     low, high = axes.get_ylim()
-    gap = NAME_SPACING_PX / _size(axes)[1] * (high - low)
+    gap = NAME_SPACING_PX / panel_axes.size(axes)[1] * (high - low)
     upwards = colored[::-1]
     places = separate_labels([float(last[c]) for c in upwards], gap, low + gap / 2, high - gap / 2)
     beside = {"xycoords": ("axes fraction", "data"), "xytext": (6, 0), "textcoords": "offset points", "va": "center"}
@@ -296,14 +256,16 @@ def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
         axes.annotate(f"+ {rest} more, gray", (1, 1), color=SOFT, fontsize=SMALL, **above)
 
 
-def _single(axes: Axes, found: list[Polyline], factor: float, color: str, *, steps: Sequence[float] = ROUND) -> None:
+def _single(
+    axes: Axes, found: list[Polyline], factor: float, color: str, *, steps: Sequence[float] = panel_axes.ROUND
+) -> None:
     """Draw one filled curve from 0, or two lines for a comparison."""
     from matplotlib.ticker import MaxNLocator
 
     top = max((float(np.nanmax(line.values)) for line in found if len(line.times)), default=0.0) * factor
     axes.set_ylim(0, top * 1.08 if top > 0 else 1)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=2, steps=list(steps)))
-    plain(axes)
+    panel_axes.plain(axes)
     for i, line in enumerate(found):
         behind = len(found) > 1 and i == 0
         look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
@@ -311,32 +273,3 @@ def _single(axes: Axes, found: list[Polyline], factor: float, color: str, *, ste
         axes.plot(line.times, values, color=color, **look)
         if len(found) == 1:
             axes.fill_between(line.times, values, 0, color=color, alpha=0.08, linewidth=0)
-
-
-def plain(axes: Axes) -> None:
-    """Label the ticks of y with the least number of decimals."""
-    from matplotlib.ticker import FuncFormatter
-
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value, axes)))
-
-
-def _tick(value: float, axes: Axes) -> str:
-    places = axes.get_yticks()
-    step = float(places[1] - places[0]) if len(places) > 1 else 1.0
-    digits = max(0, math.ceil(-math.log10(step) - 1e-9)) if step > 0 else 0
-    digits += 1 if abs(step * 10**digits - round(step * 10**digits)) > 1e-6 else 0
-    return f"{value + 0.0:.{digits}f}".replace("-", "−")
-
-
-def _size(axes: Axes) -> tuple[float, float]:
-    """Width and height of a panel in pixels."""
-    box = axes.get_window_extent()
-    return float(box.width), float(box.height)
-
-
-def _spacing(axes: Axes, each: PlotTrack) -> float:
-    """Mean interval between keys in pixels."""
-    times = (each.other or each.track).times
-    low, high = span(each)
-    share = float(times[-1] - times[0]) / (high - low) if len(times) > 1 else 1.0
-    return _size(axes)[0] * share / max(len(times) - 1, 1)

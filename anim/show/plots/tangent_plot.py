@@ -18,7 +18,7 @@ from anim.maths import hermite
 from anim.measure.continuity.continuity import ContinuityClass, KeyJumps, at_keys
 from anim.model import Interpolation, Track
 from anim.show.plots.figure import COLORS, FAINT, INK, PAPER, SMALL, SOFT, TEXT, TITLE, Figure, format_number, style
-from anim.show.plots.panels import plain
+from anim.show.plots.panel_axes import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from anim.show.plots import panels
+from anim.show.plots import panel_axes, panels
 from anim.show.plots.figure import INK, SMALL, SOFT, TITLE, Figure, format_number, style, text_width
 from anim.show.plots.rotations import FROM_REST
 from anim.show.plots.track_selection import PlotTrack
@@ -89,13 +89,13 @@ def _cell(sheet: Figure, each: PlotTrack, x: float, y: float, width: float, slac
     for i, kind in enumerate(kinds):
         tall = LOW if i else TALL + slack
         axes = sheet.panel(left, at, across, tall)
-        axes.set_xlim(*panels.span(each))
+        axes.set_xlim(*panel_axes.span(each))
         caption = panels.DRAW[kind](axes, each)
         if i:
             sheet.text(left, at - 0.07, caption, fontsize=SMALL, color=SOFT)
         else:
             _title(sheet, each, left, y + 0.2, caption, many_clips=many_clips)
-        panels.time_axis(axes, each, labeled=i == len(kinds) - 1)
+        panel_axes.time_axis(axes, each, labeled=i == len(kinds) - 1)
         at += tall + CAPTION
 
 
