@@ -10,9 +10,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Interpolation, Track, ValueKind
-from anim.sampling.times import distinct_float32
+from anim.sampling.times import distinct_float32, jump_time_before
 
-JUMP_S = 1e-6  # shortest duration of a jump, to avoid denormal times near 0 s
 JUMP_TOLERANCE = 1e-9  # of the largest value; smaller differences between segments are no jumps
 
 
@@ -98,8 +97,7 @@ def _insert_jump_keys(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Keys with one more just before each jump, as the end of the previous segment."""
     at = np.array(jumps)
-    early = times[at].astype(np.float32)
-    early = np.minimum(np.nextafter(early, np.float32(-np.inf)).astype(np.float64), times[at] - JUMP_S)
+    early = jump_time_before(times[at])
     still = np.zeros((len(at), values.shape[1]))
     arriving = before[at].copy()
     before[at] = 0.0

@@ -14,8 +14,9 @@ from anim.curves.fitting.easing_fit import fit_segments
 from anim.curves.fitting.rotation_fit import ANGLE_STEP_RAD, RotationFit, fit_rotation
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track, ValueKind
-from anim.operations.cubic_segments import JUMP_S, CubicSegments, join_segments
+from anim.operations.cubic_segments import CubicSegments, join_segments
 from anim.sampling import segment
+from anim.sampling.times import jump_time_before
 
 KNOT_TOLERANCE = 1e-12  # of an easing; u this near to a knot between two cubics is at the knot
 LINE = (CubicSegment(0, 1, 0, 1, 1, 1),)
@@ -56,7 +57,9 @@ def ease_steps(track: Track, inside: Bools, easing: Easing, *, angle_tolerance: 
         parts.append(_constant_segments(at[:, 0], at[:, 1], values, values))
     if inside[-1]:
         end = track.times[-1:]
-        parts.append(_constant_segments(end if inside.all() else end - JUMP_S, end, values[-1:], track.values[-1:]))
+        parts.append(
+            _constant_segments(end if inside.all() else jump_time_before(end), end, values[-1:], track.values[-1:])
+        )
         parts[-2].end[-1] = parts[-1].start[0]
     return join_segments(parts) if not inside.all() else _without_last_start(join_segments(parts))
 

@@ -12,12 +12,12 @@ from anim.maths import hermite, quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
 from anim.sampling.derivatives import rates
-from anim.sampling.times import check_fps
+from anim.sampling.times import check_fps, distinct_float32, min_interval
 from anim.sampling.track import sample
 
 MIN_BLEND_KEYS = 6  # fewest keys in a blend; sparser tracks get more
 BLEND_FPS = 30.0  # of the added keys
-MIN_INTERVAL_S = 1e-5  # s, between two keys
+MIN_INTERVAL_S = 1e-5  # s, between two keys; more where float32 resolves less
 
 
 def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None = None, root: int = -1) -> Clip:
@@ -98,7 +98,7 @@ def _close(track: Track, clip: Clip, blend: float) -> Track:
     first, last = sample(track, ends)
     if track.interpolation is Interpolation.STEP:
         return replace(track, values=np.concatenate((track.values[:-1], first[None])))
-    if len(track.times) > 2 and track.times[-2] > clip.end - MIN_INTERVAL_S:
+    if len(track.times) > 2 and track.times[-2] > clip.end - min_interval(clip.end, MIN_INTERVAL_S):
         track = _without_last_jump(track)
         last = track.values[-1]
     gap = _closing_offset(track, first, last)
@@ -181,7 +181,8 @@ def _times(track: Track, start: float, end: float) -> Floats:
     more = np.array([start, end])
     if len(inside) < MIN_BLEND_KEYS or end - inside[-1] > (end - start) / MIN_BLEND_KEYS:
         more = np.linspace(start, end, max(2 * MIN_BLEND_KEYS, round((end - start) * BLEND_FPS) + 1))
-    more = more[np.abs(more[:, None] - keys).min(axis=1) > MIN_INTERVAL_S]
+    more = more[distinct_float32(more)]
+    more = more[np.abs(more[:, None] - keys).min(axis=1) > min_interval(end, MIN_INTERVAL_S)]
     return np.sort(np.concatenate((keys, more)))
 
 

@@ -12,9 +12,10 @@ from anim.arrays import Floats
 from anim.errors import RangeError, check_number
 from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.operations.selection import track_indices
+from anim.sampling.times import jump_time_after, separate_float32
 
 NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
-JUMP_S = 1e-6  # s; duration of the final value of a reversed STEP track
+MAX_END_S = 2.0**24  # s, 194 days; after it, float32 times do not differ by 1 s
 
 
 def retime(
@@ -44,15 +45,18 @@ def retime(
     factor = _factor(clip, speed, duration)
     start, end = clip.start, clip.start + (clip.end - clip.start) * factor
     offset = _resolve_offset(offset, start)
+    _check_end(clip, end + offset + (end - start if ping_pong else 0.0))
     steps: list[Callable[[Track], Track]] = []
     if factor != 1:
         steps.append(lambda track: scale_time(track, start, factor))
-    if reverse:
-        steps.append(lambda track: reverse_track(track, start, end))
-    if ping_pong:
-        steps.append(lambda track: ping_pong_track(track, start, end))
-    if offset:
+    if offset:  # first, so that jumps are as short as float32 allows at their final times
         steps.append(lambda track: shift_time(track, offset))
+    first, last = max(start + offset, 0.0), end + offset
+    if reverse:
+        steps.append(lambda track: reverse_track(track, first, last))
+    if ping_pong:
+        steps.append(lambda track: ping_pong_track(track, first, last))
+    steps.append(_separate_keys)
     return Clip(clip.name, tuple(_all(steps, t) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 
@@ -72,8 +76,8 @@ def shift_time(track: Track, offset: float) -> Track:
 def reverse_track(track: Track, start: float, end: float) -> Track:
     """Return the track reversed between `start` and `end` (s, of the clip); reversing twice restores it.
 
-    STEP keeps its value in each mirrored interval; its last value comes first, for a microsecond if the last key is at
-    `end`.
+    STEP keeps its value in each mirrored interval; its last value comes first, for the duration of a jump if the last
+    key is at `end`.
     """
     times = start + end - track.times[::-1]
     if track.interpolation is Interpolation.STEP:
@@ -88,7 +92,7 @@ def ping_pong_track(track: Track, start: float, end: float) -> Track:
     """Return the track followed by itself reversed, from `end` to twice as far from `start` (s, of the clip)."""
     if len(track.times) == 1:
         return track
-    back = shift_time(reverse_track(track, start, end), end - start)
+    back = reverse_track(track, end, end)
     if track.interpolation is not Interpolation.STEP:
         return _concatenate(track, back, drop_first=bool(track.times[-1] == end))
     first_of_back = int(np.searchsorted(back.times, max(end, float(track.times[-1])), side="right"))
@@ -99,6 +103,17 @@ def _all(steps: list[Callable[[Track], Track]], track: Track) -> Track:
     for step in steps:
         track = step(track)
     return track
+
+
+def _separate_keys(track: Track) -> Track:
+    """The track with jumps long enough for float32 at their new times."""
+    times = separate_float32(track.times)
+    return track if times is track.times else replace(track, time_axis=TimeAxis(times))
+
+
+def _check_end(clip: Clip, end: float) -> None:
+    if end > max(MAX_END_S, clip.end):
+        raise RangeError(f"the clip would end at {end:.3g} s (limit {MAX_END_S:.0f} s, for times in float32)")
 
 
 def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
@@ -133,8 +148,8 @@ def _resolve_offset(offset: float, start: float) -> float:
 def _reverse_step(track: Track, times: Floats, start: float) -> Track:
     values = np.concatenate((track.values[-2::-1], track.values[:1]))
     if len(track.times) > 1 and (track.values[-1] != track.values[-2]).any():
-        shown = start if times[0] - start > JUMP_S else float(times[0])
-        times = np.concatenate(([shown, max(float(times[0]), shown + JUMP_S)], times[1:]))
+        shown = start if times[0] > jump_time_after(start) else float(times[0])
+        times = np.concatenate(([shown, max(float(times[0]), jump_time_after(shown))], times[1:]))
         values = np.concatenate((track.values[-1:], values))
     return track.with_keys(times, values)
 

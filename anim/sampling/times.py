@@ -18,7 +18,9 @@ MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
 )
 MAX_FRAMES = 10_000_000
+MAX_MOVED_STEPS = 2  # float32 steps that a key may be moved by to differ from its neighbor
 FLOAT32_SPACING = 2.0**-23  # relative distance of neighboring float32 numbers
+MIN_JUMP_S = 1e-6  # s; shortest time between two keys that represent a jump, to avoid denormal times near 0 s
 MAX_JUMP_S = 1.5e-6  # s; with two float32 steps, the longest time between two keys that represent a jump
 
 
@@ -56,6 +58,45 @@ def key_times(seconds: Floats) -> Floats:
 def just_before(times: Floats) -> Floats:
     """Return the float32 times before times (T,) in seconds, not below 0."""
     return np.nextafter(times.astype(np.float32), np.float32(0)).astype(np.float64)
+
+
+def jump_time_before(seconds: Floats) -> Floats:
+    """Return the latest times before `seconds` that differ in a file and are a jump's duration earlier."""
+    stored = np.asarray(seconds, np.float64).astype(np.float32)
+    earlier = np.nextafter(stored, np.float32(-np.inf)).astype(np.float64)
+    return np.asarray(np.minimum(earlier, seconds - MIN_JUMP_S))
+
+
+def jump_time_after(seconds: float) -> float:
+    """Return the earliest time after `seconds` that differs in a file and is a jump's duration later."""
+    later = np.nextafter(np.float32(seconds), np.float32(np.inf))
+    return max(float(later), seconds + MIN_JUMP_S)
+
+
+def min_interval(end: float, least: float) -> float:
+    """Return the shortest time between keys up to `end` (s): `least`, or two float32 steps if that is more."""
+    return max(least, 2 * float(np.spacing(np.float32(end))))
+
+
+def separate_float32(seconds: Floats) -> Floats:
+    """Return times that strictly increase as float32; equal ones are moved apart by the fewest float32 steps.
+
+    Keys of a jump coincide if they are moved to later times. The first and the last time stay. Times for which
+    MAX_MOVED_STEPS are not enough are returned unchanged.
+    separate_float32([0, 40, 40 + 1e-6]) → [0, 40 − 3.8e-6, 40]
+    """
+    original = seconds.astype(np.float32)
+    if len(original) < 2 or (np.diff(original) > 0).all():
+        return seconds
+    stored = original.copy()
+    for i in range(len(stored) - 2, -1, -1):
+        stored[i] = min(stored[i], np.nextafter(stored[i + 1], np.float32(-np.inf)))
+    stored[0] = original[0]
+    for i in range(1, len(stored)):
+        stored[i] = max(stored[i], np.nextafter(stored[i - 1], np.float32(np.inf)))
+    if (np.abs(stored - original) > MAX_MOVED_STEPS * np.spacing(original)).any():
+        return seconds
+    return np.where(stored == original, seconds, stored.astype(np.float64))
 
 
 def distinct_float32(seconds: Floats) -> Ints:

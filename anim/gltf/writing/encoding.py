@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anim.arrays import Floats
-from anim.errors import RangeError, ShapeError
+from anim.errors import RangeError, ShapeError, UnsupportedError
 from anim.gltf.document import Json
 from anim.gltf.meshopt import storage
 from anim.gltf.meshopt.storage import EncodedTrack, FilteredValues
@@ -65,12 +65,15 @@ class AccessorData:
 def times(axis: TimeAxis) -> AccessorData:
     """Return the key times as float32, with min and max exact in float32 and short as text.
 
-    Raises RangeError if two keys are equal in float32.
+    Raises UnsupportedError if two keys are equal in float32.
     """
     stored = axis.times.astype("<f4")
     if len(stored) > 1 and not (np.diff(stored) > 0).all():
         k = int(np.argmax(np.diff(stored) <= 0))
-        raise RangeError(f"keys {k} and {k + 1} fall together in float32 (both at {stored[k]} s)")
+        raise UnsupportedError(
+            f"keys {k} and {k + 1} fall together in float32 (both at {stored[k]} s)",
+            help=f"float32 steps there are {np.spacing(stored[k]):.2g} s: start the clip at 0 s or use fewer keys",
+        )
     return AccessorData(stored.tobytes(), FLOAT, "SCALAR", bounds=(_shortest(stored[0]), _shortest(stored[-1])))
 
 

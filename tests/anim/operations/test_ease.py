@@ -154,6 +154,14 @@ def test_steps_in_a_part_jump_within_a_microsecond_or_so() -> None:
     np.testing.assert_allclose(sample(new, near), want, atol=1e-3)
 
 
+def test_steps_at_the_end_of_a_late_track_jump_within_float32() -> None:
+    """At 7200 s float32 times are 0.5 ms apart: the jump to the last key takes two of those."""
+    late = clips.track("translation", 7200 + 20 * KEYS, VALUES)
+    new = eased(late, "steps(2)", start=7210.0)
+    near = 7200 + np.array([10.1, 59.99, 60.0])
+    np.testing.assert_allclose(sample(new, near), [VALUES[1], (VALUES[2] + VALUES[3]) / 2, VALUES[3]], atol=1e-3)
+
+
 def test_holds_and_single_keys_stay() -> None:
     held = clips.track("scale", [0, 1], [[1, 1, 1], [2, 2, 2]], STEP)
     single = clips.track("scale", [0], [[1, 1, 1]], node=1)

@@ -117,6 +117,19 @@ def test_a_jump_in_the_last_moment_goes() -> None:
     np.testing.assert_allclose(new.values, 0, atol=1e-9)
 
 
+@pytest.mark.parametrize("key", ["cubic", "turning", "linear", "slerp", "step"])
+def test_a_late_clip_gets_keys_that_float32_tells_apart(key: str) -> None:
+    late = TRACKS[key].with_keys(
+        7200 + TRACKS[key].times,
+        TRACKS[key].values,
+        TRACKS[key].in_tangents,
+        TRACKS[key].out_tangents,
+    )
+    for blend in (0.0101, 0.3, 1.75, 1.7501):  # the last starts 0.1 ms before a key, where float32 steps are 0.5 ms
+        times = loop(Clip("", (late,)), blend=blend).tracks[0].times.astype(np.float32)
+        assert (np.diff(times) > 0).all()
+
+
 def test_blend_longer_than_the_clip_is_refused() -> None:
     with pytest.raises(RangeError, match="blend"):
         loop(WALK, blend=1.5)

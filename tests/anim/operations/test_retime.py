@@ -15,6 +15,7 @@ from anim.model import Clip, TimeAxis, Track
 from anim.operations.retime import retime
 from anim.operations.time_warp import warp
 from anim.sampling.track import sample
+from tests import clips
 from tests.anim.operations.plain_eases import EASES
 from tests.anim.operations.tracks import ANCHOR, KEYS, TRACKS, distance
 
@@ -143,3 +144,42 @@ def test_warp_gives_lines_too() -> None:
     old = 3 * (u * u * (3 - 2 * u))
     assert new.in_tangents is None
     assert distance(new, sample(new, INSIDE), sample(TRACKS["slerp"], old)) <= np.radians(0.05) * 1.01
+
+
+# Late clips
+
+
+@pytest.mark.parametrize("start", [0.0, 7200.0])
+@pytest.mark.parametrize("options", [{"reverse": True}, {"ping_pong": True}, {"reverse": True, "offset": 3600.0}])
+def test_late_steps_keep_their_jumps_in_float32(start: float, options: dict[str, object]) -> None:
+    """Float32 times are 0.5 ms apart at 7200 s: a jump of a microsecond would be none."""
+    step = replace(TRACKS["step"], time_axis=TimeAxis(20 * TRACKS["step"].times + start))
+    new = retime(Clip("", (step,)), **options).tracks[0]  # type: ignore[arg-type]
+    stored = new.times.astype(np.float32)
+    assert (np.diff(stored) > 0).all()
+    assert new.times[0] == start + options.get("offset", 0.0)  # type: ignore[operator]
+    inside = INSIDE * 20 + start
+    times = inside if "reverse" not in options else 2 * start + 60 - inside
+    shown = sample(replace(new, time_axis=TimeAxis(stored)), inside + options.get("offset", 0.0))  # type: ignore[operator]
+    assert distance(step, shown, sample(step, times)) < 1e-12
+
+
+@pytest.mark.parametrize("name", ["linear", "cubic", "slerp", "turning", "step"])
+def test_a_jump_stays_one_where_it_gets_later(name: str) -> None:
+    """Reversed back, the first microsecond becomes the last, at 60 s."""
+    times = 20 * TRACKS[name].times
+    early = replace(TRACKS[name], time_axis=TimeAxis(np.concatenate((times[:1], times[:1] + 1e-6, times[2:]))))
+    for options in ({"reverse": True}, {"offset": 100.0}):
+        new = changed(early, **options)
+        assert (np.diff(new.times.astype(np.float32)) > 0).all()
+
+
+def test_keys_that_no_float32_time_tells_apart_are_left_to_the_writer() -> None:
+    dense = clips.track("scale", 1e-6 * np.arange(9), np.ones((9, 3)))
+    new = retime(Clip("", (dense,)), offset=1000.0).tracks[0]
+    np.testing.assert_array_equal(new.times, dense.times + 1000)
+
+
+def test_a_clip_beyond_the_seconds_of_float32_is_refused() -> None:
+    with pytest.raises(RangeError, match=r"the clip would end at 3e\+30 s \(limit 16777216 s"):
+        changed(TRACKS["linear"], speed=1e-30)
