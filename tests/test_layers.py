@@ -27,7 +27,7 @@ LEVELS = (
     {"api"},
 )
 NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning")}
-NEIGHBORS |= {("simulation", "skinning"), ("simulation", "operations")}
+NEIGHBORS |= {("simulation", "skinning"), ("simulation", "operations"), ("simulation", "optimization")}
 LEVEL = {package: level for level, packages in enumerate(LEVELS) for package in packages}
 
 MODULES = sorted(path for path in (ROOT / "anim").rglob("*.py") if path.name != "__main__.py")  # which runs the command
@@ -81,6 +81,7 @@ PUBLIC = {
     ),
     "measure.loops": "loop_analysis recommendations seam",
     "optimization.search": "plan",
+    "optimization.tracks": "key_reduction",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations stability_plot tangent_plot "
@@ -88,6 +89,7 @@ PUBLIC = {
         "track_selection"
     ),
     "simulation.particles": "emission forces obstacles simulate solver",
+    "simulation.spring_bones": "chain_globs chains colliders json_reader read reduction report simulate",
     "skinning.analysis": (
         "collapse collapsed_clips inbetween_error method_deviation method_scores recommendations weight_sums"
     ),

@@ -137,6 +137,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "face.glb": renamed(built("morph_cube"), ["talk"]),
         "arm.glb": built("arm"),
         "poses.glb": built("interpolations"),
+        "ponytail.glb": built("ponytail"),
     }.items():
         (folder / name).write_bytes(data)
     (folder / "walk.bvh").write_text(BVH)

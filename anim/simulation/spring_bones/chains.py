@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from anim.simulation.spring_bones.colliders import ORIGIN, Collider, Vector, check_quantity, check_vector
 
 DEFAULT_STIFFNESS = 1.0  # VRMC_springBone's schema, as all defaults here
 DEFAULT_DRAG = 0.5
-DEFAULT_DAMPING_RATIO = 0.3  # a few visible oscillations
+DEFAULT_DAMPING_RATIO = 0.5  # one visible overshoot; less resonates from joint to joint
 MAX_FORCE = 1e6  # of stiffness and gravity; far above what can be seen, far below what overflows
 MIN_FREQUENCY_HZ, MAX_FREQUENCY_HZ = 1e-3, 1e6
 MAX_DAMPING_RATIO = 1e6
@@ -87,6 +88,14 @@ class SpringBones:
     chains: tuple[SpringChain, ...]
     colliders: tuple[Collider, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    def with_parameters(self, **changes: Any) -> SpringBones:
+        """Return the same chains with these parameters, fields of `SpringParameters`, for all joints."""
+        chains = []
+        for chain in self.chains:
+            joints = [replace(each, parameters=replace(each.parameters, **changes)) for each in chain.joints]
+            chains.append(replace(chain, joints=tuple(joints)))
+        return replace(self, chains=tuple(chains))
 
     @property
     def nodes(self) -> tuple[int, ...]:

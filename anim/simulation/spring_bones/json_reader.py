@@ -43,20 +43,23 @@ SCHEMA = "spring-bones/1"
 QUANTITIES = ("stiffness", "drag", "hit_radius", "frequency", "damping_ratio")
 
 
-def read_spring_file(data: bytes, skeleton: Skeleton, *, skin_joints: Collection[int] = ()) -> SpringBones:
+def read_spring_file(
+    data: bytes, skeleton: Skeleton, *, skin_joints: Collection[int] = (), has_chains: bool = True
+) -> SpringBones:
     """Return the chains and colliders of a JSON file, for the nodes of `skeleton`.
 
-    skin_joints: as of `find_chains`. Raises FormatError with the position for anything unknown or invalid, and
-    NotFoundError for a node that the skeleton lacks.
+    skin_joints: as of `find_chains`. has_chains: False for a file that may have colliders only.
+    Raises FormatError with the position for anything unknown or invalid, and NotFoundError for a node that the skeleton
+    lacks.
     """
     content = json_text.parse(data)
-    _check(content)
+    _check(content, has_chains=has_chains)
     colliders = [
         locate(f"colliders[{i}]", _collider, each, skeleton) for i, each in enumerate(content.get("colliders", []))
     ]
     chains = [
         chain
-        for i, each in enumerate(content["chains"])
+        for i, each in enumerate(content.get("chains", []))
         for chain in locate(f"chains[{i}]", _chains, each, skeleton, colliders, skin_joints)
     ]
     return SpringBones(tuple(chains), tuple(colliders))
@@ -101,7 +104,7 @@ def _node(skeleton: Skeleton, glob: str) -> int:
     return found[0]
 
 
-def _check(content: Json) -> None:
+def _check(content: Json, *, has_chains: bool) -> None:
     """Raise FormatError, with the position, for an unknown key or a value of a wrong type."""
     chain: dict[str, Check] = {
         "name": text,
@@ -116,12 +119,12 @@ def _check(content: Json) -> None:
     _known(content, ("schema", "colliders", "chains"))
     if content.get("schema") != SCHEMA:
         raise FormatError(f"schema is {content.get('schema')!r} (expected '{SCHEMA}')")
-    if not content.get("chains"):
+    if has_chains and not content.get("chains"):
         raise FormatError("has no chains")
     check_property(
         "colliders", list_of(_strict(collider, one_of_shapes(EXTENDED_SHAPES))), content.get("colliders", [])
     )
-    check_property("chains", list_of(_strict(chain, _start)), content["chains"])
+    check_property("chains", list_of(_strict(chain, _start)), content.get("chains", []))
 
 
 def _strict(properties: Mapping[str, Check], whole: Check) -> ObjectRule:

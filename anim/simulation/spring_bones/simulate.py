@@ -9,7 +9,7 @@ import numpy as np
 from anim.arrays import Floats, freeze
 from anim.errors import RangeError, check_number
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling.times import distinct_float32, frame_times
 from anim.simulation.spring_bones.chain_globs import drop_inert_joints
 from anim.simulation.spring_bones.chains import SpringBones
@@ -101,10 +101,11 @@ def _run(
     skeleton: Skeleton, clip: Clip, bones: SpringBones, options: SpringOptions, duration: float
 ) -> tuple[Steps, LoopedMotion | None, SpringMotion]:
     """The steps, and the motion at each of them, from 0 s to the first at or after the duration."""
-    check_number(duration, "duration")
+    check_number(duration, "`duration`")
     if not duration > 0:
         raise RangeError(
-            f"duration is {duration:g} s (expected more than 0)", help="choose `duration`, since the clip has no length"
+            f"`duration` is {duration:g} s (expected more than 0)",
+            help="choose `duration`, since the clip has no length",
         )
     steps = Steps(options.step, duration, options.warm_up)
     if options.loop:
@@ -131,8 +132,9 @@ def _resample(rotations: Floats, at: Floats) -> Floats:
 
 def _merge(clip: Clip, nodes: tuple[int, ...], times: Floats, rotations: Floats) -> Clip:
     """The clip with these rotation tracks, in place of those that it has for the nodes, or after all others."""
+    axis = TimeAxis(times)
     new = {
-        node: Track(node, "rotation", Interpolation.LINEAR, times, rotations[:, j].copy())
+        node: Track(node, "rotation", Interpolation.LINEAR, axis, rotations[:, j].copy())
         for j, node in enumerate(nodes)
     }
     tracks = [new.pop(track.node) if track.path == "rotation" and track.node in new else track for track in clip.tracks]

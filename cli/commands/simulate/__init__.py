@@ -5,6 +5,14 @@ from __future__ import annotations
 from cli.main import CommandInfo, LazyGroup
 
 KINDS: dict[str, CommandInfo] = {
+    "springs": CommandInfo(
+        "Swing hair, tails and other chains of joints.",
+        (
+            "gltf-anim simulate springs ponytail.glb swinging.glb --clip walk --loop",
+            "gltf-anim simulate springs ponytail.glb soft.glb --chain hair1 --frequency 2.5 --gravity 6",
+            "gltf-anim simulate springs ponytail.glb small.glb --stiffness 1 --max-error 0.5mm --report springs.json",
+        ),
+    ),
     "particles": CommandInfo(
         "Emit particles from nodes or surfaces.",
         (

@@ -149,7 +149,7 @@ def test_a_loop_that_never_settles_is_blended() -> None:
 def test_the_rest_pose_drives_without_a_clip() -> None:
     result = simulate_springs(CHAIN, Clip("drop", ()), BONES, SpringOptions(duration=1.0))
     assert [track.target for track in result.clip.tracks] == [(1, "rotation"), (2, "rotation")]
-    with pytest.raises(RangeError, match="duration is 0 s"):
+    with pytest.raises(RangeError, match="`duration` is 0 s"):
         simulate_springs(CHAIN, Clip("", ()), BONES)
 
 
@@ -250,11 +250,11 @@ def test_chains_that_collide_with_each_other_are_refused() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (SpringOptions(step=0), "step is 0 s"),
-        (SpringOptions(step=float("nan")), "step is nan s"),
-        (SpringOptions(duration=-1), "duration is -1 s"),
-        (SpringOptions(duration=float("inf")), "duration is inf s"),
-        (SpringOptions(warm_up=-1), "warm-up is -1 s"),
+        (SpringOptions(step=0), "`step` is 0 s"),
+        (SpringOptions(step=float("nan")), "`step` is nan s"),
+        (SpringOptions(duration=-1), "duration` is -1 s"),
+        (SpringOptions(duration=float("inf")), "`duration` is inf s"),
+        (SpringOptions(warm_up=-1), "`warm_up` is -1 s"),
         (SpringOptions(fps=0), "fps is 0"),
         (SpringOptions(step=1e-12), "more than 10000000 steps"),
     ],
