@@ -225,7 +225,7 @@ def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tup
     by_clip = "{clip}" in output
     files = output_names.expand(output, rows, [(clip or 0) if by_clip else i for i, _, clip in pairs])
     for file in files if len(files) > 1 or "{" in output else ():
-        cache_files.check(file, ending)
+        cache_files.check(file, ending, placeholders=None)
     return [_Job(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
 
 

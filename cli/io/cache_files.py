@@ -70,11 +70,11 @@ def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
             raise error.at(name, ": ") from None
 
 
-def check(path: str, ending: str | None = None, placeholders: Sequence[str] = ()) -> str:
+def check(path: str, ending: str | None = None, placeholders: Sequence[str] | None = ()) -> str:
     """Return the file extension of the format of `path`: its own, or `ending`; ".npz" for "-" without one.
 
     Raises UsageError, before any work, if nothing can be written, the format is unknown, `ending` contradicts the
-    extension of the name, or a pipe can't take the format. placeholders: allowed in the name as {this}.
+    extension of the name, or a pipe can't take the format. placeholders: see `documents.check_file`.
     """
     own = "" if path == documents.PIPE else suffix(path)
     if path == documents.PIPE:

@@ -162,14 +162,15 @@ def check_binary(path: str) -> None:
         check_file(path)
 
 
-def check_file(path: str, placeholders: Sequence[str] = ()) -> None:
+def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
     """Raise UsageError or OutputError, before any work, if no file can be written at `path`.
 
-    placeholders: allowed in its name as {this}.
+    placeholders: allowed in its name as {this}; None if they are replaced already: then braces are part of the name.
     """
     if not path:
         raise UsageError("the output has an empty name")
-    output_names.check_placeholders(path, placeholders)
+    if placeholders is not None:
+        output_names.check_placeholders(path, placeholders)
     try:
         target = resolver.resolve_links(Path(path))
         if target.is_dir():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from cli.io.output_names import expand
 from tests.cli.conftest import Call
 from tests.cli.running import help_line, refusal
+from tests.files import glb_of, opened_fixture
 from tests.fixtures.reading import split
 
 
@@ -41,6 +43,24 @@ def test_a_place_for_nothing_is_refused(line: list[str], call: Call, walk: Path,
 def test_braces_that_are_no_place_are_a_name(call: Call, walk: Path, tmp_path: Path) -> None:
     call("convert", walk, tmp_path / "{1234-ab}.glb").product()
     assert (tmp_path / "{1234-ab}.glb").is_file()
+
+
+def test_names_in_the_file_may_have_braces(call: Call, tmp_path: Path) -> None:
+    """Only the pattern is asked for placeholders; a name that looks like one is a name."""
+    document = opened_fixture("biped")
+    names = {"meshes": ["fox {LOD0}"], "animations": ["{mesh}", "{foo}", "a{b}/c"]}
+    named = {
+        key: [{**each, "name": name} for each, name in zip(document.json[key], new, strict=True)]
+        for key, new in names.items()
+    }
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(replace(document, json={**document.json, **named})))
+    call("bake", path, tmp_path / "{mesh} {clip}.npz", "--fps", "4").product()
+    assert sorted(each.stem for each in tmp_path.glob("*.npz")) == [
+        "fox {LOD0} a{b}_c",
+        "fox {LOD0} {foo}",
+        "fox {LOD0} {mesh}",
+    ]
 
 
 def test_a_file_per_mesh(call: Call, walk: Path, tmp_path: Path) -> None:
