@@ -1,4 +1,4 @@
-"""Tracks of one time axis stacked into one array, so that the cost per numpy call occurs once."""
+"""Tracks in one array, so that the cost per numpy call occurs once: stacked per time axis, or concatenated."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.model import Interpolation, TimeAxis, Track, ValueKind
-from anim.model.track import PATHS
 from anim.sampling.track import KeyInterval, find_interval, interpolate
+
+MAX_GROUP_KEYS = 4096  # of concatenated tracks: temporary arrays fit into the processor's cache
 
 Rule: TypeAlias = tuple[str, Interpolation, ValueKind, int]
 Tangents: TypeAlias = tuple[Floats, Floats]
-_KINDS = {path: ValueKind.ROTATION if path == "rotation" else ValueKind.VECTOR for path in PATHS}
 
 
 @dataclass(frozen=True, slots=True)
 class TrackGroup:
-    """T tracks of one rule: see `rule`. numbers: (T,) indices among those given."""
+    """T tracks of one path, interpolation, value type and number of components: a rule.
+
+    numbers: (T,) indices among those given.
+    """
 
     tracks: tuple[Track, ...]
     numbers: Ints
@@ -40,25 +43,6 @@ class TrackGroup:
     def kind(self) -> ValueKind:
         """Value type of all tracks."""
         return self.tracks[0].kind
-
-
-def rule(track: Track) -> Rule:
-    """Return the grouping key of a track: path, interpolation, value type, number of components."""
-    kind = _KINDS[track.path] if track.pointer is None and track.path in _KINDS else track.kind
-    return track.path, track.interpolation, kind, track.values.shape[1]
-
-
-def stack_values(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:
-    """Return the values of tracks of one rule, and their in and out tangents, None without CUBICSPLINE.
-
-    join: makes one array of each track's (K, C).
-    """
-    values = join([track.values for track in tracks])
-    if tracks[0].interpolation is not Interpolation.CUBICSPLINE:
-        return values, None
-    arriving = [track.in_tangents for track in tracks if track.in_tangents is not None]
-    leaving = [track.out_tangents for track in tracks if track.out_tangents is not None]
-    return values, (join(arriving), join(leaving))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +84,7 @@ class LazyBatch:
     def whole(self) -> Batch:
         """All keys."""
         if self._whole is None:
-            values, tangents = stack_values(self.tracks, partial(np.stack, axis=1))
+            values, tangents = _stack_values(self.tracks, partial(np.stack, axis=1))
             self._whole = Batch(self.tracks, self.numbers, self.time_axis, values, tangents)
         return self._whole
 
@@ -111,19 +95,95 @@ class LazyBatch:
         keys = len(self.time_axis)
         if self._whole is not None or 2 * (high - low) >= keys or self._stacked > 2 * keys:
             return self.whole, place
-        joined = stack_values(self.tracks, lambda each: np.stack([values[low:high] for values in each], axis=1))
+        joined = _stack_values(self.tracks, lambda each: np.stack([values[low:high] for values in each], axis=1))
         moved = replace(place, left=place.left - low, right=place.right - low)
         return Batch(self.tracks, self.numbers, TimeAxis(self.time_axis.times[low:high]), *joined), moved
 
 
 def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:
-    """Return `tracks` grouped by time axis and `alike.rule`, in the order of their first members."""
+    """Return `tracks` grouped by time axis and rule, in the order of their first members."""
     tracks, groups = tuple(tracks), dict[tuple[TimeAxis, Rule], list[int]]()
     for i, track in enumerate(tracks):
-        groups.setdefault((track.time_axis, rule(track)), []).append(i)
+        groups.setdefault((track.time_axis, _rule(track)), []).append(i)
     return [LazyBatch(tuple(tracks[i] for i in group), np.array(group)) for group in groups.values()]
 
 
 def batches(tracks: Iterable[Track]) -> list[Batch]:
     """Return `tracks` stacked by the groups of `lazy_batches`."""
     return [each.whole for each in lazy_batches(tracks)]
+
+
+@dataclass(frozen=True, slots=True)
+class ConcatenatedTracks(TrackGroup):
+    """T tracks of one rule, concatenated: S keys in all.
+
+    counts: (T,) keys of each. starts: (T,) offset of each one's first key.
+    times: (S,) s. values: (S, C). tangents: in and out, both (S, C) per second, for CUBICSPLINE.
+    """
+
+    counts: Ints
+    starts: Ints
+    times: Floats
+    values: Floats
+    tangents: Tangents | None
+
+    def sample(self, at: Floats) -> Floats:
+        """Return the values (T, F, C) of each track at times of its own: `at` (T, F) in seconds."""
+        return interpolate(self._located(at), self.values, self.tangents, self.interpolation, self.kind)
+
+    def _located(self, at: Floats) -> KeyInterval:
+        """Key intervals of the times, as by `sampling.track.find_interval`, by counting keys at or before each time."""
+        before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
+        last = self.counts[:, None] - 1
+        in_track = np.clip(np.add.reduceat(before, self.starts, axis=0, dtype=np.int64) - 1, 0, last)
+        left = self.starts[:, None] + in_track
+        right = self.starts[:, None] + np.minimum(in_track + 1, last)
+        duration = self.times[right] - self.times[left]
+        inside = (at > self.times[left]) & (duration > 0)
+        u = np.where(inside, (at - self.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
+        return KeyInterval(left, right, u, duration)
+
+
+def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
+    """Return the tracks grouped by rule, each group concatenated in their order.
+
+    A group of over MAX_GROUP_KEYS keys is split between its tracks.
+    """
+    groups: dict[Rule, list[list[int]]] = {}
+    room: dict[Rule, int] = {}
+    for i, track in enumerate(tracks):
+        key = _rule(track)
+        left = room.get(key, 0)
+        if left <= 0:
+            groups.setdefault(key, []).append([])
+            left = MAX_GROUP_KEYS
+        groups[key][-1].append(i)
+        room[key] = left - len(track.times)
+    parts = [numbers for group in groups.values() for numbers in group]
+    return [_flatten_keys(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts]
+
+
+def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints) -> ConcatenatedTracks:
+    counts = np.array([len(track.times) for track in tracks])
+    starts = np.cumsum(counts) - counts
+    times = np.concatenate([track.times for track in tracks])
+    return ConcatenatedTracks(tracks, numbers, counts, starts, times, *_stack_values(tracks, np.concatenate))
+
+
+def _rule(track: Track) -> Rule:
+    return track.path, track.interpolation, track.kind, track.values.shape[1]
+
+
+def _stack_values(
+    tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]
+) -> tuple[Floats, Tangents | None]:
+    """Values of tracks of one rule, and their in and out tangents, None without CUBICSPLINE.
+
+    join: makes one array of each track's (K, C).
+    """
+    values = join([track.values for track in tracks])
+    if tracks[0].interpolation is not Interpolation.CUBICSPLINE:
+        return values, None
+    arriving = [track.in_tangents for track in tracks if track.in_tangents is not None]
+    leaving = [track.out_tangents for track in tracks if track.out_tangents is not None]
+    return values, (join(arriving), join(leaving))

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from typing import TypeAlias
 
 import numpy as np
 
 from anim import arrays
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError
 from anim.maths import matrix, quaternion
-from anim.model import Clip, Pose, Skeleton
-from anim.sampling.batch import Batch, lazy_batches
+from anim.model import Clip, Interpolation, Pose, Skeleton
+from anim.model.track import NUM_COMPONENTS
+from anim.sampling.batch import Batch, ConcatenatedTracks, concatenate, lazy_batches
 from anim.sampling.track import KeyInterval, find_interval
 
 Sampler: TypeAlias = Callable[[Batch, Floats, KeyInterval], Floats]
@@ -74,6 +75,36 @@ class PoseSampler:
         return Pose(at, parts["translation"], parts["rotation"], parts["scale"], weights)
 
 
+def sample_clips(
+    skeleton: Skeleton,
+    clips: Sequence[Clip],
+    times: Floats,
+    *,
+    step_times: Floats | None = None,
+    groups: Sequence[ConcatenatedTracks] | None = None,
+) -> tuple[Pose, list[dict[int, Floats]]]:
+    """Return the poses of clips at times of their own (clips, T) in seconds, as one pose of clips × T frames.
+
+    Second, the morph weights (T, M) of each clip by node. step_times: for STEP tracks, by default the same.
+    groups: the concatenated tracks of all clips, if the caller has them.
+    """
+    parts = {name: np.tile(getattr(skeleton, name), (*times.shape, 1, 1)) for name in NUM_COMPONENTS}
+    weights: list[dict[int, Floats]] = [{} for _ in clips]
+    clip_of_track: Ints = np.repeat(np.arange(len(clips)), [len(clip.tracks) for clip in clips])
+    for group in concatenate([track for clip in clips for track in clip.tracks]) if groups is None else groups:
+        at = step_times if step_times is not None and group.interpolation is Interpolation.STEP else times
+        clip = clip_of_track[group.numbers]
+        if group.path in parts:
+            node = np.array([track.node for track in group.tracks])
+            parts[group.path][clip[:, None], np.arange(times.shape[1]), node[:, None]] = group.sample(at[clip])
+        elif group.path == "weights":
+            for i, track, values in zip(clip.tolist(), group.tracks, group.sample(at[clip]), strict=True):
+                if track.node is not None:
+                    weights[i][track.node] = values
+    translation, rotation, scale = (part.reshape(-1, *part.shape[2:]) for part in parts.values())
+    return Pose(times.reshape(-1), translation, rotation, scale), weights
+
+
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return world_from_node (F, N, 3, 4) for every time and node of a pose."""
     return world_by_node(skeleton, pose).transpose(1, 0, 2, 3)
@@ -110,8 +141,12 @@ def with_scale_signs(skeleton: Skeleton, node: int, world: Mapping[int, Floats])
 
 def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return parent_from_node (N, F, 3, 4) for every node and time of a pose."""
-    by_node = (np.swapaxes(part, 0, 1) for part in (pose.translation, pose.rotation, pose.scale))
-    local = matrix.from_trs(*by_node)
+    return local_matrices(skeleton, [np.swapaxes(part, 0, 1) for part in (pose.translation, pose.rotation, pose.scale)])
+
+
+def local_matrices(skeleton: Skeleton, parts: Sequence[Floats]) -> Floats:
+    """Return parent_from_node (N, F, 3, 4) of all nodes from translation, rotation and scale (N, F, ·)."""
+    local = matrix.from_trs(*parts)
     if len(skeleton.sheared):
         local[skeleton.sheared] = skeleton.sheared_local[:, None]
     return local

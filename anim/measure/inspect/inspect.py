@@ -23,7 +23,7 @@ from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import Seam, SkinMotion
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.model.scene import MeshInstance
-from anim.sampling.concatenation import ConcatenatedTracks, concatenate
+from anim.sampling.batch import ConcatenatedTracks, concatenate
 
 
 def inspect(

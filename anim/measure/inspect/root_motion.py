@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.loops.clip_ends import poses_of_clips
 from anim.model import Clip, Skeleton
-from anim.sampling.concatenation import ConcatenatedTracks
-from anim.sampling.pose import world_by_node
+from anim.sampling.batch import ConcatenatedTracks
+from anim.sampling.pose import sample_clips, world_by_node
 
 MIN_DISPLACEMENT_PER_PATH = 0.7
 
@@ -45,7 +44,7 @@ def root_motions(
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
     times = np.array([[clip.start, clip.end] for clip in clips])
-    world = world_by_node(skeleton, poses_of_clips(skeleton, clips, times, groups=groups)[0])
+    world = world_by_node(skeleton, sample_clips(skeleton, clips, times, groups=groups)[0])
     places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
     depth = _depths(skeleton)
     return [_travel(clip, places[:, i, 1] - places[:, i, 0], depth, figure) for i, clip in enumerate(clips)]

@@ -11,7 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Interpolation, Skeleton, Track, ValueKind
-from anim.sampling.concatenation import ConcatenatedTracks, concatenate
+from anim.sampling.batch import ConcatenatedTracks, concatenate
 
 FLOAT32_TOLERANCE = 2.0**-22  # relative; twice the spacing of float32: values closer than this are equal
 KEY_TOLERANCE_PER_RANGE = 1e-6  # fraction of a track's range: tolerance of interpolated keys

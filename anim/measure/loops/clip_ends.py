@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Floats
 from anim.measure.error import orientation_probes
-from anim.model import Clip, Interpolation, Pose, Skeleton
-from anim.sampling.concatenation import ConcatenatedTracks, concatenate
-from anim.sampling.pose import world_by_node
+from anim.model import Clip, Skeleton
+from anim.sampling.batch import ConcatenatedTracks
+from anim.sampling.pose import sample_clips, world_by_node
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 
-PARTS = ("translation", "rotation", "scale")
 # Of the times start, just after it, a probe on, a frame on, and the same before the end: the pose, the speed (times the
 # probe's length), the first and the last frame's motion, and the start against where the last frame goes on to.
 DIFFERENCES = np.array(
@@ -86,42 +85,13 @@ def poses_around_ends(
     every = np.array([part.times() for part in parts])
     chosen = slice(None) if has_frame else TIMES_WITHOUT_FRAME
     times, held = every[:, chosen], every[:, STEP_TIME_INDEX][:, chosen]
-    whole, weights = poses_of_clips(skeleton, [part.clip for part in parts], times, held=held, groups=groups)
+    clips = [part.clip for part in parts]
+    whole, weights = sample_clips(skeleton, clips, times, step_times=held, groups=groups)
     world = world_by_node(skeleton, whole)
     world = world.reshape(len(skeleton), *times.shape, 3, 4)
     for i, part in enumerate(parts):
         remove_root_motion(skeleton, world[:, i], part.root)
     return [EndPoses(world[:, i], weights[i]) for i in range(len(parts))]
-
-
-def poses_of_clips(
-    skeleton: Skeleton,
-    clips: Sequence[Clip],
-    times: Floats,
-    *,
-    held: Floats | None = None,
-    groups: Sequence[ConcatenatedTracks] | None = None,
-) -> tuple[Pose, list[dict[int, Floats]]]:
-    """Return clips at times of their own (clips, T), one after the other: one pose of clips × T frames; and the morph
-    weights (T, M) of each, by node.
-
-    held: times for STEP tracks, by default the same.
-    """
-    parts = {name: np.tile(getattr(skeleton, name), (*times.shape, 1, 1)) for name in PARTS}
-    weights: list[dict[int, Floats]] = [{} for _ in clips]
-    clip_of_track: Ints = np.repeat(np.arange(len(clips)), [len(clip.tracks) for clip in clips])
-    for group in concatenate([track for clip in clips for track in clip.tracks]) if groups is None else groups:
-        at = held if held is not None and group.interpolation is Interpolation.STEP else times
-        clip = clip_of_track[group.numbers]
-        if group.path in parts:
-            node = np.array([track.node for track in group.tracks])
-            parts[group.path][clip[:, None], np.arange(times.shape[1]), node[:, None]] = group.sample(at[clip])
-        elif group.path == "weights":
-            for i, track, values in zip(clip.tolist(), group.tracks, group.sample(at[clip]), strict=True):
-                if track.node is not None:
-                    weights[i][track.node] = values
-    translation, rotation, scale = (part.reshape(-1, *part.shape[2:]) for part in parts.values())
-    return Pose(times.reshape(-1), translation, rotation, scale), weights
 
 
 def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:

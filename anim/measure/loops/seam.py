@@ -16,8 +16,8 @@ from anim.measure.error.surface import Surface, has_vertices, morph_points, skin
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Pose, Scene
-from anim.sampling.concatenation import ConcatenatedTracks
-from anim.sampling.pose import rest_pose, sample_pose, world_by_node
+from anim.sampling.batch import ConcatenatedTracks
+from anim.sampling.pose import rest_pose, sample_clips, sample_pose, world_by_node
 
 PARTS = ("translation", "rotation", "scale")
 STEPS = np.array([-1.0, 1])  # of two frames: the move
@@ -135,8 +135,8 @@ class SkinMotion:
     def _combined(self, clip: Clip, times: Floats, weights: Floats, root: int, *, held: Floats | None = None) -> Floats:
         """Return the longest (F,) of sums of places at times (S, F), by weights (S,). held: times of STEP tracks."""
         stops, frames = times.shape
-        poses, (morphs,) = clip_ends.poses_of_clips(
-            self.skeleton, [clip], times.reshape(1, -1), held=None if held is None else held.reshape(1, -1)
+        poses, (morphs,) = sample_clips(
+            self.skeleton, [clip], times.reshape(1, -1), step_times=None if held is None else held.reshape(1, -1)
         )
         world = world_by_node(self.skeleton, poses)
         clip_ends.remove_root_motion(self.skeleton, world, root)

@@ -11,8 +11,8 @@ from anim.maths import matrix, quaternion
 from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Skeleton
 from anim.optimization.options import Bounds
-from anim.optimization.search.playback import local_matrices
 from anim.optimization.search.source_motion import ROTATION, SourceMotion
+from anim.sampling.pose import local_matrices
 
 MIN_INTERVAL_S = 1e-4  # s; minimum time step of a speed
 

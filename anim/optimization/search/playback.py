@@ -9,6 +9,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
+from anim.sampling.pose import local_matrices
 from anim.sampling.track import KeyInterval
 
 
@@ -69,15 +70,6 @@ def level_world_matrices(skeleton: Skeleton, local: Sequence[Floats], levels: Se
     Matrices of nodes outside `levels` are undefined.
     """
     return matrix.accumulate_world(local_matrices(skeleton, local), skeleton.parents, list(levels))
-
-
-def local_matrices(skeleton: Skeleton, local: Sequence[Floats]) -> Floats:
-    """Return local matrices (N, F, 3, 4) of all nodes from translation, rotation and scale (N, F, ·)."""
-    translation, rotation, scale = local
-    matrices = matrix.from_trs(translation, rotation, scale)
-    if len(skeleton.sheared):
-        matrices[skeleton.sheared] = skeleton.sheared_local[:, None]
-    return matrices
 
 
 def _length(vectors: Floats) -> Floats:

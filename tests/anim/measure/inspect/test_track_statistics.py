@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.model import AccessorFormat, Skeleton, Track
-from anim.sampling import concatenation as module
-from anim.sampling.concatenation import concatenate
+from anim.sampling import batch as module
+from anim.sampling.batch import concatenate
 from tests import clips
 from tests.clips import CUBICSPLINE, STEP
 

@@ -15,7 +15,7 @@ from anim.optimization.options import Bounds, Packing, Policy, Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
-from anim.sampling.concatenation import concatenate
+from anim.sampling.batch import concatenate
 from tests.anim.optimization.making import scene
 from tests.clips import clip, track
 from tests.files import glb_of, opened, opened_fixture

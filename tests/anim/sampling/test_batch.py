@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.sampling import concatenation as module
-from anim.sampling.concatenation import concatenate
+from anim.sampling import batch as module
+from anim.sampling.batch import concatenate
 from anim.sampling.track import sample
 from tests import clips
 from tests.anim.operations.tracks import TRACKS
