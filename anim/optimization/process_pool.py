@@ -2,22 +2,28 @@
 
 Worker processes live only as long as their parent: each waits on a pipe without any writer, whose other end only the
 parent holds open. The system closes that end when the parent exits, and the workers exit too.
+
+Workers read the shared value from a temporary file: sent as an argument of a process, a value larger than the buffer of
+a pipe would block the parent for ever if the process ends before it reads.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, TypeVar
 
-from anim.errors import UnsupportedError
+from anim.errors import UnsupportedError, not_written
 
 Result = TypeVar("Result")
 
@@ -27,6 +33,7 @@ class ProcessPool:
 
     def __init__(self, pool: ProcessPoolExecutor | None, shared: Any) -> None:
         self._pool, self._shared = pool, shared
+        self._started: Future[None] | None = None  # done once a process has started
 
     def each(
         self, function: Callable[[Any, Any], Result], tasks: Sequence[Any], *, label: Callable[[Any], str]
@@ -34,21 +41,34 @@ class ProcessPool:
         """Yield function(shared, task) for every task, in order.
 
         label: name of a task for errors. Raises UnsupportedError if a process ended before its work did, as the system
-        ends one when memory runs out.
+        ends one when memory runs out, or at its start.
         """
-        if self._pool is None:
+        if self._pool is None or not tasks:
             yield from (function(self._shared, task) for task in tasks)
             return
-        futures = [self._pool.submit(_run, function, task) for task in tasks]
+        try:
+            self._started = self._started or self._pool.submit(_start)
+            futures = [self._pool.submit(_run, function, task) for task in tasks]
+        except BrokenProcessPool:
+            raise self._broken(label(tasks[0])) from None
         for future, task in zip(futures, tasks, strict=True):
             try:
                 result = future.result()
             except BrokenProcessPool:
-                raise UnsupportedError(
-                    f"{label(task)}: a process that worked on it, or on one of the next clips, was ended by the system",
-                    help="if memory ran out, `workers` 1 needs the least",
-                ) from None
+                raise self._broken(label(task)) from None
             yield result
+
+    def _broken(self, name: str) -> UnsupportedError:
+        """The error for a process that ended before its work on the task `name`, or on a later one."""
+        if self._started is None or self._started.exception() is not None:
+            return UnsupportedError(
+                "the processes of `workers` ended at their start",
+                help='a script with more than one calls its functions under `if __name__ == "__main__":`',
+            )
+        return UnsupportedError(
+            f"{name}: a process that worked on it, or on one of the next clips, was ended by the system",
+            help="if memory ran out, `workers` 1 needs the least",
+        )
 
 
 @contextmanager
@@ -65,33 +85,52 @@ def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator
     context = multiprocessing.get_context(start)
     lifeline, parent_end = context.Pipe(duplex=False)
     inherited = parent_end if start == "fork" else None  # forked copies inherit the parent's end and must close it
-    pool = ProcessPoolExecutor(workers, context, _set_up, (shared, lifeline, inherited))
-    try:
-        yield ProcessPool(pool, shared)
-        pool.shutdown()
-    finally:
-        parent_end.close()  # running workers exit now
-        pool.shutdown(cancel_futures=True)  # the pool's thread has ended before the interpreter shuts down
-        lifeline.close()
+    with _as_file(shared) as path:
+        pool = ProcessPoolExecutor(workers, context, _set_up, (path, lifeline, inherited))
+        try:
+            yield ProcessPool(pool, shared)
+            pool.shutdown()
+        finally:
+            parent_end.close()  # running workers exit now
+            pool.shutdown(cancel_futures=True)  # the pool's thread has ended before the interpreter shuts down
+            lifeline.close()
+
+
+@contextmanager
+def _as_file(shared: Any) -> Iterator[str]:
+    """Yield the path of a temporary file with the pickled value."""
+    with ExitStack() as stack:
+        try:
+            path = Path(stack.enter_context(tempfile.TemporaryDirectory()), "shared")
+            with path.open("wb") as file:
+                pickle.dump(shared, file, pickle.HIGHEST_PROTOCOL)
+        except OSError as error:
+            raise not_written("temporary file of `workers`", error) from None
+        yield str(path)
 
 
 _run_in_worker: list[Any] = []  # the shared value of a worker process; set once, before its first task
 
 
-def _set_up(shared: Any, lifeline: Connection, inherited: Connection | None) -> None:
+def _set_up(path: str, lifeline: Connection, inherited: Connection | None) -> None:
     for stop in (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])):
         signal.signal(stop, signal.SIG_DFL)  # forked copies inherit handlers, and would not exit
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent decides
     if inherited is not None:
         inherited.close()
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
-    _run_in_worker[:] = [shared]
+    with open(path, "rb") as file:
+        _run_in_worker[:] = [pickle.load(file)]
 
 
 def _end_with(lifeline: Connection) -> None:
     """Exit this process when the other end of the pipe is closed."""
     lifeline.poll(None)
     os._exit(1)
+
+
+def _start() -> None:
+    """Do nothing: its result shows that a process has started."""
 
 
 def _run(function: Callable[[Any, Any], Result], task: Any) -> Result:

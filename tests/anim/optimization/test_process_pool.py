@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -42,3 +45,28 @@ def test_an_error_is_the_callers(workers: int) -> None:
 def test_none_where_there_is_nothing_to_do() -> None:
     with process_pool(0, None) as workforce:
         assert list(workforce.each(_product, [], label=str)) == []
+
+
+UNGUARDED = """
+from anim.errors import AnimError
+from anim.optimization.process_pool import process_pool
+
+def size(shared, task):
+    return len(shared) + task
+
+try:
+    with process_pool(2, bytes(1_000_000)) as pool:
+        print(list(pool.each(size, [1, 2], label=str)))
+except AnimError as error:
+    print(error, error.help)
+"""
+
+
+def test_a_script_without_a_main_guard_gets_an_error_that_names_it(tmp_path: Path) -> None:
+    """It waited for ever: a process that had ended never read the megabyte that was sent to it."""
+    script = tmp_path / "unguarded.py"
+    script.write_text(UNGUARDED)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
+    assert "ended at their start" in run.stdout
+    assert '`if __name__ == "__main__":`' in run.stdout
