@@ -15,7 +15,7 @@ import numpy as np
 from anim.arguments import check_binary_file, check_function, file_path, glob_list
 from anim.arrays import Bytes
 from anim.clip_list import Clips
-from anim.errors import AnimError, RangeError, ShapeError
+from anim.errors import AnimError, FormatError, RangeError, ShapeError
 from anim.files import resolver
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
@@ -101,7 +101,8 @@ class Asset:
 def load(file: PathName | RawBytes | BinaryIO) -> Asset:
     """Return the glTF asset in a .glb or .gltf file.
 
-    file: a path, the bytes of a file, or a binary file open for reading. External buffers of a .gltf are read only from
+    file: a path, the bytes of a file, or a binary file open for reading; it is read completely, and later changes of it
+    or of writable bytes don't change the asset. External buffers of a .gltf are read only from
     its folder and below, and only for a path, since bytes have no folder.
     Raises FormatError for unreadable or invalid glTF, UnsupportedError for an unsupported required extension.
     load("walk.glb").clips["walk"] → Clip('walk', …)
@@ -112,7 +113,7 @@ def load(file: PathName | RawBytes | BinaryIO) -> Asset:
         path = file_path(file, "file")
         return _read_asset(path, lambda: open_file(path))
     name = "bytes" if isinstance(file, RAW_BYTES) else str(getattr(file, "name", "file"))
-    data = _bytes_of(file)
+    data = _bytes_of(file, name)
     return _read_asset(name, lambda: open_bytes(data, name, resolve=refuse_without_folder))
 
 
@@ -159,15 +160,23 @@ def _read_asset(name: str, read: Callable[[], Source]) -> Asset:
     return Asset(source.document, source)
 
 
-def _bytes_of(file: RawBytes | BinaryIO) -> Bytes:
+def _bytes_of(file: RawBytes | BinaryIO, name: str) -> Bytes:
+    """Bytes that nobody else can change: a copy unless they are immutable."""
     if not isinstance(file, RAW_BYTES):
         check_binary_file(file, "file", "read")
-    data: object = file if isinstance(file, RAW_BYTES) else file.read()
+    data: object = file if isinstance(file, RAW_BYTES) else _read_stream(file, name)
     if isinstance(data, np.ndarray):
-        return data
+        return data.copy()
     if not isinstance(data, bytes | bytearray | memoryview):
         raise ShapeError(f"file gives {type(data).__name__} (expected bytes)")
-    return np.frombuffer(data, np.uint8)
+    return np.frombuffer(data if isinstance(data, bytes) else bytes(data), np.uint8)
+
+
+def _read_stream(file: BinaryIO, name: str) -> object:
+    try:
+        return file.read()
+    except OSError as error:
+        raise FormatError(f"{name}: can't be read ({(error.strerror or str(error)).lower()})") from None
 
 
 def _check_ending(path: str) -> None:

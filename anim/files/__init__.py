@@ -1,1 +1,1 @@
-"""Files by path: memory-mapped, confined to a folder, and written atomically."""
+"""Files by path: read, confined to a folder, and written atomically."""

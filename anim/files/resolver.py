@@ -1,10 +1,8 @@
-"""Read files by path, or by relative address confined to a folder: memory-mapped; links."""
+"""Read files by path, or by relative address confined to a folder; links."""
 
 from __future__ import annotations
 
-import mmap
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -27,16 +25,15 @@ class CompanionFiles:
         return self._files[address]
 
 
-def map_file(path: Path, ending: str = ".glb") -> Bytes:
-    """Return the bytes of a file. ending: expected extension, for the hint if `path` is a folder."""
+def read_file(path: Path, ending: str = ".glb") -> Bytes:
+    """Return the bytes of a file, read-only. ending: expected extension, for the hint if `path` is a folder.
+
+    A copy instead of a memory map: the system kills a process whose mapped file is rewritten in place by another.
+    """
     try:
         if path.is_dir():
             raise FormatError("is a folder", help=_in_folder(path, ending))
-        with path.open("rb") as file:
-            is_plain = path.is_file() and os.fstat(file.fileno()).st_size > 0
-            if not is_plain or sys.platform == "win32":  # a mapped file could not be replaced there
-                return np.frombuffer(file.read(), np.uint8)
-            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
+        return np.frombuffer(path.read_bytes(), np.uint8)
     except OSError as error:
         raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 
@@ -54,7 +51,7 @@ def open_relative(folder: Path, address: str) -> Bytes:
     """Return the bytes of a file in or below the folder. Raises FormatError."""
     path = locate(folder, address)
     try:
-        return map_file(path)
+        return read_file(path)
     except FormatError as error:
         raise error.at(f"'{address}'", " ") from None
 

@@ -54,7 +54,7 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
     """
     name = called(path)
     try:
-        yield _stdin() if path == PIPE else resolver.map_file(Path(path), ending), name
+        yield _stdin() if path == PIPE else resolver.read_file(Path(path), ending), name
     except (UsageError, OutputError):
         raise
     except AnimError as error:

@@ -111,6 +111,56 @@ def test_paths_bytes_and_files_load_alike(biped: Path) -> None:
         assert out.getvalue() == data
 
 
+@pytest.mark.parametrize("kind", [bytearray, memoryview, np.ndarray])
+def test_an_asset_does_not_share_memory_that_can_change(kind: Any, biped: Path) -> None:
+    """A reader's buffer, used again for the next file, changed the figure."""
+    data = biped.read_bytes()
+    buffer = bytearray(data)
+    given = {bytearray: buffer, memoryview: memoryview(buffer), np.ndarray: np.frombuffer(buffer, np.uint8)}[kind]
+    asset = anim.load(given)
+    buffer[len(buffer) // 2 :] = bytes(len(buffer) - len(buffer) // 2)
+    np.testing.assert_array_equal(anim.sample(asset, "walk"), anim.sample(anim.load(data), "walk"))
+    out = io.BytesIO()
+    asset.save(out)
+    assert out.getvalue() == data
+
+
+def test_bytes_that_are_not_contiguous_load(biped: Path) -> None:
+    data = biped.read_bytes()
+    spread = bytearray(2 * len(data))
+    spread[::2] = data
+    assert len(anim.load(memoryview(spread)[::2]).clips) == len(anim.load(data).clips)
+    assert len(anim.load(np.frombuffer(spread, np.uint8)[::2]).clips) == len(anim.load(data).clips)
+
+
+@pytest.mark.parametrize("content", ["short", "zeros"])
+def test_a_file_rewritten_in_place_does_not_change_what_was_loaded(content: str, biped: Path) -> None:
+    """The interpreter was killed by SIGBUS: the pages of a mapped file were gone. So in a process of its own."""
+    lines = (
+        "import io, sys, anim",
+        f"path = {str(biped)!r}",
+        "data = open(path, 'rb').read()",
+        "asset = anim.load(path)",
+        f"other = b'short' if {content!r} == 'short' else data[: len(data) // 2].ljust(len(data), b'0')",
+        "open(path, 'wb').write(other)",
+        "out = io.BytesIO()",
+        "asset.save(out)",
+        "assert out.getvalue() == data",
+        "assert (anim.sample(asset, 'walk') == anim.sample(anim.load(data), 'walk')).all()",
+    )
+    run = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, (run.returncode, run.stderr)
+
+
+def test_a_file_that_fails_to_be_read_is_an_error_of_ours() -> None:
+    class Failing(io.BytesIO):
+        def read(self, size: int | None = -1) -> bytes:
+            raise OSError(5, "Input/output error")
+
+    with pytest.raises(anim.FormatError, match=r"can't be read \(input/output error\)"):
+        anim.load(Failing())
+
+
 def test_a_gltf_gets_its_bin_beside_it_and_loads_from_there(biped: Path, tmp_path: Path) -> None:
     asset = anim.load(biped)
     asset.save(tmp_path / "walk.gltf")

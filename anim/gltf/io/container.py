@@ -31,7 +31,7 @@ Choose: TypeAlias = Callable[[int, str, Bytes], str]
 def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None = None) -> Document:
     """Return the document in `data`, a GLB or a .gltf text.
 
-    data: bytes, or a uint8 array, best a memory map: a GLB's BIN chunk is neither copied nor read.
+    data: bytes, or a uint8 array; a GLB's BIN chunk is not copied.
     resolve: returns the bytes of a file in the input's folder by its relative path, on first use; None if the input has
     no folder.
     Raises FormatError with the fault and its position, ShapeError if `data` is not bytes.

@@ -7,8 +7,6 @@ Other files remain.
 
 from __future__ import annotations
 
-import mmap
-import os
 import posixpath
 import re
 from collections.abc import Sequence
@@ -95,7 +93,7 @@ def _needs(other: Path, buffer: Path, address: str) -> bool:
     try:
         if not other.is_file() or not (is_called_so or _begins_like_gltf(other)):
             return False
-        return _may_name(_mapped(other), buffer.name) and address in _named(_opened(other))
+        return _may_name(_read_json(other), buffer.name) and address in _named(_opened(other))
     except (AnimError, OSError, RecursionError):
         return is_called_so
 
@@ -106,12 +104,10 @@ def _begins_like_gltf(path: Path) -> bool:
     return head.startswith(container.MAGIC) or head.lstrip(_BLANK).startswith(b"{")
 
 
-def _may_name(data: mmap.mmap | bytes, name: str) -> bool:
+def _may_name(json: bytes, name: str) -> bool:
     """Return False if the name is not in the JSON: a fast test for folders with many files."""
-    is_glb = data[:4] == container.MAGIC
-    end = 20 + int.from_bytes(data[12:16], "little") if is_glb else len(data)
-    is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and data.find(b"%", 0, end) < 0
-    return not is_plain or data.find(name.encode(), 0, end) >= 0
+    is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and b"%" not in json
+    return not is_plain or name.encode() in json
 
 
 def _named(document: Document) -> set[str]:
@@ -130,9 +126,12 @@ def _file_of(address: str | None) -> str:
 
 
 def _opened(path: Path) -> Document:
-    return container.read(np.frombuffer(_mapped(path), np.uint8))
+    return container.read(path.read_bytes())
 
 
-def _mapped(path: Path) -> mmap.mmap | bytes:
+def _read_json(path: Path) -> bytes:
+    """The bytes of a .gltf, or of a GLB up to the end of its JSON."""
     with path.open("rb") as file:
-        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if os.fstat(file.fileno()).st_size else b""
+        head = file.read(20)
+        is_glb = head.startswith(container.MAGIC)
+        return head + file.read(int.from_bytes(head[12:16], "little") if is_glb else -1)
