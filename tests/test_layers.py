@@ -37,13 +37,14 @@ TERMINAL = {"typer", "click", "rich", "argparse"}
 OPENING = {  # modules of the library that may open a path
     "anim/asset.py",
     "anim/caches/cache_file.py",
+    "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/files/atomic.py",
     "anim/files/resolver.py",
     "anim/gltf/io/gltf_files.py",
     "anim/gltf/io/images.py",
     "anim/gltf/io/source.py",
     "anim/gltf/io/unused_buffers.py",
-    "anim/caches/temporary_files.py",  # for libraries that take names only
+    "anim/optimization/process_pool.py",
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }
 FORBIDDEN_CALLS = {"print", "open", "input", "exit", "sys.exit"}

@@ -33,7 +33,8 @@ def read_file(path: Path, ending: str = ".glb") -> Bytes:
     try:
         if path.is_dir():
             raise FormatError("is a folder", help=_in_folder(path, ending))
-        return np.frombuffer(path.read_bytes(), np.uint8)
+        with path.open("rb") as file:
+            return np.frombuffer(file.read(), np.uint8)
     except OSError as error:
         raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 

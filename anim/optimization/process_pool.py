@@ -119,7 +119,7 @@ def _set_up(path: str, lifeline: Connection, inherited: Connection | None) -> No
     if inherited is not None:
         inherited.close()
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
-    with open(path, "rb") as file:
+    with Path(path).open("rb") as file:
         _run_in_worker[:] = [pickle.load(file)]
 
 

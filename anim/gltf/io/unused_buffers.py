@@ -126,7 +126,8 @@ def _file_of(address: str | None) -> str:
 
 
 def _opened(path: Path) -> Document:
-    return container.read(path.read_bytes())
+    with path.open("rb") as file:
+        return container.read(file.read())
 
 
 def _read_json(path: Path) -> bytes:
