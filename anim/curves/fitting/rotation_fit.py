@@ -10,17 +10,20 @@ import numpy as np
 from anim.arrays import Floats, freeze
 from anim.curves.easing.function import Easing
 from anim.curves.fitting.hermite_fit import FitTarget, fit_end_slopes, fit_errors
-from anim.curves.fitting.subdivision import subdivide
+from anim.curves.fitting.subdivision import MIN_TOLERANCE, subdivide
 
 MAX_ANGLE_RAD = np.radians(120)  # of one segment; above, the chord of unit quaternions gets short
 ANGLE_STEP_RAD = np.pi / 32  # fits are shared by angles up to the next multiple
+SHARING_ANGLES_RAD = ANGLE_STEP_RAD * np.arange(9) / 8  # below the multiple, for errors between: they change smoothly
+MAX_FITS = 4  # attempts with smaller tolerances
 
 
 @dataclass(frozen=True, slots=True)
 class RotationFit:
     """Cubics for rotations of up to one angle: key u (P + 1,), start and end rates e′ (P,) of segments, and error.
 
-    Tangents per u are ½ q ⊗ (rate · rotation vector). error: greatest angle in radians from the eased rotation.
+    Tangents per u are ½ q ⊗ (rate · rotation vector). error: greatest angle in radians from the eased rotation, for
+    any rotation angle that shares the fit.
     """
 
     u: Floats
@@ -40,19 +43,31 @@ def fit_rotation(easing: Easing, angle: float, tolerance: float) -> RotationFit:
 
 @lru_cache(maxsize=1024)
 def _fit(easing: Easing, angle: float, tolerance: float) -> RotationFit:
-    edges = (0.0, *easing.breakpoints, 1.0)
     if angle == 0:
-        none = np.zeros(len(edges) - 1)
-        return RotationFit(freeze(np.array(edges)), none, none, 0.0)
+        none = np.zeros(len(easing.breakpoints) + 1)
+        return RotationFit(freeze(np.array((0.0, *easing.breakpoints, 1.0))), none, none, 0.0)
+    goal = tolerance
+    for _ in range(MAX_FITS):
+        found, error = _subdivide_at(easing, angle, goal)
+        if error > goal or found.error <= tolerance:  # next to a vertical slope no goal is reached
+            break
+        goal = max(goal * tolerance / found.error * 0.95, MIN_TOLERANCE)  # smaller angles have larger errors
+    return found
+
+
+def _subdivide_at(easing: Easing, angle: float, tolerance: float) -> tuple[RotationFit, float]:
+    """Return the fewest cubics within the tolerance at one angle, and their error at this angle."""
     path = _circle(easing, angle)
 
     def turn_errors(a: Floats, b: Floats) -> Floats:
         wide = np.abs(easing.value(b) - easing.value(a)) * angle > MAX_ANGLE_RAD + 1e-9
         return np.where(wide, np.inf, fit_errors(path, a, b))
 
-    ends = freeze(np.array(subdivide(turn_errors, edges, tolerance)))
-    rate0, rate1 = fit_end_slopes(path, ends[:-1], ends[1:])
-    return RotationFit(ends, rate0, rate1, float(fit_errors(path, ends[:-1], ends[1:], (rate0, rate1)).max()))
+    ends = freeze(np.array(subdivide(turn_errors, (0.0, *easing.breakpoints, 1.0), tolerance)))
+    rates = fit_end_slopes(path, ends[:-1], ends[1:])
+    paths = (_circle(easing, each) for each in np.maximum(angle - SHARING_ANGLES_RAD, 0.0))
+    errors = [float(fit_errors(each, ends[:-1], ends[1:], rates).max()) for each in paths]
+    return RotationFit(ends, *rates, max(errors)), errors[0]
 
 
 def _circle(easing: Easing, angle: float) -> FitTarget:

@@ -167,3 +167,12 @@ def test_no_turn(name: str) -> None:
     found = turn(0, name, 1e-3)
     np.testing.assert_allclose(found.value0, np.tile(START, (len(found.start), 1)), atol=1e-15)
     np.testing.assert_allclose(found.slope0, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["quint-out", "expo-out", "sine-in-out", "smootherstep"])
+@pytest.mark.parametrize("tolerance", [0.05, 0.2])
+def test_every_angle_of_a_shared_fit_is_within_the_tolerance(name: str, tolerance: float) -> None:
+    """The error at the largest angle was taken as the bound: smaller angles were off by up to 60 % more."""
+    limit = np.radians(tolerance)
+    for degrees in np.linspace(3, 177, 88):
+        assert worst_angle(turn(degrees, name, limit), name, degrees) <= limit, degrees
