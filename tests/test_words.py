@@ -23,10 +23,8 @@ FORBIDDEN = frozenset(
 )
 PENDING = (  # packages whose docstrings are not rewritten yet
     "anim/measure/compare/",
-    "anim/measure/continuity/",
     "anim/measure/continuous_bound/",
     "anim/measure/error/",
-    "anim/measure/loops/",
 )
 ADVICE = (  # modules that compose command lines, the advice of findings
     "anim/measure/inspect/",

@@ -1,10 +1,10 @@
-"""How smooth tracks are at their keys: jumps in value, speed and acceleration, by analysis and not by sampling.
+"""Continuity of tracks at their keys: jumps of value, velocity and acceleration, by analysis.
 
-A key is graded by the first thing that jumps there: the value (`jump`), the speed (`C0`), the acceleration (`C1`), or
-none of them (`C2`). `G1` is C0 on a smooth path: the direction goes on, only the speed along it jumps; numbers without
-a direction in space (weights, scalars) have no G1. A jump counts where it is above SAME of the track's own RMS speed,
-or RMS acceleration, and above what keys stored in float32 (or in normalized integers) can tell. Two keys within one
-float32 step stand for a jump and are one key here.
+The class of a key is the lowest derivative that is discontinuous there: the value (`jump`), the velocity (`C0`), the
+acceleration (`C1`), or none of them (`C2`). `G1` is C0 on a smooth path: the direction is continuous, only the speed
+along it jumps; values without a direction in space (weights, scalars) have no G1. A jump counts if it exceeds 0.001
+of the track's own RMS speed or RMS acceleration, and the rounding of keys stored as float32 (or as normalized
+integers). Two keys within one float32 step represent a jump and count as one key.
 Source: notes/algorithms.md C4 and H.
 """
 
@@ -22,14 +22,14 @@ from anim.measure.continuity.knots import Knots, lengths
 from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 
-SAME = 1e-3  # of the track's RMS speed or acceleration, or rad between two directions; jumps below are none
-CLOSED = 1e-3  # of the track's range; a loop's end this near its start is meant to be the same
-FRACTIONS = {5120: 1 / 127, 5121: 1 / 255, 5122: 1 / 32767, 5123: 1 / 65535}  # steps of normalized integers
+JUMP_TOLERANCE = 1e-3  # of the track's RMS speed or acceleration, or rad between two directions
+CLOSED_GAP_PER_RANGE = 1e-3  # fraction of the track's range: largest difference of a loop's end from its start
+INTEGER_STEPS = {5120: 1 / 127, 5121: 1 / 255, 5122: 1 / 32767, 5123: 1 / 65535}  # steps of normalized integers
 UNITS = {"translation": "m", "rotation": "rad"}
 
 
 class ContinuityClass(StrEnum):
-    """How smooth a track is at a key, the roughest first."""
+    """Continuity of a track at a key, the lowest first."""
 
     JUMP = "jump"
     C0 = "C0"
@@ -40,9 +40,9 @@ class ContinuityClass(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class KeyJumps:
-    """Jumps at I keys: times (I,) s, grades, and how far value, speed and acceleration jump (I,).
+    """Jumps at I keys: times (I,) s, classes, and sizes (I,) of jumps of value, velocity, acceleration.
 
-    In the track's unit, per second and per second squared: lengths of difference vectors; radians for rotations.
+    In the track's unit, per second, and per second squared: lengths of difference vectors; radians for rotations.
     """
 
     times: Floats
@@ -54,7 +54,7 @@ class KeyJumps:
 
 @dataclass(frozen=True, slots=True)
 class MaxJump:
-    """The largest jump of one kind, and where it is."""
+    """The largest jump of one kind, and its time."""
 
     size: float
     time_s: float
@@ -62,7 +62,7 @@ class MaxJump:
 
 @dataclass(frozen=True, slots=True)
 class LoopGap:
-    """From the last key of the clip to its first: `jump` where the track does not close, or steps."""
+    """Continuity from the last key of the clip to its first: `jump` if the track is open, or steps."""
 
     grade: ContinuityClass
     value_jump: float
@@ -72,10 +72,11 @@ class LoopGap:
 
 @dataclass(frozen=True, slots=True)
 class TrackContinuity:
-    """One track. unit: of the value, "m", "rad" or "1"; jumps in speed are per second, in acceleration per second².
+    """Continuity of one track.
 
-    interior_keys: those between the first and the last, = jumps + c0 + g1 + c1 + c2. still: nothing ever moves.
-    largest_*: None where nothing jumps. seam: None for a track that is still.
+    unit: of the value, "m", "rad" or "1"; of velocity per second, of acceleration per second².
+    interior_keys: those between the first and the last, = jumps + c0 + g1 + c1 + c2. still: the track is constant.
+    largest_*: None without a jump. seam: None for a constant track.
     """
 
     target: str
@@ -97,7 +98,7 @@ class TrackContinuity:
 
 
 def continuity(clip: Clip, skeleton: Skeleton) -> tuple[TrackContinuity, ...]:
-    """Return how smooth every track of the clip is, in their order."""
+    """Return the continuity of every track of the clip, in order."""
     return tuple(_track(track, clip, skeleton) for track in clip.tracks)
 
 
@@ -110,7 +111,7 @@ def at_keys(track: Track) -> KeyJumps:
 
 
 def loop_gap(track: Track, *, start: float, end: float) -> LoopGap:
-    """Return what jumps where a clip from `start` to `end`, in seconds, is played again from its start."""
+    """Return the continuity of a loop from `end` back to `start`, in seconds."""
     return _Analysis(track).seam(start, end)
 
 
@@ -140,7 +141,7 @@ def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
 
 
 def _max_jump(keys: KeyJumps, sizes: Floats, among: set[ContinuityClass]) -> MaxJump | None:
-    """The largest of the jumps that count: those at keys of these grades."""
+    """The largest jump at keys of these classes."""
     counted = np.where([grade in among for grade in keys.grades], sizes, 0.0)
     if not counted.any():
         return None
@@ -149,7 +150,7 @@ def _max_jump(keys: KeyJumps, sizes: Floats, among: set[ContinuityClass]) -> Max
 
 
 class _Analysis:
-    """One track with its scales: RMS speed and acceleration, and the step in which its values are stored."""
+    """One track with its scales: RMS speed and acceleration, and the step of its stored values."""
 
     def __init__(self, track: Track) -> None:
         self.track = track
@@ -157,41 +158,42 @@ class _Analysis:
         self._speed, self._acceleration = (0.0, 0.0) if self.still else knots.root_mean_squares(track)
         self._size = float(np.abs(track.values).max())
         storage = track.storage
-        self._step = FRACTIONS.get(storage.component_type, 1.0) if storage.normalized else FLOAT32_SPACING * self._size
+        integer_step = INTEGER_STEPS.get(storage.component_type, 1.0)
+        self._step = integer_step if storage.normalized else FLOAT32_SPACING * self._size
         self._late = FLOAT32_SPACING * float(track.times[-1])
 
     def at_keys(self) -> KeyJumps:
-        """The jumps at the interior keys; two keys that stand for a jump are one, at the time of the second."""
+        """The jumps at the interior keys; two keys that represent a jump are one, at the time of the second."""
         if self.still:
             none = np.zeros(max(len(self.track.times) - 2, 0))
             return KeyJumps(self.track.times[1:-1], (ContinuityClass.C2,) * len(none), none, none, none)
         return self._graded(knots.interior_knots(self.track), 0.0)
 
     def seam(self, start: float, end: float) -> LoopGap:
-        """The joint of the clip's end and its start; of a STEP track's two the one that jumps further."""
-        found = self._graded(knots.loop_knot(self.track, start=start, end=end), CLOSED * self._range())
+        """The jump from the clip's end to its start; of the two of a STEP track the larger one."""
+        found = self._graded(knots.loop_knot(self.track, start=start, end=end), CLOSED_GAP_PER_RANGE * self._range())
         worst = int(found.value.argmax())
         sizes = (float(each[worst]) for each in (found.value, found.speed, found.acceleration))
         return LoopGap(found.grades[worst], *sizes)
 
     def _graded(self, at: Knots, allowed: float) -> KeyJumps:
-        """The jumps at joints with their grades; values may differ by `allowed` and rounding."""
+        """The jumps at knots with their classes; values may differ by `allowed` and rounding."""
         speed = lengths(at.rates[1] - at.rates[0])
         acceleration = lengths(at.accelerations[1] - at.accelerations[0])
         if self.track.kind is ValueKind.ROTATION:
             value = quaternion.angle_between(*(quaternion.normalize(values) for values in at.values))
         else:
             value = lengths(at.values[1] - at.values[0])
-        allowed_speed = SAME * self._speed + self._speed_noise(at)
+        allowed_speed = JUMP_TOLERANCE * self._speed + self._speed_noise(at)
         grades = np.full(len(value), str(ContinuityClass.C2), dtype="U4")
-        grades[acceleration > SAME * self._acceleration + self._acceleration_noise(at)] = ContinuityClass.C1
+        grades[acceleration > JUMP_TOLERANCE * self._acceleration + self._acceleration_noise(at)] = ContinuityClass.C1
         grades[speed > allowed_speed] = ContinuityClass.C0
         grades[(speed > allowed_speed) & self._goes_on(at, allowed_speed)] = ContinuityClass.G1
         grades[value > allowed + self._value_noise(at)] = ContinuityClass.JUMP
         return KeyJumps(at.times, tuple(ContinuityClass(str(each)) for each in grades), value, speed, acceleration)
 
     def _goes_on(self, at: Knots, allowed_speed: Floats) -> Bools:
-        """Where the track moves on both sides, in one direction; weights and scalars have speeds but no direction."""
+        """Mask of knots where the track moves on both sides in one direction; weights and scalars have none."""
         if self.track.path == "weights" or self.track.values.shape[1] == 1:
             return np.zeros(len(at.times), np.bool_)
         before, after = (lengths(rates) for rates in at.rates)
@@ -200,15 +202,15 @@ class _Analysis:
             rates / np.where(length > 0, length, 1.0)[:, None]
             for rates, length in zip(at.rates, (before, after), strict=True)
         )
-        return np.asarray(moving & (lengths(other - one) <= SAME))
+        return np.asarray(moving & (lengths(other - one) <= JUMP_TOLERANCE))
 
     def _value_noise(self, at: Knots) -> Floats:
-        """What a value may differ by on both sides of a pair of keys without a jump: rounding, and motion between."""
+        """Difference of values on both sides of two keys without a jump: rounding, and motion between them."""
         going = np.maximum(*(lengths(rates) for rates in at.rates))
         return np.asarray(8 * FLOAT32_SPACING * self._size + 2 * (MAX_JUMP_S + 2 * self._late) * going)
 
     def _speed_noise(self, at: Knots) -> Floats:
-        """How far stored values and times leave the speeds open: chords of LINEAR; tangents are stored themselves."""
+        """Uncertainty of velocities from the rounding of values and times, for LINEAR; tangents are stored."""
         noise = np.zeros(len(at.times))
         for rates, h in zip(at.rates, at.durations, strict=True):
             going = lengths(rates)
@@ -218,7 +220,7 @@ class _Analysis:
         return noise
 
     def _acceleration_noise(self, at: Knots) -> Floats:
-        """How far stored values, tangents and times leave the accelerations of cubics open."""
+        """Uncertainty of a cubic's accelerations from the rounding of stored values, tangents and times."""
         noise = np.zeros(len(at.times))
         if self.track.interpolation is not Interpolation.CUBICSPLINE:
             return noise
@@ -236,7 +238,7 @@ class _Analysis:
 
 
 def _is_constant(track: Track) -> bool:
-    """Whether nothing ever moves: one value, and no tangents that lead away from it."""
+    """Return whether a track is constant: one value, and no tangents other than 0."""
     tangents = (track.in_tangents, track.out_tangents)
     same = bool((track.values == track.values[0]).all())
     return same and (len(track.times) == 1 or not any(each is not None and each.any() for each in tangents))

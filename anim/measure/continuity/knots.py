@@ -1,4 +1,4 @@
-"""Both sides of the keys of a track: value, speed and acceleration just before and just after, by analysis."""
+"""One-sided values, velocities and accelerations of a track at its keys, computed analytically."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from anim.sampling import derivatives
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 from anim.sampling.track import sample
 
-GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))  # of a piece; exact for the squared speed of a cubic
+GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))  # u of Gauss-Legendre quadrature, exact up to degree 5
 GAUSS_WEIGHTS = (5 / 18, 8 / 18, 5 / 18)
 
 
 @dataclass(frozen=True, slots=True)
 class Knots:
-    """J places where one piece of a track ends and the next begins.
+    """J knots, where one segment of a track ends and the next one starts.
 
-    times: (J,) s, of the later key where two stand for a jump. Pairs are before and after: values (J, C), rates and
-    accelerations (J, D) per second and second², durations (J,) s of the pieces, infinite where there is none.
+    times: (J,) s, of the later key if two represent a jump. Pairs are before and after: values (J, C), rates and
+    accelerations (J, D) per second and second², durations (J,) s of the segments, infinite without a segment.
     """
 
     times: Floats
@@ -33,7 +33,10 @@ class Knots:
 
 
 def interior_knots(track: Track) -> Knots:
-    """Return the joints at the interior keys of a track. At a jump at an end both sides move as the inner one does."""
+    """Return the knots at the interior keys of a track.
+
+    A jump at an end has the inner velocity on both sides.
+    """
     keys, steps = track.times, np.append(np.diff(track.times), np.inf)
     borders = np.concatenate(([-1], _segments(track), [len(keys) - 1]))
     first, last = borders[:-1] + 1, borders[1:]
@@ -62,9 +65,10 @@ def interior_knots(track: Track) -> Knots:
 
 
 def loop_knot(track: Track, *, start: float, end: float) -> Knots:
-    """Return the joint of a clip's end and its start, in seconds; outside its keys the track stands still.
+    """Return the knot between a clip's end and its start, in seconds.
 
-    Of a STEP track two: a loop shows the value before the last key until the end, a player that stops shows the last.
+    Outside its keys a track is constant. A STEP track has two knots: a loop shows the value before the last key until
+    the end, a player that stops shows the last.
     """
     ends, starts = np.array([end]), np.array([start])
     shown = ends
@@ -81,9 +85,9 @@ def loop_knot(track: Track, *, start: float, end: float) -> Knots:
 
 
 def accelerations(track: Track, times: Floats, *, before: bool) -> Floats:
-    """Return the second derivatives (F, D) per second² just before or just after each time; slerp and lines have none.
+    """Return second derivatives (F, D) per second² just before or after each time; 0 for slerp and lines.
 
-    Of rotations the angular acceleration along the node's own axes: ω = 2 vec(q* q′) / |q|², so
+    Of rotations the angular acceleration about the node's own axes: ω = 2 vec(q* q′) / |q|², so
     ω′ = 2 vec(q* q″) / |q|² − 2 ω (q · q′) / |q|², since q′* q′ has no vector part.
     """
     keys, rotation = track.times, track.kind is ValueKind.ROTATION
@@ -108,7 +112,7 @@ def accelerations(track: Track, times: Floats, *, before: bool) -> Floats:
 
 
 def root_mean_squares(track: Track) -> tuple[float, float]:
-    """Return RMS speed and acceleration over all pieces; keys that stand for a jump take no time."""
+    """Return RMS speed and acceleration over all segments; jumps have no duration."""
     pieces = _segments(track)
     steps = np.diff(track.times)[pieces]
     if not len(steps) or track.interpolation is Interpolation.STEP:
@@ -126,7 +130,7 @@ def lengths(vectors: Floats) -> Floats:
 
 
 def _segments(track: Track) -> Ints:
-    """Numbers of the pieces between keys that are no jumps: (P,)."""
+    """Indices of the segments between keys that are no jumps: (P,)."""
     return np.flatnonzero(np.diff(track.times) > MAX_JUMP_S + 2 * FLOAT32_SPACING * track.times[1:])
 
 
@@ -135,6 +139,6 @@ def _one_sided(before: Floats, after: Floats, at_start: Bools, at_end: Bools) ->
 
 
 def _duration_at(track: Track, times: Floats, *, before: bool) -> Floats:
-    """Lengths (F,) of the pieces just before or just after times (F,), infinite outside the keys."""
+    """Durations (F,) of the segments just before or just after times (F,), infinite outside the keys."""
     k = np.searchsorted(track.times, times, side="left" if before else "right")
     return np.diff(track.times, prepend=-np.inf, append=np.inf)[k]

@@ -62,8 +62,7 @@ class _Rule:
     """Rule of a finding.
 
     count: number of faults in a clip. problem: text from the clips with the fault and their total count. advice: text
-    with
-    {fps} for the clips' frame rate, {finer} for twice that, {clips} for the options that select them.
+    with {fps} for the clips' frame rate, {finer} for twice that, {clips} for the options that select them.
     """
 
     name: str

@@ -25,8 +25,7 @@ def estimate_frame_rate(times: Floats) -> FrameRate | None:
     """Return the frame rate of key times (K,) in seconds, increasing; None for too few keys.
 
     For evenly spaced keys the inverse of their spacing. Otherwise the slowest usual rate with nearly all keys on its
-    grid;
-    if there is none, the inverse of the median spacing.
+    grid; if there is none, the inverse of the median spacing.
     estimate_frame_rate([0, 0.25, 0.5, 1]) → 12 fps, not 4: if a key is missing, only usual rates are tried
     """
     if len(times) < 3:

@@ -33,8 +33,7 @@ class ClipReport:
 
     frame_rate_fps, frame_rate_regular: the estimate, and the fraction of keys on its grid; None for too few keys.
     data_bytes, stored_bytes, json_bytes: size of its values decoded, its part of them as stored (compressed or not),
-    and its
-    JSON; share: fraction of the file that the last two take. Data shared by clips counts in each.
+    and its JSON; share: fraction of the file that the last two take. Data shared by clips counts in each.
     repeating_tracks: constant tracks with several keys that neither equal the rest pose nor define the clip's end.
     sign_flips_in_splines: those of sign_flips that are on CUBICSPLINE tracks.
     root_*: motion of the root. seam_m, seam_speed_m_per_s: loop gap and velocity gap without root motion;

@@ -31,12 +31,10 @@ class TrackStats:
     """Statistics of T tracks; arrays (T,).
 
     constant: never changes. no_effect: constant, and equal to the rest pose. redundant: keys whose removal saves bytes
-    (see
-    `removable_keys`) without creating wide steps or changing the motion in players that do not normalize rotations; of
-    constant tracks one key is needed, of splines two.
+    (see `removable_keys`) without creating wide steps or changing the motion in players that do not normalize
+    rotations; of constant tracks one key is needed, of splines two.
     non_unit, flips, wide: number of rotation keys that are not of unit length, of sign changes from key to key (not
-    under
-    STEP), of steps of 170° or more (under LINEAR only).
+    under STEP), of steps of 170° or more (under LINEAR only).
     widest: largest step in rad.
     """
 

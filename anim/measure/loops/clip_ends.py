@@ -1,4 +1,4 @@
-"""Many clips at once around their ends: the poses there, and what differs between end and start."""
+"""Poses around the start and end of many clips at once, and their differences."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from anim.sampling.batch import ConcatenatedTracks
 from anim.sampling.pose import sample_clips, world_by_node
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 
-# Of the times start, just after it, a probe on, a frame on, and the same before the end: the pose, the speed (times the
-# probe's length), the first and the last frame's motion, and the start against where the last frame goes on to.
+# Rows are differences, columns the times start, just after it, one probe later, one frame later, and the same
+# before the end. Rows: pose; velocity (× probe); first and last frame's motion; start against extrapolated end.
 DIFFERENCES = np.array(
     [
         [-1, 0, 0, 0, 0, 0, 0, 1],
@@ -26,18 +26,18 @@ DIFFERENCES = np.array(
     ],
     float,
 )
-SPEED = 1  # its row
+VELOCITY = 1  # index of the velocity row
 TIMES_WITHOUT_FRAME = [0, 1, 2, 5, 6, 7]
-WITHOUT_FRAME = DIFFERENCES[:2, TIMES_WITHOUT_FRAME]  # where all parts have the frame 0: the others are 0, or the first
-STEP_TIME_INDEX = [0, 1, 1, 3, 4, 6, 6, 7]  # when a STEP track is looked at: it has no speed
+WITHOUT_FRAME = DIFFERENCES[:2, TIMES_WITHOUT_FRAME]  # for ranges without motion per frame: the other rows are then 0
+STEP_TIME_INDEX = [0, 1, 1, 3, 4, 6, 6, 7]  # times of STEP tracks for each column: they have no velocity
 
 
 @dataclass(frozen=True, slots=True)
 class LoopRange:
-    """A part of a clip that is played in a loop.
+    """Time range of a clip that is played as a loop.
 
-    start, end: s, start ≤ end. frame: s, from one frame to the next, 0 where motion per frame is not asked for.
-    root: the node whose way is taken off, −1 for none.
+    start, end: s, start ≤ end. frame: s, duration of a frame, 0 if motion per frame is not needed.
+    root: node whose displacement is removed, −1 for none.
     """
 
     clip: Clip
@@ -48,12 +48,12 @@ class LoopRange:
 
     @property
     def probe(self) -> float:
-        """Seconds from an end to where the speed there is looked at."""
+        """Seconds from an end to the sample for the velocity there."""
         return min(orientation_probes.SPEED_STEP, (self.end - self.start) / 4)
 
     @property
     def shortest(self) -> float:
-        """Seconds from an end within which two keys stand for a jump, which is no speed."""
+        """Seconds from an end within which two keys represent a jump instead of a velocity."""
         return min(MAX_JUMP_S + 2 * FLOAT32_SPACING * abs(self.end), self.probe / 2)
 
     def times(self) -> Floats:
@@ -64,7 +64,10 @@ class LoopRange:
 
 @dataclass(frozen=True, slots=True)
 class EndPoses:
-    """A part at the T times of DIFFERENCES. world: (N, T, 3, 4). weights: (T, M) by node, of meshes that morph."""
+    """A range at the T times of DIFFERENCES.
+
+    world: (N, T, 3, 4). weights: (T, M) by node, of morphing meshes.
+    """
 
     world: Floats
     weights: dict[int, Floats]
@@ -77,9 +80,9 @@ def poses_around_ends(
     *,
     has_frame: bool = True,
 ) -> list[EndPoses]:
-    """Return each range around its ends, the way of its root taken off.
+    """Return the poses of each range around its ends, without root motion.
 
-    groups: the tracks of all their clips, `joined`, for callers that have them. has_frame: False for the times of
+    groups: the tracks of all clips from `concatenate`, if the caller has them. has_frame: False for the times of
     WITHOUT_FRAME only.
     """
     every = np.array([part.times() for part in parts])
@@ -95,7 +98,10 @@ def poses_around_ends(
 
 
 def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:
-    """Take the way of node `root` since the first frame off world matrices (N, F, 3, 4), in place; −1: of none."""
+    """Remove the displacement of node `root` since the first frame from world matrices, in place.
+
+    world: (N, F, 3, 4). root: −1 for none.
+    """
     if root >= 0:
         way = world[root, :, :, 3] - world[root, :1, :, 3]
         world[..., 3] -= skeleton.descendants(root)[:, None, None] * way

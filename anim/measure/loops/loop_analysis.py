@@ -1,4 +1,4 @@
-"""What kind of loop is a clip, how large is its seam, and which part of it would loop best?"""
+"""Loop analysis: kind of loop, size of the loop gap, and the time ranges that loop best."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from anim.measure.loops.seam import JointGap, Seam, SkinMotion
 from anim.model import Clip, Scene
 from anim.sampling.pose import sample_pose, world_by_node
 
-CLOSED = (1e-5, 1e-3)  # of the model's size: a seam below the first is rounding, one above the second is seen
-UNSEEN = 0.1  # of the usual motion per frame; between these two, a smaller seam is not seen
-ONE_FRAME = 1.6  # an open loop's seam against the motion per frame next to it: about one frame's worth
-MAX_FRAMES = 600  # looked at by `best_ranges`
-MAX_STEPS = 300  # pairs of frames, and keys, looked at inside a clip
-INTERIOR_S = 2e-4  # s, from an end to a key inside
+NOISE_PER_SIZE = 1e-5  # of the model's size; smaller gaps are rounding
+VISIBLE_GAP_PER_SIZE = 1e-3  # of the model's size; larger gaps are visible
+INVISIBLE_GAP_PER_FRAME = 0.1  # of the usual motion per frame: a gap between those two is visible above this
+MAX_MISSING_FRAMES = 1.6  # gap of a clip open by one frame, relative to the motion per frame next to it
+MAX_FRAMES = 600  # frames that `best_ranges` compares
+MAX_STEPS = 300  # pairs of frames, and keys, that are measured inside a clip
+MIN_INTERIOR_S = 2e-4  # s, from an end to a key inside
 DEFAULT_FPS = 30.0
 
 
 class LoopKind(StrEnum):
-    """How a clip's end meets its start."""
+    """Kind of a loop, by the difference between a clip's end and its start."""
 
     CLOSED = "closed"
     OPEN_BY_ONE_FRAME = "open by one frame"
@@ -35,9 +36,10 @@ class LoopKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """What any vertex does at most from one frame to the next: largest, typical: m, over all frames, and their median.
+    """Largest motion of any vertex from frame to frame.
 
-    speed: m/s, the largest change of velocity at a key, measured as the speed at the seam is.
+    largest, typical: m, maximum and median over all frames. speed: m/s, the largest change of velocity at a key,
+    measured like the velocity gap.
     """
 
     largest: float = 0.0
@@ -47,12 +49,12 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """A clip, or a part of it, as a loop; all is measured on the skin.
+    """A clip, or a time range of it, as a loop, measured on the skin.
 
-    start, end: seconds. seam: m, how far the worst vertex is from where it started; the way that the root has made is
-    taken off. speed_seam: m/s. node: the joint that opens the seam most, by speed where the loop is closed. frame: m,
-    the motion per frame at the seam. inside: what the clip does from frame to frame. travel: m, the root's way. fps:
-    the rate that frames were counted at. joints: those that don't close, the largest gap first; none of a closed loop.
+    start, end: seconds. seam: m, loop gap: the largest distance of a vertex from its position at the start, without
+    root motion. speed_seam: m/s, velocity gap. node: joint with the largest gap, by velocity if the loop is closed.
+    frame: m, the motion per frame at the gap. inside: the motion from frame to frame. travel: m, root motion. fps: the
+    frame rate of the analysis. joints: those that are open, the largest gap first; none of a closed loop.
     """
 
     kind: LoopKind
@@ -69,25 +71,26 @@ class Loop:
 
 
 def analyze_loop(scene: Scene, clip: Clip, *, root: int = -1) -> Loop:
-    """Return what kind of loop the clip is.
+    """Return the kind of loop of a clip.
 
-    Closed: no vertex that is seen to jump. Closed except some joints: fewer joints stay open than close while they
-    move, and they jump no further than the clip moves from frame to frame. Open by one frame: the seam is about the
-    next frame's motion. root: the node whose way does not count, −1 for none.
+    Closed: no visible jump of a vertex. Closed except some joints: fewer joints are open than close while they move,
+    and they jump no further than the clip moves from frame to frame. Open by one frame: the gap is about the next
+    frame's motion. root: node whose displacement is ignored, −1 for none.
     """
     return judge_range(SkinMotion(scene), clip, root=root)
 
 
 def judge_range(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
-    """Return the same of a clip on a skin that is there already: for many clips."""
+    """Return the kind of loop of a clip on an existing skin: for many clips."""
     return _judge(skin, clip, clip.start, clip.end, root)
 
 
 def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:
-    """Return the parts of a clip that loop best, the best first, none shorter than `shortest` seconds.
+    """Return the time ranges of a clip that loop best, the best first.
 
-    Poses and their speeds are compared at the clip's frame rate, or at as many frames as fit in MAX_FRAMES; parts that
-    start and end within two frames of a better one are left out. shortest: by default half of the clip.
+    None is shorter than `shortest` seconds, by default half of the clip. Poses and velocities are compared at the
+    clip's frame rate, or at MAX_FRAMES frames if there are more; ranges that start and end within two frames of a
+    better one are left out.
     """
     duration = clip.end - clip.start
     if duration <= 0:
@@ -124,8 +127,11 @@ def _judge(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) ->
     inside = _steps(skin, clip, start, end, frame_step, root)
     gaps = skin.gaps(clip, start, end, root)
     size = seam.gap
-    joints = tuple(each for each in gaps if each.gap > CLOSED[0] * skin.size)
-    if size <= min(max(UNSEEN * inside.typical, CLOSED[0] * skin.size), CLOSED[1] * skin.size):
+    joints = tuple(each for each in gaps if each.gap > NOISE_PER_SIZE * skin.size)
+    if size <= min(
+        max(INVISIBLE_GAP_PER_FRAME * inside.typical, NOISE_PER_SIZE * skin.size),
+        VISIBLE_GAP_PER_SIZE * skin.size,
+    ):
         kind, joints = LoopKind.CLOSED, ()
     else:
         closing = skin.moving(clip, start, end, frame_step, root) - {each.node for each in joints}
@@ -136,10 +142,10 @@ def _judge(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) ->
 
 
 def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind:
-    """few: whether more joints close while they move than stay open; then no frame is missing."""
+    """few: whether more joints close while they move than are open; then no frame is missing."""
     if few and size <= inside:
         return LoopKind.CLOSED_EXCEPT
-    if not few and size <= ONE_FRAME * seam.frame and seam.going_on <= seam.frame:
+    if not few and size <= MAX_MISSING_FRAMES * seam.frame and seam.going_on <= seam.frame:
         return LoopKind.OPEN_BY_ONE_FRAME
     return LoopKind.NOT_A_LOOP
 
@@ -149,13 +155,13 @@ def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, 
     frames = start + step * _some(np.arange(count, dtype=np.float64))
     moved = skin.steps(clip, np.minimum(np.stack((frames, frames + step)), end), root)
     keys = clip.key_times
-    keys = _some(keys[(keys > start + INTERIOR_S) & (keys < end - INTERIOR_S)])
+    keys = _some(keys[(keys > start + MIN_INTERIOR_S) & (keys < end - MIN_INTERIOR_S)])
     changes = skin.velocity_changes(clip, keys, root) if len(keys) else np.zeros(1)
     return Steps(float(moved.max()), float(np.median(moved)), float(changes.max()))
 
 
 def _some(numbers: Floats) -> Floats:
-    """At most MAX_STEPS of some numbers, evenly chosen."""
+    """At most MAX_STEPS of some values, evenly chosen."""
     count = min(len(numbers), MAX_STEPS)
     return np.asarray(numbers[np.linspace(0, len(numbers) - 1, count).round().astype(int)])
 

@@ -1,4 +1,4 @@
-"""The seam of a loop as it is seen: on the skin, with the joints that make it."""
+"""Loop gaps as they are visible: on the skin, with the joints that cause them."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from anim.sampling.batch import ConcatenatedTracks
 from anim.sampling.pose import rest_pose, sample_clips, sample_pose, world_by_node
 
 PARTS = ("translation", "rotation", "scale")
-STEPS = np.array([-1.0, 1])  # of two frames: the move
-VELOCITIES = np.array([1.0, -1, -1, 1])  # of two times before and two after a key: how much the moves differ
-AT_ONCE = 1_000_000  # numbers; moves of points that are looked at together
+MOTION = np.array([-1.0, 1])  # weights of two frames: the motion between them
+VELOCITY_CHANGE = np.array([1.0, -1, -1, 1])  # weights of two times before and two after a key: the change of velocity
+MAX_BATCH_VALUES = 1_000_000  # maximum number of values in the arrays of one step
 
 
 @dataclass(frozen=True, slots=True)
 class JointGap:
-    """A joint whose own motion does not close. joint: its name. node: its number.
+    """A joint with its own loop gap. joint: its name. node: its index.
 
     gap: m, the largest distance that any vertex would move if this joint alone ended as it starts.
-    is_morph: whether it is a mesh whose morph weights don't close.
+    is_morph: whether it is a mesh with open morph weights.
     """
 
     joint: str
@@ -41,11 +41,10 @@ class JointGap:
 
 @dataclass(frozen=True, slots=True)
 class Seam:
-    """End against start, over all vertices: the largest of each.
+    """Maximum over all vertices of the difference between end and start.
 
-    gap: m. speed: m/s, the change of velocity without what STEP tracks do, and the joint at it (fastest, "" where none
-    changes). frame: m, the motion per frame next to the seam. going_on: m, how far the start is from where the end was
-    heading.
+    gap: m. speed: m/s, the change of velocity without STEP tracks, and the joint at it (fastest, "" without a change).
+    frame: m, the motion per frame next to the gap. going_on: m, the distance of the start from the extrapolated end.
     """
 
     gap: float = 0.0
@@ -56,11 +55,11 @@ class Seam:
 
 
 class SkinMotion:
-    """The points of a scene on which motion is seen: its vertices.
+    """Points of a scene on which motion is measured: its vertices.
 
-    Seams and steps are measured on all of them, long stretches (`places`) on those that stick out on each joint. Where
-    nothing has a vertex all nodes count, by six points around each. Nodes that move no vertex (IK controls, cameras)
-    don't count otherwise.
+    Gaps and steps are measured on all of them, long time ranges (`places`) on the outermost ones of each joint. In a
+    scene without vertices all nodes count, with six points around each; otherwise nodes that move no vertex (IK
+    controls, cameras) do not count.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -77,19 +76,21 @@ class SkinMotion:
 
     @cached_property
     def points(self) -> PointMatrix:
-        """The points that stick out."""
+        """The outermost points of each joint."""
         nodes = range(0 if self.is_skin else len(self.skeleton))
         return point_matrix.sample_points(self._scene, frozenset(nodes), self._lever)
 
     @cached_property
     def size(self) -> float:
-        """The diagonal, in metres, of the scene's box in its rest pose; 1 where it has none."""
+        """Diagonal of the scene's bounding box in the rest pose, in metres; 1 without one."""
         return orientation_probes.probe_size(self.points.places(self._rest_world)) if len(self.points) else 1.0
 
     @cached_property
     def _all(self) -> tuple[PointMatrix, Ints]:
-        """The distinct points of all meshes, and the node of each one's mesh (P,): seams of texture coordinates and
-        normals are vertices that always move alike."""
+        """The distinct points of all meshes, and the node of each one's mesh (P,).
+
+        Vertices that differ only in texture coordinates or normals always move alike.
+        """
         points = point_matrix.all_points(self._scene, self._lever)
         owners = np.repeat([part.owner for part in self._surfaces], [len(part.points) for part in self._surfaces])
         chosen = points.distinct(owners) if self.is_skin else np.arange(len(points))
@@ -109,31 +110,37 @@ class SkinMotion:
         return self._all[1]
 
     def places(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
-        """Return where the points that stick out are (P, F, 3) at times (F,), the way of node `root` taken off."""
+        """Return the positions of the outermost points (P, F, 3) at times (F,).
+
+        The displacement of node `root` is removed.
+        """
         world = world_by_node(self.skeleton, sample_pose(self.skeleton, clip, times))
         clip_ends.remove_root_motion(self.skeleton, world, root)
         return self.points.places(world)
 
     def steps(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
-        """Return how far (F,) any vertex moves from the first of times (2, F) to the second.
+        """Return the largest distance (F,) that a vertex moves from the first of times (2, F) to the second.
 
-        The way of node `root` is taken off.
+        The displacement of node `root` is removed.
         """
-        return self._combined(clip, times, STEPS, root)
+        return self._combined(clip, times, MOTION, root)
 
     def velocity_changes(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
-        """Return how much (K,) the velocity of any vertex changes at times (K,), in m/s; a jump there is no speed.
+        """Return the largest change of velocity (K,) of a vertex at times (K,), in m/s, without jumps.
 
-        Measured as `Seam.speed`, the way of node `root` taken off.
+        Measured like `Seam.speed`, without the displacement of node `root`.
         """
         whole = LoopRange(clip, clip.start, clip.end, root=root)
         around = np.array([-whole.probe, -whole.shortest, whole.shortest, whole.probe])[:, None]
         held = np.array([-whole.shortest] * 2 + [whole.shortest] * 2)[:, None]
-        moves = self._combined(clip, times + around, VELOCITIES, root, held=times + held)
+        moves = self._combined(clip, times + around, VELOCITY_CHANGE, root, held=times + held)
         return np.asarray(moves / (whole.probe - whole.shortest))
 
     def _combined(self, clip: Clip, times: Floats, weights: Floats, root: int, *, held: Floats | None = None) -> Floats:
-        """Return the longest (F,) of sums of places at times (S, F), by weights (S,). held: times of STEP tracks."""
+        """Return the longest (F,) weighted sums of positions at times (S, F).
+
+        weights: (S,). held: times of STEP tracks.
+        """
         stops, frames = times.shape
         poses, (morphs,) = sample_clips(
             self.skeleton, [clip], times.reshape(1, -1), step_times=None if held is None else held.reshape(1, -1)
@@ -142,7 +149,7 @@ class SkinMotion:
         clip_ends.remove_root_motion(self.skeleton, world, root)
         world = world.reshape(len(world), stops, frames, 3, 4)
         morphs = {node: each.reshape(stops, frames, -1) for node, each in morphs.items()}
-        count = max(AT_ONCE // (3 * stops * len(self._every)), 1)
+        count = max(MAX_BATCH_VALUES // (3 * stops * len(self._every)), 1)
         parts = []
         for first in range(0, frames, count):
             cut = slice(first, first + count)
@@ -166,16 +173,16 @@ class SkinMotion:
         return np.asarray(most)
 
     def seams(self, parts: Sequence[LoopRange], groups: Sequence[ConcatenatedTracks] | None = None) -> list[Seam]:
-        """Return how the end of each part meets its start, in pose and speed.
+        """Return the difference between the end of each range and its start, in pose and velocity.
 
-        groups: the tracks of all their clips, `joined`, for callers that have them.
+        groups: the tracks of all clips from `concatenate`, if the caller has them.
         """
         if not parts or not len(self._every):
             return [Seam() for _ in parts]
         has_frame = any(part.frame for part in parts)
         seen = clip_ends.poses_around_ends(self.skeleton, parts, groups, has_frame=has_frame)
         wanted = clip_ends.DIFFERENCES if has_frame else clip_ends.WITHOUT_FRAME
-        count = max(AT_ONCE // (3 * len(wanted) * len(self._every)), 1)
+        count = max(MAX_BATCH_VALUES // (3 * len(wanted) * len(self._every)), 1)
         return [
             seam
             for first in range(0, len(parts), count)
@@ -195,15 +202,15 @@ class SkinMotion:
         ]
 
     def _seam(self, squares: Floats, seen: EndPoses, part: LoopRange, wanted: Floats) -> Seam:
-        """squares: (P, D), the squared lengths of all differences, of meshes that morph as they are at rest."""
+        """squares: (P, D), the squared lengths of all differences, with morphing meshes at rest."""
         morphing = [mesh for mesh in self._surfaces if len(mesh.targets) and mesh.owner in seen.weights]
         if morphing:
             squares[np.isin(self._owners, [mesh.owner for mesh in morphing])] = 0
         most = np.sqrt(squares.max(axis=0)).astype(np.float64)
-        fastest = self._carrier(int(squares[:, clip_ends.SPEED].argmax()))
+        fastest = self._carrier(int(squares[:, clip_ends.VELOCITY].argmax()))
         for mesh in morphing:
             moved = _longest_each(clip_ends.differences(_morphing(mesh, seen), 0, wanted))
-            fastest = self._name(mesh.owner) if moved[clip_ends.SPEED] > most[clip_ends.SPEED] else fastest
+            fastest = self._name(mesh.owner) if moved[clip_ends.VELOCITY] > most[clip_ends.VELOCITY] else fastest
             most = np.maximum(most, moved)
         gap, speed, *of_frames = most.tolist()
         second, last, going_on = of_frames or (0.0, 0.0, gap)
@@ -211,18 +218,18 @@ class SkinMotion:
         return Seam(gap, speed, fastest if speed else "", max(second, last), going_on)
 
     def _squares(self, differences: Floats) -> Floats:
-        """Squared lengths (P, F) of the moves of all points, by differences of world matrices (N, F, 3, 4)."""
+        """Squared lengths (P, F) of the motion of all points, from differences of world matrices (N, F, 3, 4)."""
         moves = self._rows.moves(point_matrix.stack_points(differences, self._every.nodes))
         moves *= moves
         return np.asarray(moves.sum(axis=1))
 
     def _carrier(self, point: int) -> str:
-        """Name of the node that carries most of a point."""
+        """Name of the node with the largest weight at a point."""
         most = self._every.factors[point, :, 3].argmax()
         return self._name(int(self._every.nodes[self._every.joints[point, most]]))
 
     def gaps(self, clip: Clip, start: float, end: float, root: int = -1) -> list[JointGap]:
-        """Return the joints whose pose at `end` is not that at `start`, the largest gap first.
+        """Return the joints whose pose at `end` differs from that at `start`, the largest gap first.
 
         The translation of `root` does not count. Morph weights count for the node of their mesh.
         """
@@ -236,7 +243,7 @@ class SkinMotion:
         return sorted((each for each in rows if each.gap > 0), key=lambda each: (-each.gap, each.node))
 
     def moving(self, clip: Clip, start: float, end: float, frame: float, root: int = -1) -> set[int]:
-        """Return the nodes that move in the first or in the last frame, and carry a point."""
+        """Return the nodes with points that move in the first or in the last frame."""
         frames = (np.array([start, start + frame]), np.array([end - frame, end]))
         found = [self._moved_between(sample_pose(self.skeleton, clip, times), root) for times in frames]
         return {node for node in np.concatenate(found).tolist() if self._carries(node)}
@@ -249,7 +256,7 @@ class SkinMotion:
         return bool((below[self.points.joints] & (self.points.factors[..., 3] > 0)).any())
 
     def _moved_between(self, both: Pose, root: int) -> Ints:
-        """Numbers of the nodes whose local transforms differ between the two frames of a pose; q and −q don't."""
+        """Indices of nodes with different local transforms in the two frames of a pose; q and −q are equal."""
         differs = (both.scale[0] != both.scale[1]).any(axis=1)
         differs |= np.minimum(*(np.abs(both.rotation[0] - s * both.rotation[1]).max(axis=1) for s in (1, -1))) > 0
         shifted = (both.translation[0] != both.translation[1]).any(axis=1)
@@ -258,7 +265,7 @@ class SkinMotion:
         return np.flatnonzero(differs | shifted)
 
     def _carried(self, both: Pose, nodes: Ints, root: int) -> Floats:
-        """How far (K,) points move at most where one of the nodes (K,), alone, ends as it starts."""
+        """Largest distance (K,) that a point moves if one of the nodes (K,), alone, ends as it starts."""
         frame = np.arange(len(nodes))
         parts = {name: np.repeat(getattr(both, name)[1:], len(nodes), axis=0) for name in PARTS}
         for name, values in parts.items():
@@ -269,24 +276,24 @@ class SkinMotion:
         times = np.repeat(both.times[1:], len(nodes))
         changed = Pose(times, parts["translation"], parts["rotation"], parts["scale"])
         differences = np.subtract(*(world_by_node(self.skeleton, each) for each in (changed, last)))
-        count = max(AT_ONCE // (3 * max(len(self._every), 1)), 1)
+        count = max(MAX_BATCH_VALUES // (3 * max(len(self._every), 1)), 1)
         stretches = (differences[:, first : first + count] for first in range(0, len(nodes), count))
         squares = [self._squares(each).max(axis=0, initial=0.0) for each in stretches if len(self._every)]
         return np.sqrt(np.concatenate(squares)) if squares else np.zeros(len(nodes))
 
     def _morphed(self, node: int, change: Floats) -> float:
-        """How far, in metres, a change of morph weights (M,) moves any vertex of a node's mesh, at most."""
+        """Largest distance, in metres, that a change of morph weights (M,) moves a vertex of a node's mesh."""
         mine = [part for part in self._surfaces if part.owner == node and len(part.targets) == len(change)]
         return max((self._widening(part) * _longest(np.tensordot(change, part.targets, 1)) for part in mine), default=0)
 
     def _widening(self, part: Surface) -> float:
-        """How many metres of the world one unit of a mesh's space is at most, in the rest pose."""
+        """Largest length in metres of one unit of a mesh's space, in the rest pose."""
         world = matrix.multiply(self._rest_world[part.nodes, 0], part.bind)
         return float(np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max())
 
 
 def _morphing(mesh: Surface, seen: EndPoses) -> Floats:
-    """Vertices (T, V, 3) of a mesh that morphs, at the times of the ends."""
+    """Vertices (T, V, 3) of a morphing mesh, at the times of the ends."""
     placed = [
         skin_points(mesh, *each)
         for each in zip(
@@ -299,7 +306,7 @@ def _morphing(mesh: Surface, seen: EndPoses) -> Floats:
 
 
 def _longest_each(vectors: Floats) -> Floats:
-    """The longest (D,) of each row of vectors (D, V, 3)."""
+    """Maximum length (D,) over each row of vectors (D, V, 3)."""
     return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1).max(axis=-1)))
 
 

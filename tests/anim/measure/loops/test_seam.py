@@ -172,7 +172,7 @@ def test_the_seam_is_how_far_a_bake_ends_from_its_start(name: str) -> None:
 @pytest.mark.parametrize("name", ["arm", "biped", "morph_cube"])
 def test_steps_inside_are_those_of_a_bake(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of every vertex, skinned and morphed, whatever the number of frames that are looked at together."""
-    monkeypatch.setattr(seam, "AT_ONCE", 20_000)
+    monkeypatch.setattr(seam, "MAX_BATCH_VALUES", 20_000)
     document = opened(fixtures.build(name))
     scene = reader.scene(document)
     for each in reader.clips(document):
