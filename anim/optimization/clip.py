@@ -10,12 +10,11 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track
 from anim.optimization.options import Drop
-from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.context import Context
 from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
 from anim.optimization.search.search import search
 from anim.optimization.search.source_motion import PATHS, SourceMotion, analyze_source, key_grid
-from anim.optimization.search.trial import CHORD_BOUND_FRACTION, TrialRunner
+from anim.optimization.search.trial import CHORD_BOUND_FRACTION, BoundUsage, TrialRunner
 from anim.optimization.tracks import clip_ends, key_reduction, morph_weights
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times

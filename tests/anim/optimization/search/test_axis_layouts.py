@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.optimization.options import EFFORTS
-from anim.optimization.search.axis_layouts import LAYOUTS, TimeAxisSearch
+from anim.optimization.search.time_axes import LAYOUTS, TimeAxisSearch
 from tests.anim.optimization.making import CORE, TIMES, every_point, scene, truth_of, turning, waving
 from tests.clips import clip, track
 

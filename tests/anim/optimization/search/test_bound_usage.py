@@ -7,9 +7,9 @@ import pytest
 
 from anim.arrays import Floats
 from anim.optimization.options import Bounds
-from anim.optimization.search.bound_usage import MIN_INTERVAL_S, BoundUsage
 from anim.optimization.search.playback import level_world_matrices
 from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.trial import MIN_INTERVAL_S, BoundUsage
 from tests.anim.optimization.making import every_point, scene, truth_of, waving
 
 OF = scene()

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from anim.optimization.options import EFFORTS, Bounds
-from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.plan import TrackAction
 from anim.optimization.search.search import search
-from anim.optimization.search.trial import TrialRunner
+from anim.optimization.search.trial import BoundUsage, TrialRunner
 from tests.anim.optimization.making import CORE, every_point, scene, truth_of, waving
 
 OF = scene()

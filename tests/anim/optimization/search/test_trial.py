@@ -14,12 +14,11 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Clip, Scene
 from anim.optimization.options import Bounds
-from anim.optimization.search import axis_layouts
-from anim.optimization.search.axis_layouts import LAYOUTS
-from anim.optimization.search.bound_usage import BoundUsage
+from anim.optimization.search import time_axes
 from anim.optimization.search.plan import Plan, TrackAction, TrialResult
 from anim.optimization.search.source_motion import SourceMotion
-from anim.optimization.search.trial import TrialRunner
+from anim.optimization.search.time_axes import LAYOUTS
+from anim.optimization.search.trial import BoundUsage, TrialRunner
 from anim.sampling import sample_pose
 from tests.anim.optimization.making import CORE, every_point, scene, truth_of, turning, waving
 from tests.clips import clip, track
@@ -111,7 +110,7 @@ def test_held_as_other_clips_hold_it() -> None:
 
 def test_chords_are_asked_where_they_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     """150° in a step or two would do along arcs; players that mix components cut the corner."""
-    monkeypatch.setattr(axis_layouts, "MAX_BUDGET_PER_BOUND", math.inf)
+    monkeypatch.setattr(time_axes, "MAX_BUDGET_PER_BOUND", math.inf)
     times = np.linspace(0, 2, 49)
     angles = np.radians(150) * times / 2
     values = np.stack((0 * angles, 0 * angles, np.sin(angles / 2), np.cos(angles / 2)), axis=1)
