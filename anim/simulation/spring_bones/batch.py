@@ -17,6 +17,7 @@ from anim.simulation.spring_bones.hierarchy import tail_at_rest
 from anim.simulation.spring_bones.plan import Plan, PlannedJoint
 from anim.simulation.spring_bones.spring_models import make_model
 
+ROUNDING = 1e-12  # of a length, between two ways to compute it
 OPPOSITE = float(np.finfo(np.float64).eps)  # 1 + cosine below which two directions are opposite, as in players
 # Elements of a rotation matrix, row by row, from the products of a quaternion's components (x, y, z, w) ⊗ (x, y, z, w).
 _PRODUCTS = np.zeros((4, 4, 3, 3))
@@ -64,13 +65,18 @@ class Batch:
         self._from_direction, self._opposite = _rotation_maps(self._rest, self._axis)
 
     def load(self, chunk: DriverChunk) -> None:
-        """Take the driver's values at the steps of a chunk; what is constant over it is kept once."""
+        """Take the driver's values at the steps of a chunk; what is constant over it is kept once.
+
+        Columns: the joints' matrices at rest, the axis with the tail's length, and the tail if an animated translation
+        takes it off the axis: the axis is that of the rest pose, the length that of the current one.
+        """
         pose = chunk.pose
         scale = pose.scale[:, self._nodes]
         tail = np.stack([_tails(chunk, self._skeleton, joint) for joint in self._joints], axis=1)
         local = np.swapaxes(chunk.local[self._nodes], 0, 1)
-        columns = np.concatenate((local, (local[..., :3] @ tail[..., None])), axis=-1)
-        self._columns = _constant(columns)
+        along = self._axis * norms(tail)
+        points = [along] if np.abs(tail - along).max() <= ROUNDING * np.abs(tail).max() else [along, tail]
+        self._columns = _constant(np.concatenate((local, local[..., :3] @ np.stack(points, axis=-1)), axis=-1))
         self._scale = _constant(scale[:, :, None, :])
         self._has_scale = bool((scale != 1).any())
 
@@ -80,7 +86,7 @@ class Batch:
         parents, columns = world[self._parents], self._columns[0]
         world[self._rows] = matrix.multiply(parents, columns[..., :4])
         head = world[self._rows, :, 3]
-        goal = head + np.matmul(parents[..., :3], columns[..., 4:])[..., 0]
+        goal = head + _bones(np.matmul(parents[..., :3], columns))[0]
         self._model.start(head, goal, self._center(world))
         self.tails = goal
 
@@ -90,8 +96,7 @@ class Batch:
         linear = parents[:, :, :3]
         columns = np.matmul(linear, _at(self._columns, frame))
         head = columns[..., 3] + parents[..., 3]
-        bone = columns[..., 4]
-        length = norms(bone)
+        bone, length = _bones(columns)
         if len(self._own):
             self._place_own_centers(world, linear, head, frame)
         center = self._center(world)
@@ -144,6 +149,12 @@ class Batch:
     def _place_own_centers(self, world: Floats, linear: Floats, head: Floats, frame: int) -> None:
         """World matrices of joints that are the center of their own chain, with their rotation before this step."""
         self._place(world, linear, head, frame)
+
+
+def _bones(columns: Floats) -> tuple[Floats, Floats]:
+    """Vectors (m, 3) from the joints along their axes to the distance of the tails, and these lengths (m, 1)."""
+    bone, length = columns[..., 4], norms(columns[..., -1])
+    return (bone, length) if columns.shape[-1] == 5 else (bone * (length / np.maximum(norms(bone), TINY)), length)
 
 
 def _tails(chunk: DriverChunk, skeleton: Skeleton, joint: SpringJoint) -> Floats:

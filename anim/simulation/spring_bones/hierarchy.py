@@ -8,7 +8,10 @@ from anim.arrays import Bools, Floats
 from anim.errors import AnimError, FormatError, NotFoundError, UnsupportedError
 from anim.maths import matrix
 from anim.model import Skeleton
+from anim.sampling import rest_pose, world_matrices
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
+
+SCALE_TOLERANCE = 1e-3  # of a scale of 1
 
 
 def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
@@ -82,6 +85,23 @@ def _check_collider(skeleton: Skeleton, bones: SpringBones, index: int, joint: S
 def _check_node(skeleton: Skeleton, node: int, what: str) -> None:
     if not 0 <= node < len(skeleton):
         raise NotFoundError(f"there is no node {node} for a {what} (the file has {len(skeleton)}, from 0 on)")
+
+
+def scaled_colliders(skeleton: Skeleton, bones: SpringBones) -> tuple[str, ...]:
+    """Return a note for each collider in use on a node with a world scale other than 1: its radius is not scaled."""
+    matrices = world_matrices(skeleton, rest_pose(skeleton))[0]
+    notes = []
+    for index in sorted({index for chain in bones.chains for index in chain.colliders}):
+        collider = bones.colliders[index]
+        if collider.node is None or collider.radius == 0:
+            continue
+        scale = np.linalg.norm(matrices[collider.node, :, :3], axis=0)
+        if np.abs(scale - 1).max() > SCALE_TOLERANCE:
+            notes.append(
+                f"collider {index} on {skeleton.label(collider.node)} has a scale of {scale.max():.4g}, its radius of "
+                f"{collider.radius:.4g} m is not scaled, as in players"
+            )
+    return tuple(notes)
 
 
 def moving_nodes(skeleton: Skeleton, bones: SpringBones) -> Bools:

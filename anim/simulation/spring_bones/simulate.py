@@ -13,7 +13,7 @@ from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling.times import distinct_float32, frame_times
 from anim.simulation.spring_bones.chain_globs import drop_inert_joints
 from anim.simulation.spring_bones.chains import SpringBones
-from anim.simulation.spring_bones.hierarchy import check_hierarchy
+from anim.simulation.spring_bones.hierarchy import check_hierarchy, scaled_colliders
 from anim.simulation.spring_bones.loop import MAX_ROUNDS, LoopedMotion, run_loop
 from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
 from anim.simulation.steps import Steps
@@ -93,7 +93,7 @@ def simulate_springs(
         float(deflection.max(initial=0.0)),
         float(speeds.max(initial=0.0)),
         looped,
-        (*bones.notes, *notes),
+        (*bones.notes, *notes, *scaled_colliders(skeleton, bones)),
     )
 
 

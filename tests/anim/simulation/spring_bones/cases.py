@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,11 +24,16 @@ ROOT = 0
 
 @dataclass(frozen=True)
 class Case:
-    """A file, and the positions (F, 3) and rotations (F, 4) of its root at every step."""
+    """A file, and the positions (F, 3) and rotations (F, 4) of its root at every step.
+
+    others: further translations (F, 3) and scales (F, 3) of nodes, by node and path.
+    """
 
     document: Document
     positions: Floats
     rotations: Floats
+    step: float = STEP
+    others: Mapping[tuple[int, str], Floats] = field(default_factory=dict)
 
     @property
     def skeleton(self) -> Skeleton:
@@ -39,16 +45,16 @@ class Case:
 
     @property
     def times(self) -> Floats:
-        return STEP * np.arange(float(len(self.positions)))
+        return self.step * np.arange(float(len(self.positions)))
 
     @property
     def clip(self) -> Clip:
-        translation = Track(ROOT, "translation", LINEAR, self.times, self.positions)
-        return Clip("sway", (translation, Track(ROOT, "rotation", LINEAR, self.times, self.rotations)))
+        keyed = {(ROOT, "translation"): self.positions, (ROOT, "rotation"): self.rotations, **self.others}
+        return Clip("sway", tuple(Track(node, path, LINEAR, self.times, v) for (node, path), v in keyed.items()))
 
-    def simulate(self, step: float = STEP) -> SpringMotion:
+    def simulate(self) -> SpringMotion:
         """Return our motion at the times of all steps."""
-        solver = SpringSolver(self.skeleton, self.clip, self.bones, step=step)
+        solver = SpringSolver(self.skeleton, self.clip, self.bones, step=self.step)
         solver.start(0.0)
         return solver.run(self.times)
 
@@ -57,8 +63,10 @@ class Case:
 
         def pose(rig: plain_loop.Rig, frame: int) -> None:
             rig.positions[ROOT], rig.rotations[ROOT] = self.positions[frame], self.rotations[frame]
+            for (node, path), values in self.others.items():
+                (rig.positions if path == "translation" else rig.scales)[node] = values[frame]
 
-        return plain_loop.simulate(self.document.json, pose, len(self.positions), STEP, faults=faults)
+        return plain_loop.simulate(self.document.json, pose, len(self.positions), self.step, faults=faults)
 
 
 def swaying(document: Document, num_frames: int = 241) -> Case:

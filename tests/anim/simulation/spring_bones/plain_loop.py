@@ -164,7 +164,10 @@ def _advance(rig: Rig, spring: Spring, dt: float, tails: dict[int, Array] | None
     to_world = rig.world(-1 if spring.center is None else spring.center)
     at_rest = parent @ rig.local(spring.node, spring.rest)
     head = at_rest[:3, 3]
-    length = np.linalg.norm(_at(at_rest, spring.child) - head)
+    child = (
+        spring.child if spring.tail is None else rig.below(spring.node, spring.tail)
+    )  # its translation may be animated
+    length = np.linalg.norm(_at(at_rest, child) - head)
     if tails is not None and spring.tail is not None:
         length = np.linalg.norm(tails[spring.tail] - head)
     tail: Array = _at(to_world, spring.now + (spring.now - spring.before) * (1 - about.get("dragForce", drag)))

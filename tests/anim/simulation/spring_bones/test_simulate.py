@@ -209,6 +209,16 @@ def test_a_scale_of_0_leaves_the_rest_rotation() -> None:
     assert np.isfinite(values).all()
 
 
+def test_a_collider_on_a_scaled_node_is_noted() -> None:
+    scaled = skeleton(
+        [-1, 0, 1, 2], translation=[[0, 0, 0], [0, 1, 0], DOWN, DOWN], scale=[[2, 2, 2], *[[1, 1, 1]] * 3]
+    )
+    ball = SpringBones((replace(ONE, colliders=(0,)),), (Collider(0, ColliderShape.SPHERE, radius=0.1),))
+    (note,) = simulate_springs(scaled, swaying(), ball).notes
+    assert note == "collider 0 on node 0 '0' has a scale of 2, its radius of 0.1 m is not scaled, as in players"
+    assert simulate_springs(CHAIN, swaying(), ball).notes == ()
+
+
 SELF = SpringBones((replace(ONE, colliders=(0,)),), (Collider(2, ColliderShape.SPHERE, radius=0.1),))
 TWICE = SpringBones((ONE, replace(ONE, name="again")))
 

@@ -41,6 +41,20 @@ def test_all_chains_agree_with_the_plain_loop(case: Case) -> None:
     assert chord(case.bones.nodes, motion.rotations, *case.plain(faults=False)) < TOLERANCE
 
 
+def test_animated_scales_and_lengths_agree_with_the_plain_loop(case: Case) -> None:
+    """Uneven scales above chains, and joints and tails that move away from their parents."""
+    swell = 1 + 0.3 * np.sin(3 * case.times)
+    stretch = np.stack([swell, 2 - swell, np.full_like(swell, 0.8)], axis=-1)
+    names = case.skeleton.names
+    others = {(names.index("half"), "scale"): stretch, (names.index("c1j1"), "scale"): stretch}
+    for name in ("c0j0", "c0j3", "c3j1", "c5j2", "c7j4"):  # first, inner, skipped and last nodes of chains
+        node = names.index(name)
+        others[node, "translation"] = case.skeleton.translation[node] * swell[:, None]
+    own = replace(case, others=others)
+    assert chord(own.bones.nodes, own.simulate().rotations, *own.plain(faults=False)) < TOLERANCE
+    assert chord(own.bones.nodes, own.simulate().rotations, list(own.bones.nodes), case.simulate().rotations) > 0.01
+
+
 def test_vrm_0_agrees_with_the_plain_loop(godette: tuple[Path, Case]) -> None:
     _, case = godette
     assert len(case.bones.nodes) == 16
@@ -71,7 +85,9 @@ def test_the_fixture_as_three_vrm_computes(case: Case, tmp_path: Path) -> None:
 
 
 @needs_three_vrm
-def test_the_fixture_as_three_vrm_cured(case: Case, tmp_path: Path) -> None:
+@pytest.mark.parametrize("step", [1 / 60, 1 / 144, 1 / 24])
+def test_the_fixture_as_three_vrm_cured(step: float, case: Case, tmp_path: Path) -> None:
+    case = replace(case, step=step)
     nodes, frames = _played(fixtures.build("springs"), case, tmp_path, cured=True)
     assert chord(case.bones.nodes, case.simulate().rotations, nodes, frames) < TOLERANCE
 
@@ -87,7 +103,7 @@ def test_a_real_vrm_0_file_as_three_vrm_computes(godette: tuple[Path, Case], *, 
 def _played(data: bytes, case: Case, folder: Path, *, cured: bool) -> tuple[list[int], Floats]:
     file = folder / "springs.glb"
     file.write_bytes(data)
-    return three_vrm.play(file, {ROOT: (case.positions, case.rotations)}, STEP, cured=cured)
+    return three_vrm.play(file, {ROOT: (case.positions, case.rotations)}, case.step, cured=cured)
 
 
 def test_runs_continue_where_the_last_one_ended(case: Case) -> None:
