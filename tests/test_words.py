@@ -22,9 +22,7 @@ FORBIDDEN = frozenset(
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
 PENDING = (  # packages whose docstrings are not rewritten yet
-    "anim/measure/compare/",
     "anim/measure/continuous_bound/",
-    "anim/measure/error/",
 )
 ADVICE = (  # modules that compose command lines, the advice of findings
     "anim/measure/inspect/",

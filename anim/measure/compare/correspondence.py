@@ -1,9 +1,9 @@
-"""What carries the first of two scenes' vertices in the second.
+"""Correspondence of two scenes: nodes, and the joints of the first one's surfaces in the second.
 
-Peers rename, reorder, merge and quantize. Only motion is to be compared, so the surface of the first scene is carried
-through both: its vertices and skin weights by the joints of each. Quantized vertices lie in another mesh space, and so
-do the inverse bind matrices that belong to them; that space is found by the vertices where they agree one by one, else
-by the inverse bind matrices themselves.
+Other tools rename, reorder, merge and quantize. Only motion is compared: the first scene's surface, its vertices and
+skin weights, is moved by the joints of each scene. Quantized vertices are in another mesh space, as are the inverse
+bind matrices for them; that space is computed from the vertices if they agree one by one, else from the inverse bind
+matrices.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from anim.model import Mesh, MeshInstance, Scene, Skin
 from anim.sampling import rest_pose as rest
 from anim.sampling.pose import local_by_node
 
-SAME_SPACE_TOLERANCE = 0.01  # of a mesh's size: vertices that are farther apart than this are not the same ones
+SAME_SPACE_TOLERANCE = 0.01  # of a mesh's size: vertices at a larger distance are different ones
 SINGULAR = 1e-12  # determinants below this, relative to the cube of the size, have no inverse
 SAME_SPACE = 1e-3  # relative; joints whose matrices differ by more have another bind pose, not another mesh space
 NOWHERE = np.eye(4)[:3]
@@ -31,10 +31,10 @@ NOWHERE = np.eye(4)[:3]
 
 @dataclass(frozen=True, slots=True)
 class Correspondence:
-    """Two scenes as one.
+    """Correspondence of two scenes.
 
-    nodes: (N,) for each node of the first scene its number in the second, −1 where it has none.
-    surfaces: of the first scene, with what carries them in the second, None where it is the same scene.
+    nodes: (N,) for each node of the first scene its index in the second, −1 without one.
+    surfaces: of the first scene, with their joints in the second, None if it is the same scene.
     by_vertex: whether all meshes agree vertex by vertex, with their joints, weights and morph targets.
     unskinned: names of meshes with a skin in the first scene only. reweighted: names of meshes whose vertices agree,
     but not their joints, weights or morph targets. has_meshes: False if only the first scene has vertices.
@@ -49,10 +49,10 @@ class Correspondence:
 
 
 def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
-    """Return which nodes of two scenes are the same, and what carries the `surfaces` of the first in the second.
+    """Return the correspondence of two scenes' nodes, and the joints of the first one's `surfaces` in the second.
 
-    What hangs on a node that the second scene doesn't have is carried by the next node above that it has, as it is
-    placed there at rest: if the first scene's clip moves it, that shows as an error.
+    Surfaces of a node that the second scene lacks are moved by its nearest ancestor there, with the offset at rest: if
+    the first scene's clip moves the node, that is an error.
     """
     if other is scene:
         return Correspondence(np.arange(len(scene.skeleton)), [(surface, None) for surface in surfaces])
@@ -85,7 +85,7 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
 
 
 class _SceneMatcher:
-    """Two scenes and their nodes, while what carries what is looked for."""
+    """Two scenes with their nodes, for the search of corresponding surfaces."""
 
     def __init__(self, scene: Scene, other: Scene, nodes: Ints) -> None:
         self._scene, self._other, self.nodes = scene, other, nodes
@@ -97,7 +97,7 @@ class _SceneMatcher:
         self._local = local_by_node(scene.skeleton, rest_pose)[:, 0]
 
     def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
-        """The instance of the other scene that has the same vertices: on the same node, of the same name, in order."""
+        """The instance of the other scene with the same vertices: on the same node, of the same name, in order."""
         skinned = instance.skin is not None
         choices = [each for each in self._choices(number, instance) if (each.skin is not None) is skinned]
         return next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
@@ -116,11 +116,11 @@ class _SceneMatcher:
 
     @property
     def has_meshes(self) -> bool:
-        """Whether the other scene has vertices."""
+        """Return whether the other scene has vertices."""
         return bool(self._new)
 
     def rigid(self, surface: Surface, instance: MeshInstance, bare: MeshInstance) -> Binding:
-        """A skinned surface carried by the node of its mesh, which lost the skin in the other scene."""
+        """A skinned surface on the node of its mesh, which has no skin in the other scene."""
         points, others = instance.mesh.positions, bare.mesh.positions
         space = _space(points, others) if _agree(instance.mesh, bare.mesh) else _space_of_boxes(points, others)
         bind = np.broadcast_to(NOWHERE if space is None else space, surface.bind.shape)
@@ -128,14 +128,14 @@ class _SceneMatcher:
         return replace(found, rest_weights=bare.weights) if len(bare.weights) == len(surface.rest_weights) else found
 
     def _choices(self, number: int, instance: MeshInstance) -> list[MeshInstance]:
-        """Instances of the other scene that may be a given one: on the same node, of the same name, in order."""
+        """Candidates for an instance in the other scene: on the same node, of the same name, in order."""
         choices = [self._on_node.get(int(self.nodes[instance.node]))]
         choices.append(self._new[self._named[number]] if self._named[number] >= 0 else None)
         choices.append(self._new[number] if len(self._new) == len(self._named) else None)
         return [each for each in choices if each is not None]
 
     def carried(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
-        """What carries an instance's surface in the other scene."""
+        """Joints of an instance's surface in the other scene."""
         if instance.skin is None:
             found = self._rigid(surface, instance, partner)
         else:
@@ -146,7 +146,7 @@ class _SceneMatcher:
         return replace(found, owner=morphing.node, rest_weights=morphing.weights)
 
     def by_nodes(self, surface: Surface) -> Binding:
-        """What carries a surface where nothing but the nodes is known."""
+        """Joints of a surface without a partner, from the correspondence of nodes alone."""
         places = [self._place(int(node)) for node in surface.nodes]
         joints = np.array([node for node, _ in places], np.int64)
         bind = np.array([matrix.multiply(local, bind) for (_, local), bind in zip(places, surface.bind, strict=True)])
@@ -159,12 +159,12 @@ class _SceneMatcher:
             return self.by_nodes(surface)
         points, others = instance.mesh.positions, there.mesh.positions
         space = _space(points, others) if partner is not None else _space_of_boxes(points, others)
-        if space is None:  # merged with others: only what it hangs on can tell
+        if space is None:  # merged with others: only the nodes are known
             return self._above(surface)
         return Binding(np.array([there.node]), space[None], -1, surface.rest_weights)
 
     def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
-        """What carries a skinned surface: joints of the skin that has most of them, the others by their nodes."""
+        """Joints of a skinned surface: of the skin that has most of them, the others by their nodes."""
         plain = self.by_nodes(surface)
         skins = dict.fromkeys(each.skin for each in self._new if each.skin is not None)
         if partner is not None and partner.skin is not None:
@@ -184,19 +184,19 @@ class _SceneMatcher:
         return Binding(nodes, bind, -1, surface.rest_weights)
 
     def _joints(self, old: Skin, new: Skin) -> Ints:
-        """For each joint of a skin (J,) its place in another skin's list, −1 where it isn't there."""
+        """For each joint of a skin (J,) its index in another skin's list, −1 without one."""
         place = {node: i for i, node in enumerate(new.joints.tolist())}
         return np.array([place.get(node, -1) for node in self.nodes[old.joints].tolist()], np.int64)
 
     def _above(self, surface: Surface) -> Binding:
-        """What carries a surface of one node if that node's own partner doesn't count."""
+        """Joint of a surface of one node without regard to that node's own partner."""
         node = int(surface.nodes[0])
         parent, local = self._place(int(self._scene.skeleton.parents[node]))
         bind = matrix.multiply(matrix.multiply(local, self._local[node]), surface.bind)
         return Binding(np.array([parent]), bind, -1, surface.rest_weights)
 
     def _place(self, node: int) -> tuple[int, Floats]:
-        """The other scene's node that stands for a node, −1 for the world, and where this one is on it at rest."""
+        """The other scene's node for a node, −1 for the world, and the transform between them at rest."""
         local: Floats = NOWHERE
         while node >= 0 and self.nodes[node] < 0:
             local = matrix.multiply(self._local[node], local)
@@ -204,7 +204,7 @@ class _SceneMatcher:
         return (int(self.nodes[node]) if node >= 0 else -1), local
 
     def _below(self, instance: MeshInstance) -> MeshInstance | None:
-        """The only instance on a child of the node that stands for an instance's own: peers put meshes there."""
+        """The only instance on a child of an instance's partner node: other tools put meshes there."""
         node = int(self.nodes[instance.node])
         parents = self._other.skeleton.parents
         children = [each for each in self._new if node >= 0 and parents[each.node] == node]
@@ -212,7 +212,7 @@ class _SceneMatcher:
 
 
 def _deform_alike(old: MeshInstance, new: MeshInstance, carried: Binding) -> bool:
-    """Whether two instances of the same vertices have the same joints, weights and morph targets."""
+    """Return whether two instances of the same vertices have the same joints, weights and morph targets."""
     space = _space(old.mesh.positions, new.mesh.positions)
     if not same_targets(old.mesh, new.mesh, space):
         return False
@@ -222,7 +222,7 @@ def _deform_alike(old: MeshInstance, new: MeshInstance, carried: Binding) -> boo
 
 
 def _agree(old: Mesh, new: Mesh) -> bool:
-    """Whether both have the same vertices in the same order, be it in another mesh space."""
+    """Return whether both have the same vertices in the same order, possibly in another mesh space."""
     a, b = old.positions, new.positions
     if len(a) != len(b):
         return False
@@ -232,7 +232,7 @@ def _agree(old: Mesh, new: Mesh) -> bool:
 
 
 def _space(a: Floats, b: Floats) -> Floats:
-    """b_from_a (3, 4): the shift and the one factor that take points a (V, 3) nearest to b (least squares)."""
+    """b_from_a (3, 4): translation and uniform scale that take points a (V, 3) nearest to b (least squares)."""
     if np.array_equal(a, b):
         return NOWHERE
     middle_a, middle_b = a.mean(axis=0), b.mean(axis=0)
@@ -242,7 +242,7 @@ def _space(a: Floats, b: Floats) -> Floats:
 
 
 def _space_of_boxes(a: Floats, b: Floats) -> Floats | None:
-    """b_from_a (3, 4) by the boxes around points a and b, in any order and number; None where their shapes differ."""
+    """b_from_a (3, 4) from the boxes around points a and b, in any order and number; None for other proportions."""
     sizes = [np.ptp(each, axis=0) for each in (a, b)]
     middles = [(each.max(axis=0) + each.min(axis=0)) / 2 for each in (a, b)]
     limit = SAME_SPACE_TOLERANCE * float(np.linalg.norm(sizes[1]))
@@ -256,9 +256,10 @@ def _space_of_boxes(a: Floats, b: Floats) -> Floats | None:
 
 
 def _space_of_binds(a: Floats, b: Floats, guess: Floats | None) -> Floats:
-    """b_from_a (3, 4) by what inverse bind matrices a and b (J, 3, 4) say, a = b · b_from_a; else what vertices say.
+    """b_from_a (3, 4) from inverse bind matrices a and b (J, 3, 4), a = b · b_from_a; else from vertices.
 
-    Vertices give it up to their rounding, the matrices exactly; but a peer may have moved the bind pose of joints.
+    Vertices give it within their rounding, the matrices exactly; but other tools may have changed the bind pose of
+    joints.
     """
     if not len(a) or np.array_equal(a, b):
         return NOWHERE

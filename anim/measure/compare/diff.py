@@ -1,4 +1,4 @@
-"""How far apart the motion of two files is: clips matched, each one measured, worst first."""
+"""Difference between the motion of two files: clips matched, each one measured, worst first."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ MAX_LISTED = 3  # names in a sentence
 
 @dataclass(frozen=True, slots=True)
 class ClipDiff:
-    """Two clips that are meant to be the same.
+    """Difference of two corresponding clips.
 
-    old, new: their numbers in the files. certified: m, no vertex is farther off at any time, looked at or not; None
-    where that could not be proven. end_old, end_new: s, their last keys.
-    missing, added: what only the old or only the new clip has a track for: (node or pointer, path).
+    old, new: their indices in the files. certified: m, upper bound of the error at all times; None if it could not be
+    proven. end_old, end_new: s, their last keys.
+    missing, added: targets of tracks of only the old or only the new clip: (node or pointer, path).
     """
 
     old: int
@@ -64,7 +64,7 @@ class Diff:
 
     @property
     def max_error(self) -> float:
-        """The largest distance between any two clips, in m; infinite where the new file lacks one."""
+        """The largest distance between any two clips, in m; infinite if the new file lacks one."""
         return math.inf if self.missing_clips else max((each.error.max_error for each in self.clips), default=0.0)
 
     def __repr__(self) -> str:
@@ -81,12 +81,12 @@ def diff(
     player: str = "spec",
     fps: float = FPS,
 ) -> Diff:
-    """Return how far the `new` clips are from the `old` ones, on the two scenes of the ruler.
+    """Return the difference of the `new` clips from the `old` ones, on the two scenes of the metric.
 
-    chosen: numbers of the old clips that are looked at, all by default. player: a name in PLAYERS, who plays both, or
-    two, "spec,nlerp": then `old` and `new` can be the same clips, and nothing is proven between the times looked at.
-    fps: frames per second of the grid that is looked at beside the keys of both.
-    Clips are matched by name, then by their order where one has no name or none is in both files.
+    chosen: indices of the old clips to compare, all by default. player: a name in PLAYERS, for both, or two,
+    "spec,nlerp": then `old` and `new` can be the same clips, and nothing is proven between the sampled times.
+    fps: frames per second of the grid that is sampled in addition to the keys of both.
+    Clips are matched by name, then in order if one has no name or the files have no name in common.
     """
     partners = name_matching.match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     wanted = range(len(old)) if chosen is None else chosen
@@ -162,7 +162,7 @@ def _compare_clips(
 
 
 def _targets(ruler: ErrorMetric, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:
-    """What each track moves: comparable between both scenes, and as people call it."""
+    """Target of each track: comparable between both scenes, and for reports."""
     scene = ruler.scene if is_old else ruler.other
     for track in clip.tracks:
         if track.node is None:

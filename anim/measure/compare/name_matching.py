@@ -1,4 +1,4 @@
-"""Which things of two files are the same: by name, then by place."""
+"""Matching of nodes and clips of two files: by name, then in order."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from anim.model import Scene, Skeleton
 
 
 def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
-    """Return for each name of `old` (N,) the number of the same name in `new`, −1 where there is none.
+    """Return for each name of `old` (N,) the index of the same name in `new`, −1 without one.
 
-    Of names that come several times the first belongs to the first, the second to the second. Empty ones match nothing.
-    by_name(["a", "b", "a"], ["b", "a"]) → 1, 0, −1
+    If a name occurs several times, the first belongs to the first, the second to the second. Empty ones match nothing.
+    match_by_name(["a", "b", "a"], ["b", "a"]) → 1, 0, −1
     """
     waiting: dict[str, list[int]] = defaultdict(list)
     for i, name in enumerate(new):
@@ -25,7 +25,7 @@ def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
 
 
 def ambiguous_names(old: Sequence[str], new: Sequence[str]) -> list[str]:
-    """Return the names in both that are not equally often in both: which of them belong together is a guess.
+    """Return the common names that occur a different number of times in both: their matches are guesses.
 
     ambiguous_names(["run", "run", "walk"], ["walk", "run"]) → ["run"]
     """
@@ -34,11 +34,10 @@ def ambiguous_names(old: Sequence[str], new: Sequence[str]) -> list[str]:
 
 
 def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
-    """Return for each name of `old` (N,) its number in `new`, −1 where it has none: by name, then in order.
+    """Return for each name of `old` (N,) its index in `new`, −1 without one: by name, then in order.
 
-    By order only where one of both has no name, or where no name is in both: two that are called differently beside
-    others that are found are two different things.
-    by_name_then_order(["walk", ""], ["run", "walk"]) → 1, 0
+    In order only if one of both has no name, or if no name is common: two different names beside matched ones are two
+    different things. match_by_name_then_order(["walk", ""], ["run", "walk"]) → 1, 0
     """
     found = match_by_name(old, new)
     left = [i for i in range(len(new)) if i not in set(found.tolist())]
@@ -50,16 +49,16 @@ def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
 
 
 def match_nodes(old: Scene, new: Scene) -> Ints:
-    """Return for each node of `old` (N,) its number in `new`, −1 where it has none.
+    """Return for each node of `old` (N,) its index in `new`, −1 without one.
 
-    By name; then joints by their order in skins that are of one size; then by order among the children of one parent,
-    where one of both has no name or no name is in both files.
+    By name; then joints in order of skins of equal size; then in order among the children of one parent, if one of both
+    has no name or no name is common.
     """
     return _Nodes(old.skeleton, new.skeleton).joined(_skins(old), _skins(new))
 
 
 class _Nodes:
-    """Nodes of two skeletons while they are being joined."""
+    """Nodes of two skeletons during matching."""
 
     def __init__(self, old: Skeleton, new: Skeleton) -> None:
         self._old, self._new = old, new
@@ -79,7 +78,7 @@ class _Nodes:
         return self.found
 
     def _join_children(self, parent: int, partner: int) -> None:
-        """Join what is left of two nodes' children where they are equally many: those that are parents first."""
+        """Match the remaining children of two nodes in order if they are equally many: parents first."""
         old_children, new_children = self._children
         one = [i for i in old_children.get(parent, ()) if self.found[i] < 0]
         other = [i for i in new_children.get(partner, ()) if i not in self._taken]
@@ -110,6 +109,6 @@ def _children(skeleton: Skeleton) -> dict[int, list[int]]:
 
 
 def _skins(scene: Scene) -> list[Ints]:
-    """Joints (J,) of the skins that are used, each once, in order."""
+    """Joints (J,) of the skins in use, each once, in order."""
     skins = dict.fromkeys(each.skin for each in scene.instances if each.skin is not None)
     return [skin.joints for skin in skins]

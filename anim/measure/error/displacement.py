@@ -1,4 +1,4 @@
-"""Displacements of the vertices of one surface over time: bounds for all, numbers for those that are asked for."""
+"""Displacements of a surface's vertices over time: bounds for all, values on demand."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 
-CHUNK = 1_000_000  # vertices times frames gone through at once: 24 MB
-FIRST = 8  # frames gone through before the bounds of the others are looked at again
+CHUNK = 1_000_000  # vertices × frames per step: 24 MB
+FIRST = 8  # frames evaluated before the bounds of the others are updated
 
 
 class DisplacementField(Protocol):
-    """What a surface's vertices do, in groups."""
+    """Displacements of a surface's vertices, in groups."""
 
     @property
     def limits(self) -> Floats:
-        """(G, F), no vertex of the group has a longer vector."""
+        """(G, F), upper bounds of the lengths of a group's vectors."""
         ...
 
     def vectors(self, group: int, frames: Ints) -> Floats:
@@ -28,21 +28,21 @@ class DisplacementField(Protocol):
         ...
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
-        """Return which joint of the surface moves a vertex of a group most in a frame; vertex −1: any of them."""
+        """Return the joint of the surface that moves a vertex of a group most in a frame; vertex −1: any of them."""
         ...
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
+        """Return the rates of change of the vectors from each frame to the next. step: (F − 1,) s between frames."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class BoundGroups:
-    """Vertices in groups, as products that displacements by joints' matrices are linear in.
+    """Vertices in groups, as products in which displacements by joint matrices are linear.
 
-    reach: numbers of the joints that carry some of each group. products: (V_g, J_g · 4) of each group: skin weight
-    times x, y, z, 1, per joint. corners: (J, P, 3), points around all that each joint carries. share: the largest sum
-    of skin weights of a vertex.
+    reach: indices of the joints that influence each group. products: (V_g, J_g · 4) of each group: skin weight
+    times x, y, z, 1, per joint. corners: (J, P, 3), corner points around the vertices of each joint. share: the largest
+    sum of skin weights of a vertex.
     """
 
     reach: Sequence[Ints]
@@ -59,16 +59,16 @@ class SkinnedDisplacement:
 
     @cached_property
     def limits(self) -> Floats:
-        """(G, F), no vertex of the group has a longer vector."""
+        """(G, F), upper bounds of the lengths of a group's vectors."""
         return _by_group(self._bounds, self._groups.reach)
 
     @cached_property
     def _bounds(self) -> Floats:
-        """(J, F), nothing that a joint carries some of has a longer vector."""
+        """(J, F), upper bounds of the lengths of vectors with influence of a joint."""
         return self._groups.fraction * largest_over(self._groups.corners, self._moved)
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
+        """Return the rates of change of the vectors from each frame to the next. step: (F − 1,) s between frames."""
         return SkinnedDisplacement(self._groups, np.diff(self._moved, axis=1) / step[:, None, None])
 
     def vectors(self, group: int, frames: Ints) -> Floats:
@@ -78,7 +78,7 @@ class SkinnedDisplacement:
         return np.asarray(flat.reshape(-1, 3, len(frames)))
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
-        """Return which joint of the surface moves a vertex of a group most in a frame; vertex −1: any of them."""
+        """Return the joint of the surface that moves a vertex of a group most in a frame; vertex −1: any of them."""
         reach = self._groups.reach[group]
         if vertex < 0:
             return int(reach[self._bounds[reach, frame].argmax()])
@@ -90,9 +90,9 @@ class SkinnedDisplacement:
 class MorphedDisplacement:
     """Displacements of morphed vertices.
 
-    bounds: (J, F), nothing that a joint carries some of is displaced more. groups: joints that reach each group, and
-    numbers of its vertices. displaced: gives all vertices' vectors (V, 3, f) for some frames (f,). rates: gives bounds
-    (J, F − 1) of how fast they change, for steps in s.
+    bounds: (J, F), upper bounds of displacements with influence of a joint. groups: joints that influence each group,
+    and indices of its vertices. displaced: function of frames (f,) that returns all vectors (V, 3, f). rates: function
+    of steps in s that returns bounds (J, F − 1) of their rates of change.
     """
 
     def __init__(
@@ -106,11 +106,11 @@ class MorphedDisplacement:
         self._bounds, self._displaced, self._rates = bounds, displaced, rates
         self._reach, self._groups = groups
         self.limits = _by_group(bounds, self._reach)
-        self._most = max(CHUNK // max(sum(map(len, self._groups)), 1), 1)  # frames that are kept
+        self._most = max(CHUNK // max(sum(map(len, self._groups)), 1), 1)  # maximum number of cached frames
         self._kept: dict[int, Floats] = {}
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return how fast the vectors change from each frame to the next. step: (F − 1,) s between frames."""
+        """Return the rates of change of the vectors from each frame to the next. step: (F − 1,) s between frames."""
         return DisplacementRate(self, step, _by_group(self._rates(step), self._reach))
 
     def vectors(self, group: int, frames: Ints) -> Floats:
@@ -119,7 +119,7 @@ class MorphedDisplacement:
         return np.concatenate([self._some(group, frames[i : i + self._most].tolist()) for i in starts], axis=-1)
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
-        """Return which joint of the surface can move any vertex of a group most in a frame."""
+        """Return the joint of the surface that can move any vertex of a group most in a frame."""
         del vertex
         reach = self._reach[group]
         return int(reach[self._bounds[reach, frame].argmax()])
@@ -136,9 +136,9 @@ class MorphedDisplacement:
 
 
 class DisplacementRate:
-    """How fast the vectors of any field change from each frame to the next.
+    """Rates of change of any field's vectors from each frame to the next.
 
-    step: (F − 1,) s between frames. limits: (G, F − 1), where known; else what the field's own limits give.
+    step: (F − 1,) s between frames. limits: (G, F − 1), if known; else derived from the field's own limits.
     """
 
     def __init__(self, field: DisplacementField, step: Floats, limits: Floats | None = None) -> None:
@@ -147,7 +147,7 @@ class DisplacementRate:
         self.limits = loose if limits is None else np.minimum(loose, limits)
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return how fast the rates themselves change."""
+        """Return the rates of change of the rates."""
         return DisplacementRate(self, step)
 
     def vectors(self, group: int, frames: Ints) -> Floats:
@@ -158,15 +158,15 @@ class DisplacementRate:
         return np.asarray((found[..., second] - found[..., first]) / self._step[frames])
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
-        """Return which joint of the surface moves a vertex of a group most at the end of a step."""
+        """Return the joint of the surface that moves a vertex of a group most at the end of a step."""
         return self._field.joint(group, frame + 1, vertex)
 
 
 @dataclass(frozen=True, slots=True)
 class MaxDisplacement:
-    """The longest vector of a field. vertex: its number within the group, −1 where only the bound was looked at.
+    """The longest vector of a field. vertex: its index within the group, −1 if only the bound was evaluated.
 
-    limits: (G, F), the field's own, and where vertices were looked at no more than the longest of them.
+    limits: (G, F), the field's own; where vertices were evaluated, at most the longest of them.
     """
 
     length: float
@@ -184,15 +184,15 @@ def lengths(field: DisplacementField, group: int, frames: Ints) -> Floats:
 
 
 def max_displacement(field: DisplacementField, *, floor: float, slack: float, most: int) -> MaxDisplacement:
-    """Return the longest vector; never shorter than it is, and no more than `slack` times or `floor` above.
+    """Return the longest vector: a bound that is at most `slack` times or `floor` above its length.
 
-    floor: nothing is searched where no bound is longer. slack: ≥ 1. most: vertices times frames gone through; beyond,
-    the bound of what is left is returned.
+    floor: groups with smaller bounds are not searched. slack: ≥ 1. most: vertices × frames that are evaluated; if there
+    are more, the bound of the rest is returned.
     """
     tops = field.limits.max(axis=1)
     group = int(tops.argmax())
     found = MaxDisplacement(0.0, group, int(field.limits[group].argmax()), -1, field.limits.copy())
-    left = 0.0  # the longest bound of what was not looked at
+    left = 0.0  # the largest bound of groups that were not evaluated
     for group in np.argsort(-tops, kind="stable").tolist():
         limits = field.limits[group]
         waiting = np.argsort(-limits, kind="stable")
@@ -215,7 +215,7 @@ def max_displacement(field: DisplacementField, *, floor: float, slack: float, mo
 
 
 def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:
-    """Bounds of joints (J, F) as those of groups (G, F)."""
+    """Bounds of groups (G, F) from bounds of joints (J, F)."""
     return np.array([bounds[joints].max(axis=0) for joints in reach])
 
 

@@ -1,4 +1,4 @@
-"""How the distance between two versions of a clip goes over time, and which joints make it."""
+"""Error between two versions of a clip over time, and the joints that cause it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
 from anim.measure.error.metric import FPS, ErrorMetric, dense_times
 from anim.model import Clip
 
-JOINTS = 4  # the worst ones that are told apart
+JOINTS = 4  # number of worst joints with a curve of their own
 
 
 @dataclass(frozen=True, slots=True)
 class JointErrorCurve:
-    """What one joint does: the largest displacement (F,) in m of a vertex that it carries most of."""
+    """Error of one joint: the largest displacement (F,) in m of a vertex with its largest weight on the joint."""
 
     joint: str
     error: Floats
@@ -24,7 +24,7 @@ class JointErrorCurve:
 
 @dataclass(frozen=True, slots=True)
 class ErrorCurve:
-    """One clip. times: (F,) s. error: (F,) m, the largest displacement of any vertex. joints: worst first."""
+    """Error of one clip. times: (F,) s. error: (F,) m, the largest displacement of any vertex. joints: worst first."""
 
     name: str
     times: Floats
@@ -33,7 +33,7 @@ class ErrorCurve:
 
 
 def error_curve(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> ErrorCurve:
-    """Return how far `after` is from `before` at each time that `dense_times` gives, as a player shows them."""
+    """Return the error of `after` at each time of `dense_times`, with the interpolation of a player."""
     times = dense_times(before, after, fps=fps)
     courses: dict[int, Floats] = {}
     first = 0

@@ -1,7 +1,7 @@
-"""How far apart two versions of a clip are, in metres on the surface: where, and when.
+"""Error metric: the distance between two versions of a clip, in metres on the surface, with position and time.
 
-What is reported is never less than the truth at the times looked at. Times are gone through in blocks, so that memory
-stays the same however long the clip is.
+Reported errors are upper bounds at the sampled times. Times are processed in blocks, so that memory does not depend on
+the length of a clip.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PoseSampler
 from anim.sampling.times import check_fps, frame_times
 
-NOISE = 1e-7  # of the diagonal: float32 files can't say more, so no vertex is searched below this
-SLACK = 1.001  # a bound this close to what was found is as good as found
-MAX_SEARCHED = 40_000_000  # vertices gone through per surface and block; beyond, the bound of what is left is reported
-BLOCK = 40_000  # matrices of nodes at once, each some 600 bytes with what is made from it
-SAME_MOMENT = 1e-6  # s; times nearer than this are one, written as float32 and as float64
-FPS = 120.0  # frames per second of the grid that shows what lies between keys
+NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no vertex is searched
+SLACK = 1.001  # factor: a bound this close to a found error is not refined
+MAX_SEARCHED = 40_000_000  # vertices per surface and block; if there are more, the bound of the rest is reported
+BLOCK = 40_000  # matrices of nodes per block, each about 600 bytes with derived values
+SAME_MOMENT = 1e-6  # s; closer times are equal, written as float32 and as float64
+FPS = 120.0  # fps of the grid for motion between keys
 
 
 @dataclass(frozen=True, slots=True)
 class MotionError:
     """The largest distance between two versions of a clip.
 
-    max_error: m, never less than the true one at the times looked at. time: s. place: the mesh or node.
-    joint: the joint that contributes most there. times: how many were looked at.
-    max_pointer_error: largest difference in the value of a track that moves no node, as a share of its range.
-    vertex: its number in the mesh, −1 of a node's shell or where the error is too small to be searched for.
+    max_error: m, upper bound at the sampled times. time: s. place: the mesh or node. joint: the joint with the largest
+    contribution. times: number of samples.
+    max_pointer_error: largest error of a track that moves no node, as a fraction of its range.
+    vertex: its index in the mesh, −1 for a shell or if the error is too small to be searched.
     """
 
     max_error: float
@@ -56,10 +56,10 @@ class MotionError:
 
 @dataclass(frozen=True, slots=True)
 class ErrorSamples:
-    """What was seen at some times (F,).
+    """Errors at some times (F,).
 
-    limits: of each part of the ruler (G, F) in m, no vertex of a group is displaced more; 0 of what nothing carries. In
-    float32, for there are many.
+    limits: of each part of the metric (G, F) in m, upper bounds of the displacement of a group's vertices; 0 without
+    joints. In float32, since there are many.
     """
 
     error: MotionError
@@ -68,7 +68,7 @@ class ErrorSamples:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Some of the times (F,) in s, both versions posed there."""
+    """Some of the times (F,) in s, with the poses of both versions."""
 
     times: Floats
     old: PosedScene
@@ -76,13 +76,12 @@ class Block:
 
 
 class ErrorMetric:
-    """Measures clips on one scene, or on two that show the same thing: what depends on no clip is prepared once.
+    """Error metric for clips on one scene, or on two corresponding ones: prepares what all clips share.
 
-    other: the scene that the second clip is of: another rest pose, other numbers of nodes, another file. What is
-    carried through both is the first scene's surface, so that only motion counts
-    (`anim.measure.compare.correspondence`).
-    shell: as a share of the diagonal, the distance of six points around each node that moves no vertex; None leaves
-    such nodes out of account, but in a scene without any vertex: that is measured at cubes on its nodes then.
+    other: the scene of the second clip: with another rest pose, other node indices, another file. The first scene's
+    surface is moved by both scenes, so that only motion counts (`anim.measure.compare.correspondence`).
+    shell: as a fraction of the diagonal, the distance of six points around each node that moves no vertex; None ignores
+    such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
     """
 
     def __init__(self, scene: Scene, other: Scene | None = None, *, shell: float | None = None) -> None:
@@ -96,28 +95,28 @@ class ErrorMetric:
             self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
-        """Return how far `after` is from `before` at the times of `dense_times`.
+        """Return the error of `after` at the times of `dense_times`.
 
-        Between them it may be more: `anim.measure.continuous_bound.largest_error` looks there too.
+        Between them it may be larger: `anim.measure.continuous_bound.largest_error` bounds it there too.
         """
         return self.error_at(before, after, dense_times(before, after), player=player)
 
     def error_at(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> MotionError:
-        """Return how far `after` is from `before` at `times` (F,) in seconds.
+        """Return the error of `after` at `times` (F,) in seconds.
 
-        player: a name in PLAYERS, who plays both of them; or two, "spec,nlerp", for `before` and `after`.
+        player: a name in PLAYERS, for both clips; or two, "spec,nlerp", for `before` and `after`.
         """
         return self._sample_block(before, after, times, player, None)
 
     def sample_errors(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> ErrorSamples:
-        """Return what `error_at` does, with limits for all times and groups of vertices."""
+        """Return the same as `error_at`, with limits for all times and groups of vertices."""
         limits = [np.zeros((len(part.groups), len(times)), np.float32) for part in self.parts]
         return ErrorSamples(self._sample_block(before, after, times, player, limits), limits)
 
     def _sample_block(
         self, before: Clip, after: Clip, times: Floats, player: str, limits: Sequence[NDArray[np.float32]] | None
     ) -> MotionError:
-        """What `error_at` returns. limits: to be filled with what `Look` has, or None."""
+        """The same as `error_at`. limits: arrays to write the limits of groups into, or None."""
         size, frame, place, joint, vertex = 0.0, 0, "", -1, -1
         first = 0
         for block in self.blocks(before, after, times, player=player):
@@ -140,9 +139,9 @@ class ErrorMetric:
     def blocks(
         self, before: Clip, after: Clip, times: Floats, *, player: str = "spec", overlap: int = 0
     ) -> Iterator[Block]:
-        """Yield `times` (F,) in s a block after the other, both clips posed there by a player, or one by each of two.
+        """Yield blocks of `times` (F,) in s, with both clips posed by a player, or by one player each.
 
-        overlap: how many of a block's last times the next one starts with.
+        overlap: number of times that a block shares with the next one.
         """
         old, new = (
             sampler_for(scene.skeleton, clip, player=name)
@@ -155,19 +154,19 @@ class ErrorMetric:
 
     @property
     def length(self) -> int:
-        """How many times are posed at once."""
+        """Maximum number of times of a block."""
         matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
         return max(BLOCK // max(matrices, 1), 8)
 
     def posed(self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]) -> tuple[PosedScene, PosedScene]:
-        """Return both clips posed at some times (F,) in s by one player, at others by the next, all in one.
+        """Return both clips posed at some times (F,) in s by one player, at others by the next, concatenated.
 
-        asked: names in PLAYERS, each with its times; not more times than `length` on the whole.
+        asked: names in PLAYERS, each with its times; not more times than `length` in total.
         """
         return _posed(self.scene.skeleton, before, asked), _posed(self.other.skeleton, after, asked)
 
     def called(self, node: int) -> str:
-        """Return how reports call a node of the scene before: by its name, or "node 7"; nothing for −1."""
+        """Return the name of a node of the first scene for reports: its own, or "node 7"; "" for −1."""
         return (self.scene.skeleton.names[node] or f"node {node}") if node >= 0 else ""
 
 
@@ -188,23 +187,22 @@ def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) 
 
 
 def _round_up(values: Floats) -> NDArray[np.float32]:
-    """The values as float32, none less than it is."""
+    """The values rounded up to float32."""
     near = values.astype(np.float32)
     return np.where(near < values, np.nextafter(near, np.float32(np.inf)), near)
 
 
 def key_and_mid_times(*clips: Clip) -> Floats:
-    """Return every key time of the clips and the middle of every gap, in seconds, increasing."""
+    """Return every key time of the clips and the middle of every interval, in seconds, increasing."""
     keys = _key_times(clips)
     return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
 
 
 def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
-    """Return what `check_times` does, a grid of `fps` frames per second, and the last moment before each STEP key, in
-    seconds, increasing.
+    """Return key and mid times, a grid of `fps` frames per second, and the last moment before each STEP key.
 
-    The grid has 0 s on it, and begins with the last frame before the first key: that shows what all earlier ones do.
-    Frames that only rounding keeps apart from a key are that key.
+    In seconds, increasing. The grid includes 0 s, and starts with the last frame before the first key, which is equal
+    to all earlier ones. Frames that differ from a key by rounding are that key.
     """
     check_fps(fps)
     end = max((clip.end for clip in clips), default=0.0)
@@ -216,10 +214,10 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
 
 
 def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
-    """Return every key time of the clips, the last moment before each STEP key, and equal parts of all gaps between
-    neighboring keys, in seconds, increasing.
+    """Return every key time of the clips, the last moment before each STEP key, and divisions of all intervals.
 
-    parts: of every gap at least, ≥ 1. step: s, no part is longer; > 0.
+    In seconds, increasing. Each interval between neighboring keys is divided into equal parts. parts: minimum number of
+    parts of an interval, ≥ 1. step: s, maximum duration of a part; > 0.
     """
     keys = _key_times(clips)
     gaps = np.diff(keys)
@@ -237,7 +235,7 @@ def _key_times(clips: Sequence[Clip]) -> Floats:
 
 
 def _before_jumps(clips: Sequence[Clip]) -> list[Floats]:
-    """The last moments before STEP keys, where a clip is as far off as the jump is high."""
+    """The last moments before STEP keys, where the error can be as large as the jump."""
     steps = (track for clip in clips for track in clip.tracks if track.interpolation is Interpolation.STEP)
     axes = dict.fromkeys(track.time_axis for track in steps if len(track.times) > 1)
     return [np.nextafter(axis.times[1:], 0) for axis in axes]

@@ -1,4 +1,4 @@
-"""Points that show where nodes are and how they are turned: each node's place, and the ends of short levers on it."""
+"""Points that represent position and rotation of nodes: each node's origin, and points on its axes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from anim.arrays import Floats, Ints
 from anim.model import Skeleton
 from anim.sampling import rest_pose, world_matrices
 
-PROBE_DISTANCE = 0.05  # of the skeleton's size: how far from a node its turning counts
+PROBE_DISTANCE = 0.05  # of the skeleton's size: distance of points from a node, for its rotation
 PER_NODE = 3
-SPEED_STEP = 1e-4  # s; speeds at an end are taken over this time: what a player shows in the first moment
-ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # of the six points around a node, along its own axes
+SPEED_STEP = 1e-4  # s; step of one-sided differences for velocities at an end
+ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # directions of the six points around a node, along its own axes
 
 
 def probe_points(world: Floats) -> Floats:
     """Return three points per node (3 N, F, 3) in world space from world matrices (N, F, 3, 4).
 
-    The node's place, and one a lever away on each of two axes, so that a node which only turns moves too.
+    The node's origin, and one point on each of two axes, so that a node that only rotates moves points too.
     """
     places = world[..., 3]
     two = world[..., :2]
@@ -28,7 +28,7 @@ def probe_points(world: Floats) -> Floats:
 
 
 def probe_size(places: Floats) -> float:
-    """Return the diagonal of the box around the points (P, F, 3) in the first frame; 1 where it has none."""
+    """Return the diagonal of the box around the points (P, F, 3) in the first frame; 1 if it is empty."""
     first = places[:, 0]
     return float(np.linalg.norm(first.max(axis=0) - first.min(axis=0))) or 1.0
 

@@ -1,8 +1,8 @@
-"""One surface in two versions: how far its vertices can be apart, and how far they are, vertex by vertex.
+"""One surface in two versions: bounds of the displacement of its vertices, and displacements per vertex.
 
-A displacement |D·p| is convex in p, so over a box it is largest at a corner, and over a blend of joints no larger than
-the largest joint's. That bounds every time cheaply. Where skin is not morphed the displacement is linear in the joints'
-matrices, so that one product of matrices gives it for many vertices and times.
+A displacement |D·p| is convex in p, so that over a box it is largest at a corner, and for a blend of joints at most the
+largest joint's. That bounds every time cheaply. Without morphing the displacement is linear in the joints' matrices, so
+that one product of matrices computes it for many vertices and times.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from anim.sampling.pose import world_by_node
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """What carries a surface in one version of the scene.
+    """Joints of a surface in one version of the scene.
 
     nodes: (J,) the joints, −1 for the world itself. bind: (J, 3, 4) joint_from_mesh.
-    owner: the node whose morph weights count, −1 for none. rest_weights: (M,), where no track moves them.
+    owner: the node with the morph weights, −1 for none. rest_weights: (M,), without a track.
     """
 
     nodes: Ints
@@ -51,7 +51,7 @@ class Binding:
 
 
 class PosedScene:
-    """One version at F times: its pose, and world matrices (N, F, 3, 4), worked out where they are asked for."""
+    """One version at F times: its pose, and world matrices (N, F, 3, 4), computed on demand."""
 
     def __init__(self, skeleton: Skeleton, pose: Pose) -> None:
         self.skeleton, self.pose = skeleton, pose
@@ -69,45 +69,45 @@ class PosedScene:
 
 
 class PointGroups(Protocol):
-    """Points that move together: those of a mesh, or shells. name: of the mesh, empty where each group has its own."""
+    """Points that move together: those of a mesh, or shells. name: of the mesh, empty if each group has its own."""
 
     @property
     def groups(self) -> Sequence[Ints]:
-        """Numbers of the points (V_g,) of each group."""
+        """Indices of the points (V_g,) of each group."""
         ...
 
     @property
     def name(self) -> str:
-        """Name of the mesh or node, for reports; empty where each group has its own."""
+        """Name of the mesh or node, for reports; empty if each group has its own."""
         ...
 
     def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
-        """Return how far every point is displaced at every time, None where there is none."""
+        """Return the displacement of every point at every time, None without points."""
         ...
 
     def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
-        """Return the nodes whose morph weights count, in the scene before, with the weights (F, M) of both versions."""
+        """Return the nodes with morph weights, in the first scene, with the weights (F, M) of both versions."""
         ...
 
     def leader(self, group: int) -> int:
-        """Return the number of the node that carries most of a group, in the scene before."""
+        """Return the index of the node with the largest weight on a group, in the first scene."""
         ...
 
     def node(self, joint: int) -> int:
-        """Return the number of the node that a joint of the field is, in the scene before."""
+        """Return the index of the node of a field's joint, in the first scene."""
         ...
 
     def vertex(self, found: MaxDisplacement) -> int:
-        """Return the number in the mesh of the vertex that was found, −1 where it is none."""
+        """Return the index in the mesh of the vertex that was found, −1 for none."""
         ...
 
 
 class SkinnedGroups:
-    """A surface, its vertices in groups by the joint that carries most of each, and boxes around what joints carry.
+    """A surface with vertices grouped by the joint with the largest weight, and boxes around joints' vertices.
 
-    new: what carries the surface in the second version, where that is not the same.
-    used: numbers of the joints that carry anything. reach: of each group the joints that carry some of it, as places in
-    `used`. share: the largest sum of skin weights of a vertex.
+    new: joints of the surface in the second version, if they differ. used: indices of the joints with influence.
+    reach: of each group the joints with influence, as indices into `used`. share: the largest sum of skin weights of a
+    vertex.
     """
 
     def __init__(self, surface: Surface, new: Binding | None = None) -> None:
@@ -130,7 +130,7 @@ class SkinnedGroups:
         self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.fraction)
 
     def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
-        """Return how far every vertex is displaced at every time, None where nothing carries any."""
+        """Return the displacement of every vertex at every time, None without joints."""
         if not self.groups or not len(old.pose.times):
             return None
         bind = self.new.bind[self.used][:, None]
@@ -152,7 +152,7 @@ class SkinnedGroups:
         )
 
     def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
-        """Return the node whose morph weights count, in the scene before, with the weights (F, M) of both versions."""
+        """Return the node with morph weights, in the first scene, with the weights (F, M) of both versions."""
         if not len(self.surface.targets):
             return []
         return [(self.old.owner, self.old.weights(old.pose), self.new.weights(new.pose))]
@@ -163,19 +163,19 @@ class SkinnedGroups:
         return self.surface.name
 
     def leader(self, group: int) -> int:
-        """Return the number of the node that carries most of each vertex of a group, in the scene before."""
+        """Return the index of the node with the largest weight on each vertex of a group, in the first scene."""
         return self.node(self._leaders[group])
 
     def node(self, joint: int) -> int:
-        """Return the number of the node that a used joint is, in the scene before."""
+        """Return the index of the node of a used joint, in the first scene."""
         return int(self.old.nodes[self.used[joint]])
 
     def vertex(self, found: MaxDisplacement) -> int:
-        """Return the number in the mesh of the vertex that was found, −1 where only a bound was looked at."""
+        """Return the index in the mesh of the vertex that was found, −1 if only a bound was evaluated."""
         return int(self.groups[found.group][found.vertex]) if found.vertex >= 0 else -1
 
     def _grouped(self, carrying: Bools) -> dict[int, Ints]:
-        """Numbers of the vertices by the joint that carries most of each; those that nothing carries are left out."""
+        """Indices of the vertices by the joint with the largest weight; without vertices that have none."""
         if not len(self.used):
             return {}
         first = self.surface.weights.argmax(axis=1)
@@ -184,7 +184,7 @@ class SkinnedGroups:
         return {joint: group for joint in range(len(self.used)) if len(group := np.flatnonzero(leader == joint))}
 
     def _boxes(self, points: Floats) -> Floats:
-        """Corners (J, 8, 3) of the box around all vertices that each used joint carries some of."""
+        """Corners (J, 8, 3) of the box around all vertices with influence of each used joint."""
         carrying = self.surface.weights > 0
         corners = []
         for joint in range(len(self.used)):
@@ -193,7 +193,7 @@ class SkinnedGroups:
         return np.array(corners).reshape(-1, 8, 3)
 
     def _products(self, points: Floats, group: Ints, reach: Ints) -> Floats:
-        """What to multiply matrices with (V_g, J_g · 4): skin weight times x, y, z, 1, per joint that reaches."""
+        """Factors of matrices (V_g, J_g · 4): skin weight times x, y, z, 1, per joint with influence."""
         result = np.zeros((len(group), len(reach), 4))
         rows = np.arange(len(group))
         whole = np.column_stack((points[group], np.ones(len(group))))
@@ -204,7 +204,7 @@ class SkinnedGroups:
         return result.reshape(len(group), -1)
 
     def _displaced(self, frames: Ints, old: PosedScene, new: PosedScene) -> Floats:
-        """How every vertex is displaced (V, 3, f) in some frames, morphed and skinned one after the other."""
+        """Displacement of every vertex (V, 3, f) in some frames, morphed and then skinned."""
         result = np.zeros((*self.surface.points.shape, len(frames)))
         for carried, posed, sign in ((self.new, new, 1), (self.old, old, -1)):
             points = morph_points(self.surface, carried.weights(posed.pose)[frames])

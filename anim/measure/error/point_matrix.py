@@ -1,8 +1,7 @@
-"""The points that an error is measured on: vertices with their joints, as one matrix that turns moves of nodes into
-moves of points.
+"""Points on which an error is measured: vertices with their joints, as one matrix from node to point motion.
 
-A skinned vertex lies at Σ w·M·b·p: linear in the joints' world matrices M. With one row per vertex and four columns
-per node (x, y, z and 1 of w·b·p), the moves of all vertices at all times are a single matrix product.
+A skinned vertex is at Σ w·M·b·p: linear in the joints' world matrices M. With one row per vertex and four columns
+per node (x, y, z and 1 of w·b·p), the displacements of all vertices at all times are a single matrix product.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from anim.measure.error.orientation_probes import shell_points as shells_of
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Scene
 
-CARRIED = 0.1  # a vertex answers for a node from this much weight on
+CARRIED = 0.1  # minimum weight with which a vertex represents a node
 DIRECTIONS = np.vstack((np.eye(3), -np.eye(3)))
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
-DENSE = 4_000_000  # numbers; a larger matrix is kept sparse
+DENSE = 4_000_000  # values; a larger matrix is stored as a sparse one
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +39,7 @@ class PointMatrix:
         return len(self.joints)
 
     def rows(self) -> PointRows:
-        """Return the matrix (P, 4 J), float32, that turns stacked columns of node matrices into places."""
+        """Return the matrix (P, 4 J), float32, from stacked columns of node matrices to positions."""
         width = self.joints.shape[1]
         row = np.repeat(np.arange(len(self)), 4 * width)
         column = (4 * self.joints[..., None] + np.arange(4)).reshape(-1)
@@ -67,7 +66,7 @@ class PointMatrix:
         return np.array(list(first.values()), np.int64)
 
     def places(self, world: Floats) -> Floats:
-        """Return where the points are (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
+        """Return the positions of the points (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
         matrices = world[self.nodes]
         places = np.zeros((len(self), world.shape[1], 3))
         for joint, factor in zip(self.joints.T, np.swapaxes(self.factors, 0, 1), strict=True):
@@ -75,19 +74,22 @@ class PointMatrix:
         return places
 
     def on(self, below: Bools) -> Bools:
-        """Return which points (P,) hang noticeably on the nodes `below` (N,); at all, where none does noticeably."""
+        """Return the mask (P,) of points with a noticeable weight on the nodes `below` (N,).
+
+        If no point has one, those with any weight.
+        """
         share = (self.factors[..., 3] * below[self.nodes][self.joints]).sum(axis=1)
         return np.asarray(share > CARRIED if (share > CARRIED).any() else share > 0)
 
 
 class PointRows:
-    """A matrix (P, 4 J), dense or sparse, in front of stacked columns."""
+    """A matrix (P, 4 J), dense or sparse, as a factor of stacked columns."""
 
     def __init__(self, matrix: object) -> None:
         self._matrix = matrix
 
     def moves(self, columns: Floats) -> Floats:
-        """Return moves (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
+        """Return displacements (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
         moved = self._matrix @ columns.astype(np.float32)  # type: ignore[operator]
         return np.asarray(moved).reshape(len(moved), 3, -1)
 
@@ -101,11 +103,10 @@ def stack_points(world: Floats, nodes: Ints) -> Floats:
 def sample_points(
     scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int, int]] = frozenset()
 ) -> PointMatrix:
-    """Return the vertices of the scene that stick out, and six points around each node in `shells`, `radius` metres
-    off in the rest pose.
+    """Return the outermost vertices of the scene, and six points at `radius` metres around each node in `shells`.
 
-    Of vertices: for each joint and each of 14 directions of its space, the farthest of those that it carries most,
-    and of all that it carries noticeably. extra: more of them, (number of the surface, number of the vertex).
+    Of vertices: for each joint and each of 14 directions of its space, the farthest of those with their largest weight
+    on it, and of all with a noticeable weight. extra: further vertices, (index of the surface, index of the vertex).
     """
     found = surfaces(scene) if has_vertices(scene) else []
     parts = []
@@ -116,7 +117,7 @@ def sample_points(
 
 
 def all_points(scene: Scene, radius: float) -> PointMatrix:
-    """Return all vertices of the scene, surface after surface; where it has none, six points around every node."""
+    """Return all vertices of the scene, surface after surface; without vertices, six points around every node."""
     if has_vertices(scene):
         return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in surfaces(scene)])
     return _joined(_shells(scene, frozenset(range(len(scene.skeleton))), radius))
@@ -138,7 +139,7 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
 
 
 def extreme_vertices(surface: Surface) -> set[int]:
-    """Return the numbers of the vertices that stick out on any joint's part of a surface."""
+    """Return the indices of the outermost vertices of each joint's part of a surface."""
     chosen: set[int] = set()
     most = surface.joints[np.arange(len(surface.points)), surface.weights.argmax(axis=1)]
     noticed = surface.weights > CARRIED
@@ -152,7 +153,7 @@ def extreme_vertices(surface: Surface) -> set[int]:
 
 
 def _of_surface(surface: Surface, vertices: Ints) -> tuple[Ints, Floats]:
-    """Nodes (P, I) and factors (P, I, 4) of some vertices, morphed as at rest."""
+    """Nodes (P, I) and factors (P, I, 4) of some vertices, morphed as in the rest pose."""
     points = surface.points[vertices]
     if len(surface.rest_weights):
         points = points + np.tensordot(surface.rest_weights, surface.targets[:, vertices], axes=1)

@@ -1,4 +1,4 @@
-"""How far apart two versions of tracks are that move no node: colors, factors, whatever a JSON pointer names."""
+"""Error of tracks that move no node: colors, factors, and other JSON pointers."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from anim.sampling.track import sample
 
 
 def pointer_error(before: Clip, after: Clip, times: Floats) -> tuple[float, str]:
-    """Return the largest difference between tracks that move no node, as a share of the old track's range, and whose.
+    """Return the largest error of such tracks as a fraction of the old track's range, and the track's pointer.
 
-    Tracks that only one of the clips has don't count. times: (F,) s.
+    Tracks of only one of the clips don't count. times: (F,) s.
     """
     worst, where = 0.0, ""
     new = {track.target: track for track in after.tracks if track.path == "pointer"}

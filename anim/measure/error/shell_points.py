@@ -1,4 +1,4 @@
-"""Six points around each node that no vertex shows: a socket, a camera or a light must not move by accident either."""
+"""Shells: six points around each node that moves no vertex, such as a socket, a camera or a light."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from anim.model import Skeleton
 
 
 class ShellPoints:
-    """Six points at `radius` (m, in the rest pose) along the axes of some nodes, each a group of its own.
+    """Six points at `radius` (m, in the rest pose) along the axes of some nodes, each node a group.
 
-    nodes, partners: (S,) their numbers in the scenes before and after. points: (S, 6, 3) m, in the nodes' spaces.
-    reach: of each group its node, as a place in `nodes`.
+    nodes, partners: (S,) their indices in the scenes before and after. points: (S, 6, 3) m, in the nodes' spaces.
+    reach: of each group its node, as an index into `nodes`.
     """
 
     def __init__(self, skeleton: Skeleton, nodes: Ints, partners: Ints, radius: float) -> None:
@@ -30,38 +30,38 @@ class ShellPoints:
 
     @property
     def name(self) -> str:
-        """Return nothing: each group is named by its node."""
+        """Empty: each group has the name of its node."""
         return ""
 
     def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
-        """Return how far the points are displaced at every time, None where there are none."""
+        """Return the displacement of the points at every time, None without points."""
         if not len(self.nodes) or not len(old.pose.times):
             return None
         return SkinnedDisplacement(self._groups, new.world[self.partners] - old.world[self.nodes])
 
     def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
-        """Return nothing: shells are not morphed."""
+        """Return an empty list: shells are not morphed."""
         del old, new
         return []
 
     def leader(self, group: int) -> int:
-        """Return the number of the node of a group, in the scene before."""
+        """Return the index of a group's node, in the first scene."""
         return self.node(group)
 
     def node(self, joint: int) -> int:
-        """Return the number of the node of a group, in the scene before."""
+        """Return the index of a group's node, in the first scene."""
         return int(self.nodes[joint])
 
     def vertex(self, found: MaxDisplacement) -> int:
-        """Return −1, for these points are no vertices."""
+        """Return −1: these points are no vertices."""
         del found
         return -1
 
 
 def nodes_without_vertices(skeleton: Skeleton, surfaces: list[Surface]) -> Bools:
-    """Return which nodes (N,) carry no vertex, nor does any node that hangs on them.
+    """Return the mask (N,) of nodes that influence no vertex, and none of whose descendants does.
 
-    A node that holds a skinned mesh is none of them either: where it is does not count.
+    A node with a skinned mesh is not among them either: its own position has no effect.
     """
     shown = np.zeros(len(skeleton), np.bool_)
     for surface in surfaces:

@@ -1,4 +1,4 @@
-"""What the largest distance doesn't say of two versions of a clip: the usual distance, the turn, the speed."""
+"""Statistics of the error between two versions of a clip: mean, percentile, rotation, speed."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.times import frame_times
 
-FRAMES = 64  # times that mean and p99 are taken over
-MAX_SAMPLES = 4_000_000  # vertices times frames that they are taken over
-SLACK = 1.01  # the speed error is no more than this above the true one
-SPEED_TOLERANCE = 1e-6  # diagonals per second; no speed error below this is searched for
+FRAMES = 64  # maximum number of times for mean and p99
+MAX_SAMPLES = 4_000_000  # maximum number of vertices × frames for mean and p99
+SLACK = 1.01  # factor: the speed error is at most this much above the true one
+SPEED_TOLERANCE = 1e-6  # diagonals per second; smaller speed errors are not searched
 
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """The largest of something: how much, when (s), and where: the mesh or node, the joint, the vertex or −1."""
+    """A maximum: its size, time (s) and position: mesh or node, joint, vertex or −1."""
 
     size: float = 0.0
     time: float = 0.0
@@ -34,12 +34,12 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Two versions of a clip, beside the largest distance.
+    """Errors between two versions of a clip besides the largest distance.
 
-    mean, p99: m, over all vertices at up to 64 of the times, evenly chosen (fewer of very large meshes).
-    angle: rad, the largest turn between the world rotations of a node; over all nodes that are in both scenes.
+    mean, p99: m, over all vertices at up to 64 of the times, evenly chosen (fewer for very large meshes).
+    angle: rad, the largest difference between the world rotations of a node; over all nodes of both scenes.
     speed: m/s, the largest difference in a vertex's velocity, by differences from frame to frame of a regular grid.
-    weight: the largest difference of a morph weight; its vertex is the number of the target.
+    weight: the largest difference of a morph weight; its vertex is the index of the target.
     """
 
     mean: float
@@ -58,10 +58,10 @@ def statistics(
     player: str = "spec",
     fps: float = FPS,
 ) -> Statistics:
-    """Return how far `after` is from `before` on the whole, on the ruler's scenes.
+    """Return the statistics of the error of `after`, on the scenes of the metric.
 
-    times: (F,) s, where distances, turns and weights are looked at; `dense_times` by default.
-    player: a name in PLAYERS, who plays both. fps: frames per second of the grid for speeds, 120 by default.
+    times: (F,) s, samples of distances, rotations and weights; `dense_times` by default.
+    player: a name in PLAYERS, for both clips. fps: frames per second of the grid for speeds, 120 by default.
     """
     times = dense_times(before, after, fps=fps) if times is None else times
     vertices = sum(len(group) for part in ruler.parts for group in part.groups)
@@ -80,9 +80,9 @@ def statistics(
 
 
 def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Peak:
-    """Return the largest difference in a vertex's velocity, m/s, by differences over a grid of `fps` frames per second.
+    """Return the largest difference in a vertex's velocity, m/s, by differences over a grid of `fps`.
 
-    It is never less than the true one on that grid, and no more than 1 % above. time: the middle of the frame's step.
+    It is an upper bound on that grid, at most 1 % above the true one. time: the middle of the frame's step.
     """
     times = frame_times(0.0, max(before.end, after.end), fps=fps)
     worst = Peak()
@@ -105,7 +105,7 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
 
 
 def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
-    """Distances of all vertices at all times of the block; where there are none, of the points of shells."""
+    """Distances of all vertices at all times of the block; without vertices, of the points of shells."""
     frames = np.arange(len(block.times))
     surfaces = [part for part in ruler.parts if not isinstance(part, ShellPoints)]
     for part in surfaces or ruler.parts:
@@ -116,7 +116,7 @@ def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
 
 
 def _percentile(values: Floats, share: float) -> float:
-    """The value that this share of all does not exceed."""
+    """The value below which this fraction of all is."""
     place = min(int(np.ceil(share * len(values))), len(values)) - 1
     return float(np.partition(values, place)[place])
 
@@ -135,7 +135,7 @@ def _rotation_errors(ruler: ErrorMetric, block: Block) -> Peak:
 
 
 def _world_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Rotations of all nodes against the world (N, F, 4), scales left out."""
+    """World rotations of all nodes (N, F, 4), without scales."""
     local = quaternion.normalize(np.swapaxes(pose.rotation, 0, 1))
     result = local.copy()
     for level in skeleton.levels()[1:]:

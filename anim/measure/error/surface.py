@@ -1,4 +1,4 @@
-"""Points that must not move by accident: the vertices of a scene, or small cubes on its nodes where it has none."""
+"""Surfaces on which an error is measured: the vertices of a scene, or small cubes on its nodes without any."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from anim.maths import matrix
 from anim.model import MeshInstance, Scene
 from anim.sampling import rest_pose, world_matrices
 
-SHELL = 0.01  # half the edge of the cube around a node without vertices, as a share of the scene's diagonal
+SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's diagonal
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Vertices that one set of joints carries.
+    """Vertices with one set of joints.
 
     name: of the mesh or node, for reports. nodes: (J,) the joints, or the one node of a rigid mesh.
     bind: (J, 3, 4) joint_from_mesh at bind time. points: (V, 3) m, in mesh space. targets: (M, V, 3).
-    joints, weights: (V, I), into `nodes`. owner: the node whose morph weights count, and what they are at rest (M,).
+    joints, weights: (V, I), into `nodes`. owner: the node with the morph weights, and their values at rest (M,).
     """
 
     name: str
@@ -41,20 +41,20 @@ def has_vertices(scene: Scene) -> bool:
 
 
 def is_measured_at(scene: Scene) -> str:
-    """Return the word for what errors are measured on: "surface", or "nodes" where no mesh has a vertex."""
+    """Return the word for the points on which errors are measured: "surface", or "nodes" without any vertex."""
     return "surface" if has_vertices(scene) else "nodes"
 
 
 def surfaces(scene: Scene) -> list[Surface]:
-    """Return one surface per mesh instance; where no mesh has a vertex, one per node."""
+    """Return one surface per mesh instance; without any vertex, one per node."""
     found = [_of_instance(scene, instance) for instance in scene.instances if len(instance.mesh.positions)]
     return found or list(_of_nodes(scene))
 
 
 def diagonal(scene: Scene) -> float:
-    """Return the length of the diagonal of the scene's bounding box in its rest pose, in metres; 0 of an empty one.
+    """Return the diagonal of the scene's bounding box in its rest pose, in metres; 0 of an empty one.
 
-    Of the vertices, skinned and morphed; of the nodes where there are none.
+    Of the vertices, skinned and morphed; of the nodes without any vertex.
     """
     world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
     meshes = [_of_instance(scene, i) for i in scene.instances if len(i.mesh.positions)]
@@ -66,8 +66,10 @@ def diagonal(scene: Scene) -> float:
 
 
 def place_points(surface: Surface, world: Floats, weights: Floats) -> Floats:
-    """Return the points (V, 3) in world space: morphed by weights (M,), then blended linearly by the joints' world
-    matrices (J, 3, 4)."""
+    """Return the points (V, 3) in world space: morphed by weights (M,), then blended linearly.
+
+    world: matrices of the joints (J, 3, 4).
+    """
     return skin_points(surface, morph_points(surface, weights[None])[0], matrix.multiply(world, surface.bind))
 
 
