@@ -48,12 +48,12 @@ class Clip:
     @property
     def start(self) -> float:
         """Time of the first key, in seconds; 0 without tracks."""
-        return min((float(track.times[0]) for track in self.tracks), default=0.0)
+        return min((float(axis.times[0]) for axis in self.time_axes), default=0.0)
 
     @property
     def end(self) -> float:
         """Time of the last key, in seconds: the animation's duration in glTF, where it always starts at 0."""
-        return max((float(track.times[-1]) for track in self.tracks), default=0.0)
+        return max((float(axis.times[-1]) for axis in self.time_axes), default=0.0)
 
     def __repr__(self) -> str:
         return f"Clip({self.name!r}, tracks={len(self.tracks)}, start_s={self.start:.6g}, end_s={self.end:.6g})"

@@ -219,4 +219,5 @@ def _tangents(values: ArrayLike | None, shape: tuple[int, int], name: str) -> Fl
 def share_time_axes(tracks: Iterable[Track]) -> list[Track]:
     """Return the tracks with one axis for equal times."""
     axes: dict[bytes, TimeAxis] = {}
-    return [replace(track, time_axis=axes.setdefault(track.times.tobytes(), track.time_axis)) for track in tracks]
+    found = [(track, axes.setdefault(track.times.tobytes(), track.time_axis)) for track in tracks]
+    return [track if track.time_axis is axis else replace(track, time_axis=axis) for track, axis in found]

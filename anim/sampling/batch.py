@@ -158,13 +158,13 @@ def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
             groups.setdefault(key, []).append([])
             left = MAX_GROUP_KEYS
         groups[key][-1].append(i)
-        room[key] = left - len(track.times)
+        room[key] = left - len(track.values)
     parts = [numbers for group in groups.values() for numbers in group]
     return [_flatten_keys(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts]
 
 
 def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints) -> ConcatenatedTracks:
-    counts = np.array([len(track.times) for track in tracks])
+    counts = np.array([len(track.values) for track in tracks])
     starts = np.cumsum(counts) - counts
     times = np.concatenate([track.times for track in tracks])
     return ConcatenatedTracks(tracks, numbers, counts, starts, times, *_stack_values(tracks, np.concatenate))
