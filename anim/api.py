@@ -109,7 +109,7 @@ def optimize(
 ) -> OptimizeResult:
     """Return the asset with its animations in fewer bytes and no vertex displaced by more than `max_error` at any time.
 
-    max_error: "0.5mm", "0.01%", or metres; 0 is lossless. clips: globs, all by default.
+    max_error: "0.5mm", "0.01%", or metres; 0 is lossless. clips: globs, all by default; an empty list is refused.
     max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
     keep_nodes: globs for nodes with exact motion. drop: "rest", "unused" or "never", removed channels at the rest pose.
     meshopt: "ext" or "khr" for compression by that extension. effort: "fast", "balanced" or "max".
@@ -118,6 +118,8 @@ def optimize(
     optimize("walk.glb", max_error="0.5mm").save("small.glb")
     """
     asset = as_asset(asset)
+    document = container.check_edits(asset.document)
+    asset = asset if document is asset.document else replace(asset, document=document)
     scale = diagonal(asset.scene)
 
     def length(value: Length, name: str) -> float:
@@ -130,7 +132,7 @@ def optimize(
         None if max_angle is None else radians(max_angle, "max_angle"),
         None if max_speed_error is None else length(max_speed_error, "max_speed_error"),
     )
-    nodes = glob_list(keep_nodes, "keep_nodes")
+    nodes = glob_list(keep_nodes or None, "keep_nodes")
     kept = Selection((), nodes).chosen_nodes(asset.skeleton) if nodes else ()
     check_workers(workers)
     if progress is not None:
@@ -171,7 +173,7 @@ def bake(
     normals: bool = False,
     tangents: bool = False,
     rigid: bool = False,
-    meshes: str | Sequence[str] = (),
+    meshes: str | Sequence[str] | None = None,
 ) -> BakedCache:
     """Return a clip as a vertex cache: every vertex at every frame, skinned by `method`.
 
@@ -212,8 +214,9 @@ def diff(
 ) -> Diff:
     """Return the distances between the motion of two assets, in metres on the surface; worst clip first.
 
-    Its `max_error` is the largest distance of all, infinite if a clip is missing in `new`. clips: globs for names in
-    `old`. player: of both, or two, "spec,nlerp". fps: of the sampled grid, in addition to all keys.
+    Its `max_error` is the largest distance of all, infinite if a clip is missing in `new`, 0 without clips in `old`.
+    clips: globs for names in `old`. player: of both, or two, "spec,nlerp". fps: of the sampled grid, in addition to all
+    keys.
     """
     old, new = as_asset(old), as_asset(new)
     globs = glob_list(clips, "clips")

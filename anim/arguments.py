@@ -13,12 +13,18 @@ from anim.errors import RangeError, ShapeError, check_number
 
 
 def glob_list(globs: object, name: str) -> list[str]:
-    """Return one glob or several as a list, empty for None. Raises ShapeError for anything else."""
+    """Return one glob or several as a list, empty for None, which selects all.
+
+    Raises RangeError for an empty list, so that an empty result of the caller's doesn't select all; ShapeError for
+    anything else.
+    """
     if globs is None or isinstance(globs, str):
         return [] if globs is None else [globs]
     if not isinstance(globs, Iterable):
         raise ShapeError(f"{name} is {kind(globs)} (expected a glob such as 'run*', or a list of globs)")
     given = list(globs)
+    if not given:
+        raise RangeError(f"{name} is empty, which selects nothing", help=f"{name}=None selects all")
     result = [each for each in given if isinstance(each, str)]
     if len(result) < len(given):
         wrong = next(each for each in given if not isinstance(each, str))

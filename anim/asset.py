@@ -37,6 +37,8 @@ class Asset:
     """A glTF file: its document, and views of its contents, read on first use.
 
     document: JSON and buffers. source: the input it was read from, or None.
+    The dicts and lists of `document.json` may be edited before the views are used; buffers may be appended, with a data
+    URI. The views and `save` check the JSON again, as `load` does.
     """
 
     document: Document
@@ -45,17 +47,17 @@ class Asset:
     @cached_property
     def clips(self) -> Clips:
         """The animations, by name or index. Raises FormatError with the position of the first error."""
-        return Clips(reader.clips(self.document))
+        return Clips(reader.clips(container.check_edits(self.document)))
 
     @cached_property
     def skeleton(self) -> Skeleton:
         """All nodes in their rest pose, with the indices of the file."""
-        return reader.skeleton(self.document)
+        return reader.skeleton(container.check_edits(self.document))
 
     @cached_property
     def scene(self) -> Scene:
         """The skeleton with all meshes. Raises UnsupportedError if vertices can't be read."""
-        return reader.scene(self.document)
+        return reader.scene(container.check_edits(self.document))
 
     @property
     def name(self) -> str:
@@ -66,7 +68,8 @@ class Asset:
         """Return the asset with `change` applied to clips; everything else is unchanged.
 
         change: Clip → Clip, such as `lambda clip: anim.ops.resample(clip, fps=30)`. A new name is written too.
-        clips: globs for names, "run*" or several; all by default. Raises NotFoundError for a glob without match.
+        clips: globs for names, "run*" or several; all by default. Raises NotFoundError for a glob without match,
+        RangeError for an empty list.
         """
         check_function(change, "change", "a function from Clip to Clip")
         globs = glob_list(clips, "clips")
@@ -83,7 +86,7 @@ class Asset:
                 new[i] = changed
         if not new:
             return self
-        document = writer.replace_clips(self.document, new)
+        document = writer.replace_clips(container.check_edits(self.document), new)
         return replace(self, document=_rename(document, {i: clip.name for i, clip in new.items()}))
 
     def save(self, path: PathName | BinaryIO) -> None:
@@ -123,20 +126,22 @@ def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
     path: a name with the extension .glb, .gltf, .vrm or .vrma, or a binary file open for writing, for a GLB.
     Files are replaced atomically; the input may be the output. An unchanged asset keeps its bytes; changes
     in the dicts and lists of its JSON are written. In another folder external images are copied next to the output.
-    Raises OutputError if a file can't be written, RangeError for another extension, ShapeError for a file not open for
-    binary writing.
+    Raises OutputError if a file can't be written, FormatError if the JSON was made invalid, RangeError for another
+    extension, ShapeError for a file not open for binary writing.
     """
     asset = Asset(asset) if isinstance(asset, Document) else asset
     if not isinstance(asset, Asset):
         raise ShapeError(f"asset is {type(asset).__name__} (expected an Asset)", help="save(result.asset, path)")
+    own = _own_bytes(asset)
+    document = container.check_edits(asset.document) if own is None else asset.document
     if not isinstance(path, str | os.PathLike):
         check_binary_file(path, "path", "write")
         name = str(getattr(path, "name", "file"))
-        write_stream(path, (piece.data for piece in glb_chunks(asset.document, _own_bytes(asset))), name)
+        write_stream(path, (piece.data for piece in glb_chunks(document, own)), name)
         return
     name = file_path(path)
     _check_ending(name)
-    write_file(asset.document, name, asset.source, unchanged=_own_bytes(asset))
+    write_file(document, name, asset.source, unchanged=own)
 
 
 def as_asset(value: Asset | Document | PathName) -> Asset:

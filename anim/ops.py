@@ -17,10 +17,13 @@ All take `tracks`, the indices of the tracks to change; all by default. `select_
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 
 from anim.arguments import glob_list
+from anim.errors import RangeError
 from anim.model import Clip, Skeleton
+from anim.model.track import PATHS
 from anim.operations.ease import ease
 from anim.operations.loop import append_first_frame, loop
 from anim.operations.resample import resample
@@ -32,13 +35,28 @@ from anim.operations.trim import trim
 
 __all__ = ["append_first_frame", "ease", "loop", "resample", "retime", "select_tracks", "spline", "trim", "warp"]
 
+TRACK_PATHS = (*PATHS, "pointer")
+
 
 def select_tracks(
-    clip: Clip, skeleton: Skeleton, *, nodes: str | Sequence[str] = (), paths: str | Sequence[str] = ()
+    clip: Clip,
+    skeleton: Skeleton,
+    *,
+    nodes: str | Sequence[str] | None = None,
+    paths: str | Sequence[str] | None = None,
 ) -> frozenset[int]:
     """Return the indices of the tracks of some nodes, by globs, and of some paths: "translation", "rotation", ….
 
-    Raises NotFoundError for a glob that matches no node.
+    None selects all. Raises NotFoundError for a glob that matches no node, RangeError for an unknown path or an empty
+    list.
     ops.resample(clip, fps=30, tracks=ops.select_tracks(clip, skeleton, nodes=["*Hand*"]))
     """
-    return Selection((), glob_list(nodes, "nodes"), glob_list(paths, "paths")).chosen_tracks(clip, skeleton)
+    chosen_paths = glob_list(paths, "paths")
+    for path in chosen_paths:
+        if path not in TRACK_PATHS:
+            near = difflib.get_close_matches(path, TRACK_PATHS, n=1, cutoff=0.4)
+            raise RangeError(
+                f"paths has '{path}' (expected {', '.join(TRACK_PATHS)})",
+                help=f"did you mean '{near[0]}'?" if near else "",
+            )
+    return Selection((), glob_list(nodes, "nodes"), chosen_paths).chosen_tracks(clip, skeleton)

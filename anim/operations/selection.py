@@ -64,15 +64,18 @@ def track_indices(clip: Clip, tracks: Collection[int] | None) -> frozenset[int]:
 def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
     """Return the indices of the names that match any of the globs; all without globs. what: "clip", for messages.
 
-    "#3" is index 3, with any name.
+    "#3" is index 3, with any name. A glob that is a name itself, "Run[1]", is that name only.
     Raises NotFoundError, with similar names, for a glob that matches none.
     """
     if not globs:
         return list(range(len(names)))
+    chosen: set[int] = set()
     for glob in globs:
-        if not any(_is_meant(i, name, glob) for i, name in enumerate(names)):
+        found = _matches(glob, names)
+        if not found:
             raise not_found(glob, names, what)
-    return [i for i, name in enumerate(names) if any(_is_meant(i, name, glob) for glob in globs)]
+        chosen |= found
+    return sorted(chosen)
 
 
 def not_found(name: str, names: Iterable[str], what: str) -> NotFoundError:
@@ -80,9 +83,10 @@ def not_found(name: str, names: Iterable[str], what: str) -> NotFoundError:
     return NotFoundError(f"no {what} matches '{name}'", help=_suggestion(name, names, what))
 
 
-def _is_meant(number: int, name: str, glob: str) -> bool:
-    is_nameless = name == f"#{number}"
-    return glob == f"#{number}" or fnmatchcase(name, glob) or (is_nameless and glob == str(number))
+def _matches(glob: str, names: Sequence[str]) -> set[int]:
+    """Indices of the names that are `glob` itself, otherwise of those that match it."""
+    exact = {i for i, name in enumerate(names) if glob in (name, f"#{i}") or (name == f"#{i}" and glob == str(i))}
+    return exact or {i for i, name in enumerate(names) if fnmatchcase(name, glob)}
 
 
 def _suggestion(glob: str, names: Iterable[str], what: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import inspect
 import io
 import json
@@ -116,7 +117,7 @@ def test_an_asset_does_not_share_memory_that_can_change(kind: Any, biped: Path) 
     """A reader's buffer, used again for the next file, changed the figure."""
     data = biped.read_bytes()
     buffer = bytearray(data)
-    given = {bytearray: buffer, memoryview: memoryview(buffer), np.ndarray: np.frombuffer(buffer, np.uint8)}[kind]
+    given: Any = {bytearray: buffer, memoryview: memoryview(buffer), np.ndarray: np.frombuffer(buffer, np.uint8)}[kind]
     asset = anim.load(given)
     buffer[len(buffer) // 2 :] = bytes(len(buffer) - len(buffer) // 2)
     np.testing.assert_array_equal(anim.sample(asset, "walk"), anim.sample(anim.load(data), "walk"))
@@ -159,6 +160,109 @@ def test_a_file_that_fails_to_be_read_is_an_error_of_ours() -> None:
 
     with pytest.raises(anim.FormatError, match=r"can't be read \(input/output error\)"):
         anim.load(Failing())
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda asset, none: asset.map_clips(lambda clip: clip, clips=none),
+        lambda asset, none: anim.optimize(asset, clips=none),
+        lambda asset, none: anim.diff(asset, asset, clips=none),
+        lambda asset, none: anim.bake(asset, meshes=none),
+        lambda asset, none: ops.select_tracks(asset.clips[0], asset.skeleton, nodes=none),
+        lambda asset, none: ops.select_tracks(asset.clips[0], asset.skeleton, paths=none),
+    ],
+    ids=["map_clips", "optimize", "diff", "bake", "nodes", "paths"],
+)
+@pytest.mark.parametrize("none", [[], ()])
+def test_an_empty_selection_does_not_select_all(call: Callable[[Any, Any], Any], none: Any, biped: Path) -> None:
+    with pytest.raises(anim.RangeError, match="is empty, which selects nothing") as caught:
+        call(anim.load(biped), none)
+    assert "=None selects all" in caught.value.help
+
+
+def test_an_unknown_path_of_tracks_is_refused(biped: Path) -> None:
+    asset = anim.load(biped)
+    with pytest.raises(anim.RangeError, match="paths has 'rot'") as caught:
+        ops.select_tracks(asset.clips[0], asset.skeleton, paths="rot")
+    assert caught.value.help == "did you mean 'rotation'?"
+    assert ops.select_tracks(asset.clips[0], asset.skeleton, paths=["rotation", "pointer"])
+
+
+# Edits of the JSON.
+
+
+def _with_buffer(biped: Path) -> anim.Asset:
+    """The biped with a buffer of six floats, a view and an accessor appended to its JSON."""
+    asset, data = anim.load(biped), np.arange(6, dtype="<f4").tobytes()
+    address = f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
+    content = asset.document.json
+    content["buffers"].append({"byteLength": len(data), "uri": address})
+    content["bufferViews"].append({"buffer": len(content["buffers"]) - 1, "byteLength": len(data)})
+    view = len(content["bufferViews"]) - 1
+    content["accessors"].append({"bufferView": view, "componentType": 5126, "count": 6, "type": "SCALAR"})
+    return asset
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda asset: asset,
+        lambda asset: asset.map_clips(lambda clip: ops.retime(clip, speed=2)),
+        lambda asset: anim.optimize(asset, max_error="1mm", effort="fast").asset,
+    ],
+    ids=["save", "map_clips", "optimize"],
+)
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+def test_a_buffer_appended_to_the_json_is_saved(
+    change: Callable[[anim.Asset], anim.Asset], ending: str, biped: Path, tmp_path: Path
+) -> None:
+    change(_with_buffer(biped)).save(tmp_path / f"out.{ending}")
+    again = anim.load(tmp_path / f"out.{ending}").document
+    assert again.buffers[1].data.tobytes() == np.arange(6, dtype="<f4").tobytes()
+    assert [accessor["count"] for accessor in again.json["accessors"]].count(6) >= 1
+
+
+BROKEN: dict[str, tuple[Callable[[Any], object], str]] = {
+    "sampler": (lambda j: j["animations"][0]["channels"][0].update(sampler=999), "animations[0].channels[0].sampler"),
+    "negative": (lambda j: j["animations"][0]["channels"][0].update(sampler=-1), "animations[0].channels[0].sampler"),
+    "accessors": (lambda j: j["accessors"].clear(), "animations[0].samplers[0].input"),
+    "buffers": (lambda j: j["buffers"].pop(), "bufferViews[0].buffer"),
+    "channels": (lambda j: j["animations"][0].pop("channels"), "animations[0]"),
+}
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_references_broken_by_an_edit_are_named_with_their_path(fault: str, biped: Path) -> None:
+    edit, where = BROKEN[fault]
+    uses: tuple[Callable[[Any], object], ...] = (
+        lambda asset: asset.clips,
+        lambda asset: asset.scene,
+        lambda asset: asset.map_clips(lambda clip: ops.retime(clip, speed=2)),
+        lambda asset: asset.save(io.BytesIO()),
+    )
+    for use in uses:
+        asset = anim.load(biped)
+        edit(asset.document.json)
+        with pytest.raises(anim.FormatError) as caught:
+            use(asset)
+        assert caught.value.where == where
+
+
+@pytest.mark.parametrize(
+    ("extras", "where"),
+    [
+        ({"weight": np.float32(1)}, "nodes[0].extras.weight"),
+        ({"tags": [1, {"a"}]}, "nodes[0].extras.tags[1]"),
+        ({"by": {(1, 2): 3}}, "nodes[0].extras.by"),
+    ],
+)
+def test_values_that_are_no_json_are_named_with_their_path(extras: Any, where: str, biped: Path) -> None:
+    asset = anim.load(biped)
+    asset.document.json["nodes"][0]["extras"] = extras
+    with pytest.raises(anim.FormatError, match="is no JSON value") as caught:
+        asset.save(io.BytesIO())
+    assert caught.value.where == where
 
 
 def test_a_gltf_gets_its_bin_beside_it_and_loads_from_there(biped: Path, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import count
 from typing import TypeAlias, TypeGuard
 
@@ -60,6 +61,20 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
     raw = data.tobytes()
     parsed, expanded = _parse(raw)
     return Document(parsed, buffers_of(parsed, None, resolve, glb=False), (), json_text.indent_of(raw), expanded)
+
+
+def check_edits(document: Document) -> Document:
+    """Return a document whose JSON may have been edited in place, with the buffers that were appended to it.
+
+    Raises FormatError for invalid JSON, as on reading, and for removed buffers.
+    """
+    schema.validate(document.json)
+    count, known = len(json_array(document.json, "buffers")), len(document.buffers)
+    if count < known:
+        raise FormatError(f"has {count} buffers (expected the document's {known}, or more)", where="buffers")
+    if count == known:
+        return document
+    return replace(document, buffers=(*document.buffers, *buffers_of(document.json, None, None, glb=False)[known:]))
 
 
 def is_glb(data: Bytes) -> bool:

@@ -36,7 +36,7 @@ def parse(raw: bytes) -> Json:
 def dump(content: Json, indent: int | None = None) -> bytes:
     """Return `content` as UTF-8: compact, or with `indent` spaces per level.
 
-    Raises FormatError for a number that JSON cannot represent.
+    Raises FormatError for a number that JSON cannot represent, and for a value that is no JSON, with its path.
     """
     separators = (",", ": ") if indent else (",", ":")
     text = functools.partial(json.dumps, content, indent=indent or None, separators=separators, allow_nan=False)
@@ -45,8 +45,26 @@ def dump(content: Json, indent: int | None = None) -> bytes:
             return text(ensure_ascii=False).encode("utf-8")
         except UnicodeEncodeError:  # a lone surrogate, which can be written only as an escape
             return text().encode("ascii")
+    except TypeError as error:
+        path = _find_foreign(content, "")
+        raise FormatError(
+            f"is no JSON value ({str(error)[:1].lower()}{str(error)[1:]})", where=path or "JSON"
+        ) from None
     except ValueError as error:
         raise FormatError(f"a number can't be written as JSON ({str(error).lower()})") from None
+
+
+def _find_foreign(value: object, path: str) -> str:
+    """Path of the first value, or object with a key, that JSON has no type for; "" if there is none."""
+    if isinstance(value, dict):
+        if not all(key is None or isinstance(key, str | int | float) for key in value):
+            return path
+        items = [(f"{path}.{key}" if path else str(key), item) for key, item in value.items()]
+    elif isinstance(value, list | tuple):
+        items = [(f"{path}[{i}]", item) for i, item in enumerate(value)]
+    else:
+        return "" if value is None or isinstance(value, str | int | float) else path
+    return next(filter(None, (_find_foreign(item, where) for where, item in items)), "")
 
 
 def indent_of(raw: bytes) -> int | None:

@@ -44,6 +44,15 @@ def test_clips(globs: list[str], numbers: list[int]) -> None:
         assert Selection(clips=globs).chosen_clips(CLIPS) == numbers
 
 
+def test_a_name_that_is_written_exactly_comes_before_globs() -> None:
+    """Without escapes no glob selected the clip 'Run[1]', and '*' in a name selected all."""
+    names = ["Run[1]", "Run1", "a*", "ab"]
+    assert Selection(clips=["Run[1]"]).chosen_clips(names) == [0]
+    assert Selection(clips=["Run[12]"]).chosen_clips(names) == [1]
+    assert Selection(clips=["a*"]).chosen_clips(names) == [2]
+    assert Selection(clips=["a*", "Run?"]).chosen_clips(names) == [1, 2]
+
+
 def test_what_is_near_is_suggested() -> None:
     with pytest.raises(NotFoundError, match="no clip matches 'wlak'") as caught:
         Selection(clips=["wlak"]).chosen_clips(CLIPS)
