@@ -90,7 +90,7 @@ PUBLIC = {
         "track_selection"
     ),
     "simulation.particles": "emission forces obstacles simulate solver",
-    "simulation.spring_bones": "chain_globs chains colliders json_reader read reduction report simulate",
+    "simulation.spring_bones": "chain_globs chains colliders json_reader penetration read reduction report simulate",
     "skinning.analysis": (
         "collapse collapsed_clips inbetween_error method_deviation method_scores recommendations weight_sums"
     ),

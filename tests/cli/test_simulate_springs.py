@@ -58,6 +58,7 @@ def test_a_loop_is_closed_and_reported(fixture: Fixture, call: Call, tmp_path: P
     )
     assert (found["chains"], found["joints"], found["colliders"], found["oscillators"]) == (1, 5, 2, 0)
     assert found["loop_settled"]
+    assert 0 <= found["penetration_m"] < 0.01
     assert found["loop_seam_m"] < 1e-4
 
 

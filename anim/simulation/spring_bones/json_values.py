@@ -50,6 +50,12 @@ def parse_shape(value: Json, node: int | None, name: str = "") -> Collider:
     )
 
 
+def count_items(value: Json, key: str) -> int:
+    """Return the length of an array that may be missing, or be something else that its own check reports."""
+    items = value.get(key)
+    return len(items) if isinstance(items, list) else 0
+
+
 def locate(where: str, make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """Return what `make` returns; its errors become FormatErrors at `where`, since the values are those of a file.
 

@@ -15,9 +15,13 @@ from anim.simulation.spring_bones.simulate import SpringOptions, SpringResult, s
 
 
 def make_report(
-    bones: SpringBones, options: SpringOptions, result: SpringResult, error_estimate: float | None = None
+    bones: SpringBones,
+    options: SpringOptions,
+    result: SpringResult,
+    error_estimate: float | None = None,
+    penetration: float | None = None,
 ) -> SimulationReport:
-    """Return the figures of a run. error_estimate: m, of `step_error`."""
+    """Return the figures of a run. error_estimate: m, of `step_error`. penetration: m, of `deepest_penetration`."""
     frequencies = [joint.parameters.frequency for chain in bones.chains for joint in chain.joints]
     fastest = max((each for each in frequencies if each is not None), default=None)
     figures: dict[str, Any] = {
@@ -40,6 +44,7 @@ def make_report(
         warm_up_s=options.warm_up,
         omega_h=None if fastest is None else 2 * math.pi * fastest * result.step,
         omega_h_limit=None if fastest is None else math.inf,
+        penetration_m=penetration,
         error_estimate_m=error_estimate,
         loop_seam_m=None if result.loop is None else result.loop.seam,
         figures=figures,

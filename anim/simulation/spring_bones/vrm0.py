@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from anim.gltf.document import Json, json_array
-from anim.gltf.validation.rules import ObjectRule, check_property, index, list_of, number, text
+from anim.gltf.validation.rules import ObjectRule, at_least, check_property, index, list_of, number, text
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape, Vector
-from anim.simulation.spring_bones.json_values import locate
+from anim.simulation.spring_bones.json_values import count_items, locate
 
 EXTENSION = "VRM"
 DEFAULT_STIFFNESS, DEFAULT_DRAG, DEFAULT_HIT_RADIUS_M = 1.0, 0.4, 0.02  # UniVRM's
@@ -88,10 +88,11 @@ def _check(animation: Json, num_nodes: int) -> None:
     vector = ObjectRule(dict.fromkeys("xyz", number))
     collider = ObjectRule({"offset": vector, "radius": number})
     group = ObjectRule({"node": node, "colliders": list_of(collider)}, ("node",))
-    num_groups = len(animation.get("colliderGroups") or [])
+    num_groups = count_items(animation, "colliderGroups")
     bones = ObjectRule(
         {
-            **dict.fromkeys(("stiffiness", "gravityPower", "dragForce", "hitRadius", "center"), number),
+            **dict.fromkeys(("stiffiness", "gravityPower", "dragForce", "hitRadius"), number),
+            "center": at_least(-1),
             "gravityDir": vector,
             "comment": text,
             "bones": list_of(node),

@@ -21,7 +21,14 @@ from anim.simulation.spring_bones.chains import (
     SpringParameters,
 )
 from anim.simulation.spring_bones.colliders import Collider
-from anim.simulation.spring_bones.json_values import EXTENDED_SHAPES, PLAIN_SHAPES, locate, one_of_shapes, parse_shape
+from anim.simulation.spring_bones.json_values import (
+    EXTENDED_SHAPES,
+    PLAIN_SHAPES,
+    count_items,
+    locate,
+    one_of_shapes,
+    parse_shape,
+)
 
 EXTENSION = "VRMC_springBone"
 EXTENDED = "VRMC_springBone_extended_collider"
@@ -86,9 +93,8 @@ def _notes(extension: Json) -> Iterator[str]:
 def _check(extension: Any, node: Any) -> None:
     """Raise FormatError, with the position, for a value that the schema does not allow."""
     of_type(extension, dict, "an object")
-    counts = {key: len(extension.get(key) or []) for key in ("colliders", "colliderGroups")}
-    colliders = list_of(index("colliders", counts["colliders"]))
-    groups = list_of(index("collider groups", counts["colliderGroups"]))
+    colliders = list_of(index("colliders", count_items(extension, "colliders")))
+    groups = list_of(index("collider groups", count_items(extension, "colliderGroups")))
     properties = {
         "colliders": list_of(_collider_rule(node)),
         "colliderGroups": list_of(ObjectRule({"name": text, "colliders": colliders}, ("colliders",))),

@@ -6,7 +6,7 @@ from cli.main import CommandInfo, LazyGroup
 
 KINDS: dict[str, CommandInfo] = {
     "springs": CommandInfo(
-        "Swing hair, tails and other chains of joints.",
+        "Simulate hair, tails and other joint chains.",
         (
             "gltf-anim simulate springs ponytail.glb swinging.glb --clip walk --loop",
             "gltf-anim simulate springs ponytail.glb soft.glb --chain hair1 --frequency 2.5 --gravity 6",

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from anim.arrays import Floats
 from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -22,6 +23,7 @@ from anim.simulation.spring_bones.chain_globs import find_chains
 from anim.simulation.spring_bones.chains import SpringBones, SpringParameters
 from anim.simulation.spring_bones.colliders import Vector
 from anim.simulation.spring_bones.json_reader import read_spring_file
+from anim.simulation.spring_bones.penetration import deepest_penetration
 from anim.simulation.spring_bones.read import read_spring_bones
 from anim.simulation.spring_bones.reduction import reduce_keys
 from anim.simulation.spring_bones.report import make_report, step_error
@@ -65,7 +67,9 @@ def command(
     ] = None,
     frequency: Annotated[
         float | None,
-        typer.Option("--frequency", metavar="HZ", help="Frequency of an oscillator, for --stiffness and --drag."),
+        typer.Option(
+            "--frequency", metavar="HZ", help="Frequency of an oscillator, in place of --stiffness and --drag."
+        ),
     ] = None,
     damping_ratio: Annotated[
         float | None,
@@ -86,7 +90,7 @@ def command(
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> None:
-    """Let hair, tails and ears follow a clip late, and write their rotations into it.
+    """Simulate the secondary motion of hair, tails and ears, and write it as rotation tracks of the clip.
 
     Chains and colliders are those of the file (VRMC_springBone with extended colliders, or VRM 0.x), of a .json file,
     or the joints below --chain, which swing at 2.5 Hz without --stiffness, --drag or --frequency. Parameters given as
@@ -121,14 +125,15 @@ def command(
         for note in _notes(result, scene.skeleton, options):
             voice.info(f"note: {note}")
         prover = Prover(ErrorMetric(scene)) if max_error is not None or report is not None else None
-        error = None
+        error = depth = None
         if prover is not None and report is not None:
             error = step_error(prover, scene.skeleton, driver, bones, options, result)
+            depth = deepest_penetration(scene.skeleton, result.clip, bones, _key_times(result))
         reduced = ""
         if prover is not None and max_error is not None:
             bound = units.parse_length(max_error, "--max-error", lambda: prover.ruler.diagonal)
             result, reduced = _reduce(result, prover, bound)
-        found = make_report(bones, options, result, error)
+        found = make_report(bones, options, result, error, depth)
         return _written(document, result.clip, number), found, _summary(found, result) + reduced
 
     simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)
@@ -195,6 +200,10 @@ def _reduce(result: SpringResult, prover: Prover, bound: float) -> tuple[SpringR
     reduced = replace(result, clip=clip)
     error = text.format_length(proof.error.max_error)
     return reduced, f", {before} → {_num_keys(reduced)} keys with an error of {error}"
+
+
+def _key_times(result: SpringResult) -> Floats:
+    return next(t.times for t in result.clip.tracks if t.path == "rotation" and t.node in result.joints)
 
 
 def _num_keys(result: SpringResult) -> int:

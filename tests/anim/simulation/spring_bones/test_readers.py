@@ -85,6 +85,8 @@ def joints(**fields: Any) -> list[Any]:
     [
         ({"springs": 3}, "extensions.VRMC_springBone.springs: is 3 (expected an array)"),
         ({"springs": [{}]}, "springs[0]: has no 'joints'"),
+        ({"colliders": 3}, "extensions.VRMC_springBone.colliders: is 3 (expected an array)"),
+        ({"colliderGroups": True}, "colliderGroups: is a boolean (expected an array)"),
         ({"springs": joints(node=7)}, "springs[0].joints[0].node: is 7 (the file has 3 nodes)"),
         ({"springs": joints(stiffness="1")}, "springs[0].joints[0].stiffness: is a string (expected a finite number)"),
         ({"springs": joints(dragForce=2)}, "springs[0].joints[0]: drag is 2 (expected 0 to 1)"),
@@ -142,6 +144,8 @@ def test_every_node_below_a_bone_is_a_joint() -> None:
     [
         ({"bones": [5]}, "boneGroups[0].bones[0]: is 5 (the file has 3 nodes)"),
         ({"dragForce": -1}, "boneGroups[0]: drag is -1"),
+        ({"center": 1.5}, "boneGroups[0].center: is 1.5 (expected a whole number)"),
+        ({"center": -2}, "boneGroups[0].center: is -2 (expected -1 or more)"),
         ({"colliderGroups": [0]}, "colliderGroups[0]: is 0 (the file has 0 collider groups)"),
     ],
 )
