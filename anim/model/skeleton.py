@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -74,6 +75,17 @@ class Skeleton:
     def levels(self) -> list[Ints]:
         """Return the nodes by depth, roots first, so that parents precede their children."""
         return list(self._levels)
+
+
+def ancestors(parents: Sequence[int] | Ints, node: int) -> Iterator[int]:
+    """Yield the nodes above a node, the nearest first; none of −1. parents: (N,), −1 for roots."""
+    while node >= 0 and (node := int(parents[node])) >= 0:
+        yield node
+
+
+def nearest_ancestor(parents: Sequence[int] | Ints, node: int, among: Container[int]) -> int:
+    """Return the nearest node above a node that is in `among`, −1 for none."""
+    return next((above for above in ancestors(parents, node) if above in among), -1)
 
 
 def _find_levels(parents: Ints) -> tuple[Ints, ...]:

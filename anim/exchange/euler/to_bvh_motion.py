@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from itertools import takewhile
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Clip, Skeleton, TimeAxis
+from anim.model.skeleton import ancestors, nearest_ancestor
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.pose import world_rotations
 
@@ -89,7 +91,7 @@ def _node(
     figure: _Skeleton, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
 ) -> EulerNode:
     """A joint with its required curves; lengths in the file's unit, keys at times `shown`."""
-    parent = _ancestors_outside(figure.skeleton, node, figure.numbers)
+    parent = nearest_ancestor(figure.skeleton.parents, node, figure.numbers)
     offset, turn, path = _relative_to(figure.placed(node), figure.placed(parent))
     moved = parent < 0 or bool(np.abs(path - offset).max() > CONSTANT_TOLERANCE * figure.size)
     end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
@@ -138,13 +140,8 @@ def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> l
     wanted = set(joints) or set(range(len(skeleton)))
     top = set(wanted)
     for node in list(wanted):
-        path = []
-        at = int(skeleton.parents[node])
-        while at >= 0 and at not in top:
-            path.append(at)
-            at = int(skeleton.parents[at])
-        if at >= 0:
-            wanted.update(path)
+        if nearest_ancestor(skeleton.parents, node, top) >= 0:
+            wanted.update(takewhile(lambda above: above not in top, ancestors(skeleton.parents, node)))
     wanted |= {n for n in range(len(skeleton)) if _is_end(skeleton, clip, n, wanted)}
     return [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
 
@@ -174,21 +171,13 @@ def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int])
     """Descriptions of the tracks that a BVH of the chosen nodes cannot represent."""
     carrying = set(chosen)
     for node in chosen:
-        while (node := int(skeleton.parents[node])) >= 0 and node not in carrying:
-            carrying.add(node)
+        carrying.update(ancestors(skeleton.parents, node))
     names = labels(skeleton)
     return [
         label_of(track, names)
         for track in clip.tracks
         if track.path not in ("translation", "rotation") or track.node not in carrying
     ]
-
-
-def _ancestors_outside(skeleton: Skeleton, node: int, among: Collection[int]) -> int:
-    parent = int(skeleton.parents[node])
-    while parent >= 0 and parent not in among:
-        parent = int(skeleton.parents[parent])
-    return parent
 
 
 def _curves(times: Floats, values: Floats) -> list[Curve]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TypeAlias
 
 from anim.model import Skeleton
+from anim.model.skeleton import ancestors
 
 Pair: TypeAlias = tuple[int, int]  # a source node and a target node
 NONE: Pair = (-1, -1)
@@ -20,10 +21,10 @@ def find_anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -
     back = {b: a for a, b in pairs.items()}
     found: dict[int, Pair] = {}
     for a, b in pairs.items():
-        in_source = next(((up, pairs[up]) for up in ancestors(source, a) if up in pairs), NONE)
-        in_target = next(((back[up], up) for up in ancestors(target, b) if up in back), NONE)
-        is_nearer = in_target == NONE or in_source[1] not in ancestors(target, in_target[1])
-        depends = in_source[1] == b or b in ancestors(target, in_source[1])
+        in_source = next(((up, pairs[up]) for up in ancestors(source.parents, a) if up in pairs), NONE)
+        in_target = next(((back[up], up) for up in ancestors(target.parents, b) if up in back), NONE)
+        is_nearer = in_target == NONE or in_source[1] not in ancestors(target.parents, in_target[1])
+        depends = in_source[1] == b or b in ancestors(target.parents, in_source[1])
         found[b] = in_source if in_source != NONE and is_nearer and not depends else in_target
     return found
 
@@ -41,16 +42,8 @@ def evaluation_order(target: Skeleton, chosen: dict[int, Pair], pairs: Mapping[i
         waiting = [node for node in waiting if not _is_ready(target, node, chosen, done)]
         if len(waiting) == before:
             node = next(n for n in waiting if int(target.parents[n]) in done)
-            chosen[node] = next(((back[up], up) for up in ancestors(target, node) if up in back), NONE)
+            chosen[node] = next(((back[up], up) for up in ancestors(target.parents, node) if up in back), NONE)
     return [node for node in done if node >= 0]
-
-
-def ancestors(skeleton: Skeleton, node: int) -> list[int]:
-    """Return the ancestors of a node, the nearest first; none of −1."""
-    found = []
-    while node >= 0 and (node := int(skeleton.parents[node])) >= 0:
-        found.append(node)
-    return found
 
 
 def _is_ready(target: Skeleton, node: int, chosen: Mapping[int, Pair], done: dict[int, None]) -> bool:

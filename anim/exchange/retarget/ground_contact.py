@@ -11,6 +11,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.model import MeshInstance, Scene, Skeleton
+from anim.model.skeleton import nearest_ancestor
 from anim.sampling import rest_pose, world_matrices
 
 SOLE_PERCENTILE = 5.0  # percentile of a foot's lowest height, taken as its ground
@@ -75,14 +76,9 @@ def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]
 
 def with_descendants(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
     """Return the indices of `nodes` and of all their descendants, in order."""
-    found: list[int] = []
-    for node in range(len(skeleton)):
-        at = node
-        while at >= 0 and at not in nodes:
-            at = int(skeleton.parents[at])
-        if at >= 0:
-            found.append(node)
-    return np.array(found, np.int64)
+    parents = skeleton.parents
+    found = (n for n in range(len(skeleton)) if n in nodes or nearest_ancestor(parents, n, nodes) >= 0)
+    return np.array([*found], np.int64)
 
 
 def ground_offset(

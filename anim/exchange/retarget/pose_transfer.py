@@ -9,12 +9,13 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
-from anim.exchange.retarget.anchors import NONE, Pair, ancestors, evaluation_order, find_anchors
+from anim.exchange.retarget.anchors import NONE, Pair, evaluation_order, find_anchors
 from anim.exchange.retarget.joint_matching import JointMatch, match_same_hierarchy
 from anim.exchange.retarget.rest_alignment import RestAlignment, align_rests, floor_offset
 from anim.exchange.retarget.rest_pose import UP, RestPose, rest_corrections
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
+from anim.model.skeleton import ancestors
 from anim.sampling import rest_pose, world_matrices
 from anim.sampling import sample_pose as posed
 from anim.sampling.pose import local_by_node, with_scale_signs, world_by_node, world_rotations
@@ -130,7 +131,7 @@ class PoseTransfer:
 
         Rotations of unmatched nodes between the two are ignored: the target has no joint there.
         """
-        between = ancestors(self.source, a)
+        between = [*ancestors(self.source.parents, a)]
         if anchor not in between:
             return np.asarray(of_source[a, :, :, 3] - of_source[anchor, :, :, 3])
         inside = motion.translation[:, a]

@@ -13,6 +13,7 @@ from anim.exchange.euler.motion import IDENTITY
 from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.rest_pose import RestPose, facing_rotation, rotation_between
 from anim.maths import quaternion
+from anim.model.skeleton import ancestors
 
 BUILD_TOLERANCE = 1e-3  # fraction of the radius; joints that differ less between two rest poses have the same build
 MIN_MATCHED_FRACTION = 0.5  # minimum fraction of the source's joints that must be matched to measure the size
@@ -112,9 +113,7 @@ def _extent(pose: RestPose, nodes: Ints) -> float:
 
 
 def _root(pose: RestPose, node: int) -> int:
-    while pose.parents[node] >= 0:
-        node = pose.parents[node]
-    return node
+    return [node, *ancestors(pose.parents, node)][-1]
 
 
 @dataclass(frozen=True, slots=True)

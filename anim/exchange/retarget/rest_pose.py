@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from anim.exchange.euler.motion import IDENTITY
 from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.joint_roles import PERSON
 from anim.maths import quaternion
+from anim.model.skeleton import ancestors, nearest_ancestor
 
 UP = np.array((0.0, 1.0, 0.0))
 SNAP_ANGLE_RAD = np.radians(30)  # angles nearer to a multiple of 90° are snapped: rest poses are made along axes
@@ -75,7 +76,7 @@ def rest_corrections(source: RestPose, target: RestPose, matching: JointMatch, t
         elif person and node in _up_rotation(matching):
             found[node] = IDENTITY
         else:
-            above = _matched_parent(target, node, found)
+            above = nearest_ancestor(target.parents, node, found)
             found[node] = found[above] if above >= 0 else IDENTITY
     return found
 
@@ -126,21 +127,9 @@ def _chain_ends(source: RestPose, target: RestPose, matching: JointMatch) -> Lim
 def _matched_child(pose: RestPose, nodes: set[int]) -> dict[int, list[int]]:
     below: dict[int, list[int]] = {}
     for node in sorted(nodes):
-        below.setdefault(_matched_parent(pose, node, dict.fromkeys(nodes)), []).append(node)
+        below.setdefault(nearest_ancestor(pose.parents, node, nodes), []).append(node)
     return below
 
 
-def _matched_parent(pose: RestPose, node: int, nodes: Mapping[int, object]) -> int:
-    above = pose.parents[node]
-    while above >= 0 and above not in nodes:
-        above = pose.parents[above]
-    return above
-
-
 def _parents_first(pose: RestPose, nodes: Iterable[int]) -> list[int]:
-    depth = {}
-    for node in nodes:
-        at, depth[node] = node, 0
-        while pose.parents[at] >= 0:
-            at, depth[node] = pose.parents[at], depth[node] + 1
-    return sorted(depth, key=lambda node: depth[node])
+    return sorted(nodes, key=lambda node: sum(1 for _ in ancestors(pose.parents, node)))

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.exchange.retarget.anchors import ancestors
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
+from anim.model.skeleton import ancestors, nearest_ancestor
 from anim.sampling import sample_pose
 from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
@@ -58,7 +58,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
     axis = TimeAxis(times)
     for node in below:
         parent = int(skeleton.parents[node])
-        top = next((up for up in ancestors(skeleton, node) if up in known), -1)
+        top = nearest_ancestor(skeleton.parents, node, known)
         carried = world[parent]
         if top >= 0:  # world matrix of the parent after its matched joint is restored
             carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
@@ -68,7 +68,7 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
 
 
 def _between(skeleton: Skeleton, node: int, known: set[int]) -> Iterator[int]:
-    for up in ancestors(skeleton, node):
+    for up in ancestors(skeleton.parents, node):
         if up in known:
             return
         yield up

@@ -10,6 +10,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import UnstableError
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
+from anim.model.skeleton import nearest_ancestor
 from anim.simulation.spring_bones.batch import Batch
 from anim.simulation.spring_bones.chains import SpringBones
 from anim.simulation.spring_bones.driver import Driver, DriverChunk
@@ -133,9 +134,7 @@ def _base_rows(skeleton: Skeleton, bones: SpringBones, plan: Plan) -> Ints:
     driven = set(plan.driven.tolist())
     rows = []
     for node in bones.nodes:
-        base = int(skeleton.parents[node])
-        while base >= 0 and base not in driven:
-            base = int(skeleton.parents[base])
+        base = nearest_ancestor(skeleton.parents, node, driven)
         rows.append(int(plan.rows[base]) if base >= 0 else -1)
     return np.array(rows, np.int64)
 
