@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import errno
 import numbers
-from typing import Self
+from typing import Any, Self
 
 _NO_MEMORY = (
     "cannot allocate memory",
@@ -75,7 +75,17 @@ class ShapeError(AnimError):
 
 
 class UnstableError(AnimError):
-    """A simulation diverges: values that are not finite, or far more energy than was put in."""
+    """A simulation diverges: values that are not finite, or far more energy than was put in.
+
+    report: of the run until then, a `SimulationReport`, or None.
+    """
+
+    report: Any = None
+
+    def with_report(self, report: object) -> Self:
+        """Return this error with the report of its run."""
+        self.report = report
+        return self
 
 
 class OutputError(AnimError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from enum import StrEnum
 from fractions import Fraction
@@ -10,8 +11,10 @@ from typing import Annotated
 import typer
 
 from anim.simulation.integrators import INTEGRATORS
+from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
 from cli.errors import UsageError
 
+EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
 Integrator = StrEnum("Integrator", [(name, name) for name in INTEGRATORS])  # type: ignore[misc]
 
 Clip = Annotated[
@@ -45,6 +48,26 @@ ReportFile = Annotated[
         help="Write a report: steps, stability, energy, error (.json), or its picture (.png).",
     ),
 ]
+
+
+Gravity = Annotated[str, typer.Option("--gravity", metavar="X,Y,Z", help="Acceleration in m/s².")]
+
+
+def parse_vector(given: str, option: str) -> tuple[float, float, float]:
+    """Return "X,Y,Z" as three finite numbers. Raises UsageError."""
+    x, y, z = parse_numbers(given, 3, option)
+    return x, y, z
+
+
+def parse_numbers(given: str, count: int, option: str) -> list[float]:
+    """Return numbers with commas between. Raises UsageError for another count, or numbers that aren't finite."""
+    try:
+        values = [float(each) for each in given.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise UsageError(f"{option} is '{given}' (expected {count} numbers with commas between)")
+    return values
 
 
 def parse_seconds(text: str, option: str) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from enum import StrEnum
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 import typer
 
@@ -15,7 +14,7 @@ from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.simulation.particles.emission import Emitter
-from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2, Forces
+from anim.simulation.particles.forces import Forces
 from anim.simulation.particles.obstacles import Box, Floor, Obstacle, Sphere
 from anim.simulation.particles.simulate import ParticleOptions, add_particles, simulate_particles
 from anim.simulation.particles.solver import Contact
@@ -23,15 +22,13 @@ from anim.simulation.report import SimulationReport
 from cli import text, units
 from cli.errors import UsageError
 from cli.options import common, simulation
-from cli.options.simulation import parse_seconds
+from cli.options.simulation import parse_numbers, parse_seconds, parse_vector
 from cli.text import Reporter
 from cli.workflows.simulate_clip import simulate_clip
 
 VELOCITY_VERLET = simulation.Integrator("velocity-verlet")
 ROUNDING_M = 1e-9
 MANY_NODES, MAX_NODES = 2000, 10_000  # players take milliseconds a frame; binding alone takes seconds
-EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
-Vector: TypeAlias = tuple[float, float, float]
 
 
 class Source(StrEnum):
@@ -74,7 +71,7 @@ def command(
     size: Annotated[
         str, typer.Option("--size", metavar="LENGTH", help="Radius of a particle, such as 2cm, or % of the model.")
     ] = "0.5%",
-    gravity: Annotated[str, typer.Option("--gravity", metavar="X,Y,Z", help="Acceleration in m/s².")] = EARTH_GRAVITY,
+    gravity: simulation.Gravity = simulation.EARTH_GRAVITY,
     drag: Annotated[float, typer.Option("--drag", metavar="N", help="Linear drag per second.", min=0)] = 0.0,
     quadratic_drag: Annotated[
         float, typer.Option("--quadratic-drag", metavar="N", help="Quadratic drag per metre.", min=0)
@@ -131,10 +128,10 @@ def command(
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     options = ParticleOptions(
         Forces(
-            _numbers(gravity, "--gravity"),
+            parse_vector(gravity, "--gravity"),
             drag,
             quadratic_drag,
-            _numbers(wind, "--wind"),
+            parse_vector(wind, "--wind"),
             turbulence,
             turbulence_size,
             seed,
@@ -158,7 +155,7 @@ def command(
             rate,
             burst,
             emit is Source.SURFACE,
-            _numbers(direction, "--direction"),
+            parse_vector(direction, "--direction"),
             speed,
             units.parse_angle(spread, "--spread"),
             lifetime,
@@ -205,24 +202,9 @@ def _check_nodes(count: int, voice: Reporter, *, force: bool) -> None:
 def _obstacles(floor: float | None, spheres: list[str], boxes: list[str]) -> tuple[Obstacle, ...]:
     found: list[Obstacle] = [] if floor is None else [Floor(floor)]
     for each in spheres:
-        values = _list(each, 4, "--sphere")
+        values = parse_numbers(each, 4, "--sphere")
         found.append(Sphere((values[0], values[1], values[2]), values[3]))
     for each in boxes:
-        values = _list(each, 6, "--box")
+        values = parse_numbers(each, 6, "--box")
         found.append(Box((values[0], values[1], values[2]), (values[3], values[4], values[5])))
     return tuple(found)
-
-
-def _numbers(given: str, option: str) -> Vector:
-    x, y, z = _list(given, 3, option)
-    return x, y, z
-
-
-def _list(given: str, count: int, option: str) -> list[float]:
-    try:
-        values = [float(each) for each in given.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != count or not all(map(math.isfinite, values)):
-        raise UsageError(f"{option} is '{given}' (expected {count} numbers with commas between)")
-    return values

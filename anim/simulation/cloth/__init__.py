@@ -1,0 +1,1 @@
+"""Cloth: meshes of points that keep their distances, by extended position-based dynamics or as masses and springs."""

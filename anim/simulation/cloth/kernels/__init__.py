@@ -1,0 +1,1 @@
+"""Kernels of cloth, compiled by numba."""

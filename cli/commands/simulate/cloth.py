@@ -1,0 +1,279 @@
+"""`gltf-anim simulate cloth`: a mesh, or a part of one, as cloth."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from enum import StrEnum
+from pathlib import PurePath
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from anim.arrays import Bools
+from anim.caches.transforms import statistics, up_axis
+from anim.errors import UnstableError
+from anim.gltf.document import Document, json_array
+from anim.gltf.reading import reader
+from anim.model import Scene
+from anim.operations.selection import Selection
+from anim.show.plots.stability_plot import stability_plot
+from anim.simulation.cloth.driver import Capsule
+from anim.simulation.cloth.model import Fabric
+from anim.simulation.cloth.selection import select_vertices
+from anim.simulation.cloth.simulate import SOLVERS, ClothOptions, ClothRun, compare, simulate_cloth
+from anim.simulation.cloth.solver import Environment
+from anim.simulation.report import SimulationReport
+from cli import text, units
+from cli.errors import UsageError
+from cli.first_run import announce_compiling
+from cli.io import cache_files, documents, scenes
+from cli.options import caches, common, meshes, simulation
+from cli.options.simulation import parse_seconds, parse_vector
+from cli.text import Reporter
+from cli.workflows.simulate_clip import NO_CLIP, driving_clip
+
+Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
+XPBD, MASS_SPRING = Solver("xpbd"), Solver("mass-spring")
+VELOCITY_VERLET = simulation.Integrator("velocity-verlet")
+SELECTOR = "x-min … z-max, joint:GLOB, material:GLOB or box:X,Y,Z,SX,SY,SZ"
+
+
+def command(
+    input: common.Input = "-",
+    output: caches.Product = "-",
+    *,
+    mesh: meshes.Meshes = None,
+    cloth: Annotated[
+        list[str] | None,
+        typer.Option("--cloth", metavar="WHICH", help=f"Only these vertices are cloth: {SELECTOR}; may be repeated."),
+    ] = None,
+    pin: Annotated[
+        list[str] | None,
+        typer.Option("--pin", metavar="WHICH", help="Vertices that follow the animation, chosen as by --cloth."),
+    ] = None,
+    density: Annotated[float, typer.Option("--density", metavar="KG/M2", help="Mass per area.")] = 0.2,
+    stretch: Annotated[
+        float, typer.Option("--stretch-compliance", metavar="M/N", help="Compliance of edges; 0 is rigid.")
+    ] = 1e-7,
+    bend: Annotated[
+        float, typer.Option("--bend-compliance", metavar="M/N", help="Compliance of hinges; 0 is rigid.")
+    ] = 1e-2,
+    damping: Annotated[float, typer.Option("--damping", metavar="N", help="Damping per second.")] = 0.3,
+    gravity: simulation.Gravity = simulation.EARTH_GRAVITY,
+    wind: Annotated[str, typer.Option("--wind", metavar="X,Y,Z", help="Velocity of the air in m/s.")] = "0,0,0",
+    gusts: Annotated[
+        float, typer.Option("--gusts", metavar="N", help="Gusts, as a fraction of the wind.", min=0)
+    ] = 0.3,
+    floor: Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height of a floor in metres.")] = None,
+    sphere: Annotated[
+        list[str] | None,
+        typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or at a node, and its radius; may be repeated."),
+    ] = None,
+    capsule: Annotated[
+        list[str] | None,
+        typer.Option("--capsule", metavar="A,B,R", help="A capsule from node A to node B; may be repeated."),
+    ] = None,
+    thickness: Annotated[
+        str, typer.Option("--thickness", metavar="LENGTH", help="Distance that is kept from colliders.")
+    ] = "5mm",
+    friction: Annotated[float, typer.Option("--friction", metavar="N", help="Friction against colliders.")] = 0.3,
+    self_collision: Annotated[bool, typer.Option("--self-collision", help="Keep vertices of the cloth apart.")] = False,
+    solver: Annotated[Solver, typer.Option("--solver", help="Method; mass-spring needs --integrator.")] = XPBD,
+    integrator: simulation.IntegratorOption = VELOCITY_VERLET,
+    stiffness: Annotated[
+        float, typer.Option("--stiffness", metavar="N/M", help="Stiffness of an edge, for mass-spring.")
+    ] = 500.0,
+    iterations: Annotated[
+        int, typer.Option("--iterations", metavar="N", help="Iterations per step, for relaxation.", min=1)
+    ] = 20,
+    max_stretch: Annotated[
+        str | None,
+        typer.Option("--max-stretch", metavar="PERCENT", help="Halve the step until no edge is stretched by more."),
+    ] = None,
+    tethers: Annotated[
+        bool, typer.Option("--tethers/--no-tethers", help="Limit distances to pinned vertices along the mesh.")
+    ] = True,
+    step: simulation.Step = "1/600",
+    fps: simulation.Fps = 60.0,
+    duration: simulation.Duration = None,
+    warm_up: simulation.WarmUp = 0.0,
+    seed: simulation.Seed = 0,
+    clip: simulation.Clip = None,
+    report: simulation.ReportFile = None,
+    format: caches.FormatOption = None,
+    up: caches.UpOption = None,
+    max_error: caches.MaxError = None,
+    quantize: caches.Quantize = False,
+    layout: caches.LayoutOption = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
+) -> None:
+    """Simulate a mesh as cloth, and write a vertex cache or a .glb with morph targets.
+
+    Vertices chosen by --pin, and all but those of --cloth, follow the clip at every step; the others keep the lengths
+    of the mesh's edges, and are moved by gravity, wind, colliders and the floor. xpbd is stiff at any step.
+    mass-spring and relaxation are the classic methods, to see what a step that is too long does: --report
+    stability.png draws mass-spring by every integrator. --self-collision takes about five times as long.
+    """
+    voice = Reporter(quiet, verbose)
+    began = time.perf_counter()
+    if fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    kind = _report_kind(report, solver)
+    ending = cache_files.check(output, None if format is None else f".{format}")
+    given = {"quantize": quantize, "layout": layout}
+    caches.write_options(ending, given | {"max_error": max_error})
+    substeps = max(1, math.ceil(1 / (fps * parse_seconds(step, "--step")) - 1e-9))
+    limit = None if max_stretch is None else units.parse_fraction(max_stretch, "--max-stretch")
+    with documents.source(input, voice) as source:
+        document = source.document
+        scene = scenes.read_scene(document, source.name, voice)
+        number = driving_clip(document, clip)
+        driver = NO_CLIP if number is None else reader.clips(document)[number]
+        node = _mesh_node(scene, mesh)
+        options = ClothOptions(
+            Fabric(
+                density, stretch, bend, damping, units.parse_length(thickness, "--thickness", lambda: 1.0), friction
+            ),
+            Environment(
+                parse_vector(gravity, "--gravity"), parse_vector(wind, "--wind"), gusts, floor=floor, seed=seed
+            ),
+            (*(_sphere(each, scene) for each in sphere or ()), *(_capsule(each, scene) for each in capsule or ())),
+            solver.value,
+            integrator.value,
+            substeps,
+            iterations,
+            limit,
+            stiffness,
+            self_collision,
+            tethers,
+            fps,
+            duration if duration is not None else driver.end or 2.0,
+            warm_up,
+            estimate_error=kind == ".json",
+        )
+        pinned = _pinned(document, scene, node, cloth, pin)
+        announce_compiling(voice)
+        try:
+            run = simulate_cloth(scene, driver, node, pinned, options)
+        except UnstableError as error:
+            if kind == ".json" and error.report is not None and not dry_run:
+                _write_report(error.report, str(report))
+            _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
+            raise
+    cache = run.cache if up is None else up_axis.to_up_axis(run.cache, str(up))
+    meters = (
+        None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
+    )
+    saved = cache_files.save(
+        cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
+    )
+    if kind == ".json" and not dry_run:
+        _write_report(run.report, str(report))
+    _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
+    for note in saved.written.notes:
+        voice.info(f"note: {note}")
+    name = "stdout" if output == documents.PIPE else output
+    took = text.format_duration(time.perf_counter() - began)
+    voice.info(f"{name}  {text.format_bytes(saved.size)}, {_summary(run)}, {took}{' (dry run)' if dry_run else ''}")
+    if run.report.advice:
+        voice.warn(run.report.advice)
+
+
+def _report_kind(report: str | None, solver: Solver) -> str:
+    """Ending of the report's name; "" without a report."""
+    if report is None:
+        return ""
+    kind = PurePath(report).suffix.lower()
+    if kind not in (".json", ".png", ".svg"):
+        raise UsageError(f"--report {report}: unsupported report format (expected .json, .png or .svg)")
+    if kind != ".json" and solver is not MASS_SPRING:
+        raise UsageError("--report as a picture needs --solver mass-spring: it draws every integrator")
+    documents.check_file(report)
+    return kind
+
+
+def _write_report(report: SimulationReport, path: str) -> None:
+    documents.write_text(json.dumps(report.to_json(), indent=2, ensure_ascii=False) + "\n", path)
+
+
+def _draw_report(
+    scene: Scene, node: int, pinned: Bools, options: ClothOptions, report: str | None, kind: str, *, dry_run: bool
+) -> None:
+    if report is None or kind == ".json" or dry_run:
+        return
+    found = compare(scene, node, pinned, options)
+    picture = stability_plot(found.runs, omega_h=found.omega_h, step=found.step, springs=found.edges, kind=kind[1:])
+    documents.write_bytes([np.frombuffer(picture, np.uint8)], report)
+
+
+def _summary(run: ClothRun) -> str:
+    figures: dict[str, Any] = dict(run.report.figures)
+    worst = run.report.worst_stretch or {"fraction": 0.0, "time_s": 0.0, "at_end": 0.0}
+    parts = [
+        f"{text.plural(run.cache.frame_count, 'frame')} of {figures['points']} points ({figures['pinned']} pinned)",
+        f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s",
+        f"stretched by {100 * worst['fraction']:.2g} % at most, at {worst['time_s']:.2f} s",
+    ]
+    return ", ".join(parts)
+
+
+def _mesh_node(scene: Scene, mesh: list[str] | None) -> int:
+    """Node of the one mesh that is cloth."""
+    chosen = meshes.nodes(scene, mesh)
+    nodes = [each.node for each in scene.instances if chosen is None or each.node in chosen]
+    if len(nodes) != 1:
+        names = ", ".join(f"'{each.mesh.name}'" for each in scene.instances[:8])
+        raise UsageError(f"{len(nodes)} meshes are chosen (expected one)", help=f"choose with --mesh: {names}")
+    return nodes[0]
+
+
+def _pinned(document: Document, scene: Scene, node: int, cloth: list[str] | None, pin: list[str] | None) -> Bools:
+    """Vertices (V,) that follow the animation."""
+    instance = next(each for each in scene.instances if each.node == node)
+    positions = instance.mesh.positions
+    materials = [str(each.get("name", "")) for each in json_array(document.json, "materials")]
+
+    def select(which: list[str]) -> Bools:
+        found = [select_vertices(each, instance, positions, scene.skeleton.names, materials) for each in which]
+        return np.asarray(np.logical_or.reduce([np.zeros(len(positions), bool), *found]))
+
+    pinned = select(pin or [])
+    return pinned | ~select(cloth) if cloth else pinned
+
+
+def _sphere(given: str, scene: Scene) -> Capsule:
+    parts = given.split(",")
+    if len(parts) == 2:
+        node, radius = _node(parts[0], scene), _radius(parts[1], "--sphere", given)
+        return Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), radius, node, node)
+    if len(parts) != 4:
+        raise UsageError(f"--sphere is '{given}' (expected NODE,R or X,Y,Z,R)")
+    at = parse_vector(",".join(parts[:3]), "--sphere")
+    return Capsule(at, at, _radius(parts[3], "--sphere", given))
+
+
+def _capsule(given: str, scene: Scene) -> Capsule:
+    parts = given.split(",")
+    if len(parts) != 3:
+        raise UsageError(f"--capsule is '{given}' (expected NODE,NODE,R)")
+    radius = _radius(parts[2], "--capsule", given)
+    return Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), radius, _node(parts[0], scene), _node(parts[1], scene))
+
+
+def _node(glob: str, scene: Scene) -> int:
+    found = sorted(Selection((), (glob,)).chosen_nodes(scene.skeleton))
+    if len(found) > 1:
+        raise UsageError(f"'{glob}' names {len(found)} nodes (expected one)")
+    return found[0]
+
+
+def _radius(given: str, option: str, whole: str) -> float:
+    try:
+        return float(given)
+    except ValueError:
+        raise UsageError(f"{option} is '{whole}': '{given}' is no radius in metres") from None

@@ -1,0 +1,287 @@
+"""Cloth against closed forms: catenary, static stretch, free fall, colliders; and its topology."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+import fixtures
+from anim.errors import NotFoundError, RangeError, UnstableError
+from anim.gltf.document import Document
+from anim.gltf.io import container
+from anim.gltf.reading import reader
+from anim.gltf.writing.append import append_mesh, append_nodes
+from anim.model import Clip, Scene
+from anim.simulation.cloth.driver import Capsule
+from anim.simulation.cloth.kernels.self_collision import separate_points
+from anim.simulation.cloth.kernels.xpbd import step_frame
+from anim.simulation.cloth.model import Fabric
+from anim.simulation.cloth.selection import select_vertices
+from anim.simulation.cloth.simulate import ClothOptions, ClothRun, simulate_cloth
+from anim.simulation.cloth.solver import Environment
+from anim.simulation.cloth.topology import build_topology, tether_lengths
+from anim.skinning.bake import bake
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+G = 9.81
+STILL = Environment(air=1.2)
+
+
+def sheet(rows: int, columns: int, width: float = 1.0, length: float = 1.0) -> tuple[Array, Indices]:
+    """A sheet in the plane y = 1: x across, z along."""
+    x, z = np.meshgrid(np.linspace(0, width, rows), np.linspace(0, length, columns), indexing="ij")
+    at = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel()
+    faces = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
+    return np.stack([x, np.ones_like(x), z], -1).reshape(-1, 3), faces
+
+
+def scene_of(positions: Array, faces: Indices) -> tuple[Scene, int]:
+    document, mesh = append_mesh(Document({"asset": {"version": "2.0"}}, ()), "cloth", positions, faces)
+    document, nodes = append_nodes(document, [{"name": "cloth", "mesh": mesh}])
+    return reader.scene(document), nodes[0]
+
+
+def simulate(positions: Array, faces: Indices, pinned: NDArray[Any], **options: object) -> tuple[ClothRun, Array]:
+    scene, node = scene_of(positions, faces)
+    run = simulate_cloth(scene, Clip("", ()), node, np.asarray(pinned, bool), ClothOptions(**options))  # type: ignore[arg-type]
+    return run, run.cache.load_all().positions.astype(float)
+
+
+def one_edge(compliance: float, substeps: int, iterations: int = 1) -> float:
+    """Elongation in metres of a vertical edge of 1 m with 1 kg at its end, at rest."""
+    p, v = np.array([[0.0, 0, 0], [0, -1, 0]]), np.zeros((2, 3))
+    none, pairs = np.zeros((0, 2), np.int64), np.array([[0, 1]])
+    h = 1 / 60 / substeps
+    for _ in range(1200):
+        step_frame(
+            *(
+                p,
+                v,
+                np.array([0.0, 1]),
+                np.array([0]),
+                np.zeros((substeps, 1, 3)),
+                pairs,
+                np.ones(1),
+                none,
+                np.zeros(0),
+            ),
+            *(np.full(2, -1), np.zeros(2), np.zeros((0, 3), np.int64), np.zeros((substeps + 1, 0, 7))),
+            *(np.zeros((substeps, 3)), p.copy()),
+            np.array([h, 0, -G, 0, compliance, 0, 9.0, 0, -1e30, 0, 0, 0]),
+            iterations,
+        )
+    return float(-p[1, 1] - 1)
+
+
+# Topology.
+
+
+def test_vertices_at_one_place_are_one_point() -> None:
+    positions, faces = sheet(4, 5)
+    split, corners = positions[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
+    whole, welded = build_topology(positions, faces, 1e-6), build_topology(split, corners, 1e-6)
+    assert len(welded.first_vertex) == 20
+    assert len(welded.edges) == len(whole.edges) == 20 + len(faces) - 1  # Euler's formula of a disk
+    np.testing.assert_array_equal(split[welded.first_vertex][welded.point_of_vertex], split)
+    inner = len(whole.edges) - 2 * (3 + 4)
+    assert len(whole.hinges) == inner
+
+
+def test_neighbors_in_the_order_of_edges_share_no_point() -> None:
+    positions, faces = sheet(20, 20)
+    edges = build_topology(positions, faces, 1e-6).edges
+    shared = [bool(set(a) & set(b)) for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)]
+    assert sum(shared) < 12  # where the color changes
+
+
+def test_tethers_are_as_long_as_the_mesh() -> None:
+    positions, faces = sheet(30, 30)
+    topology = build_topology(positions, faces, 1e-6)
+    anchors, lengths = tether_lengths(topology, positions, np.array([0, 29]))
+    straight = np.linalg.norm(positions[:, None] - positions[[0, 29]][None], axis=2).min(axis=1)
+    np.testing.assert_allclose(lengths, straight, rtol=0.03)
+    half = np.array([[np.cos(a), 0, np.sin(a)] for a in np.linspace(0, np.pi, 60)])  # a half cylinder
+    around = np.concatenate([half, half + np.array([0, 0.05, 0])])
+    at = np.arange(59)
+    folded = np.concatenate([np.stack([at, at + 60, at + 1], 1), np.stack([at + 1, at + 60, at + 61], 1)])
+    _, lengths = tether_lengths(build_topology(around, folded, 1e-6), around, np.array([0]))
+    np.testing.assert_allclose(lengths[59], np.pi, rtol=0.02)
+    assert (anchors >= 0).all()
+
+
+# Statics and dynamics.
+
+
+@pytest.mark.parametrize("substeps", [1, 4, 16])
+def test_static_elongation_is_weight_times_compliance_at_any_step(substeps: int) -> None:
+    assert one_edge(1e-3, substeps) == pytest.approx(G * 1e-3, rel=1e-6)
+    assert one_edge(1e-3, substeps, iterations=3) == pytest.approx(G * 1e-3, rel=1e-6)
+    assert one_edge(0.0, substeps, iterations=5) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_narrow_strip_hangs_as_a_catenary() -> None:
+    positions, faces = sheet(2, 41, width=0.02)
+    ends = np.isin(positions[:, 2], [0.0, 1.0])
+    scene, node = scene_of(positions, faces)
+    # The ends come together by 20 %: 0.8 m apart, a strip of 1 m.
+    moving = positions.copy()
+    run, frames = simulate(
+        moving * [1, 1, 0.8],
+        faces,
+        ends,
+        fabric=Fabric(bend_compliance=1e9, stretch_compliance=0.0, damping=2.0, density=0.2),
+        environment=STILL,
+        substeps=30,
+        duration=6.0,
+        tethers=False,
+    )
+    assert scene.instances[0].node == node
+    low = frames[-1, :41, 1].min()
+    lengths = np.linalg.norm(np.diff(frames[-1, :41], axis=0), axis=1).sum()
+    a = brentq(lambda a: 2 * a * np.sinh(0.4 / a) - lengths, 0.05, 50)
+    sag = a * (np.cosh(0.4 / a) - 1)
+    assert 1 - low == pytest.approx(sag, rel=0.05, abs=2e-3)
+    assert run.report.worst_stretch is not None
+
+
+def test_free_fall_is_rigid() -> None:
+    positions, faces = sheet(6, 6)
+    _, frames = simulate(positions, faces, np.zeros(36), fabric=Fabric(damping=0.0), environment=STILL, duration=0.5)
+    t = np.arange(31) / 60
+    expected = positions + np.array([0, -1, 0]) * (0.5 * G * t**2 + 0.5 * G * t / 600)[:, None, None]
+    np.testing.assert_allclose(frames, expected, atol=1e-6)
+
+
+def test_a_sheet_held_at_an_edge_keeps_its_length_and_the_same_seed_its_bytes() -> None:
+    positions, faces = sheet(20, 20)
+    options = {"environment": Environment(wind=(3, 0, 1), seed=5), "duration": 2.0, "estimate_error": False}
+    run, frames = simulate(positions, faces, positions[:, 0] == 0, **options)
+    _, again = simulate(positions, faces, positions[:, 0] == 0, **options)
+    assert frames.tobytes() == again.tobytes()
+    fixed = positions[:, 0] == 0
+    assert np.abs(frames[:, fixed] - positions[fixed]).max() < 1e-6
+    assert run.report.worst_stretch is not None
+    assert run.report.worst_stretch["at_end"] < 0.05
+    finer, _ = simulate(positions, faces, positions[:, 0] == 0, **options, max_stretch=0.02)
+    assert finer.report.figures["substeps"] > run.report.figures["substeps"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("corners", "substeps", "limit"), [(False, 10, 0.03), (True, 20, 0.06)])
+def test_a_large_sheet_is_hardly_longer_at_the_end(corners: bool, substeps: int, limit: float) -> None:
+    positions, faces = sheet(64, 64)
+    pinned = positions[:, 0] == 0
+    if corners:
+        pinned &= np.isin(positions[:, 2], [0.0, 1.0])
+    run, _ = simulate(positions, faces, pinned, environment=STILL, duration=5.0, substeps=substeps)
+    assert run.report.worst_stretch is not None
+    assert run.report.worst_stretch["at_end"] <= limit
+
+
+def test_cloth_stays_out_of_colliders_and_above_the_floor() -> None:
+    positions, faces = sheet(16, 16)
+    ball = Capsule((0.5, 0.6, 0.5), (0.5, 0.6, 0.5), 0.25)
+    _, frames = simulate(
+        *(positions, faces, np.zeros(256)), environment=replace(STILL, floor=0.0), capsules=(ball,), duration=3.0
+    )
+    away = np.linalg.norm(frames - [0.5, 0.6, 0.5], axis=2)
+    assert away.min() >= 0.25 + 0.005 - 1e-6
+    assert frames[..., 1].min() >= 0.005 - 1e-6
+
+
+def test_points_of_a_cloth_keep_apart_but_for_those_near_at_rest() -> None:
+    p = np.array([[0.0, 0, 0], [0.04, 0, 0], [0.5, 0, 0], [0.52, 0, 0]])
+    at_rest = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0, 0], [0.52, 0, 0]])
+    separate_points(p, np.array([1.0, 3, 1, 1]), at_rest, 0.1)
+    np.testing.assert_allclose(p[:2, 0], [-0.015, 0.085], atol=1e-12)
+    np.testing.assert_array_equal(p[2:], at_rest[2:])
+
+
+def test_a_mass_spring_cloth_beyond_its_limit_is_an_error_with_advice() -> None:
+    positions, faces = sheet(8, 8)
+    options = {"solver": "mass-spring", "stiffness": 800.0, "environment": STILL, "duration": 1.0}
+    with pytest.raises(UnstableError, match="diverges at frame") as caught:
+        simulate(positions, faces, positions[:, 0] == 0, **options, substeps=1)
+    assert "limit is 2: --step 1/" in caught.value.help
+    step = int(caught.value.help.split("--step 1/")[1].split()[0])
+    run, _ = simulate(positions, faces, positions[:, 0] == 0, **options, substeps=-(-step // 60))
+    assert run.report.omega_h is not None
+    assert run.report.omega_h < 2
+    assert run.report.energy_j is not None
+    assert run.report.energy_j["peak"] <= run.report.energy_j["start"] * 1.01 + 0.01
+
+
+@pytest.mark.parametrize("integrator", ["symplectic-euler", "verlet", "rk4", "implicit-euler"])
+def test_integrators_agree_at_small_steps(integrator: str) -> None:
+    positions, faces = sheet(5, 5)
+    options = {"solver": "mass-spring", "stiffness": 100.0, "environment": STILL, "duration": 0.3, "substeps": 60}
+    _, expected = simulate(positions, faces, positions[:, 0] == 0, **options)
+    _, found = simulate(positions, faces, positions[:, 0] == 0, **options, integrator=integrator)
+    assert np.abs(found - expected).max() < 0.01
+
+
+def test_relaxation_is_stiffer_with_more_iterations() -> None:
+    positions, faces = sheet(12, 12)
+    stretch = []
+    for iterations in (2, 30):
+        options = {"solver": "relaxation", "iterations": iterations, "substeps": 1, "tethers": False, "duration": 2.0}
+        run, _ = simulate(positions, faces, positions[:, 0] == 0, **options)
+        assert run.report.worst_stretch is not None
+        stretch.append(run.report.worst_stretch["at_end"])
+    assert stretch[1] < 0.3 * stretch[0]
+
+
+# The animated body.
+
+
+def test_pinned_vertices_follow_the_skin_at_every_frame() -> None:
+    document = container.read(np.frombuffer(fixtures.build("arm"), np.uint8))
+    scene, clip = reader.scene(document), reader.clips(document)[0]
+    instance = scene.instances[0]
+    positions = instance.mesh.positions
+    pinned = ~select_vertices("y-max", instance, positions, scene.skeleton.names, [])
+    run = simulate_cloth(scene, clip, instance.node, pinned, ClothOptions(fps=24, duration=1.0))
+    times = np.arange(25) / 24
+    expected = bake(scene, clip, times=times, rigid=True, nodes=[instance.node]).load_all().positions
+    np.testing.assert_allclose(run.cache.load_all().positions[1:, pinned], expected[1:, pinned], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("selector", "error"),
+    [("top", RangeError), ("joint:nobody", NotFoundError), ("material:*x", NotFoundError), ("box:0,0,0,1", RangeError)],
+)
+def test_selectors_without_sense_are_refused(selector: str, error: type[Exception]) -> None:
+    scene = reader.scene(container.read(np.frombuffer(fixtures.build("arm"), np.uint8)))
+    instance = scene.instances[0]
+    with pytest.raises(error):
+        select_vertices(selector, instance, instance.mesh.positions, scene.skeleton.names, ["skin"])
+
+
+def test_vertices_are_selected_by_joint_weights_and_material() -> None:
+    scene = reader.scene(container.read(np.frombuffer(fixtures.build("arm"), np.uint8)))
+    instance, names = scene.instances[0], scene.skeleton.names
+    joints = [names[node] for node in instance.skin.joints] if instance.skin else []
+    found = sum(
+        select_vertices(f"joint:{name}", instance, instance.mesh.positions, names, []).astype(int)
+        for name in joints
+        if (instance.mesh.weights * (instance.mesh.joints == joints.index(name))).sum(axis=1).max() >= 0.5
+    )
+    assert np.asarray(found).min() >= 0
+    assert np.asarray(found).max() >= 1
+
+
+def test_a_mesh_without_free_points_or_edges_is_refused() -> None:
+    positions, faces = sheet(3, 3)
+    with pytest.raises(NotFoundError, match="every point"):
+        simulate(positions, faces, np.ones(9))
+    with pytest.raises(NotFoundError, match="no edges"):
+        build_topology(positions, faces[:0], 1e-6)
+    with pytest.raises(RangeError, match="density"):
+        Fabric(density=-1.0)
