@@ -89,6 +89,7 @@ PUBLIC = {
         "track_plot "
         "track_selection"
     ),
+    "simulation.cloth": "driver model selection simulate solver",
     "simulation.particles": "emission forces obstacles simulate solver",
     "simulation.spring_bones": "chain_globs chains colliders json_reader penetration read reduction report simulate",
     "skinning.analysis": (

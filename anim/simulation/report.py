@@ -66,3 +66,11 @@ def advise_step(omega_h: float, limit: float, step: float, integrator: str) -> s
     per_second = math.ceil(omega_h / (step * limit * SAFE_STEP_FRACTION))
     other = " or --integrator rk4" if integrator != "rk4" and omega_h < 2 * math.sqrt(2) else ""
     return f"{words}: --step 1/{per_second}{other}"
+
+
+def advise_elongation(worst: Mapping[str, Any] | None, substeps: int, limit: float | None) -> str:
+    """Return advice for a cloth that is stretched beyond the limit in spite of many substeps."""
+    if worst is None or limit is None or worst["fraction"] <= limit:
+        return ""
+    stretched = f"stretched by {100 * worst['fraction']:.2g} % at {worst['time_s']:.2f} s"
+    return f"{stretched} in spite of {substeps} substeps a frame: a higher --fps, or a lower --density"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import anim
@@ -95,6 +96,74 @@ def test_input_without_sense_is_refused_in_one_line(
 ) -> None:
     out = tmp_path / "out.glb"
     run = call("simulate", "particles", fixture("biped"), out, *args)
+    assert (run.code, out.exists()) == (code, False), run.err
+    assert words in run.err
+    assert len(run.err.splitlines()) <= 2
+
+
+# Cloth.
+
+
+def test_a_flag_blows_on_its_swaying_pole(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    flag, out, report = fixture("flag"), tmp_path / "out.npz", tmp_path / "flag.json"
+    args = ("--mesh", "flag", "--pin", "x-min", "--wind", "5,0,2", "--duration", "1", "--report", report)
+    run = call("simulate", "cloth", flag, out, *args)
+    assert run.code == 0, run.err
+    assert "61 frames of 425 points (17 pinned), xpbd, steps of 1/600 s" in run.err
+    found = json.loads(report.read_text())
+    assert (found["kind"], found["solver"], found["points"]) == ("cloth", "xpbd", 425)
+    assert found["error_estimate_m"] > 0
+    call("bake", flag, tmp_path / "rigid.npz", "--mesh", "flag", "--rigid", "--fps", "60").product()
+    with np.load(out) as cloth, np.load(tmp_path / "rigid.npz") as rigid:
+        at_pole = np.flatnonzero(cloth["rest"][:, 0] < 0.01)
+        np.testing.assert_allclose(cloth["positions"][:, at_pole], rigid["positions"][:61, at_pole], atol=1e-5)
+        assert np.abs(cloth["positions"] - rigid["positions"][:61]).max() > 0.2
+
+
+@needs_validator
+def test_cloth_as_morph_targets_is_valid(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    call("simulate", "cloth", fixture("flag"), out, "--mesh", "flag", "--pin", "x-min", "--duration", "0.5").product()
+    assert errors(validate(out.read_bytes())) == []
+
+
+@pytest.mark.parametrize("ending", ["json", "png"])
+def test_springs_that_diverge_end_with_a_report_and_nothing_written(
+    ending: str, fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    out, report = tmp_path / "out.npz", tmp_path / f"report.{ending}"
+    args = ("--mesh", "flag", "--pin", "x-min", "--solver", "mass-spring", "--step", "1/60", "--report", report)
+    run = call("simulate", "cloth", fixture("flag"), out, *args)
+    assert (run.code, out.exists(), report.exists()) == (6, False, True)
+    assert "diverges at frame" in run.err
+    assert "help: ω·h = " in run.err
+    step = run.err.split("--step ")[1].split()[0]
+    calmer = call("simulate", "cloth", fixture("flag"), out, *args[:-4], "--step", step, "--duration", "0.5")
+    assert calmer.code == 0, calmer.err
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "words"),
+    [
+        ((), 2, "2 meshes are chosen"),
+        (("--mesh", "flag", "--pin", "left"), 2, "selects no vertices"),
+        (("--mesh", "flag", "--pin", "joint:hip"), 5, "has no skin"),
+        (("--mesh", "flag", "--pin", "x-min", "--density", "-1"), 2, "--density is -1"),
+        (("--mesh", "flag", "--cloth", "material:wool"), 5, "selects no vertex"),
+        (("--mesh", "flag", "--sphere", "1,2"), 5, "no node"),
+        (("--mesh", "flag", "--sphere", "0,0,0,0"), 2, "radius"),
+        (("--mesh", "flag", "--capsule", "pole,post"), 2, "expected NODE,NODE,R"),
+        (("--mesh", "flag", "--report", "x.png"), 2, "needs --solver mass-spring"),
+        (("--mesh", "flag", "--report", "x.txt"), 2, "unsupported report format"),
+        (("--mesh", "flag", "--step", "0"), 2, "--step is '0'"),
+        (("--mesh", "flag", "--pin", "box:0,0,0,9,9,9"), 5, "every point"),
+    ],
+)
+def test_cloth_without_sense_is_refused_in_one_line(
+    args: tuple[str, ...], code: int, words: str, fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.npz"
+    run = call("simulate", "cloth", fixture("flag"), out, *args)
     assert (run.code, out.exists()) == (code, False), run.err
     assert words in run.err
     assert len(run.err.splitlines()) <= 2

@@ -136,6 +136,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "hero.glb": renamed(built("biped"), ["walk", "Run_fast", "Attack_high"]),
         "face.glb": renamed(built("morph_cube"), ["talk"]),
         "arm.glb": built("arm"),
+        "flag.glb": built("flag"),
         "poses.glb": built("interpolations"),
         "ponytail.glb": built("ponytail"),
     }.items():

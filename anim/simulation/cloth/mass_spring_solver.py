@@ -9,13 +9,12 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import UnstableError
 from anim.simulation.cloth.driver import ClothDriver
-from anim.simulation.cloth.kernels.xpbd import push_out
 from anim.simulation.cloth.model import ClothModel, Fabric
 from anim.simulation.cloth.solver import MAX_SPEED_M_S, NO_FLOOR_M, Environment
 from anim.simulation.integrators import State, Step, find_integrator
 from anim.simulation.mass_spring import MassSpring
 
-BEND_PER_STRETCH = 0.05  # stiffness of hinges
+HINGE_STIFFNESS_PER_EDGE = 0.05  # stiffness of hinges, per stiffness of edges
 DAMPING_RATIO = 0.02  # of the springs, at their own frequency
 
 
@@ -24,7 +23,7 @@ def as_mass_spring(model: ClothModel, fabric: Fabric, environment: Environment, 
     springs = np.concatenate([model.topology.edges, model.topology.hinges])
     lengths = np.concatenate([model.edge_lengths, model.hinge_lengths])
     k = np.full(len(springs), stiffness)
-    k[len(model.topology.edges) :] *= BEND_PER_STRETCH
+    k[len(model.topology.edges) :] *= HINGE_STIFFNESS_PER_EDGE
     with np.errstate(divide="ignore"):
         masses = 1.0 / model.inverse_masses
     reduced = 1.0 / np.maximum(model.inverse_masses[springs].sum(axis=1), 1e-30)
@@ -46,6 +45,8 @@ def run_mass_spring(
     warm_up_frames: int = 0,
 ) -> Iterator[tuple[Floats, Floats]]:
     """Yield positions and velocities (P, 3) at frames, as `run_xpbd`. Wind is left out. Raises UnstableError."""
+    from anim.simulation.cloth.kernels.xpbd import push_out
+
     method = find_integrator(integrator)
     h = 1.0 / (fps * substeps)
     first = -warm_up_frames

@@ -16,12 +16,12 @@ from anim.simulation.cloth.model import ClothModel, Fabric, build_cloth
 from anim.simulation.cloth.solver import Environment, run_xpbd
 from anim.simulation.comparison import IntegratorRun, compare_integrators
 from anim.simulation.integrators import INTEGRATORS
-from anim.simulation.report import SimulationReport, advise_step
+from anim.simulation.report import SimulationReport, advise_elongation, advise_step
 from anim.skinning.bake import prepare_bake
 
 SOLVERS = {
     "xpbd": "extended position-based dynamics, stiff at any step",
-    "mass-spring": "springs, by --integrator",
+    "mass-spring": "springs, by a time integrator",
     "relaxation": "Verlet with relaxed distances, as stiff as it has iterations",
 }
 MAX_SUBSTEPS = 80
@@ -31,7 +31,7 @@ COMPARED_S = 1.0  # of the integrators
 
 @dataclass(frozen=True, slots=True)
 class ClothOptions:
-    """How a cloth is simulated.
+    """Fabric, surroundings, solver and time of a cloth.
 
     solver: a name in SOLVERS. substeps: per frame. iterations: of the constraints per substep, for relaxation.
     max_stretch: doubles the substeps until no edge is longer than this fraction; None for no limit.
@@ -201,7 +201,7 @@ def _report(
             "pinned": len(model.pinned),
             "edges": len(model.topology.edges),
         },
-        advice=advice or _advise_stretch(worst, substeps, options),
+        advice=advice or advise_elongation(worst, substeps, options.max_stretch),
     )
 
 
@@ -234,10 +234,3 @@ def compare(scene: Scene, node: int, pinned: Bools, options: ClothOptions) -> Co
     lowest = float(damped.energies.min()) - 1e-3 * abs(float(np.ptp(damped.energies)))
     runs = compare_integrators(system, x, v, step=step, duration=duration, lowest_energy=lowest)
     return ComparedCloth(runs, system.max_frequency() * step, step, model.topology.edges)
-
-
-def _advise_stretch(worst: dict[str, Any] | None, substeps: int, options: ClothOptions) -> str:
-    if worst is None or options.max_stretch is None or worst["fraction"] <= options.max_stretch:
-        return ""
-    stretched = f"{100 * worst['fraction']:.2g} %"
-    return f"stretched by {stretched} at {worst['time_s']:.2f} s in spite of {substeps} substeps: --density or --fps"

@@ -10,7 +10,6 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError, UnstableError
 from anim.simulation.cloth.driver import ClothDriver
-from anim.simulation.cloth.kernels.xpbd import step_frame
 from anim.simulation.cloth.model import ClothModel, Fabric
 
 NO_FLOOR_M = -1e30
@@ -64,6 +63,8 @@ def run_xpbd(
     substeps: per frame. warm_up_frames: simulated before, at the pose of 0 s. iterations: of the constraints in each
     substep. Raises UnstableError.
     """
+    from anim.simulation.cloth.kernels.xpbd import step_frame
+
     if substeps < 1 or iterations < 1:
         raise RangeError(f"{substeps} substeps and {iterations} iterations (expected at least 1)")
     h = 1.0 / (fps * substeps)

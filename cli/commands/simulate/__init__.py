@@ -24,9 +24,9 @@ KINDS: dict[str, CommandInfo] = {
     "cloth": CommandInfo(
         "Let a mesh, or a part of one, hang and blow as cloth.",
         (
-            "gltf-anim simulate cloth flag.glb waving.glb --pin x-min --wind 6,0,2 --duration 3",
-            "gltf-anim simulate cloth flag.glb flag.npz --pin x-min --max-stretch 5% --fps 24 --report flag.json",
-            "gltf-anim simulate cloth flag.glb net.npz --pin x-min --solver mass-spring --integrator rk4 --step 1/600",
+            "gltf-anim simulate cloth flag.glb waving.glb --mesh flag --pin x-min --wind 5,0,2",
+            "gltf-anim simulate cloth flag.glb flag.npz --mesh flag --pin x-min --max-stretch 5% --report flag.json",
+            "gltf-anim simulate cloth flag.glb net.npz --mesh flag --pin x-min --solver mass-spring --stiffness 20",
         ),
     ),
 }

@@ -28,10 +28,10 @@ from anim.simulation.cloth.solver import Environment
 from anim.simulation.report import SimulationReport
 from cli import text, units
 from cli.errors import UsageError
-from cli.first_run import announce_compiling
 from cli.io import cache_files, documents, scenes
 from cli.options import caches, common, meshes, simulation
 from cli.options.simulation import parse_seconds, parse_vector
+from cli.progress import announce_compiling
 from cli.text import Reporter
 from cli.workflows.simulate_clip import NO_CLIP, driving_clip
 
