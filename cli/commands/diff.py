@@ -25,6 +25,7 @@ from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
 from anim.show.plots import error_plot as picture
 from anim.show.plots.figure import FORMATS
+from anim.units import is_zero
 from cli import units
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
@@ -33,9 +34,6 @@ from cli.options.common import Format
 from cli.reports import diff_report
 from cli.reports.diff_report import DiffReport, File
 from cli.text import Reporter, format_bytes, format_length, plural
-
-DISABLED = ("0", "0%", "0m")
-
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
 SPEC = Player("spec")
@@ -55,7 +53,9 @@ def command(
     fail_above: Annotated[
         str | None,
         typer.Option(
-            "--fail-above", metavar="LENGTH", help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the model's size."
+            "--fail-above",
+            metavar="LENGTH",
+            help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the model's size; 0: no error.",
         ),
     ] = None,
     player: Annotated[
@@ -105,8 +105,8 @@ def command(
     one = _opened(old, voice)
     other = one if new is None else _opened(new, voice)
     scale = diagonal(one.scene)
-    limit = None if fail_above is None else units.parse_length(fail_above, "--fail-above", lambda: scale)
-    radius = 0.0 if shell.strip() in DISABLED else units.parse_length(shell, "--shell", lambda: scale)
+    limit = None if fail_above is None else _length(fail_above, "--fail-above", scale)
+    radius = _length(shell, "--shell", scale)
     ruler = ErrorMetric(one.scene, other.scene, shell=radius / scale if radius and scale else None)
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
@@ -127,6 +127,11 @@ def command(
         voice.info(f"{plot}  {format_bytes(len(drawn))}")
     if limit is not None:
         _check(report, limit)
+
+
+def _length(text: str, option: str, scale: float) -> float:
+    """A length in m, also 0."""
+    return 0.0 if is_zero(text) else units.parse_length(text, option, lambda: scale)
 
 
 def _players(new: str | None, player: str, players: str | None) -> str:

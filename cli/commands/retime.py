@@ -14,7 +14,7 @@ from anim.operations.time_warp import warp
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter
-from cli.workflows.edit_clips import edit_clips
+from cli.workflows.edit_clips import check_clips, edit_clips
 
 
 def command(
@@ -46,7 +46,9 @@ def command(
     except --warp are exact. They are applied in the order --warp, --speed or --duration, --reverse, --ping-pong,
     --offset.
     """
+    selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
     if speed is None and duration is None and not (reverse or ping_pong or offset or warp_ease):
+        check_clips(input, selection, voice)
         raise UsageError("nothing to do", help="give --speed, --duration, --reverse, --ping-pong, --warp or --offset")
     easing = parse(warp_ease) if warp_ease is not None else None
 
@@ -63,5 +65,4 @@ def command(
             tracks=tracks,
         )
 
-    selection = Selection(clip or (), node or (), path or ())
-    edit_clips(input, output, selection, change, Reporter(quiet, verbose), dry_run=dry_run, measure=False)
+    edit_clips(input, output, selection, change, voice, dry_run=dry_run, measure=False)

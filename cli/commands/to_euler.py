@@ -28,7 +28,7 @@ from cli.options import common
 
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
 MIN_DEVIATION_DEG = 1e-6  # degrees; smaller ones come from rounding
-NOTABLE = math.radians(0.5)  # rad; above, a note names an alternative to linear curves
+WARNED_DEVIATION_DEG = 1.0  # degrees; larger ones are warned of unless a tolerance was given
 CENTIMETERS = 0.01  # default m per unit of a BVH
 
 
@@ -94,7 +94,7 @@ def command(
     convention = Convention(DEFAULT_ORDER if orders.otherwise == AUTO else orders.otherwise, axes, unit)
     with documents.source(input, voice) as source:
         chosen = _only(reader.clips(source.document), clip)
-        motion, words, num_bound = _motion(
+        motion, words, num_bound, deviation = _motion(
             source.document, chosen, kind, orders, axes, fps, limit, scale or CENTIMETERS
         )
         data = kind.write(motion, convention)
@@ -107,6 +107,9 @@ def command(
         voice.warn(f"{resting}: the bind pose is the rest of these curves")
     for note in motion.notes:
         voice.warn(note)
+    if limit is None and math.degrees(deviation) > WARNED_DEVIATION_DEG:
+        error = f"{math.degrees(deviation):.2g}°"
+        voice.warn(f"between keys, the curves are off by up to {error}: --angle-tolerance 0.1deg adds keys")
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     voice.info(
@@ -167,15 +170,17 @@ def _motion(
     fps: float | None,
     limit: float | None,
     scale: float,
-) -> tuple[EulerMotion, str, int]:
-    """The motion to write, notes on lost data, and the number of joints with another rest pose in the file."""
+) -> tuple[EulerMotion, str, int, float]:
+    """The motion to write, notes on lost data, the number of joints with another rest pose in the file, and the largest
+    error between keys in radians."""
     nodes = reader.skeleton(document)
     bound = bind_pose(nodes, reader.skins(document))
     skeleton = bound.skeleton
     clip = fill_from_parents(clip, nodes, skeleton)
     if kind is TRACK_FORMATS["bvh"]:
         joints = {joint for skin in json_array(document.json, "skins") for joint in skin["joints"]}
-        return to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale), "", bound.num_joints
+        made = to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale)
+        return made, "", bound.num_joints, 0.0
     holders = {i for i, node in enumerate(json_array(document.json, "nodes")) if "skin" in node}
     found = curves_of(
         skeleton,
@@ -191,6 +196,4 @@ def _motion(
         if math.degrees(found.deviation) > MIN_DEVIATION_DEG
         else ""
     )
-    if limit is None and found.deviation > NOTABLE:
-        words = f"{words[:-2]} (--angle-tolerance adds keys), "
-    return found.motion, words, bound.num_joints
+    return found.motion, words, bound.num_joints, found.deviation

@@ -13,7 +13,7 @@ from anim.operations.trim import trim as trimmed
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter
-from cli.workflows.edit_clips import Clips, edit_clips
+from cli.workflows.edit_clips import Clips, check_clips, edit_clips
 
 LISTED = 4  # times in a note
 
@@ -36,14 +36,16 @@ def command(
     The range keeps its times, and players show its first pose until it starts; --rebase moves the start of each clip to
     0 s. A note lists clips that are moved by different times. --rebase alone cuts nothing.
     """
+    selection, voice = Selection(clip or ()), Reporter(quiet, verbose)
     if start is None and end is None and not rebase:
+        check_clips(input, selection, voice)
         raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")
     edit_clips(
         input,
         output,
-        Selection(clip or ()),
+        selection,
         lambda each, tracks, _: trimmed(each, start=start, end=end, rebase=rebase, tracks=tracks),
-        Reporter(quiet, verbose),
+        voice,
         dry_run=dry_run,
         measure=False,
         notes=lambda before, _: _moved_apart(before, start or 0.0) if rebase else (),

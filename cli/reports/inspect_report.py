@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 MIN_ROOT_DISTANCE_M = 1e-4  # smaller displacements of the root show no speed
-MARKS = {"error": "error  ", "warning": "warning", "info": "note   "}
+MARKS = {"error": "error  ", "warning": "warning", "info": "info   "}
 Inspected: TypeAlias = tuple[str, int, Facts]  # name, size in bytes, contents
 Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip and track
 
@@ -82,6 +82,8 @@ def _headline(name: str, file_bytes: int, facts: Facts) -> str:
     if facts.vertices:
         counts.append(f"{facts.vertices} vertices")
     counts += [plural(len(facts.skins), "skin"), plural(len(facts.clips), "clip")]
+    if facts.unreadable_clips:
+        counts[-1] += f" and {facts.unreadable_clips} unreadable"
     share = f" ({100 * cost / file_bytes:.0f} % of the file)" if file_bytes else ""
     decoded = facts.animation_data_bytes
     unpacked = f" ({format_bytes(decoded)} decoded)" if any("meshopt" in each for each in facts.extensions_used) else ""

@@ -110,6 +110,13 @@ def edit_clips(
     voice.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
+def check_clips(path: str, selection: Selection, voice: text.Reporter) -> None:
+    """Raise NotFoundError for a selected clip that a file lacks; without such a selection the file is not read."""
+    if selection.clips:
+        with documents.source(path, voice) as source:
+            selection.chosen_clips(reader.names(source.document))
+
+
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
     """The scene, without meshes if their vertices can't be read."""
     try:

@@ -100,6 +100,18 @@ def test_badly_stored_keys_are_written_anew(
     assert finding in follow(call, path)
 
 
+def test_keys_on_no_grid_are_not_advised_by_their_closest_ones(call: Call, tmp_path: Path) -> None:
+    """Random keys, some 2 ms apart: the rate in the advice is a usual one."""
+    times = np.sort(np.random.default_rng(3).uniform(0, 0.1, 40))
+    signs = np.where(np.arange(40) % 7 == 0, -1.0, 1.0)[:, None]
+    turning = clips.track("rotation", times, signs * clips.about("y", np.linspace(0, 90, 40)))
+    document = writer.replace_clips(opened(built("gltf_embedded")), {0: clips.clip(turning, name="slide")})
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(document))
+    (finding,) = (each for each in only(call, path)["findings"] if each["name"] == "sign-flips")
+    assert "--fps 60 " in finding["advice"]
+
+
 def test_splines_that_turn_the_long_way(call: Call, tmp_path: Path) -> None:
     values = np.array([[0, 0, 0, 1], [0, 0.1, 0, -0.995], [0, 0.2, 0, 0.98]])
     zero = np.zeros((3, 4))

@@ -85,6 +85,8 @@ def test_a_gate(lifted: tuple[Path, Path], call: Call) -> None:
     assert "b.glb: 0.5 mm (" in run.err
     assert run.err.rstrip().endswith("(limit 0.4 mm)")
     assert call("diff", *lifted, "--fail-above", "0.4mm", "--clip", "wave").code == 0
+    assert call("diff", *lifted, "--fail-above", "0", "--clip", "wave").code == 0
+    assert "(limit 0 mm)" in call("diff", *lifted, "--fail-above", "0mm").err
 
 
 def test_a_missing_clip_is_named_and_stops_the_gate(tmp_path: Path, call: Call) -> None:
@@ -174,7 +176,7 @@ def test_a_picture_counts_what_it_leaves_out(asset: Find, tmp_path: Path, call: 
     ("options", "problem"),
     [
         (("--fail-above", "3deg"), "--fail-above is '3deg' (expected a length above 0"),
-        (("--fail-above", "0"), "--fail-above is '0' (expected a length above 0"),
+        (("--fail-above", "-1mm"), "--fail-above is '-1mm' (expected a length above 0"),
         (("--shell", "-1mm"), "--shell is '-1mm' (expected a length above 0"),
         (("--samples-per-second", "0"), "--samples-per-second is 0 (expected a number above 0)"),
         (("--player", "unity"), "'unity' is none of spec, three, raw, nlerp"),

@@ -145,3 +145,24 @@ def test_fail_on_makes_it_a_gate(call: Call, fixture: Fixture) -> None:
     assert run.json["files"]
     assert run.err.startswith("gltf-anim: ")
     assert "warning" in run.err
+
+
+def test_unreadable_clips_are_counted(call: Call, tmp_path: Path) -> None:
+    """A track of one key and 21 values: that clip can't be read, the file has it nevertheless."""
+    document = opened_fixture("biped")
+    content = json.loads(dump(document.json))
+    sampler = content["animations"][1]["samplers"][0]
+    content["accessors"].append({**content["accessors"][sampler["input"]], "count": 1})
+    sampler["input"] = len(content["accessors"]) - 1
+    path = tmp_path / "in.glb"
+    path.write_bytes(glb_of(replace(document, json=content)))
+    assert ", 2 clips and 1 unreadable\n" in call("inspect", path).text
+    (facts,) = call("inspect", path, "--format", "json").json["files"]
+    assert (len(facts["clips"]), facts["unreadable_clips"]) == (2, 1)
+
+
+def test_severities_are_shown_as_fail_on_takes_them(call: Call, fixture: Fixture) -> None:
+    path = fixture("biped")
+    shown = {line.split()[0] for line in call("inspect", path).text.splitlines() if "gltf-anim optimize" in line}
+    assert shown == {"info"}
+    assert call("inspect", path, "--fail-on", *shown).code == 6

@@ -7,12 +7,16 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from anim.exchange.formats import bvh_reader
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
-from tests.files import clips_of, glb_of, opened
+from tests.clips import CUBICSPLINE, about, clip, track
+from tests.files import clips_of, glb_of, opened, opened_fixture
 
 
 @pytest.mark.parametrize("suffix", ["bvh", "csv", "json"])
@@ -72,6 +76,23 @@ def test_a_tolerance_adds_keys(call: Call, fixture: Fixture) -> None:
     count = [sum(len(c["times"]) for n in f["nodes"] for c in n.get("curves", {}).values()) for f in (plain, fine)]
     assert count[1] > count[0]
     assert all(node["name"] != "body" for node in plain["nodes"])
+
+
+def test_splines_that_angles_do_not_follow_are_warned_of(call: Call, tmp_path: Path) -> None:
+    """Three keys, 0°, 115° and 0°, with tangents: linear angles between them are far off."""
+    document = opened_fixture("arm")
+    joint = next(t.node for t in reader.clips(document)[0].tracks if t.path == "rotation")
+    turn, out = about("z", [0, 115, 0]), np.array([[0, 0, 1.5, 0], [0, 0, 0, 0], [0, 0, -1.5, 0]])
+    swing = clip(track("rotation", [0, 1, 2], turn, CUBICSPLINE, tangents=(out, out), node=joint), name="twist")
+    path = tmp_path / "swing.glb"
+    path.write_bytes(glb_of(writer.replace_clips(document, {0: swing})))
+    for out_file in ("a.csv", "a.json"):
+        run = call("to-euler", path, tmp_path / out_file, "--clip", "twist", "-q")
+        assert run.err.startswith("warning: between keys, the curves are off by up to ")
+        assert run.err.endswith("°: --angle-tolerance 0.1deg adds keys\n")
+        mended = call("to-euler", path, tmp_path / out_file, "--clip", "twist", "--angle-tolerance", "0.1deg")
+        assert "warning" not in mended.err
+    assert "warning" not in call("to-euler", path, tmp_path / "bend.csv", "--clip", "bend").err
 
 
 def test_the_clip_must_be_one(call: Call, fixture: Fixture) -> None:

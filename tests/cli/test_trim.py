@@ -46,3 +46,10 @@ def test_rebase_says_which_clips_it_moves_apart(call: Call, fixture: Fixture) ->
 )
 def test_refusals(call: Call, fixture: Fixture, options: list[str], words: str) -> None:
     assert words in refusal(call("trim", fixture("biped"), *options), 2)
+
+
+@pytest.mark.parametrize("command", ["trim", "retime"])
+def test_a_missing_clip_is_said_before_missing_options(call: Call, fixture: Fixture, command: str) -> None:
+    run = call(command, fixture("biped"), "-", "--clip", "wakl")
+    assert "no clip matches 'wakl'" in refusal(run, 5)
+    assert "nothing to do" in refusal(call(command, fixture("biped"), "-", "--clip", "walk"), 2)

@@ -16,6 +16,7 @@ from anim.measure.inspect.report import ClipReport, SkinReport
 MAX_USUAL_INFLUENCES = 4  # influences per vertex that most players evaluate
 MIN_REGULAR_FRACTION = 0.9  # fraction of keys on the grid below which a frame rate is not reliable
 MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display shows them
+MAX_IRREGULAR_FPS = 60.0  # advised where keys are on no frame grid; the spacing of the closest ones says little
 DEFAULT_FPS = 60.0  # advised for clips without a frame rate of their own
 
 
@@ -92,8 +93,13 @@ def _range(seconds: list[float]) -> str:
 
 def _rate(clips: list[ClipReport]) -> int:
     """Smallest whole frame rate with a frame at every key of the clips, else DEFAULT_FPS."""
-    rates = [clip.frame_rate_fps or DEFAULT_FPS for clip in clips]
-    return math.ceil(max(rates) - 1e-3)
+    return math.ceil(max(map(_clip_rate, clips)) - 1e-3)
+
+
+def _clip_rate(clip: ClipReport) -> float:
+    """Frame rate of a clip; of irregular keys at most MAX_IRREGULAR_FPS, however close some of them are."""
+    fps = clip.frame_rate_fps or DEFAULT_FPS
+    return fps if (clip.frame_rate_regular or 0.0) >= MIN_REGULAR_FRACTION else min(fps, MAX_IRREGULAR_FPS)
 
 
 _CLIP_RULES: tuple[_Rule, ...] = (

@@ -96,6 +96,7 @@ def inspect(
             *clip_findings.skin_findings(skins),
         ),
         faults,
+        sum(i in lost_clips or i not in clips for i in range(len(json_array(json, "animations")))),
     )
 
 

@@ -97,6 +97,7 @@ class Facts:
 
     animation_*_bytes: values decoded, values as stored, and JSON; data shared by clips counts once.
     faults: reasons for which other commands refuse the file; the parts concerned are absent from the report.
+    unreadable_clips: number of clips that are among those parts.
     """
 
     generator: str
@@ -111,3 +112,4 @@ class Facts:
     skins: tuple[SkinReport, ...]
     findings: tuple[Finding, ...]
     faults: tuple[AnimError, ...] = ()
+    unreadable_clips: int = 0
