@@ -6,6 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from anim.measure.continuous_bound.largest_error import largest_error
 from anim.measure.continuous_bound.prover import Prover
 from anim.model import Clip, Skeleton
@@ -54,10 +56,12 @@ def make_report(
 def step_error(
     prover: Prover, skeleton: Skeleton, clip: Clip, bones: SpringBones, options: SpringOptions, result: SpringResult
 ) -> float:
-    """Return the largest distance in metres, on the surface, from the same run with half the step.
+    """Return the largest distance in metres, on the surface and of tails, from the same run with half the step.
 
     prover: on the scene. Springs by VRM are another motion at another step, since drag is per step.
     """
     half = simulate_springs(skeleton, clip, bones, replace(options, step=result.step / 2))
     proof = largest_error(prover, result.clip, half.clip)
-    return max(proof.error.max_error, proof.bound or 0.0)
+    common = min(len(result.tails), len(half.tails[::2]))  # the last step may begin before the end, and end after it
+    apart = result.tails[:common] - half.tails[::2][:common]
+    return max(proof.error.max_error, proof.bound or 0.0, float(np.sqrt((apart * apart).sum(axis=-1)).max()))

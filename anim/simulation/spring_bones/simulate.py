@@ -38,13 +38,14 @@ class SpringOptions:
     fps: float = 60.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SpringResult:
     """The clip with the springs' rotation tracks, and the run's figures.
 
     joints: nodes of the joints, in the order of the chains. replaced: those that had a rotation track before.
     step: in seconds, as simulated. num_steps: from 0 s on, in one round of a loop. loop: of the loop, None for none.
-    max_rotation: rad, largest rotation of a joint from its rest. max_speed: m/s, of a tail. notes: lines for the user.
+    tails: (S, J, 3) m, of the joints at every step, in world space. max_rotation: rad, largest rotation of a joint from
+    its rest. max_speed: m/s, of a tail. notes: lines for the user.
     """
 
     clip: Clip
@@ -53,6 +54,7 @@ class SpringResult:
     step: float
     num_steps: int
     duration: float
+    tails: Floats
     max_rotation: float
     max_speed: float
     loop: LoopedMotion | None = None
@@ -90,6 +92,7 @@ def simulate_springs(
         steps.step_s,
         steps.num_steps,
         duration,
+        motion.tails,
         float(deflection.max(initial=0.0)),
         float(speeds.max(initial=0.0)),
         looped,
