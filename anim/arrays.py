@@ -87,14 +87,6 @@ def own(array: NDArray[Any]) -> NDArray[Any]:
     return array if _is_frozen(array) else freeze(array.copy(order="K"))
 
 
-def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return `array` itself if this object is read-only, else a read-only view of it."""
-    if array.flags.writeable:
-        array = array.view()
-        array.flags.writeable = False
-    return array
-
-
 def freeze(array: NDArray[Any]) -> NDArray[Any]:
     """Make an array without other references read-only, together with its base, and return it."""
     owner: object = array

@@ -9,22 +9,8 @@ from anim.model import Skeleton
 from anim.sampling import rest_pose, world_matrices
 
 PROBE_DISTANCE = 0.05  # of the skeleton's size: distance of points from a node, for its rotation
-PER_NODE = 3
 SPEED_STEP = 1e-4  # s; step of one-sided differences for velocities at an end
 ENDS = np.concatenate((np.eye(3), -np.eye(3)))  # directions of the six points around a node, along its own axes
-
-
-def probe_points(world: Floats) -> Floats:
-    """Return three points per node (3 N, F, 3) in world space from world matrices (N, F, 3, 4).
-
-    The node's origin, and one point on each of two axes, so that a node that only rotates moves points too.
-    """
-    places = world[..., 3]
-    two = world[..., :2]
-    lengths = np.sqrt((two * two).sum(axis=-2, keepdims=True))
-    axes = PROBE_DISTANCE * probe_size(places) * np.swapaxes(two / np.where(lengths > 0, lengths, 1), -1, -2)
-    joined = np.concatenate((places[:, None], places[:, None] + axes.transpose(0, 2, 1, 3)), axis=1)
-    return joined.reshape(-1, world.shape[1], 3)
 
 
 def probe_size(places: Floats) -> float:
