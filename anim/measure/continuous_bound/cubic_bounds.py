@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools, Floats
-from anim.measure.continuous_bound.quaternion_bounds import MIN_LENGTH, QuaternionBounds, arc_mix, directed, nearest
+from anim.measure.continuous_bound.quaternion_bounds import MIN_MIX_LENGTH, QuaternionBounds, arc_mix, directed, nearest
 
 
 def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic: Bools, h: Floats) -> QuaternionBounds:
@@ -31,7 +31,7 @@ def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Quaterni
     jerk = np.sqrt(((bend[1] - bend[0]) ** 2).sum(axis=0)) / h  # |c‴|, constant
     rate = np.sqrt(of.rate.max(axis=0)) + h * h / 8 * jerk
     least, most = _min_norm(value, h) - h * h / 8 * push, np.sqrt(of.square.max(axis=0)) + h * h / 8 * push
-    least = np.where(least > MIN_LENGTH, least, np.nan)
+    least = np.where(least > MIN_MIX_LENGTH, least, np.nan)
     drag, speed = of.along / of.square, rate / least
     most_drag = (np.abs(of.along).max(axis=0) + h / 2 * (rate * rate + most * push)) / least**2
     direction, tilt = directed(of, drag)

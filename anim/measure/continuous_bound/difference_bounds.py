@@ -1,10 +1,11 @@
 """Bounds of the difference of two versions' quaternions within an interval, with two derivatives.
 
-Both versions obey q″ = −λq − 2ρq′ + e, see `quaternion_bounds`, so that the difference d of two quaternions obeys
+Both versions satisfy q″ = −λq − 2ρq′ + e, see `quaternion_bounds`, so that the difference d of two quaternions
+satisfies
 
     |d″| ≤ λ|d| + |Δλ||q| + 2ρ|d′| + 2|Δρ||q′| + |Δe|
 
-In an interval of length h no |d| exceeds the larger one of both ends by more than h²/8 · sup|d″|, no |d′| by more than
+In an interval of length h, |d| exceeds the larger one of both ends by at most h²/8 · sup|d″|, and |d′| by at most
 h/2 · sup|d″|. With that, the line above has sup|d″| on both sides, and is solved for it. All its terms vanish for equal
 versions.
 """
@@ -16,7 +17,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.measure.continuous_bound.quaternion_bounds import ChordBounds, QuaternionBounds
 
-MIN_LENGTH = 1e-3  # where less than this of sup|d″| is left on one side, nothing is said
+MIN_COEFFICIENT = 1e-3  # of sup|d″|, after solving; with a smaller one there is no bound
 
 
 def difference_bounds(
@@ -33,7 +34,7 @@ def difference_bounds(
     left = 1 - b.max_lambda * h * h / 8 - b.max_rho * h
     known = b.max_lambda * start + pull * a.size + 2 * b.max_rho * rate + 2 * a.speed * drag + _own(a, b, h)
     loose = a.bend + b.bend
-    bend = np.where(left > MIN_LENGTH, np.minimum(known / np.maximum(left, MIN_LENGTH), loose), loose)
+    bend = np.where(left > MIN_COEFFICIENT, np.minimum(known / np.maximum(left, MIN_COEFFICIENT), loose), loose)
     return np.stack((start + h * h / 8 * bend, rate + h / 2 * bend, bend))
 
 

@@ -63,7 +63,7 @@ def vector_bounds(of: Endpoints, lengths: Floats, size: Callable[[Floats], Float
     """
     h = lengths[:, None]
     bend = np.maximum(*map(size, of.bend))
-    jerk = size(of.bend[1] - of.bend[0])  # times the gap's length
+    jerk = size(of.bend[1] - of.bend[0])  # times the interval's length
     slope = np.maximum(*map(size, of.slope)) + h / 8 * jerk
     return np.stack((np.maximum(*map(size, of.value)) + h * h / 8 * bend, slope, bend))
 

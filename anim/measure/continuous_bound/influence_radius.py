@@ -1,4 +1,4 @@
-"""Influence radius of joints: distance of the points that they carry."""
+"""Influence radius of joints: distance of the points with influence."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Morphing:
 class InfluenceRadius:
     """Bounds of the points of one surface by J joints.
 
-    nodes: (J,). arms: (J,) m, largest distance of a carried point from the joint in its own space; of a morphed surface
-    at weights 0. apart: (J,) m, largest difference there between both versions. fraction: (J,), the largest sum of
-    skin weights of a vertex. groups: joints with influence on each group of points.
+    nodes: (J,). arms: (J,) m, largest distance of a point with influence from the joint in its own space; of a morphed
+    surface at weights 0. apart: (J,) m, largest difference there between both versions. fraction: (J,), the largest sum
+    of skin weights of a vertex. groups: joints with influence on each group of points.
     """
 
     nodes: Ints

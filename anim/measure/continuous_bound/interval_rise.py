@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import InfluenceRadius
-from anim.measure.continuous_bound.intervals import LONG, merge_intervals
+from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S, merge_intervals
 from anim.measure.continuous_bound.node_bounds import world_bounds
 from anim.measure.continuous_bound.second_derivative import second_derivative_bound
 from anim.measure.continuous_bound.track_partition import partition_tracks
@@ -35,18 +35,18 @@ def interval_rise(
     reaches: Sequence[InfluenceRadius],
     players: Sequence[str],
     *,
-    longest: float = LONG,
+    longest: float = MAX_UNSPLIT_S,
 ) -> IntervalRise:
-    """Return how far the displacement of one clip from the other can rise between `times` (F,) in s, two or more.
+    """Return upper bounds of the rise of displacements between `times` (F,) in s, two or more.
 
     times: increasing, with all keys of both clips that are between them, and the last moment before each STEP key.
-    reaches: of all surfaces, their groups in order. players: keys of `laws.LAWS`; what is returned is true of each.
-    longest: s, gaps between keys up to this length are bounded as one; shorter ones cost more and bound better.
-    Source: |f(t)| ≤ max(|f(0)|, |f(h)|) + h²/8 · sup|f″|, as f less its chord is at most that long.
+    reaches: of all surfaces, their groups in order. players: names in PLAYERS; the bounds hold for each.
+    longest: s, intervals between keys up to this duration are bounded as one; shorter ones cost more and bound better.
+    Source: |f(t)| ≤ max(|f(0)|, |f(h)|) + h²/8 · sup|f″|, since f minus its chord is bounded by the second term.
     """
     first, second = partition_tracks(scenes, clips)
     where = merge_intervals(times, *clips, longest=longest)
-    with np.errstate(all="ignore"):  # what has no bound is inf or nan
+    with np.errstate(all="ignore"):  # without a bound: inf or nan
         nodes = world_bounds(first, second, where, players=players)
         each = [second_derivative_bound(reach, nodes, first, second, where) for reach in reaches]
         number, length = where.number(times[:-1]), np.diff(times)

@@ -9,7 +9,9 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.model import Clip, TimeAxis
 
-LONG = 0.05  # s; longer gaps are split at all times looked at: how much a motion bends is bounded gap by gap
+MAX_UNSPLIT_S = (
+    0.05  # s; longer intervals are split at all sampled times: the second derivative is bounded per interval
+)
 
 
 class Intervals:
@@ -49,7 +51,7 @@ class Intervals:
         return self._placed[keys]
 
     def number(self, at: Floats) -> Ints:
-        """Return the numbers of the gaps (F,) that times `at` (F,) in s lie in, or start."""
+        """Return the indices of the intervals (F,) that contain times `at` (F,) in s, or start there."""
         return np.clip(np.searchsorted(self.edges, at, side="right") - 1, 0, max(len(self) - 1, 0))
 
 
@@ -57,8 +59,8 @@ class Intervals:
 class IntervalKeys:
     """Intervals on the keys of one time axis.
 
-    left, right: (G,) keys of the segment. start, end: (G,) interpolation parameters, both 0 beyond the first or last
-    key. duration: (G,) s from left to right. inside: (G,) whether the interval is between keys.
+    left, right: (G,) keys of the segment. start, end: (G,) interpolation parameters, both 0 outside the keys. duration:
+    (G,) s from left to right. inside: (G,) whether the interval is between keys.
     """
 
     left: Ints
@@ -69,11 +71,11 @@ class IntervalKeys:
     inside: Bools
 
 
-def merge_intervals(times: Floats, *clips: Clip, longest: float = LONG) -> Intervals:
-    """Return the gaps between all keys of the clips; long ones split at those of `times` (F,) in s that are in them.
+def merge_intervals(times: Floats, *clips: Clip, longest: float = MAX_UNSPLIT_S) -> Intervals:
+    """Return the intervals between all keys of the clips; long ones are split at `times` (F,) in s.
 
     The first starts at the first of the times, the last ends at the last of them. times: increasing, with all keys that
-    are between them. longest: s, gaps up to this length are not split.
+    are between them. longest: s, intervals up to this duration are not split.
     """
     axes = [axis.times for clip in clips for axis in clip.time_axes]
     keys = unique_sorted(np.concatenate([times[:1], *axes, times[-1:]]))

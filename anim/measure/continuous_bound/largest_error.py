@@ -1,10 +1,10 @@
-"""The largest distance between two versions of a clip at any time, for reports that name one number."""
+"""Largest distance between two versions of a clip at all times, for reports with a single number."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from anim.measure.continuous_bound.intervals import LONG
+from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
 from anim.measure.error.metric import NOISE, cut_times
 from anim.model import Clip, Interpolation
@@ -12,25 +12,27 @@ from anim.model import Clip, Interpolation
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """Times that are looked at first. parts: of each gap between keys, at least. step: s, no part is longer.
-    longest: s, as of `Prover.certified`."""
+    """Spacing of the first samples. parts: minimum number per interval between keys. step: s, maximum distance.
+
+    longest: s, as for `Prover.certified`.
+    """
 
     parts: int
     step: float
     longest: float
 
 
-LINES = Spacing(1, 1 / 30, LONG)  # lines between keys are farthest apart at keys, but for turns
-CUBICS = Spacing(4, 1 / 30, 0.0)  # two cubics can be alike at keys and half-way, and far apart elsewhere
-FINE = Spacing(16, 1 / 480, 0.0)  # where the first look proves nothing
+LINES = Spacing(1, 1 / 30, MAX_UNSPLIT_S)  # lines between keys differ most at keys, except for rotations
+CUBICS = Spacing(4, 1 / 30, 0.0)  # two cubics can be equal at keys and half-way, and different elsewhere
+FINE = Spacing(16, 1 / 480, 0.0)  # for intervals in which the first samples prove nothing
 
 
 def largest_error(prover: Prover, before: Clip, after: Clip, *, floor: float = 0.0) -> Proof:
-    """Return how far `after` is from `before` at most, as the specification plays them, and a bound on it.
+    """Return the largest error of `after`, interpolated as the specification says, and an upper bound of it.
 
-    All keys are looked at, the last moment before each jump, and between keys wherever any vertex could be farther off
-    than what was seen already. `is_closed` says whether the largest distance was found.
-    floor: m, of what is less than this nobody needs to know: the largest distance in other clips of a file.
+    Samples are at all keys, at the last moment before each jump, and between keys wherever a vertex could have a larger
+    error than the samples so far. `is_closed` tells if the largest error was found.
+    floor: m, smaller errors are not refined: the largest error of other clips of a file.
     """
     is_cubic = any(
         track.interpolation is Interpolation.CUBICSPLINE for clip in (before, after) for track in clip.tracks
@@ -46,7 +48,7 @@ def largest_error(prover: Prover, before: Clip, after: Clip, *, floor: float = 0
 
 
 def is_closed(proof: Proof, diagonal: float, *, floor: float = 0.0) -> bool:
-    """Return whether no vertex is farther off than 2 % more than was seen, or than `floor` m, or than rounding.
+    """Return whether the bound is at most 2 % above the largest sample, or below `floor` m or rounding.
 
     diagonal: m, of the scene's bounding box.
     """

@@ -1,4 +1,4 @@
-"""Majorants of where nodes are in their parents' spaces and in the world, in two versions of a clip."""
+"""Majorants of node transforms in local and world space, in two versions of a clip."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
 from anim.measure.continuous_bound.track_partition import ClipVersion, pick_tracks
 from anim.sampling.batch import Batch
 
-UNIT_TOLERANCE = 1e-6  # of |q|², up to which players that normalize and players that do not agree
+UNIT_TOLERANCE = 1e-6  # of |q|²: up to this, players with and without normalization agree
 
 
 @dataclass(frozen=True, slots=True)
 class NodeBounds:
-    """Majorants of N nodes in G gaps, without what they hang on or with it: of matrices and of origins, in m,
-    (3, 2, N, G). jumps: (1 or 2, N, G), how far both versions' matrices and origins jump where the gap ends.
+    """Majorants of N nodes in G intervals, local or world: of matrices and of origins, in m, (3, 2, N, G).
+
+    jumps: (1 or 2, N, G), upper bounds of both versions' jumps of matrices and origins at the end of an interval.
     """
 
     matrices: Floats
@@ -31,9 +32,9 @@ class NodeBounds:
 
 
 def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
-    """Return the majorants of all nodes in the world, of what any of the players shows.
+    """Return the majorants of all nodes in world space, valid for each of the players.
 
-    Both versions have the same hierarchy. players: keys of `laws.LAWS`.
+    Both versions have the same hierarchy. players: names in PLAYERS.
     """
     local = local_bounds(first, second, where, players=players)
     matrices, origins = np.empty_like(local.matrices), np.empty_like(local.origins)
@@ -55,7 +56,7 @@ def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, p
 
 
 def local_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
-    """Return the majorants of all nodes in their parents' spaces. Parameters as of `in_world`."""
+    """Return the majorants of all nodes in local space. Parameters as for `world_bounds`."""
     matrices, jumps = _rotations(first, second, where, players)
     scales = _vectors(first, second, where, "scale", _max_norm)
     matrices, jumps = product(matrices, scales), jumps * scales[0, 1]
@@ -105,7 +106,7 @@ def _vectors(
 
 
 def _held(version: ClipVersion, path: str) -> Floats:
-    """Constant values (N, C) of the nodes that do not move: of their tracks, or of the rest pose."""
+    """Constant values (N, C) of static nodes: of their tracks, or of the rest pose."""
     values: Floats = getattr(version.skeleton, path).copy()
     for batch in _of_path(version.still, path):
         values[[track.node for track in batch.tracks if track.node is not None]] = batch.values[0]
@@ -113,7 +114,7 @@ def _held(version: ClipVersion, path: str) -> Floats:
 
 
 def _late(version: ClipVersion, where: Intervals) -> set[int]:
-    """Nodes with a constant rotation that starts after the first interval: players may normalize only from there on."""
+    """Nodes with a constant rotation that starts after the first interval: some players normalize only from then on."""
     late = [batch for batch in _of_path(version.still, "rotation") if batch.times[-1] > where.edges[1]]
     return _nodes(late)
 
@@ -121,8 +122,10 @@ def _late(version: ClipVersion, where: Intervals) -> set[int]:
 def _groups(
     first: ClipVersion, second: ClipVersion, path: str, where: Intervals, uneven: Collection[int] = ()
 ) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Intervals]]:
-    """Nodes that move in either version, with their tracks and all intervals; then those of `uneven` that do not, with
-    one interval, which is like any other."""
+    """Nodes that move in either version, with their tracks and all intervals; then those of `uneven` that do not.
+
+    The latter with one interval, since all are equal.
+    """
     moving = (_of_path(first.moving, path), _of_path(second.moving, path))
     movers = _nodes(*moving)
     if movers:

@@ -1,4 +1,4 @@
-"""Proof of a bound on the distance of two versions of a clip at every time."""
+"""Proof of an upper bound of the distance between two versions of a clip at all times."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
 from anim.measure.continuous_bound.interval_rise import interval_rise
-from anim.measure.continuous_bound.intervals import LONG
+from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
 from anim.model import Clip
 from anim.sampling.players import PLAYERS
 
-BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is as good
-MAX_PARTS = 128  # per interval between two times
-PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # those with normalized arcs are adjacent, so that others skip that
-BLOCK = 1_000_000  # players × stretches × groups and nodes at once, each some 100 bytes
+BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is not refined
+MAX_PARTS = 128  # maximum number of subintervals between two times
+PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # players with normalized arcs are adjacent
+BLOCK = 1_000_000  # players × intervals × groups and nodes per step, each about 100 bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """Bound over every time of a clip.
+    """Upper bound over all times of a clip.
 
     bound: m, of the displacement of any vertex at any time, except for rounding; None if unproven.
     error, player: the largest sampled distance, including samples of the proof.
@@ -37,14 +37,14 @@ class Proof:
 
 @dataclass(frozen=True, slots=True)
 class ProofTarget:
-    """What to prove. found: m, the largest distance so far. room: m, how far above it the bound may be."""
+    """Target of a proof. found: m, the largest distance so far. room: m, maximum excess of the bound over it."""
 
     found: float
     slack: float
 
 
 class Prover:
-    """Proves bounds for clips on a ruler's scenes: what depends on no clip is prepared once."""
+    """Prover of bounds for clips on the scenes of a metric: prepares what all clips share."""
 
     def __init__(self, ruler: ErrorMetric) -> None:
         self.ruler = ruler
@@ -68,17 +68,17 @@ class Prover:
         *,
         enough: float | None = None,
         floor: float = 0.0,
-        longest: float = LONG,
+        longest: float = MAX_UNSPLIT_S,
     ) -> Proof:
-        """Return a bound on how far any vertex is displaced at any time, whoever of the players shows it.
+        """Return an upper bound of the displacement of any vertex at any time, in all of the players.
 
-        It is at most 1 % above what is seen, unless stretches between times would have to be cut too finely for that.
+        It is at most 1 % above the largest sample, unless intervals between times would need too many subdivisions.
         times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
-        `error.dense_times`. looks: what was seen there, by player. enough: m, where that is less than 1 % above what is
-        seen, the bound is to be no more than that. floor: m, no bound below it is
-        sought. longest: s, as of `rises`.
-        Nothing is proven where the scenes are not of one hierarchy, or for other players than those of `laws.LAWS`; nor
-        where quaternions run through zero or turn too far between two times.
+        `metric.dense_times`. looks: samples at these times, by player. enough: m, target of the bound if it is less
+        than 1 % above the largest sample. floor: m, bounds below it are not refined. longest: s, as for
+        `interval_rise`.
+        Nothing is proven for scenes with different hierarchies, for players other than those of PLAYERS, or if
+        quaternions pass through zero or rotate too far between two times.
         """
         player, worst = max(((name, look.error) for name, look in looks.items()), key=lambda each: each[1].max_error)
         if not self._knows_all or not set(looks) <= set(PLAYERS):
@@ -102,14 +102,14 @@ class Prover:
         return Proof(bound if np.isfinite(bound) else None, worst, player)
 
     def _length(self, players: int) -> int:
-        """How many stretches are gone through at once."""
+        """Maximum number of intervals per step."""
         groups = sum(len(part.groups) for part in self._parts)
         return max(BLOCK // (players * (groups + len(self.ruler.scene.skeleton)) + 1), 8)
 
     def _proven(
         self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget, longest: float
     ) -> tuple[float, RefinedMaximum]:
-        """What bounds all stretches that need no second look, and what that shows of the others."""
+        """The bound of all intervals without refinement, and the result of refining the others."""
         scenes = self.ruler.scene, self.ruler.other
         risen = interval_rise(scenes, clips, times, self._reaches, list(limits), longest=longest)
         closed, asked = 0.0, []

@@ -1,6 +1,6 @@
 """Bounds of one version's quaternions within intervals.
 
-A quaternion q, the mix c unchanged or normalized, obeys q″ = −λq − 2ρq′ + e. On an arc λ = ν², on a line 0,
+A quaternion q, the mix c unchanged or normalized, satisfies q″ = −λq − 2ρq′ + e. On an arc λ = ν², on a line 0,
 with ρ = e = 0. Normalized, λ = |q′|², ρ = c·c′/|c|², and e is the part of c″/|c| perpendicular to q; on a
 line |c|²|q′| is constant, and ρ′ = λ − ρ².
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 
-MIN_LENGTH = 1e-3  # shorter mixes have no direction that could be relied on
+MIN_MIX_LENGTH = 1e-3  # length of a mix; shorter ones have no reliable direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class QuaternionBounds:
 
 @dataclass(frozen=True, slots=True)
 class ArcMix:
-    """Mixes c that are known at both ends of gaps. value, slope: (2, 4, P, G, U), c and c′.
+    """Mixes c that are known at both ends of intervals. value, slope: (2, 4, P, G, U), c and c′.
 
     square, along, rate: (2, P, G, U), |c|², c·c′, |c′|².
     """
@@ -91,7 +91,7 @@ def arc_mix(value: Floats, slope: Floats) -> ArcMix:
 
 
 def chord_bounds(of: ArcMix, h: Floats) -> ChordBounds:
-    """Return a mix on a line, or the chord of one that isn't. h: (G, 1) s."""
+    """Return a mix on a line, or the chord of another one. h: (G, 1) s."""
     first, along, rate = of.square[0], of.along[0], of.rate[0]
     least = nearest(first, along, rate, h)
     wedge = np.maximum(first * rate - along**2, 0.0)
@@ -104,7 +104,7 @@ def slerp_bounds(of: ArcMix, turn: Floats, h: Floats) -> QuaternionBounds:
 
     turn: (P, G, U) rad, ν times the interval's length.
     """
-    reach = 1 - turn * turn / 8  # no c is larger than the larger end divided by this, nor is c′, for c″ = −ν²c
+    reach = 1 - turn * turn / 8  # |c| is at most the larger end divided by this, and so is |c′|, since c″ = −ν²c
     size, speed = (np.sqrt(each.max(axis=0)) / reach for each in (of.square, of.rate))
     pull = (turn / h) ** 2
     none = [np.zeros_like(turn) for _ in range(3)]
@@ -129,7 +129,7 @@ def nlerp_bounds(of: ArcMix, chord: ChordBounds) -> QuaternionBounds:
 
 
 def select_bounds(into: QuaternionBounds, part: QuaternionBounds, players: slice, where: Bools) -> None:
-    """Write the figures of some players into those of all. where: (P', G, U), which of the part's."""
+    """Write the bounds of some players into those of all. where: (P', G, U), mask of the part's."""
     for name in QuaternionBounds.__slots__[:11]:
         np.copyto(getattr(into, name)[..., players, :, :], getattr(part, name), where=where)
 
@@ -138,7 +138,7 @@ def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
     """Return the smallest |c|² on a line, nan near 0, from |c|² and c·c′ at its start, and |c′|²."""
     until = np.clip(-along / np.where(rate > 0, rate, 1.0), 0.0, h)
     least = square + until * (2 * along + until * rate)
-    return np.asarray(np.where(least > MIN_LENGTH**2, least, np.nan))
+    return np.asarray(np.where(least > MIN_MIX_LENGTH**2, least, np.nan))
 
 
 def directed(of: ArcMix, drag: Floats) -> tuple[Floats, Floats]:

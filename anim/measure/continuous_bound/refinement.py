@@ -1,4 +1,4 @@
-"""Refinement of the bound: samples in intervals in which displacements may exceed it."""
+"""Refinement of the bound: samples in intervals with displacements that may exceed it."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from anim.model import Clip
 
 @dataclass(frozen=True, slots=True)
 class Subintervals:
-    """Stretches between neighboring times of the first look, cut into equal parts, for one player.
+    """Intervals between neighboring samples, divided into equal parts, for one player.
 
-    times: (T,) s, all ends of all parts; the last of a stretch is the moment before its end. more: (C, T) m, by how
-    much the displacement of a group can rise around each within a part; nan where that stretch is not asked for.
+    times: (T,) s, all ends of all parts; the last of an interval is the moment before its end. more: (C, T) m, upper
+    bound of the rise of the displacement of a group around each within a part; nan if that interval is not refined.
     """
 
     player: str
@@ -27,7 +27,7 @@ class Subintervals:
     more: Floats
 
     def some(self, start: int, end: int) -> Subintervals:
-        """Return those from number `start` up to `end`."""
+        """Return those with indices from `start` up to `end`."""
         here = slice(max(start, 0), max(end, 0))
         return Subintervals(self.player, self.times[here], self.more[:, here])
 
@@ -47,9 +47,9 @@ class RefinedMaximum:
 
 
 def subdivide(player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints) -> Subintervals:
-    """Return stretches between neighbors among `times` (F,) in s, each cut into some of `parts` (F − 1,).
+    """Return intervals between neighbors among `times` (F,) in s, each divided into some of `parts` (F − 1,).
 
-    rise: (C, F − 1) m of groups in whole stretches. asked: (C, F − 1), which of them to look at for which groups.
+    rise: (C, F − 1) m of groups in whole intervals. asked: (C, F − 1), mask of the intervals to refine for each group.
     """
     stretches = np.flatnonzero(asked.any(axis=0))
     counts = parts[stretches] + 1
@@ -68,10 +68,10 @@ def refine(
     *,
     target: float,
 ) -> RefinedMaximum:
-    """Return what a second look shows of the displacement of one clip from the other.
+    """Return the largest displacement in the refined intervals, and its upper bound.
 
-    asked: of every player. parts: whose groups they are about, in order. target: m; where nothing can be displaced
-    more, no vertex is looked at.
+    asked: of every player. parts: the surfaces of the groups, in order. target: m; vertices of groups with a smaller
+    bound are not evaluated.
     """
     seen, left = RefinedMaximum(), MAX_SEARCHED
     for chunk in _chunks(asked, ruler.length):
@@ -96,7 +96,7 @@ def refine(
 
 
 def _chunks(asked: Sequence[Subintervals], length: int) -> Iterator[list[Subintervals]]:
-    """Cuts of all players, up to `length` times at once."""
+    """Slices of all players' intervals, of up to `length` times together."""
     firsts = np.cumsum([0, *(len(each.times) for each in asked)]).tolist()
     for start in range(0, firsts[-1], length):
         some = (each.some(start - first, start + length - first) for each, first in zip(asked, firsts, strict=False))
@@ -104,7 +104,7 @@ def _chunks(asked: Sequence[Subintervals], length: int) -> Iterator[list[Subinte
 
 
 def _searched(field: DisplacementField, more: Floats, target: float, most: int) -> tuple[float, float, int, int]:
-    """What bounds all groups, the longest vector, its frame, and how many were looked at, of `most` at most."""
+    """The bound of all groups, the longest vector, its frame, and the number of evaluated ones, of `most` at most."""
     tops = field.limits + more
     found, frame, looked = 0.0, 0, 0
     for group in np.flatnonzero((tops > target).any(axis=1)).tolist():

@@ -1,4 +1,4 @@
-"""Majorants of rotation matrices, played by several players, in two versions of a clip."""
+"""Majorants of rotation matrices, in several players, in two versions of a clip."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from anim.measure.continuous_bound.rotation_endpoints import RotationEndpoints
 
 
 def rotation_bounds(first: RotationEndpoints, second: RotationEndpoints, lengths: Floats) -> tuple[Floats, Floats]:
-    """Return the majorant (3, 2, G, U) of the matrices that players make of quaternions, and how far they jump (G, U).
+    """Return the majorant (3, 2, G, U) of matrices from quaternions, and upper bounds of their jumps (G, U).
 
-    That is true of each of the players. A matrix is q·x·q* + (1 − |q|²)·x of a vector x, of any quaternion q: a product
-    of q with itself, and what is left where q is not of unit length. Where what follows a gap is divided by its length
-    and the gap is not, or the other way round, matrices jump at its end, both versions together by no more than said.
-    lengths: of gaps (G,) in s.
+    Valid for each of the players. A matrix is q·x·q* + (1 − |q|²)·x of a vector x, for any quaternion q: a product
+    of q with itself, and a remainder if q is not of unit length. If the quaternion is normalized in an interval but not
+    after it, or the other way round, matrices jump at its end, both versions together by at most the second result.
+    lengths: of intervals (G,) in s.
     """
     h = lengths[:, None]
     second = _on_the_side_of(first, second)
@@ -36,21 +36,21 @@ def rotation_bounds(first: RotationEndpoints, second: RotationEndpoints, lengths
     lines = first.unit & second.unit & ~(first.is_cubic | second.is_cubic)
     other = ~_same(first, second)
     apart = np.where(other, difference_bounds(a, b, (line_a, line_b, lines), h), 0.0)
-    # the largest of all players, each by itself: the largest sums would be too near to each other
+    # the maximum over players, each by itself: maxima of the sums would be too close to each other
     q = derivative_bound(np.stack((a.size, a.speed, a.bend)).max(axis=1), apart.max(axis=1))
     uneven = derivative_bound(a.excess.max(axis=1), np.where(other, a.excess + b.excess, 0.0).max(axis=1))
     return product(q, q) + uneven, np.asarray((_jumps(first) + _jumps(second)).max(axis=0))
 
 
 def _on_the_side_of(first: RotationEndpoints, second: RotationEndpoints) -> RotationEndpoints:
-    """The second with signs like the first's: q and −q are one rotation."""
+    """The second version with signs like the first's: q and −q are one rotation."""
     sign = np.where((first.value[0] * second.value[0]).sum(axis=0) < 0, -1.0, 1.0)
     cubic = None if second.cubic is None else second.cubic * sign
     return replace(second, value=second.value * sign, cubic=cubic)
 
 
 def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:
-    """Where (P, G, U) both versions are one motion."""
+    """Mask (P, G, U) of equal motion in both versions."""
     same: Bools = (first.value == second.value).all(axis=(0, 1)) & (first.turn == second.turn)
     same &= first.unit == second.unit
     if first.cubic is None and second.cubic is None:
@@ -61,7 +61,7 @@ def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:
 
 
 def _arc_bounds(of: RotationEndpoints, h: Floats) -> tuple[QuaternionBounds, ChordBounds]:
-    """What quaternions do, and their mixes as lines. h: (G, 1) s."""
+    """Bounds of quaternions, and their mixes as lines. h: (G, 1) s."""
     start, end = of.value
     sine, cosine = 1 / (h * np.sinc(of.turn / np.pi)), np.cos(of.turn)
     mixed = arc_mix(of.value, np.stack(((end - cosine * start) * sine, (cosine * end - start) * sine)))

@@ -21,12 +21,11 @@ from anim.sampling.players import GLTF, PLAYERS, is_divided
 
 @dataclass(frozen=True, slots=True)
 class RotationEndpoints:
-    """Mixes of P players, in G gaps, of U nodes.
+    """Mixes of P players, in G intervals, of U nodes.
 
-    value: (2, 4, P, G, U), at both ends. turn: (P, G, U) rad, ν times the gap's length; 0 on lines and cubics.
-    unit: (P, G, U) whether the mix is divided by its length. next_unit: the same of what follows the gap; the opposite
-    where that is not known.
-    cubic: slope per s and bend per s² (2, 2, 4, 1, G, U) of cubics, 0 of others; None where there is no cubic.
+    value: (2, 4, P, G, U), at both ends. turn: (P, G, U) rad, ν times the interval's length; 0 on lines and cubics.
+    unit: (P, G, U) whether the mix is normalized. next_unit: the same after the interval; the opposite if unknown.
+    cubic: slope per s and bend per s² (2, 2, 4, 1, G, U) of cubics, 0 of others; None without cubics.
     is_cubic: (U,).
     """
 
@@ -40,11 +39,11 @@ class RotationEndpoints:
 
 @dataclass(frozen=True, slots=True)
 class _Keys:
-    """What tracks say of G gaps and U nodes.
+    """Keys of tracks in G intervals and U nodes.
 
-    keys: (2, 4, G, U), the keys on both sides as they are stored. shares: (2, G, U) of the way, at both ends of gaps.
-    mixed: (G, U) whether LINEAR keys are mixed there, not held. tracked: (U,) whether there is a track. ended: (U,),
-    whether that has no key after the last gap. cubic, is_cubic: as `Turns` has them.
+    keys: (2, 4, G, U), the stored keys on both sides. shares: (2, G, U) interpolation parameters at both ends of
+    intervals. mixed: (G, U) whether LINEAR keys are interpolated there. tracked: (U,) whether there is a track. ended:
+    (U,), whether it has no key after the last interval. cubic, is_cubic: as in `RotationEndpoints`.
     """
 
     keys: Floats
@@ -59,9 +58,9 @@ class _Keys:
 def rotation_endpoints(
     rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals, *, players: Sequence[str]
 ) -> RotationEndpoints:
-    """Return the rotations of nodes that are at `rest` (U, 4) where no track moves them.
+    """Return the rotations of nodes, `rest` (U, 4) for those without a track.
 
-    place: for numbers of nodes which of them each is. players: keys of LAWS.
+    place: index of each node among them, by node index. players: names in PLAYERS.
     """
     of = _keys(rest, tracks, place, where)
     a, b = _stored_for(of, players)
@@ -106,7 +105,7 @@ def _keys(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where
 
 
 def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
-    """The keys on both sides (4, P, G, U) in players, before interpolation."""
+    """The keys on both sides (4, P, G, U) as each player uses them before interpolation."""
     directed = of.keys
     if GLTF in players:
         length = np.sqrt((of.keys * of.keys).sum(axis=1))
@@ -116,12 +115,12 @@ def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
 
 
 def _blend(a: Floats, b: Floats, angle: Floats, shares: Floats) -> Floats:
-    """Mixes (2, 4, P, G, U) of quaternions (4, P, G, U) with `angle` (P, G, U) between them, at shares (2, G, U)."""
+    """Mixes (2, 4, P, G, U) of quaternions (4, P, G, U) with `angle` (P, G, U), at parameters (2, G, U)."""
     angle = angle / np.pi
     whole = np.sinc(angle)
     result = np.empty((2, *a.shape))
     for k, u in enumerate(shares):
-        if not (u - k).any():  # keys themselves
+        if not (u - k).any():  # the keys themselves
             result[k] = (a, b)[k]
             continue
         np.multiply((1 - u) * np.sinc((1 - u) * angle) / whole, a, out=result[k])

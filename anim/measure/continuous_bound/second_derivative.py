@@ -1,4 +1,4 @@
-"""Bounds of the second derivative of displacements, from majorants of the nodes that carry the points."""
+"""Bounds of the second derivative of displacements, from majorants of the points' nodes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def second_derivative_bound(
 
 
 def _morphed(of: Morphing, first: ClipVersion, second: ClipVersion, where: Intervals) -> Floats:
-    """Majorants (3, 2, J, G) of how far weights move points in the spaces of joints."""
+    """Majorants (3, 2, J, G) of the displacement of points by weights in the spaces of joints."""
     first_ends, second_ends = (
         endpoints(rest[None], side.weights(owner, len(rest)), {owner: 0}, where)
         for side, owner, rest in zip((first, second), of.owners, of.rest, strict=True)
@@ -51,6 +51,6 @@ def _morphed(of: Morphing, first: ClipVersion, second: ClipVersion, where: Inter
 
 
 def _by_group(bounds: Floats, of: InfluenceRadius) -> Floats:
-    """Bounds of joints (J, G) as those of groups (C, G): the largest of those that carry some."""
+    """Bounds of groups (C, G) from bounds of joints (J, G): the largest of those with influence."""
     starts = np.cumsum([0, *map(len, of.groups[:-1])])
     return np.asarray(np.maximum.reduceat(bounds[np.concatenate(of.groups)], starts, axis=0))

@@ -14,15 +14,17 @@ from anim.sampling.batch import Batch, batches
 
 @dataclass(frozen=True, slots=True)
 class ClipVersion:
-    """One version: nodes at rest, tracks of nodes that move in either version, and tracks of those that don't, of one
-    key each; all stacked."""
+    """One version: nodes at rest, tracks of nodes that move in either version, and constant tracks with one key each.
+
+    All stacked.
+    """
 
     skeleton: Skeleton
     moving: list[Batch]
     still: list[Batch]
 
     def weights(self, node: int, count: int) -> list[Batch]:
-        """Return the track of a node's `count` morph weights, where it has one."""
+        """Return the track of a node's `count` morph weights, if it has one."""
         all_ = (track for batch in (*self.moving, *self.still) for track in batch.tracks if batch.path == "weights")
         return batches(track for track in all_ if track.node == node and track.values.shape[1] == count)
 
@@ -56,7 +58,7 @@ def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | No
 
 
 def _is_constant(batch: Batch) -> Bools:
-    """Which of a batch's tracks have one value only."""
+    """Mask of a batch's tracks with a single value."""
     same = (batch.values == batch.values[:1]).all(axis=(0, 2))
     if batch.tangents is not None:
         for tangents in batch.tangents:

@@ -13,7 +13,7 @@ CELLS = 10.0  # squares of a checker along the diagonal of the rest pose
 DARK, LIGHT = 0.38, 1.12  # brightness of the squares
 EDGE, EDGE_WIDTH = 0.30, 1.1  # brightness of edges, and their width in pixels
 FINE, COARSE = 3.0, 9.0  # pixels of triangle size: edges fade in from the first to the second
-MIN_CELLS = 0.12  # relative darkness of the edges of the smallest triangles
+MIN_EDGE_DARKNESS = 0.12  # of the full darkness: edges of the smallest triangles
 
 # (corners (S, 3, 3) on the screen, x and y of samples (S, 2), their faces (S,)) → brightness (S,)
 SurfaceMarks = Callable[[Floats, Floats, Ints], Floats]
@@ -51,7 +51,7 @@ def edges(corners: Floats, samples: Floats, faces: Ints) -> Floats:
     """
     heights = _heights(corners)
     is_near = (barycentric(corners, samples) * heights).min(axis=1) < EDGE_WIDTH / 2
-    depth = np.interp(heights.min(axis=1), (FINE, COARSE), (MIN_CELLS, 1.0))
+    depth = np.interp(heights.min(axis=1), (FINE, COARSE), (MIN_EDGE_DARKNESS, 1.0))
     return np.where(is_near, 1 - (1 - EDGE) * depth, 1.0)
 
 
