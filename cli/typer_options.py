@@ -52,7 +52,8 @@ class Command(Parsing, TyperCommand):
         try:
             return super().invoke(ctx)
         except AnimError as error:
-            name_options(error, {each.name: each.opts[0] for each in self.params if each.param_type_name == "option"})
+            options = {str(each.name): each.opts[0] for each in self.params if each.param_type_name == "option"}
+            name_options(error, options)
             raise
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
@@ -96,14 +97,35 @@ def set_parsers(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _set_parser(info: OptionInfo | ArgumentInfo, kind: Any) -> None:
+    if info.parser is not None:  # of an option that an earlier command has too
+        return
     if issubclass(kind, Enum):
         choices = {str(member.value): member for member in kind}
         info.parser = lambda value: _choice(value, choices)
+        info.autocompletion = _complete(list(choices))
         info.metavar = info.metavar or f"<{'|'.join(choices)}>"
     elif kind in METAVARS:
         if kind is not str:
-            info.parser = lambda value: _number(value, kind, info.min, info.max)
+            low, high = info.min, info.max
+            info.parser = lambda value: _number(value, kind, low, high)
+            info.help = _with_range(info.help or "", low, high)
+            info.min = info.max = None  # some versions of typer show them too, beside a parser
         info.metavar = info.metavar or METAVARS[kind]
+
+
+def _complete(choices: list[str]) -> Callable[[str], list[str]]:
+    def complete(incomplete: str) -> list[str]:
+        return [each for each in choices if each.startswith(incomplete)]
+
+    return complete
+
+
+def _with_range(words: str, low: float | None, high: float | None) -> str:
+    """The help of an option and its range: "Height of a frame (from 32 to 4096)." """
+    if low is None and high is None:
+        return words
+    limits = [f"{word} {limit:g}" for word, limit in (("from", low), ("to", high)) if limit is not None]
+    return f"{words.removesuffix('.')} ({' '.join(limits)})."
 
 
 def _value_type(hint: Any) -> Any:

@@ -54,7 +54,7 @@ def _section(name: str, command: Any, examples: Sequence[str], context: Any) -> 
 def _usage(argument: Any) -> str:
     if argument.metavar.startswith("["):
         return str(argument.metavar)
-    many = "..." if argument.nargs == -1 else ""
+    many = "..." if argument.nargs == -1 and not argument.metavar.endswith("...") else ""
     return f"{argument.metavar}{many}" if argument.required else f"[{argument.metavar}{many}]"
 
 
@@ -68,10 +68,6 @@ def _option(option: Any, context: Any) -> str:
 def _details(option: Any, default: Any) -> Iterator[str]:
     if option.required:
         yield "required"
-    if option.min is not None or option.max is not None:
-        yield " ".join(
-            f"{word} {limit:g}" for word, limit in (("from", option.min), ("to", option.max)) if limit is not None
-        )
     if option.show_default and default is not None and not option.is_flag:
         yield f"default {getattr(default, 'value', default)}"
 

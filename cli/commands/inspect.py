@@ -43,7 +43,7 @@ class Format(StrEnum):
 
 def command(
     inputs: Annotated[
-        list[str] | None, typer.Argument(metavar="FILE", help="Files to inspect; '-' for stdin.", show_default=False)
+        list[str] | None, typer.Argument(metavar="FILE...", help="Files to inspect; '-' for stdin.", show_default=False)
     ] = None,
     *,
     format: Annotated[Format, typer.Option("--format", help="Text, or one JSON or CSV document.")] = Format.TEXT,
