@@ -136,7 +136,7 @@ def _nodes(data: bytes) -> list[dict[str, str]]:
         (("--hit-radius", "-1cm"), 2, "--hit-radius is '-1cm'", ""),
         (("--gravity", "down"), 2, "--gravity is 'down' (expected a number, or three", ""),
         (("--frequency", "0"), 2, "frequency is 0 (expected 0.001", ""),
-        (("--frequency", "2", "--drag", "0.1"), 2, "--frequency takes the place of --stiffness and --drag", ""),
+        (("--frequency", "2", "--drag", "0.1"), 2, "--frequency replaces --stiffness and --drag", ""),
         (("--damping-ratio", "1"), 2, "--damping-ratio needs --frequency", ""),
         (("--center", "hair3"), 3, "spring 0 'ponytail': center is node 23 'hair3'", ""),
         (("--center", "*foot"), 2, "--center '*foot' matches 2 nodes", ""),

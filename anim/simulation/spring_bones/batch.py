@@ -183,8 +183,8 @@ def _rotation_maps(rest: Floats, axis: Floats) -> tuple[Floats, Floats]:
     x, y, z = axis.T
     none = np.zeros(size)
     about = np.where((np.abs(x) > np.abs(z))[:, None], np.stack((-y, x, none), -1), np.stack((none, -z, y), -1))
-    turn = np.concatenate((about / np.maximum(norms(about), TINY), none[:, None]), axis=-1)
-    return maps, quaternion.multiply(rest, turn)
+    half_turn = np.concatenate((about / np.maximum(norms(about), TINY), none[:, None]), axis=-1)
+    return maps, quaternion.multiply(rest, half_turn)
 
 
 def _center_rows(planned: Sequence[PlannedJoint], plan: Plan) -> Ints | None:

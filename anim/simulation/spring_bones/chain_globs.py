@@ -64,7 +64,7 @@ def drop_inert_joints(skeleton: Skeleton, chains: Sequence[SpringChain]) -> tupl
             if _length(skeleton, joint) > 0:
                 joints.append(joint)
             else:
-                notes.append(f"{skeleton.label(joint.node)} does not swing: its tail is at the same place")
+                notes.append(f"{skeleton.label(joint.node)} does not swing: its tail has the same position")
         if joints:
             kept.append(SpringChain(chain.name, tuple(joints), chain.colliders, chain.center))
     return tuple(kept), notes

@@ -24,7 +24,7 @@ class SpringParameters:
     stiffness: speed in m/s by which the tail returns to its rest direction, ≥ 0. drag: fraction of the tail's velocity
     lost in each step, 0 … 1. gravity: (3,) in m/s, power times direction, in world space.
     hit_radius: of the tail against colliders, in metres, ≥ 0.
-    frequency: Hz of an angular spring that takes the place of stiffness and drag, or None; damping_ratio belongs to it:
+    frequency: Hz of an angular spring that replaces stiffness and drag, or None; damping_ratio belongs to it:
     0 oscillates for ever, from 1 on nothing overshoots. Its gravity is an acceleration in m/s².
     Raises RangeError for values out of range, NaN included.
     """

@@ -57,12 +57,12 @@ def run_loop(solver: SpringSolver, steps: Steps) -> LoopedMotion:
 
 def _close(rotations: Floats, num_blended: int) -> Floats:
     """Rotations (S, J, 4) whose last `num_blended` steps lead over to the first."""
-    gap = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(rotations[-1]), rotations[0]))
+    difference = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(rotations[-1]), rotations[0]))
     u = np.arange(1, num_blended + 1) / num_blended
     weight = u * u * (3 - 2 * u)
     closed = rotations.copy()
-    turn = quaternion.from_rotation_vector(weight[:, None, None] * gap)
-    closed[-num_blended:] = quaternion.multiply(rotations[-num_blended:], turn)
+    correction = quaternion.from_rotation_vector(weight[:, None, None] * difference)
+    closed[-num_blended:] = quaternion.multiply(rotations[-num_blended:], correction)
     return closed
 
 

@@ -45,12 +45,12 @@ def reduce_keys(prover: Prover, clip: Clip, joints: Collection[int], *, max_erro
 
 def _reaches(skeleton: Skeleton, joints: Collection[int]) -> dict[int, float]:
     """Distance in metres from each joint to the farthest node below, at least to its parent: a measure of its skin."""
-    places = world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
+    positions = world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
     reach = {}
     for node in joints:
         others = np.flatnonzero(skeleton.descendants(node))
         others = np.append(others, skeleton.parents[node]) if skeleton.parents[node] >= 0 else others
-        reach[node] = max(float(np.linalg.norm(places[others] - places[node], axis=-1).max()), 1e-6)
+        reach[node] = max(float(np.linalg.norm(positions[others] - positions[node], axis=-1).max()), 1e-6)
     return reach
 
 

@@ -14,7 +14,7 @@ from anim.sampling.times import distinct_float32, frame_times
 from anim.simulation.spring_bones.chain_globs import drop_inert_joints
 from anim.simulation.spring_bones.chains import SpringBones
 from anim.simulation.spring_bones.hierarchy import check_hierarchy, scaled_colliders
-from anim.simulation.spring_bones.loop import MAX_ROUNDS, LoopedMotion, run_loop
+from anim.simulation.spring_bones.loop import LoopedMotion, run_loop
 from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
 from anim.simulation.steps import Steps
 
@@ -142,6 +142,3 @@ def _merge(clip: Clip, nodes: tuple[int, ...], times: Floats, rotations: Floats)
     }
     tracks = [new.pop(track.node) if track.path == "rotation" and track.node in new else track for track in clip.tracks]
     return Clip(clip.name, (*tracks, *new.values()))
-
-
-__all__ = ["MAX_ROUNDS", "SpringOptions", "SpringResult", "simulate_springs"]

@@ -81,9 +81,9 @@ class SpringSolver:
         scene = np.eye(3, 4)[None]
         world_before, world_after = (np.concatenate((each, scene)) for each in ends)
         moved = matrix.multiply(world_after[self._bases], matrix.inverse(world_before[self._bases]))
-        loose = self._centers < -1  # centers that a spring moves: they carry their state themselves
-        moved[loose] = np.eye(3, 4)
-        rows = np.where(loose, -1, self._centers)
+        own = self._centers < -1  # centers that a spring moves: their state is relative to them
+        moved[own] = np.eye(3, 4)
+        rows = np.where(own, -1, self._centers)
         for level in self._levels:
             level.transform(moved, world_before[rows], world_after[rows])
 

@@ -68,7 +68,7 @@ def command(
     frequency: Annotated[
         float | None,
         typer.Option(
-            "--frequency", metavar="HZ", help="Frequency of an oscillator, in place of --stiffness and --drag."
+            "--frequency", metavar="HZ", help="Frequency of an oscillator, instead of --stiffness and --drag."
         ),
     ] = None,
     damping_ratio: Annotated[
@@ -101,7 +101,7 @@ def command(
     motion repeats within 0.1 mm, or else blends the last 0.2 s; its step is the nearest that divides the clip.
     """
     if frequency is not None and (stiffness is not None or drag is not None):
-        raise UsageError("--frequency takes the place of --stiffness and --drag (expected one or the other)")
+        raise UsageError("--frequency replaces --stiffness and --drag (expected one or the other)")
     if damping_ratio is not None and frequency is None and not chain:
         raise UsageError("--damping-ratio needs --frequency")
     voice = Reporter(quiet, verbose)

@@ -200,7 +200,7 @@ def test_a_joint_without_length_is_left_out_with_a_note() -> None:
     flat = skeleton([-1, 0, 1, 2], translation=[[0, 0, 0], [0, 1, 0], [0, 0, 0], DOWN])
     result = simulate_springs(flat, swaying(), BONES)
     assert result.joints == (2,)
-    assert result.notes == ("node 1 '1' does not swing: its tail is at the same place",)
+    assert result.notes == ("node 1 '1' does not swing: its tail has the same position",)
 
 
 def test_a_scale_of_0_leaves_the_rest_rotation() -> None:
