@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.reader import EXTENSION, instanced_nodes
+from anim.gltf.reading.reader import INSTANCING, instanced_nodes
 from anim.model import Scene
 from anim.skinning.analysis.weight_sums import unnormalized_weights
 from cli.text import Reporter
@@ -42,6 +42,6 @@ def _warn_of_copies(document: Document, name: str, voice: Reporter, chosen: Coll
     if copied:
         words = f" and {len(copied) - 1} more have" if len(copied) > 1 else " has"
         voice.warn(
-            f"{name}: {node_label(document.json, copied[0])}{words} copies of a mesh by {EXTENSION}: "
+            f"{name}: {node_label(document.json, copied[0])}{words} copies of a mesh by {INSTANCING}: "
             "one copy per node counts here, and others may move farther than is said"
         )

@@ -16,7 +16,7 @@ from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin
 
 MAX_LISTED_CLIPS = 3  # clips in a message
-EXTENSION = "EXT_mesh_gpu_instancing"
+INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 def skeleton(document: Document) -> Skeleton:
@@ -215,7 +215,7 @@ def _unit(rotation: list[float], node: int) -> Floats:
 def instanced_nodes(json: Json) -> list[int]:
     """Return the indices of the nodes with mesh instances."""
     nodes = enumerate(json_array(json, "nodes"))
-    return [i for i, node in nodes if "mesh" in node and EXTENSION in node.get("extensions", {})]
+    return [i for i, node in nodes if "mesh" in node and INSTANCING in node.get("extensions", {})]
 
 
 def check_not_required(document: Document) -> None:
@@ -224,7 +224,7 @@ def check_not_required(document: Document) -> None:
     An error bound of one instance does not hold for the others.
     """
     json = document.json
-    if EXTENSION in json.get("extensionsRequired", ()) and (found := instanced_nodes(json)):
+    if INSTANCING in json.get("extensionsRequired", ()) and (found := instanced_nodes(json)):
         raise UnsupportedError(
-            f"{node_label(json, found[0])} has copies of its mesh by {EXTENSION}, which is required and not read here"
+            f"{node_label(json, found[0])} has copies of its mesh by {INSTANCING}, which is required and not read here"
         )
