@@ -47,7 +47,7 @@ OPENING = {  # modules of the library that may open a path
     "anim/optimization/process_pool.py",
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }
-FORBIDDEN_CALLS = {"print", "open", "input", "exit", "sys.exit"}
+FORBIDDEN_CALLS = {"print", "open", "input", "exit", "sys.exit", "id"}  # id: values are keys themselves
 FORBIDDEN_METHODS = {"read_bytes", "write_bytes", "read_text", "write_text"}
 FORBIDDEN_ATTRIBUTES = {"sys.stdout", "sys.stderr", "sys.stdin", "sys.argv", "os.environ"}
 FORBIDDEN_ATTRIBUTES |= {"time.time", "np.random.seed", "np.fromfile", "np.load", "np.memmap"}

@@ -20,7 +20,7 @@ from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
 from anim.skinning.methods.registry import SKINNING_METHODS
 from anim.skinning.methods.skinner import Skinner
-from anim.skinning.pose_blocks import PosePlayback
+from anim.skinning.pose_blocks import rest_block
 
 SPACES = ("world", "mesh")
 
@@ -96,7 +96,7 @@ def prepare_bake(
         bind_mesh(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
-    rest = PosePlayback(scene.skeleton, Clip("", ())).at(np.zeros(1))
+    rest = rest_block(scene.skeleton)
     return Baker(
         scene,
         layers,
