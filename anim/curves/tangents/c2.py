@@ -21,6 +21,14 @@ def clamped(times: Floats, values: Floats) -> SplineKeys:
     return _cubic(times, values, ends="clamped")
 
 
+def with_end_slopes(times: Floats, values: Floats, start: Floats, end: Floats) -> SplineKeys:
+    """Return the C2 curve through the keys with these slopes (C,) at its ends."""
+    from scipy.interpolate import CubicSpline
+
+    slopes = np.asarray(CubicSpline(times, values, axis=0, bc_type=((1, start), (1, end)))(times, 1))
+    return SplineKeys(values, slopes, slopes)
+
+
 def periodic(times: Floats, values: Floats) -> SplineKeys:
     """Return the C2 curve through the keys with equal speed and acceleration at start and end.
 

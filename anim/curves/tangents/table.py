@@ -69,8 +69,8 @@ def apply_rotation_tangents(
 
     Local rules work on the rotations from key to key, unrolled into a curve of rotation vectors in body axes:
     its slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when
-    the player normalizes them; bspline's values are normalized here, which leaves it nearly C2. Best below 120° between
-    keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
+    the player normalizes them; through bspline's values, which are normalized here, a second C2 curve is solved. Best
+    below 120° between keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
     Raises RangeError for an open loop under a C2 rule, or a quaternion of length 0.
     Source: notes/algorithms.md C4, rotations (b).
     """
@@ -118,10 +118,15 @@ def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -
     keys = _keys(times, q, rule, cyclic)
     if keys.departure == 0:
         return SplineKeys(q[:count], keys.in_tangents[:count], keys.out_tangents[:count])
-    length = np.sqrt(quat.dot(keys.values, keys.values))[:count, None]
-    unit, rates = keys.values[:count] / length, keys.out_tangents[:count] / length
-    rates = rates - quat.dot(unit, rates)[:, None] * unit
-    return SplineKeys(unit, rates, rates, float(quat.angle_between(unit, q[:count]).max()))
+    length = np.sqrt(quat.dot(keys.values, keys.values))[:, None]
+    unit = keys.values / length
+    if cyclic:
+        through = smooth.periodic(times, unit)
+    else:
+        ends = keys.out_tangents[[0, -1]] / length[[0, -1]]
+        through = smooth.with_end_slopes(times, unit, *ends)
+    angle = float(quat.angle_between(unit[:count], q[:count]).max())
+    return SplineKeys(unit[:count], through.in_tangents[:count], through.out_tangents[:count], angle)
 
 
 def _clear_end_tangents(keys: SplineKeys) -> SplineKeys:

@@ -33,7 +33,7 @@ def test_turn_has_continuous_rate(name: str) -> None:
         np.testing.assert_allclose(before, after, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["natural", "clamped"])
+@pytest.mark.parametrize("name", ["natural", "clamped", "bspline"])
 def test_turn_has_continuous_acceleration(name: str) -> None:
     keys = apply_rotation_tangents(TIMES, TURNS, parse(name))
     for k in range(1, 8):
