@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,6 +68,11 @@ class BakedCache(VertexCache):
     """Vertex cache with a `save` method. Frames are baked on demand: `load_all()` returns all of them."""
 
     __slots__ = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the frames themselves: the bake can't be sent to other processes."""
+        values: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
+        return partial(BakedCache, **values | {"chunks": partial(iter, (self.load_all(),))}), ()
 
     def save(
         self,
@@ -148,16 +154,17 @@ def optimize(
         given=(str(max_error), str(max_angle), str(max_speed_error)),
     )
     globs = glob_list(clips, "clips")
+    chosen = match_names(globs, asset.clips.names, "clip")
     found = search.optimize(
         asset.document,
         asset.scene,
         tuple(asset.clips),
         request,
-        chosen=match_names(globs, asset.clips.names, "clip"),
+        chosen=chosen,
         workers=workers or os.cpu_count() or 1,
         progress=progress or (lambda _: None),
     )
-    return _build_result(asset, found, limits)
+    return _build_result(asset, found, limits, chosen)
 
 
 def bake(
@@ -252,7 +259,7 @@ def sample_poses(
     return sample_table(asset.skeleton, playing, _times(playing, fps, times), space=space)
 
 
-def _build_result(asset: Asset, found: search.Optimized, limits: Bounds) -> OptimizeResult:
+def _build_result(asset: Asset, found: search.Optimized, limits: Bounds, chosen: Sequence[int]) -> OptimizeResult:
     bad = [i for i, each in found.verdicts.items() if not each.holds]
     if bad:
         off = found.verdicts[bad[0]].error
@@ -260,8 +267,9 @@ def _build_result(asset: Asset, found: search.Optimized, limits: Bounds) -> Opti
         raise AnimError(f"{label}: {off.max_error:g} m at {off.time:g} s (bound {limits.max_error:g} m)")
     names = asset.clips.names
     errors: dict[str, float] = {}
-    for i, each in sorted(found.verdicts.items()):
-        errors[f"#{i}" if names[i] in errors else names[i]] = each.error.max_error
+    for i in chosen:
+        error = found.verdicts[i].error.max_error if i in found.verdicts else 0.0
+        errors[f"#{i}" if names[i] in errors else names[i]] = error
     smaller = replace(asset, document=found.document)
     if found.unchanged or _size(smaller) >= _size(asset):
         return OptimizeResult(asset, 0.0, dict.fromkeys(errors, 0.0))

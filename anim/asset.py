@@ -1,10 +1,10 @@
-"""Asset: an immutable glTF file in memory, with views of its contents; `map_clips` returns a changed copy."""
+"""Asset: an immutable glTF file in memory, with views of its contents; `map_clips` and `add_clips` return copies."""
 
 from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path, PurePath
@@ -15,7 +15,7 @@ import numpy as np
 from anim.arguments import check_binary_file, check_function, file_path, glob_list
 from anim.arrays import Bytes
 from anim.clip_list import Clips
-from anim.errors import AnimError, FormatError, RangeError, ShapeError
+from anim.errors import AnimError, FormatError, RangeError, ShapeError, check_type
 from anim.files import resolver
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
@@ -88,6 +88,25 @@ class Asset:
             return self
         document = writer.replace_clips(container.check_edits(self.document), new)
         return replace(self, document=_rename(document, {i: clip.name for i, clip in new.items()}))
+
+    def add_clips(self, clips: Iterable[Clip]) -> Asset:
+        """Return the asset with clips appended to its animations; those without tracks are omitted.
+
+        Raises RangeError for a track of a node that the asset doesn't have.
+        asset.add_clips([Clip("rise", (Track(0, "translation", "LINEAR", [0, 1], [[0, 0, 0], [0, 1, 0]]),))])
+        """
+        from anim.gltf.authoring import add_clips
+
+        check_type(clips, Iterable, "clips")
+        new, count = list(clips), len(json_array(self.document.json, "nodes"))
+        for i, clip in enumerate(new):
+            check_type(clip, Clip, f"clips[{i}]")
+            if strange := [track.node for track in clip.tracks if track.node is not None and track.node >= count]:
+                raise RangeError(
+                    f"clips[{i}] has a track of node {strange[0]} (the asset has {count} nodes, from 0 on)"
+                )
+        document = add_clips(container.check_edits(self.document), new)
+        return self if document is self.document else replace(self, document=document)
 
     def save(self, path: PathName | BinaryIO) -> None:
         """Write the asset, as `anim.save` does."""

@@ -6,6 +6,7 @@ import base64
 import inspect
 import io
 import json
+import pickle
 import pydoc
 import subprocess
 import sys
@@ -407,3 +408,39 @@ def test_the_module_runs_the_command() -> None:
     run = subprocess.run([sys.executable, "-m", "anim", "--version"], cwd=ROOT, capture_output=True, text=True)
     assert (run.returncode, run.stderr) == (0, "")
     assert anim.__version__ in run.stdout
+
+
+def test_clips_made_in_python_are_appended(biped: Path) -> None:
+    asset = anim.load(biped)
+    rise = anim.Track(0, "translation", "LINEAR", [0, 1], [[0, 0, 0], [0, 1, 0]])
+    longer = asset.add_clips([anim.Clip("rise", (rise,)), anim.Clip("nothing", ())])
+    out = io.BytesIO()
+    longer.save(out)
+    again = anim.load(out.getvalue())
+    assert again.clips.names == (*asset.clips.names, "rise")
+    (track,) = again.clips["rise"].tracks
+    assert (track.node, track.path, track.interpolation) == (rise.node, rise.path, rise.interpolation)
+    np.testing.assert_array_equal(track.values, rise.values)
+    assert list(again.clips)[:-1] == list(asset.clips)
+    assert asset.add_clips([]) is asset
+    with pytest.raises(anim.RangeError, match=r"clips\[0\] has a track of node 99"):
+        asset.add_clips([anim.Clip("far", (anim.Track(99, "translation", "LINEAR", [0], [[0, 0, 0]]),))])
+    with pytest.raises(anim.ShapeError, match=r"clips\[0\] is str"):
+        asset.add_clips(["walk"])  # type: ignore[list-item]
+
+
+def test_a_baked_cache_can_be_pickled(biped: Path) -> None:
+    cache = anim.bake(biped, "walk", fps=8, normals=True)
+    again = pickle.loads(pickle.dumps(cache))
+    assert isinstance(again, type(cache))
+    np.testing.assert_array_equal(again.times, cache.times)
+    for _ in range(2):  # a new pass each time
+        np.testing.assert_array_equal(again.load_all().positions, cache.load_all().positions)
+        np.testing.assert_array_equal(again.load_all().normals, cache.load_all().normals)
+
+
+def test_what_is_optimized_already_has_an_error_of_zero_for_each_clip(biped: Path) -> None:
+    small = anim.optimize(biped, max_error="1mm", effort="fast")
+    again = anim.optimize(small.asset, max_error="1mm", effort="fast")
+    assert again.errors == dict.fromkeys(small.errors, 0.0)
+    assert again.max_error == 0

@@ -67,10 +67,10 @@ def apply_rotation_tangents(
 ) -> SplineKeys:
     """Return CUBICSPLINE keys for times (K,) s and quaternions (K, 4): signs aligned, the rule's tangents per second.
 
-    Local rules work on the rotations from key to key, unrolled into a curve of rotation vectors in body axes:
-    its slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when
-    the player normalizes them; through bspline's values, which are normalized here, a second C2 curve is solved. Best
-    below 120° between keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
+    Local rules work on the rotations from key to key, unrolled into a curve of rotation vectors in body axes: its
+    slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when the
+    player normalizes them; through bspline's values, which are normalized here, a second C2 curve is solved. Best below
+    120° between keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
     Raises RangeError for an open loop under a C2 rule, or a quaternion of length 0.
     Source: notes/algorithms.md C4, rotations (b).
     """
