@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from anim.skinning.kernels.jit import KERNEL_FOLDERS
+
 ROOT = Path(__file__).resolve().parents[1]
 
 # Packages from the bottom up; one may import from its own level only where NEIGHBORS says so.
@@ -164,6 +166,11 @@ def test_heavy_packages_are_imported_late() -> None:
             if name.split(".")[0] in heavy or (path not in KERNELS and name.startswith(kernels)):
                 wrong.append((_short(path), name))
     assert not wrong
+
+
+def test_the_cache_of_machine_code_knows_all_kernels() -> None:
+    """A change of any kernel makes a new cache: numba doesn't check callees."""
+    assert {path.parent.relative_to(ROOT / "anim").as_posix() for path in KERNELS} == set(KERNEL_FOLDERS)
 
 
 def test_importing_the_library_loads_nothing_heavy() -> None:

@@ -14,6 +14,7 @@ import numba
 
 import anim
 
+KERNEL_FOLDERS = ("skinning/kernels", "simulation/cloth/kernels")  # in `anim`
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -54,7 +55,8 @@ def _cache_folder() -> str:
 
     Numba checks the file of a function for changes, but not those of its callees.
     """
-    stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in Path(__file__).parent.glob("*.py")]
+    kernels = (path for folder in KERNEL_FOLDERS for path in (Path(__file__).parents[2] / folder).glob("*.py"))
+    stamps = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in kernels]
     sources = hashlib.sha256(repr(sorted(stamps)).encode()).hexdigest()[:12]
     base = _user_caches()
     return "" if base is None else str(base / "gltf-anim" / f"{anim.__version__}-{sources}")
