@@ -7,9 +7,9 @@ import time
 
 from cli.text import Reporter
 
-PATIENCE = 1.0  # s, before the bar is shown
-PAUSE = 0.1  # s, between two updates
-WIDTH = 30  # characters
+DELAY_S = 1.0  # s, before the bar is shown
+UPDATE_INTERVAL_S = 0.1  # s, between two updates
+WIDTH_CHARACTERS = 30  # characters
 
 
 class Progress:
@@ -27,13 +27,13 @@ class Progress:
     def __call__(self, done: int) -> None:
         """Draw the bar if an update is due."""
         now = time.monotonic()
-        if not self._shown or now - self._began < PATIENCE or now - self._drawn < PAUSE:
+        if not self._shown or now - self._began < DELAY_S or now - self._drawn < UPDATE_INTERVAL_S:
             return
         self._drawn = now
         share = min(done / self._total, 1.0)
-        filled = round(share * WIDTH)
+        filled = round(share * WIDTH_CHARACTERS)
         left = (now - self._began) * (1 - share) / share if share else 0.0
-        bar = "█" * filled + "░" * (WIDTH - filled)
+        bar = "█" * filled + "░" * (WIDTH_CHARACTERS - filled)
         line = f"{self._words} {bar} {100 * share:3.0f} %, {left:.0f} s left"
         sys.stderr.write("\r" + line.ljust(self._length))
         sys.stderr.flush()

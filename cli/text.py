@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 MIN_PERCENT = 1e-4
-NEARLY_NOTHING = 1e-11  # m; smaller lengths come from rounding
+MIN_LENGTH_M = 1e-11  # m; smaller lengths come from rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +60,8 @@ def format_length(meters: float) -> str:
     """Return a length in a suitable unit: "0.41 mm", "12 µm", "1.5 cm", "2.9 m"."""
     if meters == 0:
         return "0 mm"
-    if meters < NEARLY_NOTHING:
-        return f"<{format_number(1e9 * NEARLY_NOTHING, 2)} nm"
+    if meters < MIN_LENGTH_M:
+        return f"<{format_number(1e9 * MIN_LENGTH_M, 2)} nm"
     for unit, factor, limit in (("nm", 1e9, 1e-6), ("µm", 1e6, 1e-4), ("mm", 1e3, 1e-2), ("cm", 1e2, 1.0)):
         if float(f"{meters:.2g}") < limit:
             return f"{format_number(meters * factor, 2)} {unit}"

@@ -18,7 +18,7 @@ from anim.model import VertexCache
 
 Read: TypeAlias = Callable[[Inputs, ReadOptions], VertexCache]
 Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
-HEAD = 1024  # bytes that are enough for every signature
+SIGNATURE_BYTES = 1024  # bytes that are enough for every signature
 
 
 class Files(Enum):
@@ -115,7 +115,7 @@ def _of(ending: str) -> CacheFormat:
 
 
 def sniff_format(head: bytes, size: int) -> str:
-    """Return the file extension of a format by a file's first bytes (`HEAD`, if possible) and its size.
+    """Return the file extension of a format by a file's first bytes (`SIGNATURE_BYTES`, if possible) and its size.
 
     Raises FormatError for bytes that no cache format starts with.
     """

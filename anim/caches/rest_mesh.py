@@ -22,8 +22,13 @@ from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
 REST_EXTENSIONS = (".ply", ".obj", "")
-OURS = ("-rest.ply", "-rest.obj")  # appended to the cache's whole name
-OTHERS = ("-rest.ply", "-rest.obj", ".ply", ".obj")  # appended to its name without the extension, tried in this order
+OWN_ENDINGS = ("-rest.ply", "-rest.obj")  # appended to the cache's whole name
+ENDINGS = (
+    "-rest.ply",
+    "-rest.obj",
+    ".ply",
+    ".obj",
+)  # appended to its name without extension, in this order
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +65,10 @@ def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable
     there = set(inputs.names())
     mark = ""
     stem = PurePath(inputs.main).stem
-    for name in (*(companion_name(inputs.main, place) for place in OURS), *(stem + place for place in OTHERS)):
+    for name in (
+        *(companion_name(inputs.main, place) for place in OWN_ENDINGS),
+        *(stem + place for place in ENDINGS),
+    ):
         if name not in there or name == inputs.main:
             continue
         mesh = _opened(inputs, name)

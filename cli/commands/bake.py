@@ -33,7 +33,7 @@ from cli.reports import bake_notes
 from cli.text import Reporter, plural
 
 PLACEHOLDERS = ("mesh", "clip")
-LISTED = 8  # files in a note
+MAX_LISTED_FILES = 8  # files in a note
 
 LBS = Method("lbs")
 Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc]
@@ -232,8 +232,8 @@ def _jobs(output: str, ending: str, groups: Sequence[Group], clips: Sequence[tup
 def _report_written(done: Sequence[_Done], voice: Reporter, *, dry_run: bool) -> None:
     """Report the files already written when a later one fails."""
     if done and not dry_run:
-        names = ", ".join(each.file for each in done[:LISTED])
-        more = f" and {len(done) - LISTED} more" if len(done) > LISTED else ""
+        names = ", ".join(each.file for each in done[:MAX_LISTED_FILES])
+        more = f" and {len(done) - MAX_LISTED_FILES} more" if len(done) > MAX_LISTED_FILES else ""
         voice.info(f"note: {plural(len(done), 'file')} written before: {names}{more}")
 
 
@@ -256,8 +256,8 @@ def _report_notes(done: list[_Done], voice: Reporter) -> None:
         for note in each.saved.written.notes:
             files.setdefault(note, []).append(PurePath(each.file).name)
     for note, names in files.items():
-        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-        where = f"{', '.join(names[:LISTED])}{more}: " if len(names) < len(done) else ""
+        more = f" and {len(names) - MAX_LISTED_FILES} more" if len(names) > MAX_LISTED_FILES else ""
+        where = f"{', '.join(names[:MAX_LISTED_FILES])}{more}: " if len(names) < len(done) else ""
         voice.info(f"note: {where}{note}")
 
 

@@ -134,7 +134,7 @@ def command(
     )
 
 
-DENSE = 0.1  # s; keys nearer than this are samples of a motion rather than poses
+MAX_SAMPLE_SPACING_S = 0.1  # s; keys nearer than this are samples of a motion rather than poses
 
 
 def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[str]:
@@ -144,7 +144,7 @@ def _notes(before: Clips, after: Clips, easing: Easing, per: Per) -> Iterator[st
         for i, clip in before.items()
     }
     steps = {i: found for i, tracks in changed.items() if (found := _usual_step(tracks)) is not None}
-    dense = {i: step for i, step in steps.items() if step < DENSE}
+    dense = {i: step for i, step in steps.items() if step < MAX_SAMPLE_SPACING_S}
     if per is Per.SEGMENT and dense:
         yield (
             f"{_labels(before, dense)}: median key interval {1000 * min(dense.values()):.0f} ms; easing every "

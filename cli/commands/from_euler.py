@@ -35,7 +35,7 @@ from cli.reports import from_euler_report
 from cli.reports.from_euler_report import ConversionReport
 from cli.workflows.character import CharacterOptions, check_name, index_of, named, pairs, put_on_character
 
-TALL = 10.0  # m; a taller skeleton is unlikely to be in meters
+MAX_HEIGHT_M = 10.0  # m; a taller skeleton is unlikely to be in meters
 
 
 class Up(StrEnum):
@@ -199,7 +199,7 @@ def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -
             f"{scale:g} m per unit (--scale): skeleton height {text.format_length(height * scale)}",
             False,
         )
-    if known and height < TALL:
+    if known and height < MAX_HEIGHT_M:
         return 1.0, "", False
     if known:
         return (

@@ -30,7 +30,7 @@ from cli.reports.inspect_report import Inspected, Smoothness
 from cli.text import Reporter
 
 SCHEMA = 1
-LOST_NOTE = "put it there, or mend the URI"
+LOST_NOTE = "put it there, or fix the URI"
 
 
 class Format(StrEnum):

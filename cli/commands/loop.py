@@ -29,7 +29,7 @@ from cli.workflows.edit_clips import edit_clips
 
 SCHEMA = 1
 HELP = "--blend S closes the loop over the last S seconds; --clip selects clips"
-MAX_NAMES = 3  # joints that a table or a message lists
+MAX_LISTED_JOINTS = 3  # joints that a table or a message lists
 
 
 def command(
@@ -231,8 +231,8 @@ def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
 def _names(found: Loop, *, quote: bool = False) -> str:
     """Names of the joints that stay open, the largest loop gap first."""
     names = [f"'{each.joint}'" if quote else each.joint for each in found.joints]
-    more = len(names) - MAX_NAMES
-    return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_LISTED_JOINTS
+    return ", ".join(names[:MAX_LISTED_JOINTS]) + (f" and {more} more" if more > 0 else "")
 
 
 def _json(

@@ -173,7 +173,7 @@ def command(
             source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
         )
         said = {
-            "max_error": optimize_job.MAX_ERROR if max_error is None else max_error,
+            "max_error": optimize_job.DEFAULT_MAX_ERROR if max_error is None else max_error,
             "shell": shell,
             "max_pointer_error": max_pointer_error,
             "max_angle": max_angle,

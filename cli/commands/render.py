@@ -15,7 +15,7 @@ import typer
 from anim.arrays import Floats
 from anim.caches.formats import gltf
 from anim.caches.options import ReadOptions
-from anim.caches.registry import CACHE_FORMATS, HEAD, reader_for, sniff_format
+from anim.caches.registry import CACHE_FORMATS, SIGNATURE_BYTES, reader_for, sniff_format
 from anim.caches.storage import Memory, suffix
 from anim.files import resolver
 from anim.gltf.document import Document
@@ -199,7 +199,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
             yield gltf.pages(source.document) or source.document, source.name, beside
     else:
         with documents.content(path) as (data, name):
-            head = data[:HEAD].tobytes()
+            head = data[:SIGNATURE_BYTES].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data, resolver.refuse_relative)
                 documents.repaired_note(document, name, voice)

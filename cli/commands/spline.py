@@ -76,16 +76,16 @@ def command(
 def _notes(before: Clips, after: Clips) -> Iterator[str]:
     """Yield notes on the largest distance of the curve from its keys."""
     found = {i: max_key_change(old, after[i]) for i, old in before.items()}
-    found = {i: each for i, each in found.items() if each[0] or each[1] > SHOWN_TRACKS}
+    found = {i: each for i, each in found.items() if each[0] or each[1] > MIN_DEVIATION_RAD}
     if found:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))
-        far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > SHOWN_TRACKS else []
+        far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > MIN_DEVIATION_RAD else []
         far += [f"other values by up to {moved:.3g}"] if moved else []
         where = reader.clip_labels([(before[i].name, i) for i in found])
         yield f"{where}: the curve does not pass through its keys ({', '.join(far)}); --tangents natural does"
 
 
-SHOWN_TRACKS = 1e-6  # rad; smaller angles come from rounding
+MIN_DEVIATION_RAD = 1e-6  # rad; smaller angles come from rounding
 
 
 _ABOUT = {

@@ -29,7 +29,7 @@ from cli.options import common
 Format = StrEnum("Format", {name.upper(): name for name in TRACK_FORMATS})  # type: ignore[misc]
 MIN_DEVIATION_DEG = 1e-6  # degrees; smaller ones come from rounding
 WARNED_DEVIATION_DEG = 1.0  # degrees; larger ones are warned of unless a tolerance was given
-CENTIMETERS = 0.01  # default m per unit of a BVH
+DEFAULT_METERS_PER_UNIT = 0.01  # default m per unit of a BVH
 
 
 def command(
@@ -95,11 +95,12 @@ def command(
     with documents.source(input, voice) as source:
         chosen = _only(reader.clips(source.document), clip)
         motion, words, num_bound, deviation = _motion(
-            source.document, chosen, kind, orders, axes, fps, limit, scale or CENTIMETERS
+            source.document, chosen, kind, orders, axes, fps, limit, scale or DEFAULT_METERS_PER_UNIT
         )
         data = kind.write(motion, convention)
         if kind is TRACK_FORMATS["bvh"]:  # which can't store its unit
-            words = f"1 unit = {scale or CENTIMETERS:g} m (from-euler --scale {scale or CENTIMETERS:g}), "
+            meters = f"{scale or DEFAULT_METERS_PER_UNIT:g}"
+            words = f"1 unit = {meters} m (from-euler --scale {meters}), "
     if not dry_run:
         documents.write_text(data.decode(), output)
     if num_bound:

@@ -15,7 +15,7 @@ from cli.options import common
 from cli.text import Reporter
 from cli.workflows.edit_clips import Clips, check_clips, edit_clips
 
-LISTED = 4  # times in a note
+MAX_LISTED_TIMES = 4  # times in a note
 
 
 def command(
@@ -59,5 +59,5 @@ def _moved_apart(before: Clips, start: float) -> Iterator[str]:
         by_time.setdefault(round(max(clip.start, start), 6), []).append((clip.name, number))
     if len(by_time) > 1:
         ways = [f"{reader.clip_labels(clips)} by {seconds:.4g} s" for seconds, clips in by_time.items()]
-        shown = "; ".join(ways[:LISTED]) + (" …" if len(ways) > LISTED else "")
+        shown = "; ".join(ways[:MAX_LISTED_TIMES]) + (" …" if len(ways) > MAX_LISTED_TIMES else "")
         yield f"--rebase moves clips that belong together apart: {shown}"

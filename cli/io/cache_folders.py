@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from anim.caches.registry import HEAD
+from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError
 from anim.files import resolver
@@ -70,7 +70,7 @@ class CacheFolder:
     def read_head(self, name: str) -> tuple[bytes, int]:
         """First bytes of a file, and its size."""
         with self.open(name) as file:
-            return file.read(HEAD), self.sizes[name]
+            return file.read(SIGNATURE_BYTES), self.sizes[name]
 
     def names(self) -> Sequence[str]:
         """Names of all files in the folder."""

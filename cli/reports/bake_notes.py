@@ -14,8 +14,8 @@ from anim.skinning.bake import bakeable_instances
 from cli import text
 from cli.text import Reporter
 
-SHOWN_JOINTS = 3  # joints that a note lists
-SHOWN = 1e-3  # of the diagonal; smaller errors are invisible
+MAX_LISTED_JOINTS = 3  # joints that a note lists
+VISIBLE_ERROR_PER_DIAGONAL = 1e-3  # of the diagonal; smaller errors are invisible
 
 
 def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: Reporter) -> None:
@@ -35,8 +35,8 @@ def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: 
 def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: Reporter) -> None:
     """Note the joints with non-uniform scale if other tools define the method differently there."""
     if joints:
-        names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:SHOWN_JOINTS])
-        more = f" and {len(joints) - SHOWN_JOINTS} more" if len(joints) > SHOWN_JOINTS else ""
+        names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:MAX_LISTED_JOINTS])
+        more = f" and {len(joints) - MAX_LISTED_JOINTS} more" if len(joints) > MAX_LISTED_JOINTS else ""
         voice.info(
             f"note: {names}{more}: non-uniform scale, for which tools define {method} differently; here each joint "
             "scales the mesh about its origin before rotating it"
@@ -58,7 +58,7 @@ def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, vo
     found: name and inter-frame error of each clip. rest: (V, 3) m, for the diagonal.
     """
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) if len(rest) else 0.0
-    seen = [(missed, name) for name, missed in found if missed.distance > SHOWN * diagonal]
+    seen = [(missed, name) for name, missed in found if missed.distance > VISIBLE_ERROR_PER_DIAGONAL * diagonal]
     if seen:
         missed, name = max(seen)
         others = f" ({len(seen)} clips are affected)" if len(seen) > 1 else ""

@@ -16,7 +16,7 @@ from cli import tables
 from cli.text import format_change, format_length, format_number, format_speed, plural
 
 SCHEMA = 1
-LISTED = 5  # listed names that only one file has
+MAX_LISTED_NAMES = 5  # listed names that only one file has
 STRANGERS = "no clip and no node has the same name in both files"
 HEADER = (
     *("clip", "joint", "vertex", "time s", "max error", "% of size", "p99", "mean"),
@@ -149,8 +149,8 @@ def _alone(found: DiffReport) -> list[str]:
     ):
         if names:
             noun, rest = which.split(" ", 1)
-            more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-            listed = ", ".join(f"'{tables.escape_control(name)}'" for name in names[:LISTED])
+            more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
+            listed = ", ".join(f"'{tables.escape_control(name)}'" for name in names[:MAX_LISTED_NAMES])
             lines.append(f"{plural(len(names), noun)} {rest}: {listed}{more}")
     if not diff.by_vertex:
         lines.append("meshes differ: the first file's vertices, carried by the second one's joints")

@@ -17,7 +17,7 @@ from anim.model import Skeleton
 from cli import tables, text
 
 SCHEMA = 1
-LISTED = 8  # names in a line
+MAX_LISTED_NAMES = 8  # names in a line
 WORDS = {
     Measure.JOINTS: "the path is scaled by the distances of the matched joints at rest",
     Measure.EXTENT: "the path is scaled by the sizes of both figures at rest",
@@ -105,8 +105,8 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
 
 def listed(names: list[str]) -> str:
     """Return some names for a line: "'a', 'b' and 3 more"."""
-    words = ", ".join(f"'{name}'" for name in names[:LISTED])
-    return f"{words} and {len(names) - LISTED} more" if len(names) > LISTED else words
+    words = ", ".join(f"'{name}'" for name in names[:MAX_LISTED_NAMES])
+    return f"{words} and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else words
 
 
 def _angles_line(motion: EulerMotion) -> Iterator[str]:

@@ -9,7 +9,7 @@ from anim.gltf.document import Document, json_array
 from anim.gltf.io.images import external_uri, read_image
 from cli import text
 
-LISTED = 3  # names in a note
+MAX_LISTED_NAMES = 3  # names in a note
 
 
 def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: str = "") -> Iterator[str]:
@@ -30,4 +30,4 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
 
 
 def _listed(names: list[str]) -> str:
-    return ", ".join(names[:LISTED]) + (", …" if len(names) > LISTED else "")
+    return ", ".join(names[:MAX_LISTED_NAMES]) + (", …" if len(names) > MAX_LISTED_NAMES else "")

@@ -24,8 +24,8 @@ from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length, plural
 
-LISTED = 3  # positions in the file that a note lists
-LONG = 60_000  # keys times tracks; above, worker processes save more time than they cost
+MAX_LISTED = 3  # positions in the file that a note lists
+MIN_PARALLEL_KEYS = 60_000  # keys times tracks; above, worker processes save more time than they cost
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class OptimizeReport:
 
 def is_long(clips: Sequence[Clip], chosen: Sequence[int]) -> bool:
     """Return whether several processes are faster than one."""
-    return len(chosen) > 1 and sum(track.values.size for i in chosen for track in clips[i].tracks) > LONG
+    return len(chosen) > 1 and sum(track.values.size for i in chosen for track in clips[i].tracks) > MIN_PARALLEL_KEYS
 
 
 def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: float) -> None:
@@ -98,7 +98,9 @@ def retained_keys(document: Document, clips: Iterable[int]) -> str:
     places = extensions_naming_keys(document.json, clips)
     if not places:
         return ""
-    named = ", ".join(places[:LISTED]) + (f" and {len(places) - LISTED} more" if len(places) > LISTED else "")
+    named = ", ".join(places[:MAX_LISTED]) + (
+        f" and {len(places) - MAX_LISTED} more" if len(places) > MAX_LISTED else ""
+    )
     return f"some old keys stay in the file, since unknown extensions may refer to them ({named})"
 
 

@@ -134,7 +134,7 @@ def index_of(replaced: str | None, document: Document) -> int | None:
     names = reader.names(document)
     found = Selection((replaced,)).chosen_clips(names)
     if len(found) > 1:
-        listed = ", ".join(f"#{i} '{names[i]}'" for i in found[: from_euler_report.LISTED])
+        listed = ", ".join(f"#{i} '{names[i]}'" for i in found[: from_euler_report.MAX_LISTED_NAMES])
         raise NotFoundError(f"--replace '{replaced}' means {len(found)} clips (expected one)", help=f"one of {listed}")
     return found[0]
 

@@ -30,7 +30,7 @@ from cli.text import format_span, format_time, plural
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by index in the file
 DRY = " (dry run: nothing written)"
-LISTED = 3  # clips listed with their durations; of more the sum
+MAX_LISTED_CLIPS = 3  # clips listed with their durations; of more the sum
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +217,7 @@ def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
     """
     spans = {i: [format_span(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
     changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
-    if len(changed) <= LISTED:
+    if len(changed) <= MAX_LISTED_CLIPS:
         return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())
     sums = (sum(clips[i].end for i in changed) for clips in (before, after))
     return f"{plural(len(changed), 'clip')} {' → '.join(map(format_time, sums))} in all"

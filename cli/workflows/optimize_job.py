@@ -27,8 +27,8 @@ from cli.progress import Progress
 from cli.reports import optimize_report
 from cli.text import Reporter, format_length, plural
 
-MAX_ERROR = "0.01%"  # of the diagonal
-BYTES = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
+DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
+BYTES_PER_UNIT = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +204,7 @@ def count_of_bytes(text: str) -> int:
     number = text.strip().lower().rstrip("bkmgi ")
     unit = text.strip().lower()[len(number) :].strip()
     try:
-        count = int(float(number) * BYTES[unit])
+        count = int(float(number) * BYTES_PER_UNIT[unit])
     except (ValueError, KeyError, OverflowError):
         count = 0
     if count <= 0:

@@ -14,7 +14,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats.gltf_stream import GlbFile, primitive, signed
-from anim.caches.formats.morph_encoding import SHORT, MorphEncoding, encode_morphs
+from anim.caches.formats.morph_encoding import MAX_INT16, MorphEncoding, encode_morphs
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.storage import Outputs
 from anim.caches.transforms import statistics
@@ -24,12 +24,12 @@ from anim.errors import RangeError, UnsupportedError
 from anim.gltf.authoring_parts import VERTICES
 from anim.model import FrameChunk, VertexCache
 
-DEFAULT_ERROR = 1e-3  # fraction of the diagonal, without a given limit
-MAX_BYTES = 1 << 30  # of positions, three times this in memory
+DEFAULT_ERROR_PER_DIAGONAL = 1e-3  # fraction of the diagonal, without a given limit
+MAX_POSITION_BYTES = 1 << 30  # of positions, three times this in memory
 MAX_TARGETS = 1024
 PORTABLE_TARGETS = 8  # guaranteed by glTF; most engines support more
-BATCH = 16  # frames compared at a time
-MARGINS = 0.98, 0.5  # fractions of the limit, reserve for rounding to float32; the second if the first fails
+BATCH_FRAMES = 16  # frames compared at a time
+LIMIT_FRACTIONS = 0.98, 0.5  # fractions of the limit, reserve for rounding to float32; the second if the first fails
 NAME, EXTRAS = "cache", "gltf_anim"
 
 
@@ -38,14 +38,16 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
 
     Raises UnsupportedError for caches over 1 GB, RangeError if no encoding satisfies the limit.
     """
-    if 12 * cache.frame_count * cache.vertex_count > MAX_BYTES:
+    if 12 * cache.frame_count * cache.vertex_count > MAX_POSITION_BYTES:
         raise UnsupportedError(
             f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices are "
             f"{12 * cache.frame_count * cache.vertex_count / 1e9:.1f} GB of positions (at most 1.1)",
             help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed)",
         )
     whole = cache.load_all()
-    limit = writing.max_error if writing.max_error is not None else DEFAULT_ERROR * statistics.diagonal(cache)
+    limit = (
+        writing.max_error if writing.max_error is not None else DEFAULT_ERROR_PER_DIAGONAL * statistics.diagonal(cache)
+    )
     best = _smallest_encoding(whole.positions, cache.times, limit, quantize=writing.quantize)
     if best is None:
         advice = "allow a larger `max_error`" + (", or leave out `quantize`" if writing.quantize else "")
@@ -65,10 +67,10 @@ def _smallest_encoding(
         errors = ((form, _worst(positions, times, form)) for form in changed)
         return [(form, error) for form, error in errors if error <= limit]
 
-    kept = reduce_frames(positions, times, limit * MARGINS[0])
+    kept = reduce_frames(positions, times, limit * LIMIT_FRACTIONS[0])
     most = len(kept) - 1
     found: list[tuple[MorphEncoding, float]] = []
-    for margin in MARGINS:
+    for margin in LIMIT_FRACTIONS:
         found = found or within(_pca_targets(positions, times, limit * margin, most=most))
     fewest = min((len(form.targets) for form, _ in found), default=most)
     if most <= min(fewest + 1, MAX_TARGETS):
@@ -99,8 +101,8 @@ def _worst(positions: AnyArray, times: Floats, form: MorphEncoding) -> float:
     keys = times[form.frames].astype(np.float32)  # as stored
     flat = form.targets.reshape(len(form.targets), form.base.size)
     worst = 0.0
-    for first in range(0, len(positions), BATCH):
-        rows = slice(first, first + BATCH)
+    for first in range(0, len(positions), BATCH_FRAMES):
+        rows = slice(first, first + BATCH_FRAMES)
         weights = np.empty((len(times[rows]), len(flat)), np.float32)
         for i, column in enumerate(form.weights.T):
             weights[:, i] = np.interp(times[rows], keys, column)
@@ -124,7 +126,7 @@ def _write(cache: VertexCache, whole: FrameChunk, form: MorphEncoding, outputs: 
         attributes["TANGENT"] = file.add(signed(along[0], cache.handedness), target=VERTICES)
     targets = []
     for i, target in enumerate(form.targets):
-        rows = np.rint(target * SHORT).astype("<i2") if quantize else target.astype("<f4")
+        rows = np.rint(target * MAX_INT16).astype("<i2") if quantize else target.astype("<f4")
         entry = {"POSITION": file.add(rows, target=VERTICES, normalized=quantize, bounds=True)}
         if turns is not None:
             entry["NORMAL"] = file.add(turns[1 + i].astype("<f4"), target=VERTICES)

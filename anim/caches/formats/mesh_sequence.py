@@ -18,7 +18,7 @@ from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
 
 DEFAULT_FPS = 24.0  # for files of other programs, which have no rate
-HEAD = 1024  # bytes that contain the comment
+COMMENT_BYTES = 1024  # bytes that contain the comment
 
 
 def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
@@ -104,7 +104,7 @@ def _times(inputs: Inputs, names: Sequence[str], fps: float | None) -> Floats:
     said = []
     for name in names:
         with inputs.open(name) as file:
-            said.append(mesh_frame.comment_of(file.read(HEAD)).get("time"))
+            said.append(mesh_frame.comment_of(file.read(COMMENT_BYTES)).get("time"))
     if fps is None and None not in said:
         try:
             times = np.array(said, np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 
-SHORT = 32767
+MAX_INT16 = 32767
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def _quantize(form: MorphEncoding) -> MorphEncoding:
     size = np.abs(form.targets).max(axis=(1, 2), initial=0.0).astype(np.float64)
     size = np.where(size > 0, size, 1.0)
     scale = 2.0 ** np.ceil(np.log2(size.max(initial=1.0)))  # a power of two, which adds no rounding
-    targets = (np.rint(form.targets / size[:, None, None] * SHORT) / SHORT).astype(np.float32)
+    targets = (np.rint(form.targets / size[:, None, None] * MAX_INT16) / MAX_INT16).astype(np.float32)
     return replace(form, targets=targets, weights=form.weights * (size / scale), scale=float(scale))
 
 

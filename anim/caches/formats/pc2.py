@@ -67,13 +67,13 @@ def _rate(times: Floats) -> tuple[float, tuple[str, ...]]:
     if len(times) == 1:
         return DEFAULT_FPS, ()
     step, off = statistics.frame_spacing(times)
-    if off[:-1].max() > statistics.EVEN:
-        k = int(np.argmax(off[:-1] > statistics.EVEN))
+    if off[:-1].max() > statistics.GRID_TOLERANCE_FRAMES:
+        k = int(np.argmax(off[:-1] > statistics.GRID_TOLERANCE_FRAMES))
         raise RangeError(
             f"PC2 has frames at even steps, and frame {k} at {times[k]:.4g} s is off them",
             help="choose a frame rate with `fps`",
         )
     fps = float(f"{1 / step:.6g}")
-    if off[-1] > statistics.EVEN:
+    if off[-1] > statistics.GRID_TOLERANCE_FRAMES:
         return fps, (f"{statistics.last_frame_note(times, off)}; PC2 shows it one step after the one before",)
     return fps, ()

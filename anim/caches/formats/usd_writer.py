@@ -25,7 +25,7 @@ DEFAULT_FPS = 24.0  # USD's own default
 PRIM = "/mesh"
 TANGENTS = "tangents"  # primvar name used by exporters from glTF
 KEY = "gltf_anim"  # in the layer's custom data: the parts, as in an .npz
-PER_SECOND = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # frame rates tried, in this order
+USUAL_FPS = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # frame rates tried, in this order
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
@@ -111,7 +111,7 @@ def _bounds(vt: Any, rows: AnyArray) -> Any:
 
 def _rate(times: Floats) -> float:
     """The first common rate with all times but the last on its frames, else 24: codes may be fractions."""
-    for rate in PER_SECOND:
+    for rate in USUAL_FPS:
         off = times[: max(len(times) - 1, 1)] * rate
         if np.abs(off - np.rint(off)).max() < 1e-3:
             return float(rate)

@@ -9,8 +9,8 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 
-BLOCK = 1 << 22  # values processed at a time, in float64
-RANK = 1e-15  # fraction of the largest eigenvalue; smaller ones are noise
+BLOCK_VALUES = 1 << 22  # values processed at a time, in float64
+MIN_EIGENVALUE_FRACTION = 1e-15  # fraction of the largest eigenvalue; smaller ones are noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ def fit_basis(positions: AnyArray, limit: float, *, most: int) -> PcaBasis | Non
     for _, rows, _ in _blocks(positions):
         products += rows @ rows.T
     values, vectors = np.linalg.eigh(products)
-    rank = int(np.count_nonzero(values > values.max() * RANK))
+    rank = int(np.count_nonzero(values > values.max() * MIN_EIGENVALUE_FRACTION))
     vectors = vectors[:, ::-1][:, : min(rank, most)]
     count = _min_shapes(positions, vectors, limit)
     if count is None:
@@ -52,7 +52,7 @@ def fit_basis(positions: AnyArray, limit: float, *, most: int) -> PcaBasis | Non
 
 def _blocks(positions: AnyArray) -> Iterator[tuple[slice, Floats, Floats]]:
     """Blocks of vertices, minus their mean over the frames (F, 3 n), and that mean (3 n)."""
-    step = max(BLOCK // (3 * len(positions)), 1)
+    step = max(BLOCK_VALUES // (3 * len(positions)), 1)
     for first in range(0, positions.shape[1], step):
         some = slice(first, first + step)
         rows = positions[:, some].reshape(len(positions), -1).astype(np.float64)

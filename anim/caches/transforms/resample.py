@@ -18,8 +18,8 @@ from anim.sampling import frame_times
 
 Frame: TypeAlias = tuple[AnyArray | None, ...]  # positions, normals, tangents of one frame
 
-SAME = 1e-6  # s; closer times are the same frame
-COMPARED_VALUES = 1 << 22  # at a time
+SAME_FRAME_TOLERANCE_S = 1e-6  # s; closer times are the same frame
+MAX_COMPARED_VALUES = 1 << 22  # at a time
 
 
 def resample_frames(cache: VertexCache, times: Floats) -> VertexCache:
@@ -27,14 +27,14 @@ def resample_frames(cache: VertexCache, times: Floats) -> VertexCache:
 
     Memory: some frames of the old cache and a chunk of the new.
     """
-    if len(times) == cache.frame_count and np.abs(times - cache.times).max() < SAME:
+    if len(times) == cache.frame_count and np.abs(times - cache.times).max() < SAME_FRAME_TOLERANCE_S:
         return cache
     last = cache.frame_count - 1
-    left = np.clip(np.searchsorted(cache.times, times + SAME, side="right") - 1, 0, last)
+    left = np.clip(np.searchsorted(cache.times, times + SAME_FRAME_TOLERANCE_S, side="right") - 1, 0, last)
     right = np.minimum(left + 1, last)
     span = cache.times[right] - cache.times[left]
     share = np.clip((times - cache.times[left]) / np.where(span > 0, span, 1.0), 0.0, 1.0)
-    share[np.abs(times - cache.times[left]) < SAME] = 0.0
+    share[np.abs(times - cache.times[left]) < SAME_FRAME_TOLERANCE_S] = 0.0
     return replace(cache, times=times, chunks=lambda: _chunks(cache, left, right, share))
 
 
@@ -49,7 +49,7 @@ def at_rate(cache: VertexCache, fps: float) -> VertexCache:
 def at_time(cache: VertexCache, time: float) -> VertexCache:
     """Return the cache with one frame, at `time` in seconds. Raises RangeError outside its range."""
     first, last = float(cache.times[0]), float(cache.times[-1])
-    if not first - SAME <= time <= last + SAME:
+    if not first - SAME_FRAME_TOLERANCE_S <= time <= last + SAME_FRAME_TOLERANCE_S:
         raise RangeError(f"there is no frame at {time:g} s (the cache goes from {first:g} s to {last:g} s)")
     return resample_frames(cache, np.array([min(max(time, first), last)]))
 
@@ -111,7 +111,7 @@ def reduce_frames(positions: AnyArray, times: Floats, limit: float) -> Ints:
 
 
 def _fits(positions: AnyArray, times: Floats, limit: float, start: int, end: int) -> bool:
-    step = max(1, COMPARED_VALUES // max(positions[0].size, 1))
+    step = max(1, MAX_COMPARED_VALUES // max(positions[0].size, 1))
     delta = positions[end] - positions[start]
     for first in range(start + 1, end, step):
         rows = slice(first, min(first + step, end))

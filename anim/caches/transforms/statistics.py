@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import VertexCache
 
-EVEN = 1e-3  # fraction of a step by which a frame may deviate from the grid
+GRID_TOLERANCE_FRAMES = 1e-3  # fraction of a step by which a frame may deviate from the grid
 
 
 def bounds(cache: VertexCache) -> tuple[Floats, Floats]:
@@ -45,11 +45,11 @@ def notes(times: Floats) -> tuple[str, ...]:
         return ()
     _, off = frame_spacing(times)
     steps = np.diff(times)
-    if off[:-1].max() > EVEN:
+    if off[:-1].max() > GRID_TOLERANCE_FRAMES:
         return (
             f"frames are not evenly spaced: {steps.min():.3g} … {steps.max():.3g} s apart (a frame rate spaces them)",
         )
-    return (last_frame_note(times, off),) if off[-1] > EVEN else ()
+    return (last_frame_note(times, off),) if off[-1] > GRID_TOLERANCE_FRAMES else ()
 
 
 def last_frame_note(times: Floats, off: Floats) -> str:

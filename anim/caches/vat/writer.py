@@ -34,7 +34,7 @@ from anim.gltf.authoring_parts import VERTICES
 from anim.model import VertexCache
 
 MAX_WIDTH, MAX_HEIGHT = 4096, 8192  # pixels supported by desktop engines
-UNORM = 65535
+MAX_UNORM16 = 65535
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +62,12 @@ class PixelEncoding:
     def pixels(self, numbers: AnyArray) -> AnyArray:
         """Encode values (..., 3) as pixels."""
         if self.kind == "unorm16":
-            return np.rint((numbers - self.offset) / self.scale * UNORM).clip(0, UNORM).astype(np.uint16)
+            return np.rint((numbers - self.offset) / self.scale * MAX_UNORM16).clip(0, MAX_UNORM16).astype(np.uint16)
         return numbers.astype(exr.TYPES[self.kind])
 
     def numbers(self, pixels: AnyArray) -> Floats:
         """Decode pixels (..., 3) to values."""
-        shares = pixels / UNORM if self.kind == "unorm16" else pixels.astype(np.float64)
+        shares = pixels / MAX_UNORM16 if self.kind == "unorm16" else pixels.astype(np.float64)
         return self.offset + self.scale * shares
 
 

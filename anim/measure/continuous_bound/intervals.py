@@ -9,9 +9,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints, unique_sorted
 from anim.model import Clip, TimeAxis
 
-MAX_UNSPLIT_S = (
-    0.05  # s; longer intervals are split at all sampled times: the second derivative is bounded per interval
-)
+MAX_UNSPLIT_S = 0.05  # s; longer intervals are split at all samples, for a bound per part
 
 
 class Intervals:

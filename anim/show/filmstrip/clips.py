@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Bools, Floats
 from anim.caches.transforms import resample, up_axis
-from anim.caches.transforms.resample import SAME
+from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf.document import Document
@@ -48,7 +48,7 @@ class FrameSelection:
     def check(self, start: float, end: float) -> None:
         """Raise RangeError for a requested time outside all motions, which range from `start` to `end` s."""
         for time in self.at:
-            if not start - SAME <= time <= end + SAME:
+            if not start - SAME_FRAME_TOLERANCE_S <= time <= end + SAME_FRAME_TOLERANCE_S:
                 raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
 
     def span(self, start: float, end: float) -> tuple[float, float]:
@@ -68,7 +68,7 @@ class FrameSelection:
         """
         if self.at:
             at = np.unique(np.array(self.at, np.float64))
-            return at[(at >= start - SAME) & (at <= end + SAME)]
+            return at[(at >= start - SAME_FRAME_TOLERANCE_S) & (at <= end + SAME_FRAME_TOLERANCE_S)]
         first, last = self.span(start, end)
         if self.fps is not None and self.count is None:
             found = frame_times(first, last, fps=self.fps)
