@@ -22,8 +22,8 @@ from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
 REST_EXTENSIONS = (".ply", ".obj", "")
-OWN_ENDINGS = ("-rest.ply", "-rest.obj")  # appended to the cache's whole name
-ENDINGS = (
+OWN_SUFFIXES = ("-rest.ply", "-rest.obj")  # appended to the cache's whole name
+OTHER_SUFFIXES = (
     "-rest.ply",
     "-rest.obj",
     ".ply",
@@ -66,8 +66,8 @@ def read(inputs: Inputs, header: int, frames: int, vertices: int, note: Callable
     mark = ""
     stem = PurePath(inputs.main).stem
     for name in (
-        *(companion_name(inputs.main, place) for place in OWN_ENDINGS),
-        *(stem + place for place in ENDINGS),
+        *(companion_name(inputs.main, place) for place in OWN_SUFFIXES),
+        *(stem + place for place in OTHER_SUFFIXES),
     ):
         if name not in there or name == inputs.main:
             continue
