@@ -24,7 +24,7 @@ import fixtures
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "commands.md")
-INPUTS = ("arm", "biped", "flag", "ponytail", "interpolations", "morph_cube", "tube")
+INPUTS = ("arm", "biped", "flag", "ponytail", "interpolations", "morph_cube", "tube", "wall")
 NUM_COLORS = 256  # of a picture in the repository
 NUM_REFINEMENTS = 4  # of the palette, by k-means
 BLOCK = re.compile(r"```sh\n(?P<commands>.*?)```(?P<output>\n\n```text\n.*?```)?", re.DOTALL)

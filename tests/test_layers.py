@@ -54,7 +54,7 @@ FORBIDDEN_METHODS = {"read_bytes", "write_bytes", "read_text", "write_text"}
 FORBIDDEN_ATTRIBUTES = {"sys.stdout", "sys.stderr", "sys.stdin", "sys.argv", "os.environ"}
 FORBIDDEN_ATTRIBUTES |= {"time.time", "np.random.seed", "np.fromfile", "np.load", "np.memmap"}
 LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplotlib", "PIL", "png"}
-LAZY |= {"mujoco", "pxr", "dask"}
+LAZY |= {"mujoco", "pxr", "dask", "rapier3d"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
     "caches.formats": "gltf mesh_sequence",
@@ -72,7 +72,7 @@ PUBLIC = {
     ),
     "gltf.io": "container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
-    "gltf.reading": "accessors materials reader vertex_colors",
+    "gltf.reading": "accessors materials meshes reader vertex_colors",
     "gltf.validation": "buffer_layout channel_targets hierarchy rules schema",
     "gltf.writing": "append byte_ranges references reindex writer",
     "measure.compare": "diff name_matching",
@@ -93,6 +93,7 @@ PUBLIC = {
     ),
     "simulation.cloth": "driver model selection simulate solver",
     "simulation.particles": "emission forces obstacles simulate solver",
+    "simulation.rigid_bodies": "description node_globs simulate",
     "simulation.spring_bones": "chain_globs chains colliders json_reader penetration read reduction report simulate",
     "skinning.analysis": (
         "collapse collapsed_clips inbetween_error method_deviation method_scores recommendations weight_sums"

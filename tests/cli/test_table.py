@@ -137,6 +137,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "face.glb": renamed(built("morph_cube"), ["talk"]),
         "arm.glb": built("arm"),
         "flag.glb": built("flag"),
+        "wall.glb": built("wall"),
         "poses.glb": built("interpolations"),
         "ponytail.glb": built("ponytail"),
     }.items():

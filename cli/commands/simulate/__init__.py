@@ -29,6 +29,13 @@ KINDS: dict[str, CommandInfo] = {
             "gltf-anim simulate cloth flag.glb net.npz --mesh flag --pin x-min --solver mass-spring --stiffness 20",
         ),
     ),
+    "rigid": CommandInfo(
+        "Let rigid bodies fall, collide and come to rest.",
+        (
+            "gltf-anim simulate rigid wall.glb fall.glb --body 'brick*' --body ball --velocity ball=0,0,-9 --floor 0",
+            "gltf-anim simulate rigid wall.glb box.glb --body 'brick*' --shape box --floor 0 --max-error 1mm",
+        ),
+    ),
 }
 
 

@@ -1,0 +1,149 @@
+"""Description of bodies + pose at the start → RigidScene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import AnimError, RangeError
+from anim.maths import matrix, quaternion
+from anim.model import Clip, Skeleton
+from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription, Shape, Vector
+from anim.simulation.rigid_bodies.rigid_scene import (
+    WORLD,
+    BodyCollider,
+    BodyKind,
+    Frame,
+    RigidBody,
+    RigidJoint,
+    RigidScene,
+)
+from anim.simulation.rigid_bodies.shapes import bounding_radius, scale_shape
+
+REST = Motion()
+ZERO: Floats = np.zeros(3)
+IDENTITY: Floats = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def assemble(
+    description: PhysicsDescription, skeleton: Skeleton, clip: Clip, world: Floats, gravity: Vector
+) -> RigidScene:
+    """Return the bodies of a description at the start.
+
+    A node with a motion owns the colliders below it, down to the next such node. A collider without one is static, or
+    animated if the clip moves its node or a parent. A motion whose own node the clip moves follows the clip.
+    world: world_from_node (N, 3, 4) at the start. Raises RangeError without any body that moves.
+    """
+    if not description.motions:
+        raise RangeError("there is no body to simulate", help="name some with `body`")
+    tracked = {track.node for track in clip.tracks if track.path in ("translation", "rotation", "scale")}
+    owners = {node: find_owner(skeleton, node, description) for node in description.colliders}
+    frames = [_frame(each) for each in world]
+    bodies = []
+    for node, motion in description.motions.items():
+        own = [each for each, owner in owners.items() if owner == node]
+        kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
+        kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
+        bodies.append(_body(node, kind, motion, own, description, skeleton, frames[node], world))
+    for node in [each for each, owner in owners.items() if owner < 0]:
+        kind = BodyKind.ANIMATED if tracked & set(ancestors(skeleton, node)) else BodyKind.STATIC
+        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames[node], world))
+    indices = {body.node: i for i, body in enumerate(bodies)}
+    joints = tuple(_joints(description, skeleton, indices, frames))
+    if description.floor is not None:
+        bodies.append(_floor(description))
+    return RigidScene(tuple(bodies), joints, gravity)
+
+
+def find_owner(skeleton: Skeleton, node: int, description: PhysicsDescription) -> int:
+    """Return the nearest node with a motion, from `node` upwards; −1 for none."""
+    return next((each for each in ancestors(skeleton, node) if each in description.motions), -1)
+
+
+def ancestors(skeleton: Skeleton, node: int) -> list[int]:
+    """Return a node and its ancestors, upwards."""
+    found = []
+    while node >= 0:
+        found.append(node)
+        node = int(skeleton.parents[node])
+    return found
+
+
+def relative_frame(outer: Frame, inner: Frame) -> Frame:
+    """Return `inner` in the space of `outer`."""
+    back = quaternion.conjugate(outer.rotation)
+    return Frame(quaternion.rotate(back, inner.position - outer.position), quaternion.multiply(back, inner.rotation))
+
+
+def _frame(world: Floats) -> Frame:
+    position, rotation, _, _ = matrix.decompose(world)
+    return Frame(position, rotation)
+
+
+def _body(
+    node: int,
+    kind: BodyKind,
+    motion: Motion,
+    colliders: Sequence[int],
+    description: PhysicsDescription,
+    skeleton: Skeleton,
+    frame: Frame,
+    world: Floats,
+) -> RigidBody:
+    made = []
+    for each in colliders:
+        try:
+            made += _collider(each, description.colliders[each], frame, world[each])
+        except AnimError as error:
+            raise error.at(skeleton.label(each)) from None
+    reach = [float(np.linalg.norm(each.frame.position)) + bounding_radius(each.shape) for each in made]
+    spin = quaternion.rotate(frame.rotation, np.array(motion.angular_velocity))
+    velocity: Floats = np.array(motion.linear_velocity)
+    velocity = velocity if motion.velocity_in_world else quaternion.rotate(frame.rotation, velocity)
+    return RigidBody(node, kind, frame, tuple(made), motion, velocity, spin, max(reach, default=0.0))
+
+
+def _collider(node: int, collider: Collider, body: Frame, world: Floats) -> list[BodyCollider]:
+    """One collider in its body's frame; none for a scale of 0, which disables it."""
+    own = _frame(world)
+    linear = quaternion.to_matrix(quaternion.conjugate(own.rotation)) @ world[:, :3]
+    if not np.linalg.norm(linear, axis=0).any():
+        return []
+    shape: Shape = scale_shape(collider.shape, linear)
+    return [BodyCollider(node, shape, relative_frame(body, own), collider.material, collider.filter)]
+
+
+def _joints(
+    description: PhysicsDescription, skeleton: Skeleton, indices: dict[int, int], frames: Sequence[Frame]
+) -> list[RigidJoint]:
+    found = []
+    for joint in description.joints:
+        ends = (joint.node, joint.connected)
+        owners = [_carrier(skeleton, node, description, indices) for node in ends]
+        if max(owners) < 0:
+            raise RangeError("a joint connects no body", where=skeleton.label(joint.node))
+        if owners[0] == owners[1]:
+            raise RangeError("a joint connects a body with itself", where=skeleton.label(joint.node))
+        own = [frames[owner] if owner >= 0 else Frame(ZERO, IDENTITY) for owner in owners]
+        local = [relative_frame(outer, frames[node]) for outer, node in zip(own, ends, strict=True)]
+        bodies = [indices[owner] if owner >= 0 else WORLD for owner in owners]
+        found.append(
+            RigidJoint((bodies[0], bodies[1]), (local[0], local[1]), joint.limits, joint.drives, joint.enable_collision)
+        )
+    return found
+
+
+def _carrier(skeleton: Skeleton, node: int, description: PhysicsDescription, indices: dict[int, int]) -> int:
+    """Node of the body that carries a joint's frame: with a motion, or with an animated collider; −1 for the world."""
+    owner = find_owner(skeleton, node, description)
+    return owner if owner >= 0 else next((each for each in ancestors(skeleton, node) if each in indices), -1)
+
+
+def _floor(description: PhysicsDescription) -> RigidBody:
+    assert description.floor is not None
+    plane = Collider(Shape("plane"), description.floor_material)
+    frame = Frame(np.array([0.0, description.floor, 0.0]), IDENTITY)
+    own = BodyCollider(-1, plane.shape, Frame(ZERO, IDENTITY), plane.material, plane.filter)
+    return RigidBody(-1, BodyKind.STATIC, frame, (own,), REST, ZERO, ZERO, 0.0)

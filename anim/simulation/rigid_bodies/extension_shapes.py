@@ -1,0 +1,102 @@
+"""Shapes of KHR_implicit_shapes, KHR_collision_shapes and OMI_physics_shape, and meshes as shapes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from anim.errors import FormatError, UnsupportedError
+from anim.gltf.document import Document, json_array
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.meshes import Meshes
+from anim.maths import matrix
+from anim.model import Skeleton
+from anim.sampling import rest_pose
+from anim.sampling.pose import local_by_node
+from anim.simulation.rigid_bodies.description import Shape
+from anim.simulation.rigid_bodies.extension_values import read_item, read_number, read_numbers, read_object
+from anim.simulation.rigid_bodies.shapes import join_meshes, mesh_shape
+
+# Radius and height of capsules and cylinders that a file leaves out: KHR's, OMI's.
+KHR_DEFAULTS = {"capsule": (0.25, 0.5), "cylinder": (0.25, 0.5)}
+OMI_DEFAULTS = {"capsule": (0.5, 1.0), "cylinder": (0.5, 2.0)}
+MESH_KINDS = {"convex": "hull", "trimesh": "mesh", "mesh": "mesh"}
+
+
+class ShapeReader:
+    """Reader of a document's shapes. shapes: the extension's array; defaults: of this extension."""
+
+    def __init__(
+        self, document: Document, skeleton: Skeleton, shapes: list[Any], defaults: dict[str, tuple[float, float]]
+    ) -> None:
+        self._document = document
+        self._skeleton = skeleton
+        self._meshes = Meshes(document, Accessors(document))
+        self._shapes = shapes
+        self._defaults = defaults
+        self._local = local_by_node(skeleton, rest_pose(skeleton))[:, 0]
+
+    def shape(self, index: Any) -> Shape:
+        """Return a shape of the array by index. Raises FormatError, RangeError or UnsupportedError."""
+        json = read_item(self._shapes, index, "shape")
+        kind = json.get("type") if isinstance(json, dict) else None
+        if not isinstance(kind, str):
+            raise FormatError(f"shape {index} has no type")
+        values = read_object(json, kind) or json  # the first draft has the values beside the type
+        if kind == "sphere":
+            return Shape("sphere", (read_number(values, "radius", 0.5),))
+        if kind == "box":
+            return Shape("box", read_numbers(values, "size", 3) or (1.0, 1.0, 1.0))
+        if kind in ("capsule", "cylinder"):
+            return self._round_shape(kind, values)
+        if kind == "plane":
+            return _plane(values)
+        if kind in MESH_KINDS:
+            return self.mesh(values.get("mesh"), MESH_KINDS[kind])
+        raise UnsupportedError(f"shape {index} is a '{kind}' (known: sphere, box, capsule, cylinder, plane, meshes)")
+
+    def mesh(self, index: Any, kind: str, weights: Any = None) -> Shape:
+        """Return the "mesh" or "hull" of a mesh by index. weights: of its morph targets."""
+        read_item(json_array(self._document.json, "meshes"), index, "mesh")
+        chosen = None if weights is None else np.asarray(weights, np.float64)
+        return mesh_shape(self._meshes.mesh(index, joint_count=0), kind, chosen)
+
+    def node_meshes(self, node: Any, kind: str) -> Shape:
+        """Return the "mesh" or "hull" of the meshes of a node and its descendants, in the node's space."""
+        read_item(json_array(self._document.json, "nodes"), node, "node")
+        found = self._collect(int(node), np.eye(4)[:3])
+        if not found:
+            raise FormatError(f"node {node} has no mesh to collide with")
+        joined = join_meshes(found)
+        return joined if kind == "mesh" else Shape("hull", points=joined.points[np.unique(joined.faces)])
+
+    def _collect(self, node: int, to_root: Any) -> list[Shape]:
+        json = json_array(self._document.json, "nodes")[node]
+        found = []
+        if "mesh" in json:
+            if "skin" in json:
+                raise UnsupportedError(f"{self._skeleton.label(node)} is skinned: a collider's mesh must be rigid")
+            shape = self.mesh(json["mesh"], "mesh", json.get("weights"))
+            found.append(Shape("mesh", points=matrix.apply(to_root, shape.points), faces=shape.faces))
+        for child in json.get("children", ()):
+            found += self._collect(child, matrix.multiply(to_root, self._local[child]))
+        return found
+
+    def _round_shape(self, kind: str, values: dict[str, Any]) -> Shape:
+        radius, height = self._defaults[kind]
+        radius = read_number(values, "radius", radius)  # older drafts have one radius
+        bottom, top = (read_number(values, key, radius) for key in ("radiusBottom", "radiusTop"))
+        height = read_number(values, "height", height)
+        if not height > 0:
+            raise FormatError(f"a {kind} has height {height:g} (expected above 0)")
+        return Shape(kind, (height, bottom, top))
+
+
+def _plane(values: dict[str, Any]) -> Shape:
+    """An infinite plane, or the two triangles of one with sizes."""
+    x, z = read_number(values, "sizeX", 0.0), read_number(values, "sizeZ", 0.0)
+    if not x or not z:
+        return Shape("plane")
+    corners = np.array([[-x, 0, -z], [-x, 0, z], [x, 0, z], [x, 0, -z]]) / 2
+    return Shape("mesh", points=corners, faces=np.array([[0, 1, 2], [0, 2, 3]]))

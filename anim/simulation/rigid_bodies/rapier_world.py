@@ -1,0 +1,260 @@
+"""Engine Rapier: scenes become its world, centered, in float32.
+
+Rapier solves each step in SUBSTEPS substeps of symplectic Euler, which moves a free fall ½·g·t·h/SUBSTEPS ahead of
+its parabola. All velocities begin half a substep earlier, as in leapfrog; then a free flight is exact.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError, UnsupportedError
+from anim.maths import quaternion
+from anim.simulation.rigid_bodies import rapier_joints
+from anim.simulation.rigid_bodies.description import MAX_SPEED_M_S, combine
+from anim.simulation.rigid_bodies.rapier_package import load_package
+from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidScene
+
+SUBSTEPS = 4
+MAX_PENETRATION_M = 0.005  # that Rapier leaves; of small bodies MAX_PENETRATION_PER_RADIUS
+MAX_PENETRATION_PER_RADIUS, MIN_PENETRATION_M = 0.01, 1e-5
+INFINITE_MASS_KG = 1e9
+PLANE_REACH_M, PLANE_DEPTH_M = 10_000.0, 50.0  # half the size of the box that stands for a plane
+CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
+MAX_FILTERS = 32
+
+
+class RapierWorld:
+    """World of a scene's bodies. step: s. States are those of `scene.moving`, in this order."""
+
+    def __init__(self, scene: RigidScene, step: float) -> None:
+        self._rapier = load_package()
+        self._scene = scene
+        self._center = _center(scene)
+        world = self._rapier.PhysicsWorld(gravity=scene.gravity)
+        self._world = world
+        parameters = world.integration_parameters
+        parameters.dt, parameters.num_solver_iterations = step, SUBSTEPS
+        parameters.normalized_allowed_linear_error = _allowed_penetration(scene)
+        parameters.normalized_max_linear_velocity = MAX_SPEED_M_S  # its own is 400 m/s
+        self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
+        self._groups = _interaction_groups(self._rapier, scene)
+        self._hooked = _has_mixed_modes(scene)
+        self._colliders: dict[int, tuple[int, BodyCollider]] = {}
+        self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
+        self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
+        self._read = [self._bodies[i] for i in scene.moving]
+        anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))
+        for joint in scene.joints:
+            ends = (self._handles[i] if i >= 0 else anchor for i in joint.bodies)
+            world.impulse_joints.insert(*ends, rapier_joints.build_joint(joint), True)
+        if self._hooked:
+            world.physics_hooks = _CombineHooks(self._colliders)
+
+    def step(self) -> None:
+        """Advance the world by a step."""
+        self._world.step()
+
+    def move(self, index: int, position: Floats, rotation: Floats) -> None:
+        """Move an animated body to a frame by the end of the next step."""
+        self._bodies[index].set_next_kinematic_position(self._isometry(Frame(position - self._center, rotation)))
+
+    def states(self) -> list[tuple[float, ...]]:
+        """Return position and quaternion xyzw of the moving bodies: 7 numbers each, relative to `center`."""
+        return [(*body.translation.to_tuple(), *body.rotation.to_tuple()) for body in self._read]
+
+    @property
+    def center(self) -> Floats:
+        """Origin (3,) of the world's own coordinates, near the bodies: float32 is finest there."""
+        return self._center
+
+    def energy(self) -> tuple[float, float]:
+        """Return kinetic and potential energy of the dynamic bodies, in joules."""
+        gravity = np.array(self._scene.gravity)
+        kinetic = potential = 0.0
+        for i in self._scene.moving:
+            body, motion = self._bodies[i], self._scene.bodies[i].motion
+            if self._scene.bodies[i].kind is BodyKind.DYNAMIC and motion.mass != math.inf:
+                kinetic += body.kinetic_energy()
+                fallen = float(gravity @ body.center_of_mass.to_tuple())
+                potential -= body.mass * motion.gravity_factor * fallen
+        return kinetic, potential
+
+    def mass(self) -> float:
+        """Return the mass of the dynamic bodies in kg, without infinite ones."""
+        return sum(float(body.mass) for body in self._read if body.is_dynamic and body.mass < INFINITE_MASS_KG)
+
+    def contacts(self) -> list[tuple[int, int, float]]:
+        """Return the pairs of bodies in contact with their deepest penetration in metres."""
+        found = []
+        for pair in self._world.narrow_phase.contact_pairs():
+            depths = [-point.dist for manifold in pair.manifolds for point in manifold.points]
+            if depths:
+                ends = (self._colliders[handle.index][0] for handle in (pair.collider1, pair.collider2))
+                first, second = sorted(ends)
+                found.append((first, second, max(depths)))
+        return found
+
+    def has_failed(self) -> bool:
+        """Return whether Rapier took a body out in this step, whose state was no longer finite."""
+        return bool(len(self._world.quarantine.bodies))
+
+    def _add_body(self, index: int, body: RigidBody) -> Any:
+        rapier, kind = self._rapier, body.kind
+        makers = {
+            BodyKind.DYNAMIC: rapier.RigidBody.dynamic,
+            BodyKind.STATIC: rapier.RigidBody.fixed,
+            BodyKind.KINEMATIC: rapier.RigidBody.kinematic_velocity_based,
+            BodyKind.ANIMATED: rapier.RigidBody.kinematic_position_based,
+        }
+        frame = Frame(body.frame.position - self._center, body.frame.rotation)
+        builder = makers[kind]().position(self._isometry(frame)).ccd_enabled(kind is BodyKind.DYNAMIC)
+        if kind in (BodyKind.DYNAMIC, BodyKind.KINEMATIC):
+            factor = body.motion.gravity_factor if kind is BodyKind.DYNAMIC else 0.0
+            builder = builder.linvel(tuple(body.linear_velocity + factor * self._early)).gravity_scale(factor)
+            builder = builder.angvel(tuple(body.angular_velocity))
+        shapes = [self._shape(each, kind) for each in body.colliders]
+        if kind is BodyKind.DYNAMIC:
+            builder = builder.additional_mass_properties(self._mass(body, shapes))
+        handle = self._world.add_body(builder)
+        for each, shape in zip(body.colliders, shapes, strict=True):
+            added = self._world.add_collider(self._collider(each, shape), handle)
+            self._colliders[added.index] = (index, each)
+        return handle
+
+    def _collider(self, collider: BodyCollider, shape: Any) -> Any:
+        rapier, material = self._rapier, collider.material
+        modes = {"average": "AVERAGE", "minimum": "MIN", "maximum": "MAX", "multiply": "MULTIPLY"}
+        rule = rapier.CoefficientCombineRule
+        builder = rapier.Collider.new(shape).position(self._isometry(_shape_frame(collider))).density(0.0)
+        builder = builder.friction(material.dynamic_friction).restitution(material.restitution)
+        builder = builder.friction_combine_rule(getattr(rule, modes[material.friction_combine]))
+        builder = builder.restitution_combine_rule(getattr(rule, modes[material.restitution_combine]))
+        builder = builder.collision_groups(self._groups[collider.filter])
+        return builder.active_hooks(rapier.ActiveHooks.MODIFY_SOLVER_CONTACTS) if self._hooked else builder
+
+    def _shape(self, collider: BodyCollider, kind: BodyKind) -> Any:
+        """Rapier's shape. A dynamic mesh, which has no inside, becomes its hull, or convex pieces of it."""
+        shape, make = collider.shape, self._rapier.SharedShape
+        if shape.kind == "sphere":
+            return make.ball(*shape.size)
+        if shape.kind == "box":
+            return make.cuboid(*(length / 2 for length in shape.size))
+        if shape.kind == "plane":
+            return self._plane(kind)
+        if shape.kind in ("capsule", "cylinder"):
+            height, radius, _ = shape.size
+            return (make.capsule_y if shape.kind == "capsule" else make.cylinder)(height / 2, radius)
+        points, faces = shape.points.astype(np.float32), shape.faces.astype(np.uint32)
+        if shape.kind == "mesh" and kind is not BodyKind.DYNAMIC:
+            return make.trimesh(points, faces)
+        hull = self._hull(points)
+        if shape.kind == "hull" or _volume(make.trimesh(points, faces)) >= CONVEX_VOLUME_FRACTION * _volume(hull):
+            return hull
+        return make.convex_decomposition(points, faces)
+
+    def _plane(self, kind: BodyKind) -> Any:
+        """A half-space; where hulls fall, which topple on it (Rapier 0.36), the top of a large box."""
+        has_hulls = any(each.shape.kind in ("hull", "mesh") for body in self._scene.bodies for each in body.colliders)
+        make = self._rapier.SharedShape
+        if kind is BodyKind.DYNAMIC or not has_hulls:
+            return make.halfspace((0.0, 1.0, 0.0))
+        down = self._rapier.Isometry3(translation=(0.0, -PLANE_DEPTH_M, 0.0))
+        return make.compound([(down, make.cuboid(PLANE_REACH_M, PLANE_DEPTH_M, PLANE_REACH_M))])
+
+    def _hull(self, points: Any) -> Any:
+        flat = RangeError("the collider is flat: its hull has no volume")
+        if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1] <= 1e-6 * np.ptp(points):
+            raise flat
+        try:
+            return self._rapier.SharedShape.convex_hull(points)
+        except Exception:  # the package raises a plain one
+            raise flat from None
+
+    def _mass(self, body: RigidBody, shapes: list[Any]) -> Any:
+        """Mass, center and inertia: those of the colliders, unless the motion gives its own."""
+        rapier, motion = self._rapier, body.motion
+        total = rapier.MassProperties.zero()
+        for each, shape in zip(body.colliders, shapes, strict=True):
+            total = total + self._solid(each, shape, motion.density).transform_by(self._isometry(_shape_frame(each)))
+        volume = total.mass
+        mass = motion.mass if motion.mass is not None else volume
+        mass = INFINITE_MASS_KG if math.isinf(mass) else (mass or 1.0)
+        factor = mass / volume if volume else 1.0
+        inertia = [factor * value for value in total.principal_inertia.to_tuple()] if volume else [mass] * 3
+        turned = total.principal_inertia_local_frame if volume else rapier.Rotation3()
+        if motion.inertia_diagonal is not None:
+            x, y, z, w = motion.inertia_orientation
+            inertia, turned = list(motion.inertia_diagonal), rapier.Rotation3(w=w, x=x, y=y, z=z)
+        center = total.local_com.to_tuple() if motion.center_of_mass is None else motion.center_of_mass
+        return rapier.MassProperties(tuple(center), mass, tuple(inertia), turned)
+
+    def _solid(self, collider: BodyCollider, shape: Any, density: float) -> Any:
+        """Mass of one collider; of a closed mesh, and not of its convex pieces, which overlap a little."""
+        if collider.shape.kind != "mesh":
+            return shape.mass_properties(density)
+        points, faces = collider.shape.points.astype(np.float32), collider.shape.faces.astype(np.uint32)
+        solid = self._rapier.SharedShape.trimesh(points, faces)
+        is_closed = 0 < _volume(solid) <= _volume(shape) * 1.5
+        return (solid if is_closed else shape).mass_properties(density)
+
+    def _isometry(self, frame: Frame) -> Any:
+        x, y, z, w = frame.rotation.tolist()
+        rotation = self._rapier.Rotation3(w=w, x=x, y=y, z=z)
+        return self._rapier.Isometry3(translation=tuple(frame.position.tolist()), rotation=rotation)
+
+
+class _CombineHooks:
+    """Friction and restitution of pairs by glTF's order of combine modes, where colliders have different ones."""
+
+    def __init__(self, colliders: dict[int, tuple[int, BodyCollider]]) -> None:
+        self._colliders = colliders
+
+    def modify_solver_contacts(self, context: Any) -> None:
+        first, second = (self._colliders[h.index][1].material for h in (context.collider1, context.collider2))
+        modes = (first.friction_combine, second.friction_combine)
+        context.friction = combine(modes, first.dynamic_friction, second.dynamic_friction)
+        modes = (first.restitution_combine, second.restitution_combine)
+        context.restitution = combine(modes, first.restitution, second.restitution)
+
+
+def _shape_frame(collider: BodyCollider) -> Frame:
+    """The shape's own frame in the body, its center included."""
+    offset = quaternion.rotate(collider.frame.rotation, np.array(collider.shape.center))
+    return Frame(collider.frame.position + offset, collider.frame.rotation)
+
+
+def _volume(shape: Any) -> float:
+    return float(shape.mass_properties(1.0).mass)
+
+
+def _center(scene: RigidScene) -> Floats:
+    positions = [scene.bodies[i].frame.position for i in scene.moving]
+    return np.asarray(np.round(np.mean(positions, axis=0)), np.float64) if positions else np.zeros(3)
+
+
+def _allowed_penetration(scene: RigidScene) -> float:
+    radii = [scene.bodies[i].radius for i in scene.moving if scene.bodies[i].radius > 0]
+    least = MAX_PENETRATION_PER_RADIUS * min(radii, default=1.0)
+    return float(np.clip(least, MIN_PENETRATION_M, MAX_PENETRATION_M))
+
+
+def _has_mixed_modes(scene: RigidScene) -> bool:
+    materials = [each.material for body in scene.bodies for each in body.colliders]
+    return len({(m.friction_combine, m.restitution_combine) for m in materials}) > 1
+
+
+def _interaction_groups(rapier: Any, scene: RigidScene) -> dict[Any, Any]:
+    """A bit for each distinct filter, and the bits of those that it collides with."""
+    filters = list(dict.fromkeys(each.filter for body in scene.bodies for each in body.colliders))
+    if len(filters) > MAX_FILTERS:
+        raise UnsupportedError(f"{len(filters)} different collision filters (limit {MAX_FILTERS})")
+    groups = {}
+    for i, own in enumerate(filters):
+        bits = sum(1 << j for j, other in enumerate(filters) if own.accepts(other) and other.accepts(own))
+        groups[own] = rapier.InteractionGroups(rapier.Group(1 << i), rapier.Group(bits))
+    return groups

@@ -1,0 +1,146 @@
+"""`gltf-anim simulate rigid`: bodies that fall, collide and come to rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from anim.gltf.document import Document
+from anim.measure.error.surface import diagonal
+from anim.model import Clip, Scene
+from anim.operations.selection import Selection
+from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
+from anim.simulation.report import SimulationReport
+from anim.simulation.rigid_bodies.description import WATER_KG_M3, Material, Motion, PhysicsDescription
+from anim.simulation.rigid_bodies.node_globs import SHAPES, ChosenNodes, add_chosen
+from anim.simulation.rigid_bodies.simulate import (
+    RigidOptions,
+    add_rigid_motion,
+    read_description,
+    simulate_rigid_bodies,
+)
+from cli import text, units
+from cli.errors import UsageError
+from cli.options import common, simulation
+from cli.options.simulation import parse_seconds, parse_vector
+from cli.text import Reporter
+from cli.workflows.simulate_clip import simulate_clip
+
+EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
+DEFAULT_DURATION_S = 5.0
+ROUNDING_M = 1e-6  # float32 of a body some metres from the center
+Shape = StrEnum("Shape", [(name, name) for name in SHAPES])  # type: ignore[misc]
+HULL = Shape("hull")
+
+
+def command(
+    input: common.Input = "-",
+    output: common.Output = "-",
+    *,
+    body: Annotated[
+        list[str] | None,
+        typer.Option("--body", metavar="GLOB", help="Nodes that become bodies, with all meshes below; repeatable."),
+    ] = None,
+    shape: Annotated[
+        Shape, typer.Option("--shape", help="Shape of each mesh of --body: its hull, box, sphere, or itself.")
+    ] = HULL,
+    collider: Annotated[
+        list[str] | None,
+        typer.Option("--collider", metavar="GLOB", help="Nodes that bodies collide with, static or animated."),
+    ] = None,
+    density: Annotated[float, typer.Option("--density", metavar="N", help="Density in kg/m³.")] = WATER_KG_M3,
+    friction: Annotated[float, typer.Option("--friction", metavar="N", help="Coulomb's friction.", min=0)] = 0.6,
+    restitution: Annotated[
+        float, typer.Option("--restitution", metavar="0..1", help="Speed kept by a bounce.", min=0, max=1)
+    ] = 0.0,
+    velocity: Annotated[
+        list[str] | None,
+        typer.Option("--velocity", metavar="GLOB=X,Y,Z", help="Velocity of bodies at the start, in m/s; repeatable."),
+    ] = None,
+    floor: Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height in metres of a floor.")] = None,
+    gravity: Annotated[str, typer.Option("--gravity", metavar="X,Y,Z", help="Acceleration in m/s².")] = EARTH_GRAVITY,
+    step: simulation.Step = "1/240",
+    fps: simulation.Fps = 60.0,
+    duration: simulation.Duration = None,
+    warm_up: simulation.WarmUp = 0.0,
+    max_error: simulation.MaxError = None,
+    clip: simulation.Clip = None,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="Add the tracks to the driving clip, not to a new one.")
+    ] = False,
+    name: Annotated[str, typer.Option("--name", metavar="NAME", help="Name of the clip.")] = "rigid",
+    report: simulation.ReportFile = None,
+    dry_run: common.DryRun = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
+) -> None:
+    """Let rigid bodies fall, collide and come to rest.
+
+    Bodies are nodes named by --body, and those of KHR_physics_rigid_bodies or OMI_physics_body in the file, with their
+    colliders, materials, filters, joints and motors. Colliders that the driving clip moves push bodies. Impacts get
+    keys at their own time between frames; a body that sleeps has no more keys. The same file and options give the same
+    bytes on the same kind of processor. Requires rapier3d: pip install 'gltf-anim[physics]'.
+    """
+    if fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    options = RigidOptions(parse_vector(gravity, "--gravity"), parse_seconds(step, "--step"), fps, warm_up=warm_up)
+    material = Material(friction, friction, restitution)
+    voice = Reporter(quiet, verbose)
+
+    def simulate(
+        document: Document, scene: Scene, driver: Clip, number: int | None
+    ) -> tuple[Document, SimulationReport, str]:
+        description = read_description(document, scene.skeleton)
+        chosen = ChosenNodes(
+            _nodes(scene, body),
+            shape.value,
+            _nodes(scene, collider),
+            Motion(density=density, follows_clip=False),
+            material,
+        )
+        description = replace(add_chosen(description, scene, chosen), floor=floor, floor_material=material)
+        description = _with_velocities(description, scene, velocity or [])
+        seconds = duration if duration is not None else driver.end or DEFAULT_DURATION_S
+        error = units.parse_length(max_error, "--max-error", lambda: diagonal(scene)) if max_error else 0.0
+        run = simulate_rigid_bodies(scene, driver, description, replace(options, duration=seconds, max_error=error))
+        for note in run.notes:
+            voice.warn(note)
+        merged = (number, driver) if merge and number is not None else None
+        return add_rigid_motion(document, run, name, merged), run.report, _summary(run.report)
+
+    simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)
+
+
+def _nodes(scene: Scene, globs: list[str] | None) -> tuple[int, ...]:
+    return tuple(sorted(Selection((), globs).chosen_nodes(scene.skeleton))) if globs else ()
+
+
+def _with_velocities(description: PhysicsDescription, scene: Scene, given: list[str]) -> PhysicsDescription:
+    motions = dict(description.motions)
+    for each in given:
+        glob, equals, numbers = each.rpartition("=")
+        if not equals:
+            raise UsageError(f"--velocity is '{each}' (expected GLOB=X,Y,Z)")
+        velocity = parse_vector(numbers, "--velocity")
+        nodes = set(_nodes(scene, [glob])) & motions.keys()
+        if not nodes:
+            raise UsageError(f"--velocity '{glob}' names no body")
+        for node in nodes:
+            motions[node] = replace(motions[node], linear_velocity=velocity, velocity_in_world=True)
+    return replace(description, motions=motions)
+
+
+def _summary(report: SimulationReport) -> str:
+    figures = report.figures
+    parts = [
+        f"{figures['bodies']} {'body' if figures['bodies'] == 1 else 'bodies'}",
+        text.plural(figures["impacts"], "impact"),
+        text.plural(figures["keys"], "key"),
+        f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
+    ]
+    if report.error_estimate_m and report.error_estimate_m > ROUNDING_M:
+        parts.append(f"half the step differs by {text.format_length(report.error_estimate_m)}")
+    return ", ".join(parts)

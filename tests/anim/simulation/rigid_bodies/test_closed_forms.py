@@ -1,0 +1,116 @@
+"""Rapier against closed forms: fall, bounce, incline, spin, pendulum, stack, mass."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.maths import quaternion
+from anim.simulation.rigid_bodies.description import JointLimit, Material, Motion, Shape
+from anim.simulation.rigid_bodies.impacts import find_impacts
+from anim.simulation.rigid_bodies.rapier_world import RapierWorld
+from anim.simulation.rigid_bodies.rigid_scene import WORLD, RigidJoint, RigidScene
+from tests.anim.simulation.rigid_bodies.cases import G, body, frame, ground, needs_rapier, run
+
+pytestmark = needs_rapier
+BALL = Shape("sphere", (0.1,))
+CUBE = Shape("box", (0.5, 0.5, 0.5))
+
+
+@pytest.mark.parametrize("step", [1 / 60, 1 / 240])
+def test_a_free_flight_is_its_parabola(step: float) -> None:
+    """Rapier alone is ½·g·t·h/4 off: 5.1 mm after 1 s at 1/240."""
+    motion = run(body(BALL, (0, 10, 0), velocity=(1, 5, 0)), step=step)
+    t = motion.times[:, None]
+    expected = np.array([0, 10, 0]) + np.array([1, 5, 0]) * t + 0.5 * np.array([0, -G, 0]) * t**2
+    np.testing.assert_allclose(motion.positions[:, 0], expected, atol=2e-4)
+
+
+@pytest.mark.parametrize(("step", "least"), [(1 / 60, 0.96), (1 / 240, 0.985)])
+@pytest.mark.parametrize("e", [0.5, 0.8, 1.0])
+def test_a_bounce_keeps_the_square_of_the_restitution(e: float, step: float, least: float) -> None:
+    material = Material(0, 0, e)
+    motion = run(ground(material), body(BALL, (0, 1.1, 0), material=material), seconds=1.3, step=step)
+    height = motion.positions[:, 0, 1] - 0.1
+    low = int(np.argmin(height[: round(0.7 / step)]))
+    assert least * e * e <= height[low:].max() <= 1.001 * e * e
+    assert height.min() > -0.04
+
+
+def test_the_time_of_an_impact_is_found_inside_the_step() -> None:
+    material = Material(0, 0, 0.8)
+    motion = run(ground(material), body(BALL, (0, 1.1, 0), material=material), seconds=1.0)
+    times, points = find_impacts(motion.times, motion.positions[:, 0], np.array([0, -G, 0]))
+    assert len(times) == 1
+    assert times[0] == pytest.approx(np.sqrt(2 / G), abs=1.5e-3)  # Rapier bounces at the end of a substep
+    np.testing.assert_allclose(points[0], [0, 0.1, 0], atol=6e-3)
+
+
+@pytest.mark.parametrize(("friction", "degrees"), [(0.3, 30), (0.6, 25)])
+def test_a_box_slides_down_an_incline_or_sticks(friction: float, degrees: float) -> None:
+    angle = np.radians(degrees)
+    material = Material(friction, friction)
+    box = body(CUBE, (0, 0.25, 0), material=material)
+    motion = run(ground(material), box, seconds=2.0, gravity=(G * np.sin(angle), -G * np.cos(angle), 0.0))
+    expected = 0.5 * max(0.0, G * (np.sin(angle) - friction * np.cos(angle))) * 4
+    assert motion.positions[-1, 0, 0] == pytest.approx(expected, rel=0.005, abs=1e-3)
+
+
+def test_a_free_body_keeps_its_angular_momentum() -> None:
+    inertia = np.array([1.0, 2.0, 3.0])
+    spinning = body(BALL, spin=(0.01, 5, 0.01), motion=Motion(mass=1.0, inertia_diagonal=(1.0, 2.0, 3.0)))
+    motion = run(spinning, seconds=5.0, gravity=(0, 0, 0))
+    q = motion.rotations[:, 0]
+    turn = quaternion.rotation_vector(quaternion.multiply(q[1:], quaternion.conjugate(q[:-1]))) * 240
+    world = quaternion.rotate(q[:-1], inertia * quaternion.rotate(quaternion.conjugate(q[:-1]), turn))
+    np.testing.assert_allclose(np.linalg.norm(world, axis=1), 10.0, rtol=0.02)
+    np.testing.assert_allclose(motion.positions[-1, 0], 0, atol=1e-5)
+
+
+def test_a_pendulum_has_the_period_of_the_elliptic_integral() -> None:
+    start = np.radians(60)
+    arm = np.array([np.sin(start), -np.cos(start), 0.0])
+    bob = body(Shape("sphere", (0.01,)), arm, motion=Motion(mass=1.0))
+    locked = (JointLimit(False, (0, 1, 2), 0.0, 0.0),)
+    joint = RigidJoint((WORLD, 0), (frame(), frame(-arm)), locked, (), False)
+    motion = run(bob, seconds=10.0, joints=[joint])
+    x = motion.positions[:, 0, 0]
+    down = np.flatnonzero((x[:-1] > 0) & (x[1:] <= 0))
+    period = np.diff((down + x[down] / (x[down] - x[down + 1])) / 240).mean()
+    a, b = 1.0, np.cos(start / 2)
+    for _ in range(30):
+        a, b = (a + b) / 2, np.sqrt(a * b)
+    assert period == pytest.approx(2 * np.pi / np.sqrt(G) / a, rel=0.003)
+    np.testing.assert_allclose(np.linalg.norm(motion.positions[:, 0], axis=1), 1.0, atol=1e-3)
+    assert np.degrees(np.arcsin(np.abs(x[-500:]).max())) > 58
+
+
+def test_a_stack_of_boxes_stays_and_sleeps() -> None:
+    boxes = [body(CUBE, (0, 0.25 + 0.5 * i, 0)) for i in range(13)]
+    motion = run(ground(), *boxes, seconds=4.0)
+    np.testing.assert_allclose(motion.positions[-1, :, 1], 0.25 + 0.5 * np.arange(13), atol=0.04)
+    np.testing.assert_allclose(motion.positions[-1, :, [0, 2]], 0, atol=0.01)
+    np.testing.assert_array_equal(motion.positions[-1], motion.positions[-60])
+    assert motion.energies[-1, 0] == 0
+
+
+def test_mass_and_energy_are_those_of_the_shapes() -> None:
+    world = RapierWorld(RigidScene((body(CUBE, (0, 2, 0), velocity=(3, 0, 0)),), (), (0.0, -G, 0.0)), 1e-4)
+    world.step()
+    assert world.mass() == pytest.approx(125, rel=1e-5)
+    kinetic, _ = world.energy()
+    assert kinetic == pytest.approx(0.5 * 125 * 9, rel=1e-3)
+
+
+def test_a_hull_weighs_as_its_points_enclose() -> None:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    world = RapierWorld(RigidScene((body(Shape("hull", points=corners)),), (), (0.0, 0.0, 0.0)), 0.01)
+    world.step()
+    assert world.mass() == pytest.approx(1000, rel=1e-4)
+
+
+def test_the_same_scene_gives_the_same_numbers() -> None:
+    boxes = [body(CUBE, (0.1 * i, 0.3 + 0.55 * i, 0)) for i in range(8)]
+    first, second = (run(ground(), *boxes, seconds=2.0) for _ in range(2))
+    np.testing.assert_array_equal(first.positions, second.positions)
+    np.testing.assert_array_equal(first.rotations, second.rotations)
