@@ -84,7 +84,6 @@ PUBLIC = {
     ),
     "measure.loops": "loop_analysis recommendations seam",
     "optimization.search": "plan",
-    "optimization.tracks": "key_reduction",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations stability_plot tangent_plot "

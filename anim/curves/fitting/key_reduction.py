@@ -1,13 +1,14 @@
-"""Key reduction: greedy longest segments within a tolerance."""
+"""Key reduction: greedy longest segments within a tolerance, of any motion or of linear tracks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Bools, Ints
+from anim.arrays import Bools, Floats, Ints
 
 UNBOUNDED = 1 << 30
 
@@ -57,3 +58,35 @@ def greedy_indices(count: int, fits: Callable[[int, int], bool]) -> Ints:
     """Return the indices of the keys that remain of one track; fits: as for `greedy_segments`, start and end key."""
     keep = greedy_segments(1, count, lambda _, start, end: np.array([fits(int(start[0]), int(end[0]))]))
     return np.flatnonzero(keep[0])
+
+
+def greedy_keys(values: Floats, times: Floats) -> Bools:
+    """Return the keys (G, K) of G tracks so that linear interpolation has no error above 1.
+
+    values: (G, K, C), scaled so that 1 is the tolerance. times: (K,). The first and the last key always stay.
+    """
+    tracks, count, _ = values.shape
+    return greedy_segments(tracks, count, partial(_is_straight, values, times))
+
+
+def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
+    """Return the keys (K,) of all tracks on one axis; as `greedy_keys`, with the error of the worst track."""
+    every = np.arange(len(values))
+
+    def fits(_: Ints, start: Ints, end: Ints) -> Bools:
+        same = np.zeros_like(every)
+        return np.array([_is_straight(values, times, every, same + start, same + end).all()])
+
+    return np.asarray(greedy_segments(1, values.shape[1], fits)[0])
+
+
+def _is_straight(values: Floats, times: Floats, track: Ints, start: Ints, end: Ints) -> Bools:
+    """Return whether the line of each track from key `start` to key `end` has errors up to 1 between."""
+    inner = end - start - 1
+    first = np.concatenate(([0], np.cumsum(inner)[:-1]))
+    own = np.repeat(np.arange(len(track)), inner)
+    frame = np.arange(inner.sum()) - first[own] + start[own] + 1
+    u = ((times[frame] - times[start[own]]) / (times[end] - times[start])[own])[:, None]
+    a, b = values[track, start][own], values[track, end][own]
+    error = a + u * (b - a) - values[track[own], frame]
+    return np.asarray(np.maximum.reduceat((error * error).sum(axis=1), first) <= 1)

@@ -9,9 +9,9 @@ from typing import TypeAlias
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
+from anim.curves.fitting.key_reduction import greedy_keys, joint_greedy_keys
 from anim.optimization.search.segment_errors import SegmentErrors, fits
 from anim.optimization.search.source_motion import SourceMotion
-from anim.optimization.tracks.key_reduction import greedy_keys, joint_greedy_keys
 from anim.optimization.tracks.quantization import Encoding
 
 CONSTANT_TOLERANCE = 0.1  # of the bound: tracks this close to their middle value get no table

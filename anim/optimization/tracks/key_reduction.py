@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
-from anim.curves.fitting.key_reduction import greedy_segments
+from anim.arrays import Bools
+from anim.curves.fitting.key_reduction import greedy_keys
 from anim.model import FLOAT32, AccessorFormat, Interpolation, Track, ValueKind
 from anim.sampling.track import sample
 
@@ -79,26 +78,6 @@ def _fits_int16(track: Track) -> bool:
     return len(track.values) > 1 and bool((np.abs(scaled) <= 32767).all() and (scaled / 32767 == track.values).all())
 
 
-def greedy_keys(values: Floats, times: Floats) -> Bools:
-    """Return the keys (G, K) of G tracks so that linear interpolation has no error above 1.
-
-    values: (G, K, C), scaled so that 1 is the tolerance. times: (K,). The first and the last key always stay.
-    """
-    tracks, count, _ = values.shape
-    return greedy_segments(tracks, count, partial(_is_straight, values, times))
-
-
-def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
-    """Return the keys (K,) of all tracks on one axis; as `greedy_keys`, with the error of the worst track."""
-    every = np.arange(len(values))
-
-    def fits(_: Ints, start: Ints, end: Ints) -> Bools:
-        same = np.zeros_like(every)
-        return np.array([_is_straight(values, times, every, same + start, same + end).all()])
-
-    return np.asarray(greedy_segments(1, values.shape[1], fits)[0])
-
-
 def reduce_pointer_keys(track: Track, bound: float) -> Track:
     """Return a pointer track in fewer keys, with an error up to `bound` as a fraction of its range.
 
@@ -112,15 +91,3 @@ def reduce_pointer_keys(track: Track, bound: float) -> Track:
     scaled = sample(track, track.times) / (POINTER_BOUND_FRACTION * bound * extent)
     keep = greedy_keys(scaled[None], track.times)[0]
     return reduce_lossless(track.with_keys(track.times[keep], track.values[keep]))
-
-
-def _is_straight(values: Floats, times: Floats, track: Ints, start: Ints, end: Ints) -> Bools:
-    """Return whether the line of each track from key `start` to key `end` has errors up to 1 between."""
-    inner = end - start - 1
-    first = np.concatenate(([0], np.cumsum(inner)[:-1]))
-    own = np.repeat(np.arange(len(track)), inner)
-    frame = np.arange(inner.sum()) - first[own] + start[own] + 1
-    u = ((times[frame] - times[start[own]]) / (times[end] - times[start])[own])[:, None]
-    a, b = values[track, start][own], values[track, end][own]
-    error = a + u * (b - a) - values[track[own], frame]
-    return np.asarray(np.maximum.reduceat((error * error).sum(axis=1), first) <= 1)

@@ -6,11 +6,11 @@ from collections.abc import Collection
 
 import numpy as np
 
+from anim.curves.fitting.key_reduction import greedy_keys
 from anim.errors import RangeError
 from anim.measure.continuous_bound.largest_error import largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.model import Clip, Skeleton, Track
-from anim.optimization.tracks.key_reduction import greedy_keys
 from anim.sampling import rest_pose, world_matrices
 
 MAX_TRIALS = 12

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.arrays import Bools, Floats
+from anim.curves.fitting.key_reduction import greedy_keys
 from anim.optimization.search import segment_errors
 from anim.optimization.search.segment_errors import SPAN_RANGE, SegmentErrors, fits
-from anim.optimization.tracks.key_reduction import greedy_keys
 
 
 def _missed(values: Floats, times: Floats, keep: Bools) -> float:
