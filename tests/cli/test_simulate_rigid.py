@@ -115,7 +115,4 @@ def test_the_missing_package_is_named(
     monkeypatch.setitem(sys.modules, "rapier3d", None)
     run = call("simulate", "rigid", fixture("wall"), tmp_path / "out.glb", *BRICKS)
     assert run.code == 4
-    assert (
-        run.err == ("gltf-anim: rigid bodies need the package rapier3d\nhelp: pip install 'gltf-anim[physics]'\n")
-        or "pip install 'gltf-anim[physics]'" in run.err
-    )
+    assert "rigid bodies need the package rapier3d\nhelp: pip install 'gltf-anim[physics]'\n" in run.err

@@ -53,7 +53,8 @@ def run_scene(
 ) -> RigidMotion:
     """Return the motion of a scene; steps before 0 s are not in it.
 
-    substeps: steps of a frame. stride: keep every so many steps. Raises UnstableError for a run that diverges.
+    substeps: steps of a frame. stride: keep every so many steps; penetration is measured with 1.
+    Raises UnstableError for a run that diverges.
     """
     world = RapierWorld(rigid, steps.step_s)
     first = -steps.num_warm_up_steps
@@ -83,7 +84,7 @@ def run_scene(
             if limit is not None and not limit.allows(*energy):
                 raise _unstable(index, steps.step_s, "the energy grows")
             energies += [energy] * (index >= 0)
-        if index > 0 and index % sampled == 0:
+        if index > 0 and index % sampled == 0 and stride == 1:
             penetration = max([penetration, *(depth for _, _, depth in world.contacts())])
     times = np.asarray(np.arange(count) * (steps.step_s * stride), np.float64)
     exact = np.asarray(states, np.float64)

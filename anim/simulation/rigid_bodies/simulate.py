@@ -86,8 +86,6 @@ def add_rigid_motion(document: Document, run: RigidRun, name: str, merge: tuple[
 def _report(
     rigid: RigidScene, motion: RigidMotion, made: tracks.BodyTracks, options: RigidOptions, steps: Steps, error: float
 ) -> SimulationReport:
-    energy = motion.energies.sum(axis=1)
-    low = float(motion.energies[:, 1].min())
     speeds = _speeds(motion)
     kinds = [body.kind for body in rigid.bodies]
     figures = {
@@ -108,11 +106,19 @@ def _report(
         options.fps,
         options.duration,
         warm_up_s=options.warm_up,
-        energy_j={"start": energy[0] - low, "end": energy[-1] - low, "peak": float(energy.max()) - low},
+        energy_j=_energy(motion.energies),
         penetration_m=max(0.0, motion.penetration),
         error_estimate_m=error,
         figures=figures,
     )
+
+
+def _energy(energies: Floats) -> dict[str, float] | None:
+    """Total energy above that of the lowest position; None for a run without a step."""
+    if not len(energies):
+        return None
+    total = energies.sum(axis=1) - energies[:, 1].min()
+    return {"start": float(total[0]), "end": float(total[-1]), "peak": float(total.max())}
 
 
 def _speeds(motion: RigidMotion) -> Floats:

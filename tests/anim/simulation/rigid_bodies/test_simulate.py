@@ -154,6 +154,12 @@ def test_a_document_without_bodies_is_refused() -> None:
         simulate(document([node(collider=collider(0))], BALL))
 
 
+def test_a_duration_of_0_writes_the_start() -> None:
+    run = simulate(document([node((0, 1, 0), **FALLING)], BALL), duration=0.0)
+    np.testing.assert_allclose(path(run, 0), [[0, 1, 0]], atol=1e-6)
+    assert run.report.energy_j is None
+
+
 def test_warm_up_lets_bodies_settle_before_the_first_frame() -> None:
     made = document([node((0, 1, 0), **FALLING), node(collider=collider(1))], BALL)
     run = simulate(made, duration=1.0, warm_up=3.0)
