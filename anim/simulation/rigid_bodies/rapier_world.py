@@ -47,6 +47,7 @@ class RapierWorld:
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
+        self._weighed: list[tuple[Any, float]] = []
         self._read = [self._bodies[i] for i in scene.moving]
         anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))
         for joint in scene.joints:
@@ -73,16 +74,23 @@ class RapierWorld:
         return self._center
 
     def energy(self) -> tuple[float, float]:
-        """Return kinetic and potential energy of the dynamic bodies, in joules."""
-        gravity = np.array(self._scene.gravity)
+        """Return kinetic and potential energy of the dynamic bodies, in joules; after the first step."""
+        if not self._weighed:  # once: masses don't change, and Rapier has them from the first step on
+            self._weighed = [(body, body.mass * factor) for body, factor in self._finite()]
+        x, y, z = self._scene.gravity
         kinetic = potential = 0.0
-        for i in self._scene.moving:
-            body, motion = self._bodies[i], self._scene.bodies[i].motion
-            if self._scene.bodies[i].kind is BodyKind.DYNAMIC and motion.mass != math.inf:
-                kinetic += body.kinetic_energy()
-                fallen = float(gravity @ body.center_of_mass.to_tuple())
-                potential -= body.mass * motion.gravity_factor * fallen
+        for body, mass in self._weighed:
+            kinetic += body.kinetic_energy()
+            px, py, pz = body.center_of_mass.to_tuple()
+            potential -= mass * (x * px + y * py + z * pz)
         return kinetic, potential
+
+    def _finite(self) -> list[tuple[Any, float]]:
+        """Dynamic bodies of finite mass, with their gravity factor."""
+        scene = self._scene
+        found = [i for i in scene.moving if scene.bodies[i].kind is BodyKind.DYNAMIC]
+        motions = [(i, scene.bodies[i].motion) for i in found]
+        return [(self._bodies[i], motion.gravity_factor) for i, motion in motions if motion.mass != math.inf]
 
     def mass(self) -> float:
         """Return the mass of the dynamic bodies in kg, without infinite ones."""
