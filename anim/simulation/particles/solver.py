@@ -122,9 +122,9 @@ class ParticleSolver:
                 self._keys.add(gone, births.deaths[gone], self._x[gone], self._v[gone], self._v[gone])
                 alive = alive[~dead]
                 if not self._is_exact and (n + 1) % substeps == 0:
-                    self._record_frame(alive, end)
-        if self._is_exact or steps.num_steps % substeps:
-            self._record_frame(alive, steps.duration_s)
+                    self._record_frame(alive[~self._asleep[alive]], end)
+        last = alive if self._is_exact or steps.num_steps % substeps else alive[self._asleep[alive]]
+        self._record_frame(last, steps.duration_s)
         return self._collect(max_speed)
 
     def _record_frame(self, alive: Ints, time: float) -> None:
@@ -254,7 +254,7 @@ class ParticleSolver:
         t = np.minimum(stop, h)[:, None]
         x = flight.x + t * flight.v + 0.5 * t * t * total
         v = np.where(stops[:, None], 0.0, flight.v + t * total)
-        if self._forces.is_constant:
+        if not self._forces.turbulence:  # the forces stay as they are
             self._asleep[p[still | (stops & (pull <= grip))]] = True
         self._keys.add(p[stops], (flight.start + stop)[stops], x[stops], v[stops], v[stops])
         self._x[p], self._v[p] = x, v
@@ -270,7 +270,7 @@ class ParticleSolver:
         none = (np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
         rows = self._keys.rows or [none]
         particles, times, x, v_in, v_out = (np.concatenate(each) for each in zip(*rows, strict=True))
-        order = np.lexsort((np.arange(len(times)), times, particles))
+        order = np.argsort(particles, kind="stable")  # those of each are in the order of time
         order = order[times[order] >= 0]
         return ParticleKeys(
             particles[order], times[order], x[order], v_in[order], v_out[order], self._num_impacts, max_speed
