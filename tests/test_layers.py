@@ -29,7 +29,7 @@ LEVELS = (
     {"api"},
 )
 NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning")}
-NEIGHBORS |= {("simulation", "skinning"), ("simulation", "operations"), ("simulation", "optimization")}
+NEIGHBORS |= {("simulation", "skinning"), ("simulation", "operations")}
 LEVEL = {package: level for level, packages in enumerate(LEVELS) for package in packages}
 
 MODULES = sorted(path for path in (ROOT / "anim").rglob("*.py") if path.name != "__main__.py")  # which runs the command
@@ -70,7 +70,7 @@ PUBLIC = {
     "exchange.retarget": (
         "apply bind_pose ground_contact joint_matching joint_roles rest_alignment retained_tracks retarget"
     ),
-    "gltf.io": "container images json_text lenient source uri",
+    "gltf.io": "buffers container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader vertex_colors",
     "gltf.validation": "buffer_layout channel_targets hierarchy rules schema",

@@ -13,6 +13,7 @@ import typer
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container
+from anim.gltf.io.buffers import Resolve
 from anim.gltf.io.lenient import BrokenFile, read_broken, unread_buffers
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
@@ -173,7 +174,7 @@ class _Opener:
     def __init__(self) -> None:
         self.broken: BrokenFile | None = None
 
-    def open(self, data: Bytes, resolve: container.Resolve | None) -> Document:
+    def open(self, data: Bytes, resolve: Resolve | None) -> Document:
         """Return the document in `data`; of an invalid one the readable parts."""
         self.broken = None
         try:

@@ -20,6 +20,7 @@ from anim.caches.storage import Memory, suffix
 from anim.files import resolver
 from anim.gltf.document import Document
 from anim.gltf.io import container
+from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading import reader
 from anim.model import VertexCache
 from anim.operations.selection import Selection
@@ -181,7 +182,7 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, container.Resolve | None]]:
+def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, Resolve | None]]:
     """Give a glTF document or a vertex cache, its name for messages, and the resolver of its companion files.
 
     The type follows from the file extension, for a pipe from the first bytes.

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import re
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import count
-from typing import TypeAlias, TypeGuard
+from typing import TypeAlias
 
 import numpy as np
 
 from anim.errors import FormatError, ShapeError, UnsupportedError
 from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.io import json_text, uri
+from anim.gltf.io.buffers import Resolve, as_bytes, buffers_of, describe_type, is_bytes
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import schema
 
@@ -25,7 +25,6 @@ BIN_CHUNK = 0x004E4942
 MAX_GLB_BYTES = 2**32 - 1  # bytes; the header's length field has 32 bits
 LFS_POINTER = b"version https://git-lfs"
 
-Resolve: TypeAlias = Callable[[str], Bytes | bytes | bytearray | memoryview]
 Choose: TypeAlias = Callable[[int, str, Bytes], str]
 
 
@@ -39,14 +38,14 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
     """
     if isinstance(data, (bytes, bytearray, memoryview)):
         data = np.frombuffer(data, np.uint8)
-    if not _is_bytes(data):
+    if not is_bytes(data):
         raise ShapeError(
-            f"data is no bytes (got {_kind(data)}, expected a uint8 array or bytes)",
+            f"data is no bytes (got {describe_type(data)}, expected a uint8 array or bytes)",
             help='the library opens no files: container.read(np.fromfile("walk.glb", np.uint8))',
         )
     if resolve is not None and not callable(resolve):
         raise ShapeError(
-            f"resolve is {_kind(resolve)} (expected a function from a relative path to bytes)",
+            f"resolve is {describe_type(resolve)} (expected a function from a relative path to bytes)",
             help='container.read(data, resolve=lambda name: np.fromfile(f"folder/{name}", np.uint8))',
         )
     head = data[:4096].tobytes()
@@ -100,13 +99,13 @@ def glb(document: Document) -> list[Bytes]:
         raise _too_large(document.buffers[0].byte_length)
     if described:
         chunks.append((BIN_CHUNK, _padded(document.buffers[0].data, b"\0")))
-    chunks += [(kind, [_bytes(content)]) for kind, content in document.chunks]
+    chunks += [(kind, [as_bytes(content)]) for kind, content in document.chunks]
     for kind, body in chunks:
         pieces += [_chunk_head(_size(body), kind), *body]
     total = 12 + _size(pieces)
     if total > MAX_GLB_BYTES:
         raise _too_large(total)
-    return [_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
+    return [as_bytes(struct.pack("<4sII", MAGIC, 2, total)), *pieces]
 
 
 def gltf(
@@ -135,19 +134,8 @@ def gltf(
         beside.append(about)
     if described:
         content["buffers"] = beside
-    files[f"{stem}.gltf"] = [_bytes(json_text.dump(content, indent=document.indent) + b"\n")]
+    files[f"{stem}.gltf"] = [as_bytes(json_text.dump(content, indent=document.indent) + b"\n")]
     return files
-
-
-def _is_bytes(data: object) -> TypeGuard[Bytes]:
-    return isinstance(data, np.ndarray) and data.dtype == np.uint8 and data.ndim == 1
-
-
-def _kind(value: object) -> str:
-    """Description of a value's type: "an array of float64 with shape (2, 3)", "str"."""
-    if isinstance(value, np.ndarray):
-        return f"an array of {value.dtype} with shape {value.shape}"
-    return "None" if value is None else type(value).__name__
 
 
 def _too_large(size: int) -> UnsupportedError:
@@ -217,61 +205,6 @@ def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
     return expand_matrices(parsed)
 
 
-def buffers_of(
-    parsed: Json, binary: Bytes | None, resolve: Resolve | None, *, glb: bool, check: bool = True
-) -> tuple[Buffer, ...]:
-    """Return the buffers of a JSON.
-
-    check: raise FormatError for a BIN chunk that is missing or shorter than the first buffer.
-    """
-    buffers = []
-    for i, about in enumerate(json_array(parsed, "buffers")):
-        load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
-        buffers.append(Buffer(about["byteLength"], about.get("uri"), load, where=where))
-        if check and glb and i == 0 and "uri" not in about:
-            _check_binary(about, binary)
-    return tuple(buffers)
-
-
-def _loader(about: Json, binary: Bytes | None, resolve: Resolve | None) -> Callable[[], Bytes] | None:
-    address = about.get("uri")
-    if address is None:
-        return None if binary is None else lambda: binary
-    if uri.is_data(address):
-        return lambda: _bytes(uri.decode_data(address))
-    return lambda: _read_external(address, resolve)
-
-
-def _read_external(address: str, resolve: Resolve | None) -> Bytes:
-    path = uri.relative_path(address)
-    if resolve is None:
-        raise FormatError(
-            f"the bytes of '{path}' are not given",
-            help="container.read(data, resolve=…) takes a function that reads it",
-        )
-    data = resolve(path)
-    if isinstance(data, (bytes, bytearray, memoryview)):
-        data = np.frombuffer(data, np.uint8)
-    if not _is_bytes(data):
-        raise ShapeError(
-            f"resolve gives {_kind(data)} for '{path}' (expected a uint8 array or bytes)",
-            help="raise FormatError in resolve where there is no such file",
-        )
-    return data
-
-
-def _check_binary(about: Json, binary: Bytes | None) -> None:
-    if binary is None:
-        if about.get("extensions") or "fallback" in json.dumps(about):
-            return
-        raise FormatError("has no uri and the GLB has no BIN chunk", where="buffer 0")
-    if len(binary) < about["byteLength"]:
-        raise FormatError(
-            f"BIN chunk holds {len(binary)} bytes (expected at least byteLength, {about['byteLength']})",
-            where="buffer 0",
-        )
-
-
 def _in_glb(number: int, about: Json, buffer: Buffer) -> Json:
     if number == 0:
         if not buffer.has_data:
@@ -291,18 +224,14 @@ def _data_uri(buffer: Buffer) -> str:
 
 
 def _chunk_head(size: int, kind: int) -> Bytes:
-    return _bytes(struct.pack("<II", size, kind))
+    return as_bytes(struct.pack("<II", size, kind))
 
 
 def _padded(content: bytes | Bytes, filler: bytes) -> list[Bytes]:
     rest = -len(content) % 4
-    body = _bytes(content) if isinstance(content, bytes) else content
-    return [body, _bytes(filler * rest)] if rest else [body]
+    body = as_bytes(content) if isinstance(content, bytes) else content
+    return [body, as_bytes(filler * rest)] if rest else [body]
 
 
 def _size(pieces: list[Bytes]) -> int:
     return sum(len(piece) for piece in pieces)
-
-
-def _bytes(content: bytes) -> Bytes:
-    return np.frombuffer(content, np.uint8)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Bytes, Document, Json
 from anim.gltf.io import container, json_text
+from anim.gltf.io.buffers import Resolve, buffers_of
 from anim.gltf.reading.node_matrix import expand_matrices
 
 
@@ -25,7 +26,7 @@ class BrokenFile:
     lost_skins: frozenset[int]
 
 
-def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimError) -> BrokenFile:
+def read_broken(data: Bytes, resolve: Resolve | None, refusal: AnimError) -> BrokenFile:
     """Return the valid parts of a file. refusal: its error, raised again for unreadable JSON."""
     from anim.gltf.validation import salvage
 
@@ -43,7 +44,7 @@ def read_broken(data: Bytes, resolve: container.Resolve | None, refusal: AnimErr
     with suppress(FormatError):  # a sheared matrix is kept
         json, expanded = expand_matrices(json)
     is_glb = data[:4].tobytes() == container.MAGIC
-    buffers = container.buffers_of(json, binary, resolve, glb=is_glb, check=False)
+    buffers = buffers_of(json, binary, resolve, glb=is_glb, check=False)
     return BrokenFile(Document(json, buffers, expanded=expanded), faults, found.lost_clips, found.lost_skins)
 
 

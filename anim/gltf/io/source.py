@@ -13,10 +13,11 @@ from anim.errors import FormatError
 from anim.files import resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, json_text, uri
+from anim.gltf.io.buffers import Resolve
 
 MAX_OPEN_ATTEMPTS = 20  # attempts to open a .gltf with its buffers, while others replace it
 
-Opener: TypeAlias = Callable[[Bytes, container.Resolve | None], Document]
+Opener: TypeAlias = Callable[[Bytes, Resolve | None], Document]
 Note: TypeAlias = Callable[[str], object]
 
 
@@ -76,7 +77,7 @@ def open_bytes(
     name: str,
     opener: Opener = container.read,
     *,
-    resolve: container.Resolve = resolver.refuse_relative,
+    resolve: Resolve = resolver.refuse_relative,
 ) -> Source:
     """Return the document in `data`, without a folder. name: its label in messages. Raises FormatError.
 

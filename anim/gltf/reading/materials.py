@@ -13,7 +13,7 @@ from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
-from anim.gltf.io.container import Resolve
+from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.validation.rules import Check, ObjectRule, at_least, numbers, text
 

@@ -13,7 +13,7 @@ from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf.document import Document
-from anim.gltf.io.container import Resolve
+from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading import reader
 from anim.gltf.reading.materials import read_materials
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache

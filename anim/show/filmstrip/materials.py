@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import AnimError
 from anim.gltf.document import Document, Json, json_array
-from anim.gltf.io.container import Resolve
+from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import Material, image_data, read_materials
 from anim.gltf.reading.vertex_colors import VertexColors, no_vertex_colors, read_vertex_colors, vertex_count
