@@ -23,7 +23,7 @@ SUBSTEPS = 4
 MAX_PENETRATION_M = 0.005  # that Rapier leaves; of small bodies MAX_PENETRATION_PER_RADIUS
 MAX_PENETRATION_PER_RADIUS, MIN_PENETRATION_M = 0.01, 1e-5
 INFINITE_MASS_KG = 1e9
-PLANE_REACH_M, PLANE_DEPTH_M = 10_000.0, 50.0  # half the size of the box that stands for a plane
+PLANE_REACH_M, PLANE_DEPTH_M = 500.0, 50.0  # half the size of a plane's box; at 10 km contacts are wrong by its depth
 CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
 MAX_FILTERS = 32
 

@@ -152,14 +152,13 @@ def test_colliders_below_a_motion_are_one_body() -> None:
 
 
 @needs_rapier
-@pytest.mark.parametrize(("kind", "rest"), [("capsule", 0.2), ("cylinder", 0.5)])
-def test_tapered_shapes_come_to_rest(kind: str, rest: float) -> None:
-    """A tapered capsule tips over, a tapered cylinder stands on its wide end."""
+@pytest.mark.parametrize(("kind", "start", "low", "high"), [("capsule", 1.2, 0.2, 0.9), ("cylinder", 0.6, 0.48, 0.52)])
+def test_tapered_shapes_come_to_rest(kind: str, start: float, low: float, high: float) -> None:
+    """Pushed a little, a tapered capsule tips over, and a tapered cylinder stays on its wide end."""
     shape = {"type": kind, kind: {"radiusTop": 0.2, "radiusBottom": 0.5, "height": 1}}
-    falling = node((0, 1.2 if kind == "capsule" else 0.6, 0), motion={}, collider=collider(0))
+    falling = node((0, start, 0), motion={"angularVelocity": [0, 0, 0.5]}, collider=collider(0))
     made = document([falling, node(collider=collider(1))], [shape, {"type": "plane"}])
-    height = path(simulate(made, duration=4.0), 0)[-1, 1]
-    assert height == pytest.approx(rest, abs=0.02) if kind == "cylinder" else 0.2 < height < 0.8
+    assert low < path(simulate(made, duration=4.0), 0)[-1, 1] < high
 
 
 def test_a_scale_makes_an_ellipsoid_a_hull_and_mirrors_nothing() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track
 from anim.sampling.sample import sample
 from anim.sampling.track import sample as sample_track
+from anim.simulation.rigid_bodies.description import Material
 from anim.simulation.rigid_bodies.node_globs import ChosenNodes, add_chosen
 from anim.simulation.rigid_bodies.simulate import (
     RigidOptions,
@@ -164,6 +166,19 @@ def test_warm_up_lets_bodies_settle_before_the_first_frame() -> None:
     made = document([node((0, 1, 0), **FALLING), node(collider=collider(1))], BALL)
     run = simulate(made, duration=1.0, warm_up=3.0)
     np.testing.assert_allclose(path(run, 0)[:, 1], 0.5, atol=0.01)
+
+
+@pytest.mark.parametrize("friction", [0.4, 0.6])
+def test_a_wall_of_hulls_touches_the_floor_without_an_overlap(friction: float) -> None:
+    made = opened_fixture("wall")
+    scene = reader.scene(made)
+    material = Material(friction, friction)
+    chosen = ChosenNodes(tuple(range(1, 31)), "hull", material=material)
+    description = add_chosen(read_description(made, scene.skeleton), scene, chosen)
+    description = replace(description, floor=0.0, floor_material=material)
+    run = simulate_rigid_bodies(scene, NO_CLIP, description, RigidOptions(duration=0.5))
+    assert run.notes == []
+    assert (run.report.penetration_m or 0) < 0.01
 
 
 def test_a_wall_by_globs_is_the_same_bytes_twice() -> None:
