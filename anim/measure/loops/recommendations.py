@@ -15,7 +15,7 @@ _WORDS = {
     LoopKind.OPEN_BY_ONE_FRAME: "to add the last frame that is missing",
     LoopKind.CLOSED_EXCEPT: "to close the joints that are open",
     LoopKind.NOT_A_LOOP: "if it is to loop",
-    LoopKind.CLOSED: f"closed in pose, with a velocity gap of more than {MAX_VELOCITY_GAP:g} times the usual speed",
+    LoopKind.CLOSED: f"to close a velocity gap of more than {MAX_VELOCITY_GAP:g} times the usual speed",
 }
 
 
