@@ -91,8 +91,22 @@ def cubic_keys(track: Track, motion: TrackFunction, knots: Floats, *, tolerance:
     if motion.rotation:
         values = quaternion.align_signs(values)
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    steep = np.flatnonzero(_cubic_error(motion, times[:-1], times[1:]) > tolerance)
+    _limit_slopes(steep, times, values, before, after)
     before[0], after[-1] = 0.0, 0.0
     return track.with_keys(times, values, before, after, interpolation=Interpolation.CUBICSPLINE)
+
+
+def _limit_slopes(segments: Ints, times: Floats, values: Floats, before: Floats, after: Floats) -> None:
+    """Limit the end slopes of segments that are too short to be split, in place, so that they don't overshoot.
+
+    Where the motion rises vertically, its slopes are far too large for a segment of a float32 step. Source: Fritsch and
+    Carlson, 1980.
+    """
+    length = np.diff(times)[segments, None]
+    limit = 3.0 * np.abs(values[segments + 1] - values[segments]) / length
+    after[segments] = np.clip(after[segments], -limit, limit)
+    before[segments + 1] = np.clip(before[segments + 1], -limit, limit)
 
 
 def float32_tolerance(track: Track, tolerance: float) -> float:
