@@ -91,3 +91,38 @@ def test_a_clip_that_ends_at_another_time_is_said(pair: Pair, call: Call) -> Non
     assert call("trim", paths[0], paths[1], "--clip", "wave", "--to", "0.5").code == 0
     (warning,) = call("diff", *paths, "--format", "json").json["warnings"]
     assert "clip 'wave' ends at 0.5 s instead of " in warning
+
+
+def test_a_skin_in_the_second_file_only_is_named(pair: Pair, call: Call) -> None:
+    skinned, bare = pair(_without_skins)
+    run = call("diff", bare, skinned, "--format", "json")
+    (warning,) = run.json["warnings"]
+    assert warning == (
+        f"{skinned}: mesh 'body' has a skin in the second file only: measured as the node of the mesh moves it"
+    )
+    assert f"warning: {warning}\n" in run.err
+
+
+def test_meshes_in_the_second_file_only_are_named(pair: Pair, call: Call) -> None:
+    def change(json: Json) -> None:
+        for node in json["nodes"]:
+            node.pop("mesh", None)
+            node.pop("skin", None)
+
+    whole, bare = pair(change)
+    (warning,) = call("diff", bare, whole, "--format", "json").json["warnings"]
+    assert warning == f"{whole}: the first file has no vertices: nodes are measured, not the meshes of the second file"
+    assert call("diff", bare, bare, "--format", "json").json["warnings"] == []
+
+
+def test_a_lost_primitive_is_named(pair: Pair, call: Call) -> None:
+    """The first file has every primitive twice."""
+
+    def change(json: Json) -> None:
+        for mesh in json["meshes"]:
+            mesh["primitives"] += copy.deepcopy(mesh["primitives"])
+
+    once, twice = pair(change)
+    (warning,) = call("diff", twice, once, "--format", "json").json["warnings"]
+    assert warning == f"{once}: mesh 'body' has fewer primitives in the second file: the first one's are measured"
+    assert call("diff", once, twice, "--format", "json").json["warnings"] == []

@@ -16,7 +16,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.compare import name_matching
-from anim.measure.compare.deformation import same_influences, same_targets
+from anim.measure.compare.deformation import is_reduced, same_influences, same_targets
 from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
 from anim.model import Mesh, MeshInstance, Scene, Skin
@@ -36,16 +36,20 @@ class Correspondence:
     nodes: (N,) for each node of the first scene its index in the second, −1 without one.
     surfaces: of the first scene, with their joints in the second, None if it is the same scene.
     by_vertex: whether all meshes agree vertex by vertex, with their joints, weights and morph targets.
-    unskinned: names of meshes with a skin in the first scene only. reweighted: names of meshes whose vertices agree,
-    but not their joints, weights or morph targets. has_meshes: False if only the first scene has vertices.
+    unskinned, skinned: names of meshes with a skin in the first or second scene only. reweighted: names of meshes whose
+    vertices agree, but not their joints, weights or morph targets. reduced: names of meshes that lost primitives.
+    has_meshes, had_meshes: False if only the first or only the second scene has vertices.
     """
 
     nodes: Ints
     surfaces: Sequence[tuple[Surface, Binding | None]]
     by_vertex: bool = True
     unskinned: tuple[str, ...] = ()
+    skinned: tuple[str, ...] = ()
     reweighted: tuple[str, ...] = ()
+    reduced: tuple[str, ...] = ()
     has_meshes: bool = True
+    had_meshes: bool = True
 
 
 def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
@@ -59,14 +63,22 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
     pairing = _SceneMatcher(scene, other, name_matching.match_nodes(scene, other))
     instances = [instance for instance in scene.instances if len(instance.mesh.positions)]
     if not instances:
-        return Correspondence(pairing.nodes, [(surface, pairing.by_nodes(surface)) for surface in surfaces])
+        by_nodes = [(surface, pairing.by_nodes(surface)) for surface in surfaces]
+        return Correspondence(pairing.nodes, by_nodes, had_meshes=not pairing.has_meshes)
     found: list[tuple[Surface, Binding | None]] = []
-    unskinned, reweighted, by_vertex = [], [], True
+    unskinned: list[str] = []
+    skinned: list[str] = []
+    reweighted, reduced, by_vertex = [], [], True
     for number, (surface, instance) in enumerate(zip(surfaces, instances, strict=True)):
         partner = pairing.partner(number, instance)
-        bare = pairing.unskinned(number, instance) if partner is None else None
-        if bare is not None:
-            unskinned.append(surface.name)
+        bare = None
+        if partner is None:
+            opposite = pairing.opposite(number, instance)
+            bare = opposite if instance.skin is not None else None
+            if opposite is not None:
+                (skinned if bare is None else unskinned).append(surface.name)
+            if pairing.is_reduced(number, instance):
+                reduced.append(surface.name)
         carried = (
             pairing.carried(surface, instance, partner) if bare is None else pairing.rigid(surface, instance, bare)
         )
@@ -79,7 +91,9 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
         found,
         by_vertex and not reweighted,
         tuple(unskinned),
+        tuple(skinned),
         tuple(reweighted),
+        tuple(reduced),
         pairing.has_meshes,
     )
 
@@ -102,17 +116,22 @@ class _SceneMatcher:
         choices = [each for each in self._choices(number, instance) if (each.skin is not None) is skinned]
         return next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
 
-    def unskinned(self, number: int, instance: MeshInstance) -> MeshInstance | None:
-        """A skinned instance's partner without skin: of the same vertices, or on the node of the same name."""
-        if instance.skin is None:
-            return None
-        choices = [each for each in self._choices(number, instance) if each.skin is None]
+    def opposite(self, number: int, instance: MeshInstance) -> MeshInstance | None:
+        """A skinned instance's partner without skin, or the reverse: of the same vertices, or on the node by name."""
+        is_skinned = instance.skin is not None
+        choices = [each for each in self._choices(number, instance) if (each.skin is not None) is not is_skinned]
         found = next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
         there = self._on_node.get(int(self.nodes[instance.node]))
         name = self._scene.skeleton.names[instance.node]
         if found is None and there in choices and there and name and name == self._other.skeleton.names[there.node]:
             return there
         return found
+
+    def is_reduced(self, number: int, instance: MeshInstance) -> bool:
+        """Return whether an instance lost primitives that are in no other mesh either: other tools split meshes."""
+        lost = [is_reduced(instance.mesh, each.mesh) for each in self._choices(number, instance)]
+        faces = [sum(len(each.mesh.faces) for each in scene.instances) for scene in (self._scene, self._other)]
+        return bool(lost) and all(lost) and faces[1] < faces[0]
 
     @property
     def has_meshes(self) -> bool:

@@ -1,4 +1,4 @@
-"""Equality of what deforms two meshes of the same vertices: joints, weights and morph targets."""
+"""Equality of two meshes: primitives, and for the same vertices joints, weights and morph targets."""
 
 from __future__ import annotations
 
@@ -43,3 +43,10 @@ def same_targets(old: Mesh, new: Mesh, new_from_old: Floats) -> bool:
     size = float(np.linalg.norm(np.ptp(new.positions, axis=0)))
     limit = max(TARGET_TOLERANCE_PER_SIZE * size, TARGET_TOLERANCE_PER_ROUNDING * rounding)
     return bool(np.abs(moved - new.targets).max() <= limit)
+
+
+def is_reduced(old: Mesh, new: Mesh) -> bool:
+    """Return whether the second mesh lost primitives, with their vertices and faces: merged primitives keep them."""
+    if len(new.primitives) >= len(old.primitives) or len(new.positions) >= len(old.positions):
+        return False
+    return len(old.faces) - len(new.faces) >= min(each.faces for each in old.primitives)

@@ -115,8 +115,14 @@ def _mesh_warnings(pairs: Correspondence) -> Iterator[str]:
     """Yield sentences on meshes that the second file deforms differently."""
     if not pairs.has_meshes:
         yield "the second file has no vertices: the first one's are measured as its joints move them"
+    if not pairs.had_meshes:
+        yield "the first file has no vertices: nodes are measured, not the meshes of the second file"
     if pairs.unskinned:
         yield f"{_listed(pairs.unskinned)} no skin in the second file: measured as the node of the mesh moves it"
+    if pairs.skinned:
+        yield f"{_listed(pairs.skinned)} a skin in the second file only: measured as the node of the mesh moves it"
+    if pairs.reduced:
+        yield f"{_listed(pairs.reduced)} fewer primitives in the second file: the first one's are measured"
     if pairs.reweighted:
         yield (
             f"{_listed(pairs.reweighted)} other joints, weights or morph targets in the second file: "
