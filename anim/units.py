@@ -10,6 +10,7 @@ from anim.errors import RangeError
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
 _ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
+_ZERO_ANGLE = re.compile(r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*")
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
@@ -39,6 +40,11 @@ def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
 def is_zero(text: str) -> bool:
     """Return True for a length or fraction of 0, with or without unit: "0", "0.0mm", "0%"."""
     return _ZERO.fullmatch(text) is not None
+
+
+def is_zero_angle(text: str) -> bool:
+    """Return True for an angle of 0, with or without unit: "0", "0deg"."""
+    return _ZERO_ANGLE.fullmatch(text) is not None
 
 
 def has_unit(text: str) -> bool:

@@ -19,6 +19,7 @@ from anim.simulation.particles.obstacles import Box, Floor, Obstacle, Sphere
 from anim.simulation.particles.simulate import ParticleOptions, add_particles, simulate_particles
 from anim.simulation.particles.solver import Contact
 from anim.simulation.report import SimulationReport
+from anim.units import is_zero_angle
 from cli import text, units
 from cli.errors import UsageError
 from cli.options import common, simulation
@@ -60,7 +61,7 @@ def command(
         str, typer.Option("--direction", metavar="X,Y,Z", help="Direction of emission, in the node's space.")
     ] = "0,1,0",
     spread: Annotated[
-        str, typer.Option("--spread", metavar="ANGLE", help="Half the angle of the cone of emission.")
+        str, typer.Option("--spread", metavar="ANGLE", help="Half the angle of the cone of emission; 0: a jet.")
     ] = "20deg",
     variation: Annotated[
         float, typer.Option("--variation", metavar="0..1", help="Random part of speed and lifetime.", min=0, max=1)
@@ -120,9 +121,10 @@ def command(
 ) -> None:
     """Emit particles from nodes, and let forces move them.
 
-    Each is a node with one shared mesh; a node is used again when its particle has died. Without drag a path is written
-    as the exact parabolas between impacts; with drag it has a key per frame. The time of an impact is found inside the
-    step. --loop begins with the particles that are alive at the end, so that the clip repeats without a seam.
+    Each is a node with one shared mesh; a node is used again when its particle has died. Without drag, and with verlet,
+    velocity-verlet or rk4 only, a path is written as the exact parabolas between impacts; else it has a key per frame.
+    The time of an impact is found inside the step. --floor, --sphere and --box stop the centers of particles, not their
+    surfaces. --loop begins with the particles that are alive at the end, so that the clip repeats without a seam.
     """
     if fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
@@ -157,7 +159,7 @@ def command(
             emit is Source.SURFACE,
             parse_vector(direction, "--direction"),
             speed,
-            units.parse_angle(spread, "--spread"),
+            0.0 if is_zero_angle(spread) else units.parse_angle(spread, "--spread"),
             lifetime,
             variation,
             variation,
