@@ -31,6 +31,12 @@ def test_every_kind_is_a_module_with_its_examples_in_the_help(call: Call) -> Non
         assert all(" ".join(example.split()) in words for example in row.examples)
 
 
+def test_the_help_of_particles_states_its_limits(call: Call) -> None:
+    words = " ".join(call("simulate", "particles", "--help").product().decode().split())
+    assert "with verlet, velocity-verlet or rk4 only, a path is written as the exact parabolas" in words
+    assert "--floor, --sphere and --box stop the centers of particles" in words
+
+
 def test_an_unknown_kind_is_named_with_the_nearest(call: Call) -> None:
     run = call("simulate", "particels")
     assert (run.code, run.out) == (2, b"")
@@ -63,6 +69,14 @@ def test_what_is_written_is_valid(options: tuple[str, ...], fixture: Fixture, ca
     node = "body" if "surface" in options else "head"
     data = call("simulate", "particles", fixture("biped"), "-", "--node", node, *options).product()
     assert errors(validate(data)) == []
+
+
+@pytest.mark.parametrize("zero", ["0", "0deg", "0.0rad"])
+def test_a_spread_of_0_is_accepted(zero: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    calm = ("--gravity", "0,0,0", "--inherit", "0", "--direction", "0,1,0", "--duration", "0.2", "--variation", "0")
+    run = call("simulate", "particles", fixture("flag"), out, "--node", "pole", "--spread", zero, *calm)
+    assert run.code == 0, run.err
 
 
 def test_tracks_are_put_into_the_driving_clip(fixture: Fixture, call: Call, tmp_path: Path) -> None:
@@ -140,6 +154,25 @@ def test_springs_that_diverge_end_with_a_report_and_nothing_written(
     step = run.err.split("--step ")[1].split()[0]
     calmer = call("simulate", "cloth", fixture("flag"), out, *args[:-4], "--step", step, "--duration", "0.5")
     assert calmer.code == 0, calmer.err
+
+
+@pytest.mark.parametrize("dry", [True, False])
+def test_cloth_beyond_its_largest_stretch_ends_with_a_report_and_no_cache(
+    dry: bool, fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    out, report = tmp_path / "out.npz", tmp_path / "report.json"
+    args = ("--mesh", "flag", "--pin", "x-min", "--duration", "0.2", "--report", report, "--max-stretch", "0.0001%")
+    run = call("simulate", "cloth", fixture("flag"), out, *args, *(("--dry-run",) if dry else ()))
+    assert (run.code, out.exists(), report.exists()) == (6, False, not dry)
+    problem, help = run.err.splitlines()[-2:]
+    assert problem.startswith("gltf-anim: stretched by ")
+    assert problem.endswith(" s with 80 substeps a frame (limit 0.0001 %)")
+    assert help == "help: a larger --max-stretch, a higher --fps, or a lower --density"
+    if not dry:
+        found = json.loads(report.read_text())
+        assert found["substeps"] == 80
+        assert found["worst_stretch"]["fraction"] > 1e-6
+        assert found["advice"] == help.removeprefix("help: ")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from anim.simulation.cloth.model import ClothModel, Fabric, build_cloth
 from anim.simulation.cloth.solver import Environment, run_xpbd
 from anim.simulation.comparison import IntegratorRun, compare_integrators
 from anim.simulation.integrators import INTEGRATORS
-from anim.simulation.report import SimulationReport, advise_elongation, advise_step
+from anim.simulation.report import SimulationReport, advise_elongation, advise_step, describe_elongation
 from anim.skinning.bake import prepare_bake
 
 SOLVERS = {
@@ -180,6 +180,8 @@ def _report(
         omega_h, limit = system.max_frequency() * step, INTEGRATORS[options.integrator].limit
         advice = advise_step(omega_h, limit, step, options.integrator)
     worst = None if frames is None else _worst_stretch(model, frames.positions, options.fps)
+    if not advice and describe_elongation(worst, substeps, options.max_stretch):
+        advice = advise_elongation(options.solver)
     return SimulationReport(
         "cloth",
         step,
@@ -201,7 +203,7 @@ def _report(
             "pinned": len(model.pinned),
             "edges": len(model.topology.edges),
         },
-        advice=advice or advise_elongation(worst, substeps, options.max_stretch),
+        advice=advice,
     )
 
 

@@ -25,9 +25,9 @@ from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.selection import select_vertices
 from anim.simulation.cloth.simulate import SOLVERS, ClothOptions, ClothRun, compare, simulate_cloth
 from anim.simulation.cloth.solver import Environment
-from anim.simulation.report import SimulationReport
+from anim.simulation.report import SimulationReport, describe_elongation
 from cli import text, units
-from cli.errors import UsageError
+from cli.errors import CheckError, UsageError
 from cli.io import cache_files, documents, scenes
 from cli.options import caches, common, meshes, simulation
 from cli.options.simulation import parse_seconds, parse_vector
@@ -91,7 +91,9 @@ def command(
     ] = 20,
     max_stretch: Annotated[
         str | None,
-        typer.Option("--max-stretch", metavar="PERCENT", help="Halve the step until no edge is stretched by more."),
+        typer.Option(
+            "--max-stretch", metavar="PERCENT", help="Halve the step until no edge is stretched by more; else exit 6."
+        ),
     ] = None,
     tethers: Annotated[
         bool, typer.Option("--tethers/--no-tethers", help="Limit distances to pinned vertices along the mesh.")
@@ -165,6 +167,12 @@ def command(
                 _write_report(error.report, str(report))
             _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
             raise
+    excess = describe_elongation(run.report.worst_stretch, run.report.figures["substeps"], limit)
+    if excess:
+        if kind == ".json" and not dry_run:
+            _write_report(run.report, str(report))
+        _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
+        raise CheckError(excess, help=run.report.advice)
     cache = run.cache if up is None else up_axis.to_up_axis(run.cache, str(up))
     meters = (
         None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
