@@ -200,3 +200,26 @@ def test_cloth_without_sense_is_refused_in_one_line(
     assert (run.code, out.exists()) == (code, False), run.err
     assert words in run.err
     assert len(run.err.splitlines()) <= 2
+
+
+@pytest.mark.parametrize("kind", ["particles", "cloth"])
+def test_a_late_clip_is_simulated_from_its_start(kind: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    late = tmp_path / "late.glb"
+    call("retime", fixture("flag"), late, "--offset", "600").product()
+    if kind == "cloth":
+        args: tuple[str, ...] = ("--mesh", "flag", "--pin", "x-min")
+        paths = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    else:
+        args = ("--node", "pole", "--rate", "5")
+        paths = [tmp_path / "a.glb", tmp_path / "b.glb"]
+    for source, out in zip((fixture("flag"), late), paths, strict=True):
+        run = call("simulate", kind, source, out, *args)
+        assert run.code == 0, run.err
+    if kind == "cloth":
+        with np.load(paths[0]) as a, np.load(paths[1]) as b:
+            np.testing.assert_allclose(b["times"], a["times"] + 600, atol=1e-4)
+            assert np.abs(a["positions"][:20] - b["positions"][:20]).max() < 1e-3
+        return
+    early, moved = (anim.load(path).clips["particles"] for path in paths)
+    assert (moved.start, moved.end) == pytest.approx((early.start + 600, early.end + 600))
+    assert len(moved.tracks) == len(early.tracks)

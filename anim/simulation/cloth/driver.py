@@ -39,7 +39,7 @@ class ClothDriver:
     """Driver of one cloth.
 
     baker, clip: of its mesh. vertices: (N,) of the pinned points. scene: for the colliders' nodes.
-    end: s, of the clip; the pose is constant before 0 and after it.
+    Times count from the clip's start, before which the pose is that of the start.
     """
 
     baker: Baker
@@ -56,7 +56,7 @@ class ClothDriver:
 
     def all_vertices(self, time: float) -> Floats:
         """Return all vertices (V, 3) m at a time."""
-        return np.asarray(self._bake(np.array([max(time, 0.0)]))[0])
+        return np.asarray(self._bake(np.array([self.clip.start + max(time, 0.0)]))[0])
 
     def colliders(self, times: Floats) -> Floats:
         """Return both centers and the radius (S, C, 7) m of all colliders at times (S,) s."""
@@ -80,8 +80,7 @@ class ClothDriver:
         cache = self.baker.bake(self.clip, times=times)
         return np.concatenate([chunk.positions for chunk in cache.chunks()]).astype(np.float64)
 
-    @staticmethod
-    def _unique(times: Floats, evaluate: Callable[[Floats], Floats]) -> Floats:
+    def _unique(self, times: Floats, evaluate: Callable[[Floats], Floats]) -> Floats:
         """Evaluate at times that may repeat and come before 0, where the pose is that of 0."""
-        at, inverse = np.unique(np.maximum(times, 0.0), return_inverse=True)
+        at, inverse = np.unique(self.clip.start + np.maximum(times, 0.0), return_inverse=True)
         return evaluate(at)[inverse.reshape(-1)]

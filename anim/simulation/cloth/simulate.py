@@ -98,7 +98,7 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     if options.estimate_error:
         finer = _simulate(model, driver, options, 2 * substeps)
         error = float(np.linalg.norm(finer.positions - frames.positions, axis=2).max())
-    times = np.arange(len(frames.positions), dtype=np.float64) / options.fps
+    times = clip.start + np.arange(len(frames.positions), dtype=np.float64) / options.fps
     positions = frames.positions[:, model.topology.point_of_vertex].astype(np.float32)
     cache = replace(template, times=times, chunks=lambda: iter((FrameChunk(0, positions),)), rest=start)
     return ClothRun(cache, _report(model, options, substeps, frames, error))

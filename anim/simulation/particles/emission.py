@@ -65,10 +65,12 @@ class Births:
         return len(self.times)
 
 
-def emit(scene: Scene, clip: Clip, emitter: Emitter, start: float, end: float, seed: int) -> Births:
+def emit(
+    scene: Scene, clip: Clip, emitter: Emitter, start: float, end: float, seed: int, clip_start: float = 0.0
+) -> Births:
     """Return the particles born from `start` until before `end` s.
 
-    The clip is evaluated at each birth; before 0 s it has the pose of 0 s.
+    The clip is evaluated at each birth; clip_start: its time at 0 s, before which it has the pose of 0 s.
     Raises NotFoundError for a node without a mesh where particles leave a surface, RangeError for over a million.
     """
     first = start if emitter.start is None else max(start, emitter.start)
@@ -80,7 +82,8 @@ def emit(scene: Scene, clip: Clip, emitter: Emitter, start: float, end: float, s
         [np.full(emitter.burst, first), first + np.arange(count - emitter.burst) / (emitter.rate or 1)]
     )
     parts = [
-        _emit_node(scene, clip, emitter, node, times, np.random.default_rng([seed, node])) for node in emitter.nodes
+        _emit_node(scene, clip, emitter, node, times, np.random.default_rng([seed, node]), clip_start)
+        for node in emitter.nodes
     ]
     together = [np.concatenate(each) for each in zip(*parts, strict=True)]
     order = np.argsort(together[0], kind="stable")
@@ -99,16 +102,23 @@ def repeat_births(births: Births, period: float) -> Births:
 
 
 def _emit_node(
-    scene: Scene, clip: Clip, emitter: Emitter, node: int, times: Floats, random: np.random.Generator
+    scene: Scene,
+    clip: Clip,
+    emitter: Emitter,
+    node: int,
+    times: Floats,
+    random: np.random.Generator,
+    clip_start: float,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     count = len(times)
     speed = emitter.speed * (1 + emitter.speed_variation * random.uniform(-1, 1, count))
     life = emitter.lifetime * (1 + emitter.lifetime_variation * random.uniform(-1, 1, count))
     cone = _cone(emitter.spread, random, count)
+    at = clip_start + np.maximum(times, 0.0)
     if emitter.surface:
-        positions, axes, own = _on_surface(scene, clip, node, times, random)
+        positions, axes, own = _on_surface(scene, clip, node, at, random)
     else:
-        positions, axes, own = _at_node(scene, clip, node, times, emitter.direction)
+        positions, axes, own = _at_node(scene, clip, node, at, emitter.direction)
     velocities = speed[:, None] * _rotate_z_to(axes, cone) + emitter.inherit * own
     return times, times + np.maximum(life, 1e-3), positions, velocities
 
@@ -117,7 +127,7 @@ def _at_node(
     scene: Scene, clip: Clip, node: int, times: Floats, direction: Sequence[float]
 ) -> tuple[Floats, Floats, Floats]:
     """World positions, unit directions and velocities (n, 3) of a node at times (n,)."""
-    at = np.maximum(times[:, None] + np.array([-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S]), 0.0)
+    at = np.maximum(times[:, None] + np.array([-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S]), clip.start)
     unique, inverse = np.unique(at, return_inverse=True)
     world = sample(scene.skeleton, clip, unique, space="world").world
     assert world is not None
@@ -142,12 +152,12 @@ def _on_surface(
     u, v = np.sqrt(random.uniform(0, 1, len(times))), random.uniform(0, 1, len(times))
     barycentric = np.stack([1 - u, u * (1 - v), u * v], axis=1)
     points = [
-        _vertices(scene, clip, node, np.maximum(times + offset, 0.0), chosen)
+        _vertices(scene, clip, node, np.maximum(times + offset, clip.start), chosen)
         for offset in (-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S)
     ]
     before, at, after = ((barycentric[:, :, None] * each).sum(axis=1) for each in points)
     normals = np.cross(points[1][:, 1] - points[1][:, 0], points[1][:, 2] - points[1][:, 0])
-    span = (np.maximum(times + VELOCITY_STEP_S, 0) - np.maximum(times - VELOCITY_STEP_S, 0))[:, None]
+    span = (times + VELOCITY_STEP_S - np.maximum(times - VELOCITY_STEP_S, clip.start))[:, None]
     return at, _unit(normals), (after - before) / np.maximum(span, 1e-9)
 
 

@@ -34,7 +34,7 @@ class ParticleOptions:
     """Forces, obstacles and time of a run.
 
     step: s, the longest; it is shortened so that it divides a frame. loop: begin with the particles that are alive at
-    the end. size: m, radius of a particle.
+    the end. size: m, radius of a particle. start: s, of the driving clip, the time of the simulation's 0.
     """
 
     forces: Forces = field(default_factory=Forces)
@@ -48,6 +48,7 @@ class ParticleOptions:
     loop: bool = False
     seed: int = 0
     size: float = 0.01
+    start: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
     substeps = max(1, int(np.ceil(1 / (options.fps * options.step) - 1e-9)))
     step = 1 / (options.fps * substeps)
     start = 0.0 if options.loop else -options.warm_up
-    births = emit(scene, clip, emitter, start, options.duration, options.seed)
+    births = emit(scene, clip, emitter, start, options.duration, options.seed, options.start)
     if options.loop:
         births = repeat_births(births, options.duration)
     if not len(births):
@@ -72,7 +73,7 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
     keys = _solve(births, options, steps, substeps)
     finer = Steps(step / 2, options.duration, steps.warm_up_s)
     error = _distance(keys, _solve(births, options, finer, 2 * substeps))
-    nodes = tracks.share_nodes(tracks.split_paths(keys))
+    nodes = tracks.share_nodes(tracks.split_paths(keys, options.start))
     return ParticleRun(nodes, _report(births, keys, options, steps, error, len(nodes)))
 
 
@@ -94,7 +95,7 @@ def add_particles(
     moving = [
         track
         for node, paths in zip(indices, run.nodes, strict=True)
-        for track in tracks.make_tracks(node, paths, options.size, options.duration)
+        for track in tracks.make_tracks(node, paths, options.size, options.start + options.duration, options.start)
     ]
     if merge is not None:
         number, clip = merge

@@ -26,15 +26,17 @@ class ParticlePath:
     out_velocities: Floats
 
 
-def split_paths(keys: ParticleKeys) -> list[ParticlePath]:
+def split_paths(keys: ParticleKeys, start: float = 0.0) -> list[ParticlePath]:
     """Return the path of each particle with at least two keys, ordered by birth; times are exact in float32.
+
+    start: s, of the clip: the time of the simulation's 0.
 
     Of keys that fall together in float32 the first keeps its place, with the last one's velocity after it.
     """
     starts = np.flatnonzero(np.diff(keys.particles, prepend=-1))
     paths = []
     for first, last in zip(starts, [*starts[1:], len(keys.times)], strict=True):
-        times = keys.times[first:last]
+        times = start + keys.times[first:last]
         kept = distinct_float32(times)
         if len(kept) < 2:
             continue
@@ -62,10 +64,12 @@ def share_nodes(paths: Sequence[ParticlePath]) -> list[list[ParticlePath]]:
     return nodes
 
 
-def make_tracks(node: int, paths: Sequence[ParticlePath], size: float, end: float) -> tuple[Track, Track]:
+def make_tracks(
+    node: int, paths: Sequence[ParticlePath], size: float, end: float, start: float = 0.0
+) -> tuple[Track, Track]:
     """Return the translation and the scale track of a node: cubics along the paths, steps at births and deaths.
 
-    end: of the clip, in seconds; particles that live until then keep their size.
+    start, end: of the clip, in seconds; particles that live until its end keep their size.
     """
     times = np.concatenate([path.times for path in paths])
     in_tangents = np.concatenate([path.in_velocities for path in paths])
@@ -80,8 +84,8 @@ def make_tracks(node: int, paths: Sequence[ParticlePath], size: float, end: floa
     sizes = np.tile([size, 0.0], len(paths))
     if edges[-1] >= np.float32(end):
         edges, sizes = edges[:-1], sizes[:-1]
-    if edges[0] > 0:
-        edges, sizes = np.insert(edges, 0, 0.0), np.insert(sizes, 0, 0.0)
+    if edges[0] > np.float32(start):
+        edges, sizes = np.insert(edges, 0, start), np.insert(sizes, 0, 0.0)
     scale = Track(node, "scale", Interpolation.STEP, edges, np.repeat(sizes[:, None], 3, axis=1))
     return translation, scale
 

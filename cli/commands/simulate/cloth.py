@@ -154,7 +154,7 @@ def command(
             self_collision,
             tethers,
             fps,
-            duration if duration is not None else driver.end or 2.0,
+            duration if duration is not None else driver.end - driver.start or 2.0,
             warm_up,
             estimate_error=kind == ".json",
         )

@@ -167,9 +167,9 @@ def command(
             start,
             end,
         )
-        seconds = duration if duration is not None else driver.end or 2.0
+        seconds = duration if duration is not None else driver.end - driver.start or 2.0
         radius = units.parse_length(size, "--size", lambda: diagonal(scene))
-        chosen = replace(options, duration=seconds, size=radius)
+        chosen = replace(options, duration=seconds, size=radius, start=driver.start)
         run = simulate_particles(scene, driver, emitter, chosen)
         _check_nodes(len(run.nodes), voice, force=force)
         merged = (number, driver) if merge and number is not None else None
