@@ -33,7 +33,17 @@ from anim.operations.spline import spline
 from anim.operations.time_warp import warp
 from anim.operations.trim import trim
 
-__all__ = ["append_first_frame", "ease", "loop", "resample", "retime", "select_tracks", "spline", "trim", "warp"]
+__all__ = [
+    "append_first_frame",
+    "ease",
+    "loop",
+    "resample",
+    "retime",
+    "select_tracks",
+    "spline",
+    "trim",
+    "warp",
+]
 
 TRACK_PATHS = (*PATHS, "pointer")
 

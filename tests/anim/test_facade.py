@@ -8,6 +8,7 @@ import io
 import json
 import pickle
 import pydoc
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -366,6 +367,24 @@ def test_tracks_are_selected_by_node_and_path(biped: Path) -> None:
     assert [(clip.tracks[i].node, clip.tracks[i].path) for i in chosen] == [(0, "rotation")]
     changed = ops.resample(clip, fps=7, tracks=chosen)
     assert [i for i, (a, b) in enumerate(zip(clip.tracks, changed.tracks, strict=True)) if a is not b] == list(chosen)
+
+
+@pytest.mark.parametrize("name", sorted({*ops.__all__} - {"select_tracks"}))
+def test_operations_are_in_the_docstring_and_take_tracks(name: str, biped: Path) -> None:
+    operation = getattr(ops, name)
+    assert re.search(rf"\b{name}\b", ops.__doc__ or ""), f"add a line for {name} to the docstring of anim/ops.py"
+    parameters = inspect.signature(operation).parameters.values()
+    assert "tracks" in {each.name for each in parameters}
+    needed = {"blend": 0.2, "fps": 30.0, "speed": 0.5, "easing": "smoothstep", "tangents": "natural"}
+    given = {
+        each.name: needed[each.name]
+        for each in parameters
+        if each.kind is each.KEYWORD_ONLY and each.default is each.empty
+    }
+    clip = anim.load(biped).clips["walk"]
+    changed = operation(clip, **given, tracks=frozenset())
+    assert len(changed.tracks) == len(clip.tracks)
+    assert all(new is old for new, old in zip(changed.tracks, clip.tracks, strict=True))
 
 
 # The package.

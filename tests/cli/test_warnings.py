@@ -122,6 +122,7 @@ def test_quiet_leaves_out_words_and_never_a_product(command: str, folder: Path, 
     if command == "convert-cache":
         call("bake", "arm.glb", "one.npz", "--clip", "bend", "--fps", "24").product()
     (folder / "door.csv").write_text("time,door.rx\n0,0\n1,90\n")
+    assert command in QUIET, f"add a line to QUIET for {command}"
     options, product = QUIET[command]
     run = call(command, *options, "-q")
     assert (run.code, run.err) == (0, "")

@@ -19,10 +19,14 @@ SUGGESTIONS = 3
 
 @dataclass(frozen=True, slots=True)
 class Factory(Generic[T]):
-    """A name with arguments: its usage, and the factory function of the argument texts."""
+    """A name with arguments: its usage, and the factory function of the argument texts.
+
+    examples: calls such as "back-out(3)" that tests evaluate.
+    """
 
     usage: str
     make: Callable[[tuple[str, ...]], T]
+    examples: tuple[str, ...] = ()
 
 
 def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str, listing: str) -> T:

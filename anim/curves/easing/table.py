@@ -39,14 +39,34 @@ def _steps(arguments: tuple[str, ...]) -> Easing:
 EASINGS: dict[str, Easing] = _easings()
 
 EASING_FACTORIES: dict[str, Factory[Easing]] = {
-    "cubic-bezier": Factory("cubic-bezier(x1, y1, x2, y2)", lambda args: cubic_bezier(*numbers(args, 4))),
-    "steps": Factory("steps(n, jump-start|jump-end|jump-both|jump-none)", _steps),
-    "spring": Factory("spring(stiffness, damping)", lambda args: spring(*numbers(args, 2))),
-    "hermite": Factory("hermite(slope0, slope1)", lambda args: hermite(*numbers(args, 2))),
-    "back": Factory("back(overshoot), which is back-out(overshoot)", lambda args: back_out(*numbers(args, 1))),
-    "back-in": Factory("back-in(overshoot)", lambda args: back_in(*numbers(args, 1))),
-    "back-out": Factory("back-out(overshoot)", lambda args: back_out(*numbers(args, 1))),
-    "back-in-out": Factory("back-in-out(overshoot)", lambda args: back_in_out(*numbers(args, 1))),
+    "cubic-bezier": Factory(
+        "cubic-bezier(x1, y1, x2, y2)",
+        lambda args: cubic_bezier(*numbers(args, 4)),
+        (
+            "cubic-bezier(0.2, 0, 0, 1)",
+            "cubic-bezier(1/3, -0.4, 2/3, 1.7)",
+            "cubic-bezier(0, 1.5, 1, -0.5)",
+            "cubic-bezier(0.5, 0.5, 0.5, 0.5)",
+            "cubic-bezier(1, 0, 0, 1)",
+        ),
+    ),
+    "steps": Factory(
+        "steps(n, jump-start|jump-end|jump-both|jump-none)",
+        _steps,
+        ("steps(1)", "steps(5)", "steps(4, jump-start)", "steps(3, both)", "steps(3, none)"),
+    ),
+    "spring": Factory(
+        "spring(stiffness, damping)",
+        lambda args: spring(*numbers(args, 2)),
+        ("spring(100, 10)", "spring(100, 2)", "spring(100, 20)", "spring(100, 300)"),
+    ),
+    "hermite": Factory("hermite(slope0, slope1)", lambda args: hermite(*numbers(args, 2)), ("hermite(-1, 4)",)),
+    "back": Factory(
+        "back(overshoot), which is back-out(overshoot)", lambda args: back_out(*numbers(args, 1)), ("back(3)",)
+    ),
+    "back-in": Factory("back-in(overshoot)", lambda args: back_in(*numbers(args, 1)), ("back-in(0.5)",)),
+    "back-out": Factory("back-out(overshoot)", lambda args: back_out(*numbers(args, 1)), ("back-out(1.2)",)),
+    "back-in-out": Factory("back-in-out(overshoot)", lambda args: back_in_out(*numbers(args, 1)), ("back-in-out(2)",)),
 }
 
 

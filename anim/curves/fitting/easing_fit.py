@@ -31,7 +31,7 @@ def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], toleran
     breakpoints: interior u where the slope jumps or the function is not smooth; each becomes an end of segments.
     tolerance: the greatest |error|, 1e-7 or more; RangeError otherwise. With finite slopes the result is C1.
     fit_cubic(smootherstep, 30u²(1−u)², (), 1e-3) → 4 segments
-    Source: notes/algorithms.md C2; the Hermite error is about h⁴/384 · max|f⁗|, but measured here.
+    The error of a cubic Hermite segment of length h is about h⁴/384 · max|f⁗|; it is measured here.
     """
     path = FitTarget(lambda u: f(u)[..., None], lambda u: np.ones((*u.shape, 1)), df, _difference, breakpoints)
     ends = np.array(subdivide(lambda a, b: fit_errors(path, a, b), (0.0, *breakpoints, 1.0), tolerance))

@@ -1,6 +1,6 @@
 """Tangents from a key's neighbors: h_k and d_k are the duration and the mean speed from key k to k + 1.
 
-Source: notes/algorithms.md C4. Monotone and Akima come from scipy.
+Monotone and Akima come from scipy.
 """
 
 from __future__ import annotations

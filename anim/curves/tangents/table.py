@@ -72,7 +72,6 @@ def apply_rotation_tangents(
     player normalizes them; through bspline's values, which are normalized here, a second C2 curve is solved. Best below
     120° between keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
     Raises RangeError for an open loop under a C2 rule, or a quaternion of length 0.
-    Source: notes/algorithms.md C4, rotations (b).
     """
     t, checked = _check_keys(times, arrays.as_floats(rotations, "K 4", name="rotations"))
     q = quat.align_signs(quat.normalize(checked))

@@ -5,7 +5,6 @@ acceleration (`C1`), or none of them (`C2`). `G1` is C0 on a smooth path: the di
 along it jumps; values without a direction in space (weights, scalars) have no G1. A jump counts if it exceeds 0.001
 of the track's own RMS speed or RMS acceleration, and the rounding of keys stored as float32 (or as normalized
 integers). Two keys within one float32 step represent a jump and count as one key.
-Source: notes/algorithms.md C4 and H.
 """
 
 from __future__ import annotations

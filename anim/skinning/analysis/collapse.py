@@ -49,8 +49,7 @@ def collapse(
 
     The collapse index of a vertex belongs to linear blending; the methods are compared by enclosed volume and by
     distance from the bones. bulge_clamp: with the clamp on methods other than lbs. nodes: only meshes on these. For
-    many clips create a `Comparison`. collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707 Source:
-    notes/algorithms.md E3.
+    many clips create a `Comparison`. collapse(tube, twist90, times=[0, 1]) → one mesh with indices 1, 0.707
     """
     return Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=nodes).of(clip, times=times)
 

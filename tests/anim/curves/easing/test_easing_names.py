@@ -57,6 +57,9 @@ def test_case_and_spaces_do_not_matter() -> None:
 def test_table_names_are_the_eases_names() -> None:
     assert all(name == ease.name for name, ease in EASINGS.items())
     assert all(maker.usage.startswith(f"{name}(") for name, maker in EASING_FACTORIES.items())
+    for name, maker in EASING_FACTORIES.items():
+        assert maker.examples, f"add examples of {name} to its Factory"
+        assert all(each.startswith(f"{name}(") for each in maker.examples), name
     assert [f"{f}-{way}" for f in FAMILIES for way in ("in", "out", "in-out")] == [
         n for n in EASINGS if n.split("-")[0] in FAMILIES
     ]

@@ -1,4 +1,4 @@
-"""Fits: within the tolerance at 1000 samples a piece, and with no more pieces than notes/algorithms.md C2 lists."""
+"""Fits: within the tolerance at 1000 samples a piece, and with no more pieces than TABLE lists."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from anim.operations.ease_track import ease_segments
 
 MANY = np.linspace(0, 1, 1001)
 CURVED = [name for name, ease in EASINGS.items() if ease.exact is None]
-TABLE = {  # ease: cubic and linear pieces at 1e-3, notes/algorithms.md C2
+TABLE = {  # ease: cubic and linear pieces at 1e-3
     "smoothstep": (1, 27),
     "sine-in-out": (4, 25),
     "smootherstep": (6, 27),
