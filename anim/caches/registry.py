@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from typing import TypeAlias
@@ -13,8 +14,9 @@ from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.signatures import Signature, is_mdd, is_obj, is_stl, starts_with
 from anim.caches.storage import Inputs, Outputs
 from anim.caches.vat import reader, writer
-from anim.errors import FormatError, UnsupportedError
-from anim.model import VertexCache
+from anim.errors import AnimError, FormatError, RangeError, ShapeError, UnsupportedError
+from anim.model import FrameChunk, VertexCache
+from anim.model.vertex_cache import Chunks
 
 Read: TypeAlias = Callable[[Inputs, ReadOptions], VertexCache]
 Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
@@ -97,14 +99,35 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
 def reader_for(ending: str) -> Read:
     """Return the reader of a format: reader_for(".pc2")(inputs, ReadOptions()) → VertexCache.
 
-    It reads this format from files of any name. Raises UnsupportedError for an unknown file extension.
+    It reads this format from files of any name; invalid contents raise FormatError, in chunks too. Raises
+    UnsupportedError for an unknown file extension.
     """
-    return _of(ending).read
+    return partial(_read, _of(ending).read)
 
 
 def writer_for(ending: str) -> Write:
     """Return the writer of a format: writer_for(".npz")(cache, outputs, WriteOptions()) → WriteResult."""
     return _of(ending).write
+
+
+def _read(read: Read, inputs: Inputs, reading: ReadOptions) -> VertexCache:
+    with _format_errors(ShapeError if reading.fps else (ShapeError, RangeError)):  # the caller's fps may be too high
+        cache = read(inputs, reading)
+    return replace(cache, chunks=partial(_chunks, cache.chunks))
+
+
+def _chunks(chunks: Chunks) -> Iterator[FrameChunk]:
+    with _format_errors((ShapeError, RangeError)):
+        yield from chunks()
+
+
+@contextmanager
+def _format_errors(kinds: type[AnimError] | tuple[type[AnimError], ...]) -> Iterator[None]:
+    """Convert errors of arrays into FormatError: their values are those of the file."""
+    try:
+        yield
+    except kinds as error:
+        raise FormatError(error.problem, where=error.where, help=error.help) from None
 
 
 def _of(ending: str) -> CacheFormat:

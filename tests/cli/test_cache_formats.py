@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.registry import CACHE_FORMATS, sniff_format
+from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.transforms.resample import at_time
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal
 
-WHOLE = (".npz", ".pc2", ".mdd", ".usdc", ".usda", ".glb")
-FRAMES = (".ply", ".obj", ".stl")
-TEXTURES = (".exr", ".png")
+WHOLE, FRAMES, TEXTURES = (
+    tuple(ending for ending, each in CACHE_FORMATS.items() if each.files is files)
+    for files in (Files.ONE, Files.FRAMES, Files.SEVERAL)
+)
 
 
 @pytest.fixture

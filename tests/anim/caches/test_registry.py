@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
-from anim.caches.registry import CACHE_FORMATS, SIGNATURE_BYTES, sniff_format
+from anim.arrays import as_floats
+from anim.caches.options import ReadOptions
+from anim.caches.registry import CACHE_FORMATS, SIGNATURE_BYTES, CacheFormat, reader_for, sniff_format
+from anim.caches.storage import Inputs, Memory
 from anim.caches.transforms.resample import at_time
-from anim.errors import FormatError
+from anim.errors import FormatError, RangeError
+from anim.model import FrameChunk, VertexCache
 from tests.anim.caches.making import FACES, cache, written
 
 
@@ -38,3 +45,33 @@ def test_a_long_obj_whose_last_line_is_cut() -> None:
 def test_what_no_cache_begins_with(data: bytes) -> None:
     with pytest.raises(FormatError, match=r"as no cache format does|is empty"):
         sniff_format(data, len(data))
+
+
+def _one_chunk() -> Iterator[FrameChunk]:
+    yield FrameChunk(0, np.zeros((1, 3, 3), np.float32))
+    as_floats(np.zeros(3), "F V 3", name="positions")
+
+
+def _late_times(inputs: Inputs, reading: ReadOptions) -> VertexCache:
+    return VertexCache(np.array([1.0, 0.0]), 3, FACES[:1], _one_chunk)
+
+
+def _bad_chunk(inputs: Inputs, reading: ReadOptions) -> VertexCache:
+    return VertexCache(np.array([0.0, 1.0]), 3, FACES[:1], _one_chunk)
+
+
+def test_array_errors_of_contents_are_format_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    _use(monkeypatch, replace(CACHE_FORMATS[".mdd"], read=_late_times))
+    with pytest.raises(FormatError, match="times not increasing at key 1"):
+        reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions())
+    with pytest.raises(RangeError):  # with the caller's fps it may be the caller's error
+        reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions(1e9))
+    _use(monkeypatch, replace(CACHE_FORMATS[".mdd"], read=_bad_chunk))
+    read = reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions())
+    for _ in range(2):
+        with pytest.raises(FormatError, match="positions has shape"):
+            list(read.chunks())
+
+
+def _use(monkeypatch: pytest.MonkeyPatch, entry: CacheFormat) -> None:
+    monkeypatch.setitem(CACHE_FORMATS, ".mdd", entry)
