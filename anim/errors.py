@@ -112,7 +112,7 @@ def check_type(value: object, expected: type, name: str, *, help: str = "") -> N
 def check_number(value: object, name: str) -> None:
     """Raise ShapeError unless `value`, named `name`, is a real number; True and False are none."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ShapeError(f"{name} is {value!r} (expected a number)")
+        raise ShapeError(f"`{name}` is {value!r} (expected a number)")
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:

@@ -28,7 +28,7 @@ def check_fps(fps: float) -> None:
     """Raise ShapeError or RangeError unless `fps` is a number above 0."""
     check_number(fps, "fps")
     if not (math.isfinite(fps) and fps > 0):
-        raise RangeError(f"fps is {fps:g} (expected a number above 0)")
+        raise RangeError(f"`fps` is {fps:g} (expected a number above 0)")
 
 
 def frame_times(start: float, end: float, *, fps: float) -> Floats:

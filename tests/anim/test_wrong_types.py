@@ -28,11 +28,11 @@ DOCUMENT: Any = ASSET.document
 SHAPES: dict[str, tuple[Callable[[], object], str]] = {
     "asset for clip": (lambda: ops.resample(WRONG, fps=10), "clip is Asset"),
     "ease an asset": (lambda: ops.ease(WRONG, easing="quad-in"), "clip is Asset"),
-    "text for fps": (lambda: ops.resample(CLIP, fps=TEXT), "fps is '10'"),
-    "no fps": (lambda: ops.resample(CLIP, fps=NONE), "fps is None"),
+    "text for fps": (lambda: ops.resample(CLIP, fps=TEXT), "`fps` is '10'"),
+    "no fps": (lambda: ops.resample(CLIP, fps=NONE), "`fps` is None"),
     "index for tracks": (lambda: ops.trim(CLIP, tracks=NUMBER), "tracks is 0"),
     "names for tracks": (lambda: ops.spline(CLIP, tracks=NAMES), "tracks is {'hips'}"),
-    "text for speed": (lambda: ops.retime(CLIP, speed=TEXT), "speed is '10'"),
+    "text for speed": (lambda: ops.retime(CLIP, speed=TEXT), "`speed` is '10'"),
     "no easing": (lambda: ops.warp(CLIP, easing=NONE), "easing is None"),
     "swapped": (lambda: sample(CLIP, WRONG, np.zeros(1)), "skeleton is Clip"),
     "document for scene": (lambda: bake(DOCUMENT, CLIP, times=np.zeros(1)), "scene is Document"),
@@ -40,9 +40,9 @@ SHAPES: dict[str, tuple[Callable[[], object], str]] = {
         lambda: bake(ASSET.scene, CLIP, times=np.zeros(1), nodes=TEXT),
         "nodes is '10'",
     ),
-    "facade fps": (lambda: anim.sample(ASSET, fps=TEXT), "fps is '10'"),
+    "facade fps": (lambda: anim.sample(ASSET, fps=TEXT), "`fps` is '10'"),
     "facade times": (lambda: anim.sample(ASSET, times="x"), "times holds something that is no number"),
-    "facade bound": (lambda: anim.optimize(ASSET, max_error=NONE), "max_error is None"),
+    "facade bound": (lambda: anim.optimize(ASSET, max_error=NONE), "`max_error` is None"),
     "player": (lambda: anim.diff(ASSET, ASSET, player=NONE), "player is None"),
     "list of clips": (lambda: writer.replace_clips(ASSET.document, CLIPS), "clips is list"),
     "path": (lambda: anim.save(ASSET, NONE), "path is None"),
@@ -50,7 +50,7 @@ SHAPES: dict[str, tuple[Callable[[], object], str]] = {
 RANGES: dict[str, tuple[Callable[[], object], str]] = {
     "track": (lambda: ops.resample(CLIP, fps=10, tracks=frozenset({999})), "there is no track 999"),
     "threads": (lambda: bake(ASSET.scene, CLIP, times=np.zeros(1), threads=-1), "threads is -1"),
-    "diff fps": (lambda: anim.diff(ASSET, ASSET, fps=0), "fps is 0"),
+    "diff fps": (lambda: anim.diff(ASSET, ASSET, fps=0), "`fps` is 0"),
 }
 
 

@@ -104,7 +104,7 @@ def _run(
     skeleton: Skeleton, clip: Clip, bones: SpringBones, options: SpringOptions, duration: float
 ) -> tuple[Steps, LoopedMotion | None, SpringMotion]:
     """The steps, and the motion at each of them, from 0 s to the first at or after the duration."""
-    check_number(duration, "`duration`")
+    check_number(duration, "duration")
     if not duration > 0:
         raise RangeError(
             f"`duration` is {duration:g} s (expected more than 0)",

@@ -57,7 +57,7 @@ def test_frames_are_start_and_whole_numbers_of_steps_and_the_exact_end(start: fl
 
 @pytest.mark.parametrize("fps", [0, -1, float("nan"), float("inf"), -float("inf")])
 def test_a_rate_is_a_number_above_0(fps: float) -> None:
-    with pytest.raises(RangeError, match="fps is"):
+    with pytest.raises(RangeError, match="`fps` is"):
         frame_times(0, 1, fps=fps)
 
 

@@ -265,7 +265,7 @@ def test_chains_that_collide_with_each_other_are_refused() -> None:
         (SpringOptions(duration=-1), "duration` is -1 s"),
         (SpringOptions(duration=float("inf")), "`duration` is inf s"),
         (SpringOptions(warm_up=-1), "`warm_up` is -1 s"),
-        (SpringOptions(fps=0), "fps is 0"),
+        (SpringOptions(fps=0), "`fps` is 0"),
         (SpringOptions(step=1e-12), "more than 10000000 steps"),
     ],
 )
