@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import anim
+from anim.sampling.track import sample
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built
 from tests.files import clips_of
@@ -163,3 +164,17 @@ def test_a_file_without_springs_is_told_about_chains(fixture: Fixture, call: Cal
     assert (run.code, run.out) == (5, b"")
     assert "has no spring bones (neither VRMC_springBone nor VRM 0.x secondaryAnimation)" in run.err
     assert "help: --chain names the first joint of each chain" in run.err
+
+
+def test_a_late_clip_swings_from_its_start(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    late, paths = tmp_path / "late.glb", [tmp_path / "a.glb", tmp_path / "b.glb"]
+    call("retime", fixture("ponytail"), late, "--offset", "600").product()
+    for source, out in zip((fixture("ponytail"), late), paths, strict=True):
+        call("simulate", "springs", source, out).product()
+    early, moved = (anim.load(path).clips["walk"] for path in paths)
+    assert (moved.start, moved.end) == pytest.approx((early.start + 600, early.end + 600))
+    for a, b in zip(early.tracks, moved.tracks, strict=True):
+        assert a.target == b.target
+        if a.path == "rotation":
+            found = sample(b, a.times + 600)
+            assert np.abs(np.sum(sample(a, a.times) * found, axis=1)).min() > np.cos(np.radians(1.0) / 2)

@@ -75,8 +75,8 @@ def simulate_springs(
     check_hierarchy(skeleton, bones)
     chains, notes = drop_inert_joints(skeleton, bones.chains)
     bones = replace(bones, chains=chains)
-    duration = clip.end if options.duration is None else options.duration
-    steps, looped, motion = _run(skeleton, clip, bones, options, duration)
+    duration = clip.end - clip.start if options.duration is None else options.duration
+    steps, looped, motion = _run(skeleton, _from_zero(clip), bones, options, duration)
     frames = frame_times(0.0, duration, fps=options.fps)
     frames = frames[distinct_float32(frames)]
     rotations = _resample(motion.rotations, frames / steps.step_s)
@@ -86,7 +86,7 @@ def simulate_springs(
     deflection = quaternion.angle_between(motion.rotations, skeleton.rotation[list(bones.nodes)])
     speeds = np.sqrt((np.diff(motion.tails, axis=0) ** 2).sum(axis=-1)) / steps.step_s
     return SpringResult(
-        _merge(clip, bones.nodes, freeze(frames.astype(np.float32).astype(np.float64)), rotations),
+        _merge(clip, bones.nodes, *_stored_keys(clip.start + frames, rotations)),
         bones.nodes,
         tuple(node for node in replaced if node is not None),
         steps.step_s,
@@ -98,6 +98,23 @@ def simulate_springs(
         looped,
         (*bones.notes, *notes, *scaled_colliders(skeleton, bones)),
     )
+
+
+def _from_zero(clip: Clip) -> Clip:
+    """The clip, begun at 0 s."""
+    if clip.start == 0.0:
+        return clip
+    tracks = (
+        track.with_keys(track.times - clip.start, track.values, track.in_tangents, track.out_tangents)
+        for track in clip.tracks
+    )
+    return Clip(clip.name, tuple(tracks))
+
+
+def _stored_keys(times: Floats, rotations: Floats) -> tuple[Floats, Floats]:
+    """Times (F,) as float32 stores them, without those that fall together, and their rotations."""
+    kept = distinct_float32(times)
+    return freeze(times[kept].astype(np.float32).astype(np.float64)), rotations[kept]
 
 
 def _run(
