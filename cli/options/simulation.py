@@ -16,6 +16,8 @@ from cli.errors import UsageError
 
 EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
 Integrator = StrEnum("Integrator", [(name, name) for name in INTEGRATORS])  # type: ignore[misc]
+VELOCITY_VERLET = Integrator("velocity-verlet")
+DEFAULT_FPS = 60.0
 
 Clip = Annotated[
     str | None,
@@ -48,9 +50,21 @@ ReportFile = Annotated[
         help="Write a report: steps, stability, energy, error (.json), or its picture (.png).",
     ),
 ]
-
-
 Gravity = Annotated[str, typer.Option("--gravity", metavar="X,Y,Z", help="Acceleration in m/s².")]
+Wind = Annotated[str, typer.Option("--wind", metavar="X,Y,Z", help="Velocity of the air in m/s.")]
+FloorHeight = Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height in metres of a floor.")]
+Friction = Annotated[float, typer.Option("--friction", metavar="N", help="Coulomb's friction.", min=0)]
+Restitution = Annotated[
+    float, typer.Option("--restitution", metavar="0..1", help="Speed kept by a bounce.", min=0, max=1)
+]
+Merge = Annotated[bool, typer.Option("--merge", help="Add the tracks to the driving clip, not to a new one.")]
+Name = Annotated[str, typer.Option("--name", metavar="NAME", help="Name of the new clip, and of new nodes.")]
+
+
+def check_fps(fps: float) -> None:
+    """Raise UsageError unless `fps` is above 0."""
+    if fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
 
 
 def parse_vector(given: str, option: str) -> tuple[float, float, float]:

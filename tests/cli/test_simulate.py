@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import json
+import typing
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.models import OptionInfo
 
 import anim
+from anim.simulation.registry import SIMULATIONS
 from cli.commands import simulate
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import ROOT
 from tests.khronos import errors, needs_validator, validate
+
+# Options with the same name and another meaning: VRM's, a ball's or a body's, of a fabric or of the air.
+OWN_MEANING = {"sphere", "gravity", "stiffness", "drag", "density", "max_error"}
 
 
 @pytest.mark.parametrize("args", [(), ("--help",)])
@@ -29,6 +37,30 @@ def test_every_kind_is_a_module_with_its_examples_in_the_help(call: Call) -> Non
     for kind, row in simulate.KINDS.items():
         words = " ".join(call("simulate", kind, "--help").product().decode().split())
         assert all(" ".join(example.split()) in words for example in row.examples)
+
+
+def test_the_default_step_and_the_line_of_a_kind_are_those_of_the_table(call: Call) -> None:
+    assert list(simulate.KINDS) == list(SIMULATIONS)
+    for kind, row in SIMULATIONS.items():
+        assert simulate.KINDS[kind].about == row.about
+        words = " ".join(call("simulate", kind, "--help").product().decode().split())
+        assert f"such as 1/240. [default: {row.step}]" in words
+
+
+@pytest.mark.parametrize("kind", SIMULATIONS)
+def test_the_table_loads_the_function_of_a_kind(kind: str) -> None:
+    parameters = list(inspect.signature(SIMULATIONS[kind].load()).parameters)
+    assert (parameters[1] in ("clip", "driver"), parameters[-1]) == (True, "options")
+
+
+def test_options_of_several_kinds_are_written_once() -> None:
+    seen: dict[str, tuple[str, object]] = {}
+    for kind in SIMULATIONS:
+        command = importlib.import_module(f"cli.commands.simulate.{kind}").command
+        for name, hint in typing.get_type_hints(command, include_extras=True).items():
+            option = next((each for each in typing.get_args(hint) if isinstance(each, OptionInfo)), None)
+            if option is not None and name not in OWN_MEANING:
+                assert seen.setdefault(name, (kind, option))[1] is option, f"--{name} of {seen[name][0]} and {kind}"
 
 
 def test_the_help_of_particles_states_its_limits(call: Call) -> None:

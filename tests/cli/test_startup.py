@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from anim.simulation.registry import SIMULATIONS
 from cli import main
 from tests.cli.running import ENVIRONMENT, ROOT, built
 
@@ -55,6 +56,13 @@ def test_the_help_of_a_command_imports_that_command_only() -> None:
         assert not _packages(names) & HEAVY, command
         assert _commands(names) - before == {f"cli.commands.{command.replace('-', '_')}"}
         before = _commands(names)
+
+
+def test_the_help_of_a_kind_of_simulation_imports_no_heavy_package() -> None:
+    for kind in SIMULATIONS:
+        ((code, names),) = _run(["simulate", kind, "--help"])
+        assert code == 0
+        assert not _packages(names) & HEAVY, kind
 
 
 def test_a_run_imports_only_packages_that_it_uses(tmp_path: Path) -> None:

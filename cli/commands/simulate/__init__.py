@@ -1,42 +1,32 @@
-"""`gltf-anim simulate KIND`: the table of kinds; each is a module here with a `command`."""
+"""`gltf-anim simulate KIND`: a command for each row of SIMULATIONS; each is a module here with a `command`."""
 
 from __future__ import annotations
 
+from anim.simulation.registry import SIMULATIONS
 from cli.main import CommandInfo, LazyGroup
 
-KINDS: dict[str, CommandInfo] = {
-    "springs": CommandInfo(
-        "Simulate hair, tails and other joint chains.",
-        (
-            "gltf-anim simulate springs ponytail.glb swinging.glb --clip walk --loop",
-            "gltf-anim simulate springs ponytail.glb soft.glb --chain hair1 --frequency 2.5 --gravity 6",
-            "gltf-anim simulate springs ponytail.glb small.glb --stiffness 1 --max-error 0.5mm --report springs.json",
-        ),
+EXAMPLES = {
+    "springs": (
+        "gltf-anim simulate springs ponytail.glb swinging.glb --clip walk --loop",
+        "gltf-anim simulate springs ponytail.glb soft.glb --chain hair1 --frequency 2.5 --gravity 6",
+        "gltf-anim simulate springs ponytail.glb small.glb --stiffness 1 --max-error 0.5mm --report springs.json",
     ),
-    "particles": CommandInfo(
-        "Emit particles from nodes or surfaces.",
-        (
-            "gltf-anim simulate particles walk.glb sparks.glb --node head --floor 0 --rate 100",
-            "gltf-anim simulate particles walk.glb dust.glb --node '*_Foot' --drag 3 --turbulence 0.4 --loop",
-            "gltf-anim simulate particles walk.glb rain.glb --node head --drag 2 --integrator rk4 --report rain.json",
-        ),
+    "particles": (
+        "gltf-anim simulate particles walk.glb sparks.glb --node head --floor 0 --rate 100",
+        "gltf-anim simulate particles walk.glb dust.glb --node '*_Foot' --drag 3 --turbulence 0.4 --loop",
+        "gltf-anim simulate particles walk.glb rain.glb --node head --drag 2 --integrator rk4 --report rain.json",
     ),
-    "cloth": CommandInfo(
-        "Let a mesh, or a part of one, hang and blow as cloth.",
-        (
-            "gltf-anim simulate cloth flag.glb waving.glb --mesh flag --pin x-min --wind 5,0,2",
-            "gltf-anim simulate cloth flag.glb flag.npz --mesh flag --pin x-min --max-stretch 5% --report flag.json",
-            "gltf-anim simulate cloth flag.glb net.npz --mesh flag --pin x-min --solver mass-spring --stiffness 20",
-        ),
+    "cloth": (
+        "gltf-anim simulate cloth flag.glb waving.glb --mesh flag --pin x-min --wind 5,0,2",
+        "gltf-anim simulate cloth flag.glb flag.npz --mesh flag --pin x-min --max-stretch 5% --report flag.json",
+        "gltf-anim simulate cloth flag.glb net.npz --mesh flag --pin x-min --solver mass-spring --stiffness 20",
     ),
-    "rigid": CommandInfo(
-        "Let rigid bodies fall, collide and come to rest.",
-        (
-            "gltf-anim simulate rigid wall.glb fall.glb --body 'brick*' --body ball --velocity ball=0,0,-9 --floor 0",
-            "gltf-anim simulate rigid wall.glb box.glb --body 'brick*' --shape box --floor 0 --max-error 1mm",
-        ),
+    "rigid": (
+        "gltf-anim simulate rigid wall.glb fall.glb --body 'brick*' --body ball --velocity ball=0,0,-9 --floor 0",
+        "gltf-anim simulate rigid wall.glb box.glb --body 'brick*' --shape box --floor 0 --max-error 1mm",
     ),
 }
+KINDS = {name: CommandInfo(kind.about, EXAMPLES[name]) for name, kind in SIMULATIONS.items()}
 
 
 class Group(LazyGroup):

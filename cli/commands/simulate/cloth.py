@@ -25,6 +25,7 @@ from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.selection import select_vertices
 from anim.simulation.cloth.simulate import SOLVERS, ClothOptions, ClothRun, compare, simulate_cloth
 from anim.simulation.cloth.solver import Environment
+from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport, describe_elongation
 from cli import text, units
 from cli.errors import CheckError, UsageError
@@ -37,7 +38,6 @@ from cli.workflows.simulate_clip import NO_CLIP, driving_clip
 
 Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
 XPBD, MASS_SPRING = Solver("xpbd"), Solver("mass-spring")
-VELOCITY_VERLET = simulation.Integrator("velocity-verlet")
 SELECTOR = "x-min … z-max, joint:GLOB, material:GLOB or box:X,Y,Z,SX,SY,SZ"
 
 
@@ -63,11 +63,11 @@ def command(
     ] = 1e-2,
     damping: Annotated[float, typer.Option("--damping", metavar="N", help="Damping per second.")] = 0.3,
     gravity: simulation.Gravity = simulation.EARTH_GRAVITY,
-    wind: Annotated[str, typer.Option("--wind", metavar="X,Y,Z", help="Velocity of the air in m/s.")] = "0,0,0",
+    wind: simulation.Wind = "0,0,0",
     gusts: Annotated[
         float, typer.Option("--gusts", metavar="N", help="Gusts, as a fraction of the wind.", min=0)
     ] = 0.3,
-    floor: Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height of a floor in metres.")] = None,
+    floor: simulation.FloorHeight = None,
     sphere: Annotated[
         list[str] | None,
         typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or at a node, and its radius; may be repeated."),
@@ -79,10 +79,10 @@ def command(
     thickness: Annotated[
         str, typer.Option("--thickness", metavar="LENGTH", help="Distance that is kept from colliders.")
     ] = "5mm",
-    friction: Annotated[float, typer.Option("--friction", metavar="N", help="Friction against colliders.")] = 0.3,
+    friction: simulation.Friction = 0.3,
     self_collision: Annotated[bool, typer.Option("--self-collision", help="Keep vertices of the cloth apart.")] = False,
     solver: Annotated[Solver, typer.Option("--solver", help="Method; mass-spring needs --integrator.")] = XPBD,
-    integrator: simulation.IntegratorOption = VELOCITY_VERLET,
+    integrator: simulation.IntegratorOption = simulation.VELOCITY_VERLET,
     stiffness: Annotated[
         float, typer.Option("--stiffness", metavar="N/M", help="Stiffness of an edge, for mass-spring.")
     ] = 500.0,
@@ -98,8 +98,8 @@ def command(
     tethers: Annotated[
         bool, typer.Option("--tethers/--no-tethers", help="Limit distances to pinned vertices along the mesh.")
     ] = True,
-    step: simulation.Step = "1/600",
-    fps: simulation.Fps = 60.0,
+    step: simulation.Step = SIMULATIONS["cloth"].step,
+    fps: simulation.Fps = simulation.DEFAULT_FPS,
     duration: simulation.Duration = None,
     warm_up: simulation.WarmUp = 0.0,
     seed: simulation.Seed = 0,
@@ -123,8 +123,7 @@ def command(
     """
     voice = Reporter(quiet, verbose)
     began = time.perf_counter()
-    if fps <= 0:
-        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    simulation.check_fps(fps)
     kind = _report_kind(report, solver)
     ending = cache_files.check(output, None if format is None else f".{format}")
     given = {"quantize": quantize, "layout": layout}

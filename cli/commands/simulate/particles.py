@@ -18,16 +18,15 @@ from anim.simulation.particles.forces import Forces
 from anim.simulation.particles.obstacles import Box, Floor, Obstacle, Sphere
 from anim.simulation.particles.simulate import ParticleOptions, add_particles, simulate_particles
 from anim.simulation.particles.solver import Contact
+from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.units import is_zero_angle
 from cli import text, units
-from cli.errors import UsageError
 from cli.options import common, simulation
 from cli.options.simulation import parse_numbers, parse_seconds, parse_vector
 from cli.text import Reporter
 from cli.workflows.simulate_clip import simulate_clip
 
-VELOCITY_VERLET = simulation.Integrator("velocity-verlet")
 ROUNDING_M = 1e-9
 MANY_NODES, MAX_NODES = 2000, 10_000  # players take milliseconds a frame; binding alone takes seconds
 
@@ -77,18 +76,14 @@ def command(
     quadratic_drag: Annotated[
         float, typer.Option("--quadratic-drag", metavar="N", help="Quadratic drag per metre.", min=0)
     ] = 0.0,
-    wind: Annotated[
-        str, typer.Option("--wind", metavar="X,Y,Z", help="Velocity of the air in m/s; needs drag.")
-    ] = "0,0,0",
+    wind: simulation.Wind = "0,0,0",
     turbulence: Annotated[
         float, typer.Option("--turbulence", metavar="M/S", help="Random part of the wind; needs drag.", min=0)
     ] = 0.0,
     turbulence_size: Annotated[
         float, typer.Option("--turbulence-size", metavar="M", help="Size of the eddies of the air in metres.")
     ] = 0.5,
-    floor: Annotated[
-        float | None, typer.Option("--floor", metavar="Y", help="Height in metres of a floor to bounce off.")
-    ] = None,
+    floor: simulation.FloorHeight = None,
     sphere: Annotated[
         list[str] | None,
         typer.Option("--sphere", metavar="X,Y,Z,R", help="A ball to bounce off, in metres; may be repeated."),
@@ -97,22 +92,18 @@ def command(
         list[str] | None,
         typer.Option("--box", metavar="X,Y,Z,SX,SY,SZ", help="A box to bounce off: center, size; may be repeated."),
     ] = None,
-    restitution: Annotated[
-        float, typer.Option("--restitution", metavar="0..1", help="Speed kept by a bounce.", min=0, max=1)
-    ] = 0.5,
-    friction: Annotated[float, typer.Option("--friction", metavar="N", help="Coulomb's friction.", min=0)] = 0.3,
-    integrator: simulation.IntegratorOption = VELOCITY_VERLET,
-    step: simulation.Step = "1/240",
-    fps: simulation.Fps = 60.0,
+    restitution: simulation.Restitution = 0.5,
+    friction: simulation.Friction = 0.3,
+    integrator: simulation.IntegratorOption = simulation.VELOCITY_VERLET,
+    step: simulation.Step = SIMULATIONS["particles"].step,
+    fps: simulation.Fps = simulation.DEFAULT_FPS,
     duration: simulation.Duration = None,
     warm_up: simulation.WarmUp = 0.0,
     loop: simulation.Loop = False,
     seed: simulation.Seed = 0,
     clip: simulation.Clip = None,
-    merge: Annotated[
-        bool, typer.Option("--merge", help="Add the tracks to the driving clip, not to a new one.")
-    ] = False,
-    name: Annotated[str, typer.Option("--name", metavar="NAME", help="Name of the clip and its nodes.")] = "particles",
+    merge: simulation.Merge = False,
+    name: simulation.Name = "particles",
     force: Annotated[bool, typer.Option("--force", help=f"Write more than {MAX_NODES} nodes.")] = False,
     report: simulation.ReportFile = None,
     dry_run: common.DryRun = False,
@@ -123,11 +114,11 @@ def command(
 
     Each is a node with one shared mesh; a node is used again when its particle has died. Without drag, and with verlet,
     velocity-verlet or rk4 only, a path is written as the exact parabolas between impacts; else it has a key per frame.
-    The time of an impact is found inside the step. --floor, --sphere and --box stop the centers of particles, not their
-    surfaces. --loop begins with the particles that are alive at the end, so that the clip repeats without a seam.
+    The time of an impact is found inside the step. Wind and turbulence need drag. --floor, --sphere and --box stop the
+    centers of particles, not their surfaces. --loop begins with the particles that are alive at the end, so that the
+    clip repeats without a seam.
     """
-    if fps <= 0:
-        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    simulation.check_fps(fps)
     options = ParticleOptions(
         Forces(
             parse_vector(gravity, "--gravity"),

@@ -12,7 +12,7 @@ from anim.gltf.document import Document
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
-from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
+from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.simulation.rigid_bodies.description import WATER_KG_M3, Material, Motion, PhysicsDescription
 from anim.simulation.rigid_bodies.node_globs import SHAPES, ChosenNodes, add_chosen
@@ -29,7 +29,6 @@ from cli.options.simulation import parse_seconds, parse_vector
 from cli.text import Reporter
 from cli.workflows.simulate_clip import simulate_clip
 
-EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
 DEFAULT_DURATION_S = 5.0
 ROUNDING_M = 1e-6  # float32 of a body some metres from the center
 Shape = StrEnum("Shape", [(name, name) for name in SHAPES])  # type: ignore[misc]
@@ -52,26 +51,22 @@ def command(
         typer.Option("--collider", metavar="GLOB", help="Nodes that bodies collide with, static or animated."),
     ] = None,
     density: Annotated[float, typer.Option("--density", metavar="N", help="Density in kg/m³.")] = WATER_KG_M3,
-    friction: Annotated[float, typer.Option("--friction", metavar="N", help="Coulomb's friction.", min=0)] = 0.6,
-    restitution: Annotated[
-        float, typer.Option("--restitution", metavar="0..1", help="Speed kept by a bounce.", min=0, max=1)
-    ] = 0.0,
+    friction: simulation.Friction = 0.6,
+    restitution: simulation.Restitution = 0.0,
     velocity: Annotated[
         list[str] | None,
         typer.Option("--velocity", metavar="GLOB=X,Y,Z", help="Velocity of bodies at the start, in m/s; repeatable."),
     ] = None,
-    floor: Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height in metres of a floor.")] = None,
-    gravity: Annotated[str, typer.Option("--gravity", metavar="X,Y,Z", help="Acceleration in m/s².")] = EARTH_GRAVITY,
-    step: simulation.Step = "1/240",
-    fps: simulation.Fps = 60.0,
+    floor: simulation.FloorHeight = None,
+    gravity: simulation.Gravity = simulation.EARTH_GRAVITY,
+    step: simulation.Step = SIMULATIONS["rigid"].step,
+    fps: simulation.Fps = simulation.DEFAULT_FPS,
     duration: simulation.Duration = None,
     warm_up: simulation.WarmUp = 0.0,
     max_error: simulation.MaxError = None,
     clip: simulation.Clip = None,
-    merge: Annotated[
-        bool, typer.Option("--merge", help="Add the tracks to the driving clip, not to a new one.")
-    ] = False,
-    name: Annotated[str, typer.Option("--name", metavar="NAME", help="Name of the clip.")] = "rigid",
+    merge: simulation.Merge = False,
+    name: simulation.Name = "rigid",
     report: simulation.ReportFile = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
@@ -84,8 +79,7 @@ def command(
     keys at their own time between frames; a body that sleeps has no more keys. The same file and options give the same
     bytes on the same kind of processor. Requires rapier3d: pip install 'gltf-anim[physics]'.
     """
-    if fps <= 0:
-        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    simulation.check_fps(fps)
     options = RigidOptions(parse_vector(gravity, "--gravity"), parse_seconds(step, "--step"), fps, warm_up=warm_up)
     material = Material(friction, friction, restitution)
     voice = Reporter(quiet, verbose)

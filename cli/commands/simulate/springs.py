@@ -18,6 +18,7 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection
+from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.simulation.spring_bones.chain_globs import find_chains
 from anim.simulation.spring_bones.chains import SpringBones, SpringParameters
@@ -79,8 +80,8 @@ def command(
         str | None, typer.Option("--center", metavar="NODE", help="Node in whose space inertia is evaluated.")
     ] = None,
     clip: simulation.Clip = None,
-    step: simulation.Step = "1/60",
-    fps: simulation.Fps = 60.0,
+    step: simulation.Step = SIMULATIONS["springs"].step,
+    fps: simulation.Fps = simulation.DEFAULT_FPS,
     duration: simulation.Duration = None,
     warm_up: simulation.WarmUp = 0.0,
     loop: simulation.Loop = False,
