@@ -86,9 +86,8 @@ PUBLIC = {
     "optimization.search": "plan",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (
-        "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations stability_plot tangent_plot "
-        "track_plot "
-        "track_selection"
+        "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations simulation_plot "
+        "stability_plot tangent_plot track_plot track_selection"
     ),
     "simulation.cloth": "driver model selection simulate solver",
     "simulation.particles": "emission forces obstacles simulate solver",

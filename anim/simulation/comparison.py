@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.simulation.integrators import INTEGRATORS, System, integrate
 
 MAX_ENERGY_FACTOR = 1e6  # of the start; beyond, a run has diverged
@@ -39,6 +39,19 @@ class IntegratorRun:
     def energy_change(self) -> float:
         """Relative change of energy from start to end."""
         return float(self.energies[-1] / self.energies[0] - 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Runs of all integrators on one system. omega_h: of its stiffest part. step: s.
+
+    springs: (S, 2) pairs of points to draw; with one spring the motion is drawn in phase space.
+    """
+
+    runs: list[IntegratorRun]
+    omega_h: float
+    step: float
+    springs: Ints
 
 
 def compare_integrators(

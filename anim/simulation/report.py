@@ -3,12 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from anim.arrays import Floats, Ints
+from anim.simulation.comparison import Comparison
+
 SCHEMA = "simulate/1"
+PICTURED = ("compare", "history")  # fields for the picture alone
 SAFE_STEP_FRACTION = 0.9  # of the stability limit, for advice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunHistory:
+    """One run over time, for its picture.
+
+    times: (n,) s. energies: (n,) J by name, such as "kinetic". positions: (n, P, 3) m of what moves.
+    edges: (E, 2) pairs of points to draw as lines. errors: (n,) m, distance to the run with half the step; or empty.
+    """
+
+    times: Floats
+    energies: Mapping[str, Floats]
+    positions: Floats
+    edges: Ints
+    errors: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +40,7 @@ class SimulationReport:
     worst_stretch: {"fraction", "where", "time_s"}. penetration_m: deepest, into an obstacle.
     first_bad_step: index of the first step without a finite result. error_estimate_m: largest distance to the same run
     with half the step. figures: of this kind alone, by JSON key. advice: a line with a runnable option, or "".
+    For the picture, and not in the JSON: compare, the run's system by every integrator, and history, the run itself.
     """
 
     kind: str
@@ -41,6 +61,8 @@ class SimulationReport:
     loop_seam_m: float | None = None
     figures: Mapping[str, Any] = field(default_factory=dict)
     advice: str = ""
+    compare: Callable[[], Comparison] | None = None
+    history: RunHistory | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as JSON values; an infinite limit is null."""
@@ -49,7 +71,7 @@ class SimulationReport:
             value = getattr(self, each.name)
             if each.name == "figures":
                 result |= value
-            else:
+            elif each.name not in PICTURED:
                 result[each.name] = None if isinstance(value, float) and not math.isfinite(value) else value
         return result
 

@@ -21,7 +21,7 @@ from anim.show.plots.stability_plot import stability_plot
 from anim.show.plots.tangent_plot import tangent_plot as curves_through
 from anim.show.plots.track_selection import TrackSelection, select_tracks
 from anim.show.plots.track_selection import compare as compared
-from anim.simulation.comparison import compare_integrators
+from anim.simulation.comparison import Comparison, compare_integrators
 from anim.simulation.mass_spring import oscillator
 from cli.errors import UsageError
 from cli.io import documents
@@ -164,7 +164,7 @@ def _oscillator(omega: float, step: str, kind: str) -> bytes:
             f"--step {step} is {duration / seconds:.3g} steps in {NUM_PERIODS} periods (limit {MAX_STEPS})"
         )
     runs = compare_integrators(system, x, np.zeros_like(x), step=seconds, duration=duration)
-    return stability_plot(runs, omega_h=omega * seconds, step=seconds, springs=system.springs, kind=kind)
+    return stability_plot(Comparison(runs, omega * seconds, seconds, system.springs), kind=kind)
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
-from pathlib import PurePath
 
+from anim.errors import UnstableError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene
@@ -17,6 +16,7 @@ from cli.errors import UsageError
 from cli.io import documents, scenes
 from cli.text import Reporter
 from cli.workflows.edit_clips import note_images
+from cli.workflows.simulation_report import check_report, write_report
 
 NO_CLIP = Clip("", ())
 Simulate = Callable[[Document, Scene, Clip, int | None], tuple[Document, SimulationReport, str]]
@@ -35,23 +35,28 @@ def simulate_clip(
     """Simulate on one clip of a file, write the file and the report, and sum up in one line on stderr.
 
     clip: glob of the driving clip; the first clip without it. simulate: gets the document, its scene, the driving clip,
-    without tracks where the file has none, and its index; returns the document, the report, and a summary.
+    without tracks where the file has none, and its index; returns the document, the report, and a summary. The report
+    of an UnstableError is written too, before it is raised again.
     """
     began = time.perf_counter()
     if not dry_run:
         documents.check_output(output)
-        if report is not None:
-            check_report(report)
+        check_report(report)
     with documents.source(input, voice) as source:
         scene = scenes.read_scene(source.document, source.name, voice)
         number = driving_clip(source.document, clip)
         driver = NO_CLIP if number is None else reader.clips(source.document)[number]
-        result, found, summary = simulate(source.document, scene, driver, number)
+        try:
+            result, found, summary = simulate(source.document, scene, driver, number)
+        except UnstableError as error:
+            if report is not None and error.report is not None and not dry_run:
+                write_report(error.report, report)
+            raise
         size = documents.write(result, output, source, dry_run=dry_run, voice=voice)
     if not dry_run:
         note_images(result, source, output, voice)
         if report is not None:
-            documents.write_text(json.dumps(found.to_json(), indent=2, ensure_ascii=False) + "\n", report)
+            write_report(found, report)
     name = source.name if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     nothing = " (dry run: nothing written)" if dry_run else ""
@@ -70,10 +75,3 @@ def driving_clip(document: Document, glob: str | None) -> int | None:
         listed = ", ".join(reader.clip_label(names[i], i) for i in chosen[:4])
         raise UsageError(f"--clip '{glob}' names {len(chosen)} clips ({listed} …): one drives a simulation")
     return chosen[0]
-
-
-def check_report(report: str) -> None:
-    """Raise UsageError unless a report can be written in this format."""
-    if PurePath(report).suffix.lower() != ".json":
-        raise UsageError(f"--report {report}: unsupported report format (expected .json)")
-    documents.check_file(report)

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.show.plots.figure import FAINT, HAIR, INK, SMALL, SOFT, TEXT, TITLE, Figure, separate_labels, style
-from anim.simulation.comparison import IntegratorRun
+from anim.simulation.comparison import Comparison, IntegratorRun
 from anim.simulation.integrators import INTEGRATORS
 
 if TYPE_CHECKING:
@@ -33,12 +33,12 @@ CURVES, LOG, CHANGE, POSES = 6.3, 1.75, 1.45, 2.6
 LABELS = 1.75  # of the curves, at their right
 
 
-def stability_plot(runs: Sequence[IntegratorRun], *, omega_h: float, step: float, springs: Ints, kind: str) -> bytes:
+def stability_plot(compared: Comparison, *, kind: str) -> bytes:
     """Return the plot as the bytes of a PNG or SVG file. Its title states the result of these runs.
 
-    runs: of all integrators. omega_h: of the stiffest part. springs: (S, 2) pairs of points to draw; with one spring
-    the motion is drawn in phase space. Raises UnsupportedError where matplotlib is not installed.
+    Raises UnsupportedError where matplotlib is not installed.
     """
+    runs, omega_h, step, springs = compared.runs, compared.omega_h, compared.step, compared.springs
     with style(kind):
         sheet = Figure(WIDTH, HEAD + LOG + 0.25 + CHANGE + GAP + 0.3 + POSES + 0.25)
         sheet.text(LEFT - 0.4, 0.35, _title(runs, omega_h, step), fontsize=TITLE + 2, weight="bold")

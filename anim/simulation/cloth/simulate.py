@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Bools, Floats
 from anim.errors import RangeError, UnstableError
 from anim.model import Clip, FrameChunk, Scene, VertexCache
 from anim.simulation.cloth.driver import Capsule, ClothDriver
 from anim.simulation.cloth.mass_spring_solver import as_mass_spring, run_mass_spring
 from anim.simulation.cloth.model import ClothModel, Fabric, build_cloth
 from anim.simulation.cloth.solver import Environment, run_xpbd
-from anim.simulation.comparison import IntegratorRun, compare_integrators
+from anim.simulation.comparison import Comparison, compare_integrators
 from anim.simulation.integrators import INTEGRATORS
 from anim.simulation.report import SimulationReport, advise_elongation, advise_step, describe_elongation
 from anim.skinning.bake import prepare_bake
@@ -62,16 +62,6 @@ class ClothRun:
 
     cache: VertexCache
     report: SimulationReport
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ComparedCloth:
-    """Runs of all integrators, ω·h, the step in s, and the edges (E, 2) to draw."""
-
-    runs: list[IntegratorRun]
-    omega_h: float
-    step: float
-    edges: Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,7 +213,7 @@ def _worst_stretch(model: ClothModel, positions: Floats, fps: float) -> dict[str
     }
 
 
-def compare(scene: Scene, node: int, pinned: Bools, options: ClothOptions) -> ComparedCloth:
+def compare(scene: Scene, node: int, pinned: Bools, options: ClothOptions) -> Comparison:
     """Return the same cloth as masses and springs by every integrator, over a second at the pose of 0 s."""
     baker = prepare_bake(scene, rigid=True, nodes=[node])
     template = baker.bake(Clip("", ()), times=np.zeros(1))
@@ -235,4 +225,4 @@ def compare(scene: Scene, node: int, pinned: Bools, options: ClothOptions) -> Co
     damped = compare_integrators(system, x, v, step=step, duration=duration, names=["implicit-euler"])[0]
     lowest = float(damped.energies.min()) - 1e-3 * abs(float(np.ptp(damped.energies)))
     runs = compare_integrators(system, x, v, step=step, duration=duration, lowest_energy=lowest)
-    return ComparedCloth(runs, system.max_frequency() * step, step, model.topology.edges)
+    return Comparison(runs, system.max_frequency() * step, step, model.topology.edges)

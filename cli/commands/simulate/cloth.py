@@ -213,8 +213,7 @@ def _draw_report(
 ) -> None:
     if report is None or kind == ".json" or dry_run:
         return
-    found = compare(scene, node, pinned, options)
-    picture = stability_plot(found.runs, omega_h=found.omega_h, step=found.step, springs=found.edges, kind=kind[1:])
+    picture = stability_plot(compare(scene, node, pinned, options), kind=kind[1:])
     documents.write_bytes([np.frombuffer(picture, np.uint8)], report)
 
 

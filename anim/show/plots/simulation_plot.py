@@ -1,0 +1,142 @@
+"""Plot of a report of a simulation: every integrator on its system, or energy, step error and poses of the run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.show.plots.figure import (
+    COLORS,
+    FAINT,
+    INK,
+    SMALL,
+    SOFT,
+    TEXT,
+    TITLE,
+    Figure,
+    format_number,
+    separate_labels,
+    style,
+)
+from anim.show.plots.stability_plot import stability_plot
+from anim.simulation.report import RunHistory, SimulationReport
+
+WIDTH, LEFT, HEAD = 11.6, 0.75, 0.95  # inches
+ENERGY, ERROR, GAP, POSES = 2.3, 1.1, 0.55, 4.0
+LABELS, CURVES = 1.1, 6.3
+NUM_POSES = 9
+MAX_PATHS = 60  # points with a path; more only fill the picture
+
+
+def simulation_plot(report: SimulationReport, *, kind: str) -> bytes:
+    """Return the picture of a report as the bytes of a PNG or SVG file; its title is computed from the run.
+
+    Raises UnsupportedError where matplotlib is not installed.
+    """
+    if report.compare is not None:
+        return stability_plot(report.compare(), kind=kind)
+    with style(kind):
+        has_error = report.history is not None and len(report.history.errors) > 0
+        sheet = Figure(WIDTH, HEAD + POSES + 0.4)
+        sheet.text(LEFT - 0.4, 0.35, _title(report), fontsize=TITLE + 2, weight="bold")
+        sheet.text(LEFT - 0.4, 0.6, report.advice or _subtitle(report), color=SOFT)
+        if report.history is not None and len(report.history.times) > 1:
+            _draw_energy(sheet, report.history, POSES if not has_error else ENERGY)
+            if has_error:
+                _draw_error(sheet, report.history)
+            _draw_poses(sheet, report.history)
+        return sheet.render(kind)
+
+
+def _title(report: SimulationReport) -> str:
+    start = f"{report.kind}: steps of {_seconds(report.step_s)}, {format_number(report.duration_s)} s"
+    if report.first_bad_step is not None:
+        return f"{start}: diverges at {format_number(report.first_bad_step * report.step_s)} s"
+    parts = []
+    if report.energy_j is not None:
+        ends = [format_number(report.energy_j[key]) for key in ("start", "end")]
+        parts.append(f"energy {ends[0]} → {ends[1]} J")
+    if report.error_estimate_m is not None:
+        parts.append(f"half the step differs by {_length(report.error_estimate_m)}")
+    return ": ".join([start, ", ".join(parts)]) if parts else start
+
+
+def _subtitle(report: SimulationReport) -> str:
+    parts = []
+    if report.penetration_m is not None:
+        parts.append(f"deepest penetration {_length(report.penetration_m)}")
+    if report.loop_seam_m is not None:
+        parts.append(f"seam of the loop {_length(report.loop_seam_m)}")
+    return ", ".join(parts)
+
+
+def _seconds(step: float) -> str:
+    return f"1/{1 / step:.4g} s" if step < 1 else f"{step:.3g} s"
+
+
+def _length(meters: float) -> str:
+    return f"{format_number(1000 * meters)} mm" if meters < 1 else f"{format_number(meters)} m"
+
+
+def _draw_energy(sheet: Figure, history: RunHistory, height: float) -> None:
+    width = CURVES - LEFT - LABELS
+    axes = sheet.panel(LEFT, HEAD, width, height)
+    sheet.text(LEFT, HEAD - 0.1, "Energy, J", fontsize=TEXT)
+    ends = []
+    for color, (name, values) in zip((INK, *COLORS), history.energies.items(), strict=False):
+        axes.plot(history.times, values, color=color, linewidth=2.0 if name == "total" else 1.2)
+        ends.append((name, color, float(values[-1])))
+    axes.set_xlim(0, float(history.times[-1]))
+    if len(history.errors):
+        axes.set_xticklabels([])
+    else:
+        axes.set_xlabel("seconds", fontsize=SMALL, color=SOFT)
+    low, high = axes.get_ylim()
+    at = [HEAD + height * (high - value) / (high - low) for _, _, value in ends]
+    for (name, color, _), y in zip(ends, separate_labels(at, 0.17, HEAD, HEAD + height), strict=True):
+        sheet.text(LEFT + width + 0.12, y + 0.04, name, color=color)
+
+
+def _draw_error(sheet: Figure, history: RunHistory) -> None:
+    top = HEAD + ENERGY + GAP
+    axes = sheet.panel(LEFT, top, CURVES - LEFT - LABELS, POSES - ENERGY - GAP)
+    sheet.text(LEFT, top - 0.1, "Distance to the run with half the step, mm", fontsize=TEXT)
+    axes.plot(history.times, 1000 * history.errors, color=COLORS[0], linewidth=1.2)
+    axes.set_xlim(0, float(history.times[-1]))
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("seconds", fontsize=SMALL, color=SOFT)
+
+
+def _draw_poses(sheet: Figure, history: RunHistory) -> None:
+    """Poses from pale to dark, seen from the side that shows most motion, with the paths of points."""
+    left = CURVES + 0.3
+    sheet.text(left, HEAD - 0.1, f"Poses from 0 to {format_number(float(history.times[-1]))} s", fontsize=TEXT)
+    width = WIDTH - left - 0.25
+    axes = sheet.panel(left, HEAD, width, POSES)
+    axes.grid(visible=False)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for side in axes.spines.values():
+        side.set_visible(True)
+        side.set_color(FAINT)
+    points = _side_view(history.positions)
+    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
+    half = 0.6 * max(float((high - low)[0]) / width, float((high - low)[1]) / POSES, 1e-6)
+    middle = (low + high) / 2
+    axes.set_xlim(middle[0] - half * width, middle[0] + half * width)
+    axes.set_ylim(middle[1] - half * POSES, middle[1] + half * POSES)
+    for point in range(0, points.shape[1], -(-points.shape[1] // MAX_PATHS)):
+        axes.plot(points[:, point, 0], points[:, point, 1], color=FAINT, linewidth=0.8)
+    for i, frame in enumerate(np.linspace(0, len(points) - 1, NUM_POSES).astype(int)):
+        alpha = 0.12 + 0.88 * i / (NUM_POSES - 1)
+        pose = points[frame]
+        for edge in history.edges.tolist():
+            axes.plot(pose[edge, 0], pose[edge, 1], color=COLORS[2], linewidth=1, alpha=alpha)
+        if not len(history.edges):
+            axes.plot(pose[:, 0], pose[:, 1], "o", color=COLORS[2], markersize=3, alpha=alpha, markeredgewidth=0)
+
+
+def _side_view(positions: Floats) -> Floats:
+    """Points (n, P, 2): along x or z, whichever spreads more, and upwards along y."""
+    spread = np.ptp(positions.reshape(-1, 3), axis=0)
+    return np.asarray(positions[..., [0 if spread[0] >= spread[2] else 2, 1]])

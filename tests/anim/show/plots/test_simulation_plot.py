@@ -1,0 +1,59 @@
+"""Pictures of reports: a title computed from the run, energy, step error and poses."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+
+from anim.show.plots.simulation_plot import simulation_plot
+from anim.simulation.comparison import Comparison, compare_integrators
+from anim.simulation.mass_spring import oscillator
+from anim.simulation.report import RunHistory, SimulationReport
+
+
+def _history(errors: int = 50) -> RunHistory:
+    times = np.linspace(0, 1, 50)
+    height = 2 - 4.9 * times**2
+    positions = np.stack([times, height, 0 * times], axis=1)[:, None, :]
+    energies = {"kinetic": 48 * times**2, "potential": 9.81 * height, "total": 20 + 0 * times}
+    return RunHistory(times, energies, positions, np.empty((0, 2), np.int64), np.linspace(0, 1e-3, errors))
+
+
+def test_the_title_and_the_curves_are_those_of_the_run() -> None:
+    energy = {"start": 20.0, "end": 19.5, "peak": 20.0}
+    report = SimulationReport("rigid", 1 / 240, 240, 60, 1.0, energy_j=energy, error_estimate_m=1e-3)
+    drawn = simulation_plot(_with(report, history=_history()), kind="svg").decode()
+    assert "rigid: steps of 1/240 s, 1 s: energy 20 → 19.5 J, half the step differs by 1 mm" in drawn
+    for words in ("kinetic", "potential", "total", "Distance to the run with half the step, mm"):
+        assert words in drawn
+    assert "Distance to" not in simulation_plot(_with(report, history=_history(0)), kind="svg").decode()
+
+
+def test_a_run_that_diverges_says_when_and_what_to_do() -> None:
+    report = SimulationReport("rigid", 0.1, 7, 60, 1.0, first_bad_step=7, advice="a smaller --step: 1/20")
+    drawn = simulation_plot(report, kind="svg").decode()
+    assert "diverges at 0.7 s" in drawn
+    assert "a smaller --step: 1/20" in drawn
+
+
+def test_a_system_is_drawn_by_every_integrator() -> None:
+    system, x = oscillator(20), np.array([[0.0, 0, 0], [1.0, 0, 0]])
+
+    def compare() -> Comparison:
+        runs = compare_integrators(system, x, 0 * x, step=1 / 60, duration=1)
+        return Comparison(runs, 20 / 60, 1 / 60, system.springs)
+
+    report = SimulationReport("springs", 1 / 60, 60, 60, 1.0, compare=compare)
+    assert "explicit-euler" in simulation_plot(report, kind="svg").decode()
+
+
+def test_what_the_picture_needs_is_not_in_the_json() -> None:
+    report = SimulationReport("rigid", 1 / 240, 240, 60, 1.0, history=_history())
+    found = json.loads(json.dumps(report.to_json()))
+    assert not {"history", "compare"} & set(found)
+
+
+def _with(report: SimulationReport, history: RunHistory) -> SimulationReport:
+    return replace(report, history=history)
