@@ -18,7 +18,7 @@ from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, Scene
 from anim.operations.resample import resample
 from anim.sampling import sample_pose
-from anim.sampling.pose import world_by_node
+from anim.sampling.world import world_by_node
 from tests.clips import about, clip, track
 from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.judge import RATE, ClipVerdict, Verdict, judge, needs_judge

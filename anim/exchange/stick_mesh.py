@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.model import Mesh, Skeleton, Skin
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 NAME = "sticks"
 WIDEST_FRACTION = 0.18  # fraction of a stick's length from the joint to its widest point
@@ -24,7 +24,7 @@ def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[
     """
     joints: Ints = np.array([i for i in range(len(skeleton)) if i not in ends], np.int64)
     place_of = {int(node): place for place, node in enumerate(joints)}
-    world = world_matrices(skeleton, rest_pose(skeleton))[0]
+    world = rest_world(skeleton)
     places = world[:, :, 3]
     size = float(np.ptp(places, axis=0).max()) or 1.0
     pieces, owners = [], []

@@ -1,9 +1,10 @@
-"""Clip + Skeleton → Pose at any times, and Pose → world matrices."""
+"""Clip + Skeleton → Pose at any times."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -11,11 +12,11 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError
-from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Pose, Skeleton
 from anim.model.track import NUM_COMPONENTS
 from anim.sampling.batch import Batch, ConcatenatedTracks, concatenate, lazy_batches
 from anim.sampling.track import KeyInterval, find_interval
+from anim.sampling.world import world_by_node
 
 Sampler: TypeAlias = Callable[[Batch, Floats, KeyInterval], Floats]
 
@@ -74,6 +75,43 @@ class PoseSampler:
                 parts[batch.tracks[0].path][:, numbers] = values
         return Pose(at, parts["translation"], parts["rotation"], parts["scale"], weights)
 
+    def posed(self, at: Floats) -> PosedSkeleton:
+        """Return the skeleton at times `at` (F,) in seconds."""
+        return PosedSkeleton(self._skeleton, self.at(at))
+
+
+class PosedSkeleton:
+    """A skeleton at F times: its pose, and world matrices, computed on demand."""
+
+    def __init__(self, skeleton: Skeleton, pose: Pose) -> None:
+        self.skeleton, self.pose = skeleton, pose
+
+    @classmethod
+    def at_rest(cls, skeleton: Skeleton) -> PosedSkeleton:
+        """Return a skeleton in its rest pose, as one frame at 0 s."""
+        return cls(skeleton, rest_pose(skeleton))
+
+    @property
+    def times(self) -> Floats:
+        """Times (F,) in seconds."""
+        return self.pose.times
+
+    @property
+    def weights(self) -> Mapping[int, Floats]:
+        """Animated morph weights (F, M) by node."""
+        return self.pose.weights
+
+    @cached_property
+    def world(self) -> Floats:
+        """World matrices (N, F, 3, 4)."""
+        return world_by_node(self.skeleton, self.pose)
+
+    def of(self, nodes: Ints) -> Floats:
+        """Return the world matrices (J, F, 3, 4) of some nodes; −1 is the world itself."""
+        found: Floats = self.world[nodes]
+        found[nodes < 0] = np.eye(4)[:3]
+        return found
+
 
 def sample_clips(
     skeleton: Skeleton,
@@ -105,56 +143,14 @@ def sample_clips(
     return Pose(times.reshape(-1), translation, rotation, scale), weights
 
 
-def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return world_from_node (F, N, 3, 4) for every time and node of a pose."""
-    return world_by_node(skeleton, pose).transpose(1, 0, 2, 3)
-
-
-def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return world_from_node (N, F, 3, 4), in the memory order of the computation."""
-    return matrix.accumulate_world(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
-
-
-def world_rotations(skeleton: Skeleton, local: Floats) -> dict[int, Floats]:
-    """Return the world rotation (F, 4) of every node from local ones (F, N, 4).
-
-    Scales count by the signs of the rest pose only. Below an odd count of negative scales the result is the rotation
-    in −1 times the orthogonal world matrix: the −1 cancels between two poses.
-    """
-    world: dict[int, Floats] = {}
-    for level in skeleton.levels():
-        for node in level.tolist():
-            parent = int(skeleton.parents[node])
-            own = local[:, node]
-            world[node] = own if parent < 0 else quaternion.multiply(with_scale_signs(skeleton, parent, world), own)
-    return world
-
-
-def with_scale_signs(skeleton: Skeleton, node: int, world: Mapping[int, Floats]) -> Floats:
-    """Return a node's world rotation (..., 4) times the signs of its scale: the space of its children."""
-    signs = np.where(skeleton.scale[node] < 0, -1.0, 1.0)
-    signs = signs * signs.prod()  # none or two are negative: a rotation by 180° about the third axis
-    if (signs > 0).all():
-        return world[node]
-    return quaternion.multiply(world[node], np.append(signs > 0, 0.0))
-
-
-def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return parent_from_node (N, F, 3, 4) for every node and time of a pose."""
-    return local_matrices(skeleton, [np.swapaxes(part, 0, 1) for part in (pose.translation, pose.rotation, pose.scale)])
-
-
-def local_matrices(skeleton: Skeleton, parts: Sequence[Floats]) -> Floats:
-    """Return parent_from_node (N, F, 3, 4) of all nodes from translation, rotation and scale (N, F, ·)."""
-    local = matrix.from_trs(*parts)
-    if len(skeleton.sheared):
-        local[skeleton.sheared] = skeleton.sheared_local[:, None]
-    return local
-
-
 def rest_pose(skeleton: Skeleton) -> Pose:
     """Return the rest pose, as one frame at 0 s."""
     return sample_pose(skeleton, Clip("", ()), np.zeros(1))
+
+
+def rest_world(skeleton: Skeleton) -> Floats:
+    """Return world_from_node (N, 3, 4) of every node in the rest pose."""
+    return PosedSkeleton.at_rest(skeleton).world[:, 0]
 
 
 def _rest_values(values: Floats, frames: int) -> Floats:

@@ -9,8 +9,9 @@ from anim.arrays import Floats
 from anim.errors import RangeError, check_type
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
-from anim.sampling.pose import sample_pose, world_matrices
+from anim.sampling.pose import sample_pose
 from anim.sampling.track import sample as sampled
+from anim.sampling.world import world_matrices
 
 SPACES = ("local", "world")
 

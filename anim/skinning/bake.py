@@ -12,6 +12,7 @@ from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError, ShapeError, UnsupportedError, check_number, check_type
 from anim.model import Clip, MeshInstance, MeshPart, PrimitiveRange, Scene, VertexCache
+from anim.sampling.pose import PosedSkeleton
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh, Make, bind_mesh
 from anim.skinning.chunk_pipeline import ChunkPipeline
@@ -20,7 +21,6 @@ from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
 from anim.skinning.methods.registry import SKINNING_METHODS
 from anim.skinning.methods.skinner import Skinner
-from anim.skinning.pose_blocks import rest_block
 
 SPACES = ("world", "mesh")
 
@@ -96,7 +96,7 @@ def prepare_bake(
         bind_mesh(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
-    rest = rest_block(scene.skeleton)
+    rest = PosedSkeleton.at_rest(scene.skeleton)
     return Baker(
         scene,
         layers,

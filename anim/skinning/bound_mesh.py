@@ -12,10 +12,10 @@ from anim.arrays import Floats
 from anim.errors import AnimError, RangeError
 from anim.maths import matrix
 from anim.model import MeshInstance, Skeleton
+from anim.sampling.pose import PosedSkeleton
 from anim.skinning.binding import SkinBinding, bind_skin
 from anim.skinning.kernels.layout import NO_OUTPUT, FloatArray, OutputSlice, VertexBlock
 from anim.skinning.methods.skinner import Skinner, fill_lanes
-from anim.skinning.pose_blocks import PoseBlock
 from anim.skinning.vertex_normals import SmoothNormals
 
 Make: TypeAlias = Callable[[SkinBinding, bool], Skinner]
@@ -43,7 +43,7 @@ class BoundMesh:
         morphed = len(self.rig.points) if len(self.instance.mesh.targets) else 0
         return 96 * len(self.rig.nodes) + 36 * morphed
 
-    def pack(self, frames: PoseBlock, block: slice) -> tuple[Any, VertexBlock]:
+    def pack(self, frames: PosedSkeleton, block: slice) -> tuple[Any, VertexBlock]:
         """Return the input of `skin` for some of the frames."""
         return self.skinner.pack(self.matrices(frames, block)), self._shape(frames, block)
 
@@ -54,7 +54,7 @@ class BoundMesh:
         tangents = whole.tangents[block] if len(shape.tangents) else NO_OUTPUT
         self.skinner.skin(parts, shape, OutputSlice(self.at, whole.positions[block], normals, tangents), first, last)
 
-    def finish(self, frames: PoseBlock, whole: OutputSlice) -> None:
+    def finish(self, frames: PosedSkeleton, whole: OutputSlice) -> None:
         """Transform positions from world to mesh space, and compute normals from faces, if requested."""
         span = slice(self.at, self.at + len(self.rig.points))
         if self.in_mesh_space and self.instance.skin is not None:
@@ -68,7 +68,7 @@ class BoundMesh:
         if self.smooth is not None:
             self.smooth.of(whole.positions[:, span], whole.normals[:, span])
 
-    def at_rest(self, frames: PoseBlock) -> Floats:
+    def at_rest(self, frames: PosedSkeleton) -> Floats:
         """Return the vertices (V, 3) in the first of the frames, blended linearly in float64."""
         bound = self.matrices(frames, slice(0, 1))[0]
         points = _morph(self.rig.points, self.instance.mesh.targets, self._weights(frames, slice(0, 1)))[..., 0]
@@ -82,7 +82,7 @@ class BoundMesh:
             placed = matrix.apply(_inverse(frames.world[self.instance.node, :1])[0], placed)
         return placed
 
-    def matrices(self, frames: PoseBlock, block: slice) -> Floats:
+    def matrices(self, frames: PosedSkeleton, block: slice) -> Floats:
         """Return world_from_mesh (n, J, 3, 4) of the joints; without a skin, of the node."""
         if self.in_mesh_space and self.instance.skin is None:
             count = len(frames.times[block])
@@ -94,7 +94,7 @@ class BoundMesh:
         product = world.reshape(joints, 3 * count, 4) @ whole  # one per joint, not per frame: ten times faster
         return product.reshape(joints, count, 3, 4).transpose(1, 0, 2, 3)
 
-    def _shape(self, frames: PoseBlock, block: slice) -> VertexBlock:
+    def _shape(self, frames: PosedSkeleton, block: slice) -> VertexBlock:
         mesh, weights = self.instance.mesh, self._weights(frames, block)
         if not weights.any():
             return self.static_block
@@ -103,7 +103,7 @@ class BoundMesh:
         tangents = _morph(self.rig.tangents, mesh.tangent_targets, weights)
         return VertexBlock(_rows(points), _rows(normals), _rows(tangents))
 
-    def _weights(self, frames: PoseBlock, block: slice) -> Floats:
+    def _weights(self, frames: PosedSkeleton, block: slice) -> Floats:
         """Morph weights (n, M), or (1, M) if they are not animated."""
         animated = frames.weights.get(self.instance.node)
         return self.instance.weights[None] if animated is None else animated[block]

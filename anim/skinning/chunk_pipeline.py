@@ -12,9 +12,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import Clip, FrameChunk, Skeleton
+from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.skinning.bound_mesh import BoundMesh
 from anim.skinning.kernels.layout import LANES, NO_OUTPUT, OutputSlice
-from anim.skinning.pose_blocks import PoseBlock, PosePlayback
 
 Job: TypeAlias = tuple[BoundMesh, Any, slice, int, int]  # a layer, its packed data, its block, first and last vertex
 
@@ -40,10 +40,10 @@ class ChunkPipeline:
 
         While the caller uses one chunk the next is skinned, and the poses of the one after it are sampled.
         """
-        playback, step = PosePlayback(self.skeleton, clip), self._frames_per_chunk()
+        sampler, step = PoseSampler(self.skeleton, clip), self._frames_per_chunk()
         with ThreadPoolExecutor(self.threads, thread_name_prefix="skinning") as pool:
             spans = (times[low : low + step] for low in range(0, len(times), step))
-            started = (self._start(playback.at(span), pool) for span in spans)
+            started = (self._start(sampler.posed(span), pool) for span in spans)
             following, first = next(started, None), 0
             while following is not None:
                 current, following = following, next(started, None)
@@ -57,13 +57,13 @@ class ChunkPipeline:
         blocks = min(CHUNK_BYTES // (12 * self.vertices * LANES), PACKED_BYTES // (packed * LANES), MAX_BLOCKS)
         return LANES * max(blocks, 1)
 
-    def _start(self, frames: PoseBlock, pool: ThreadPoolExecutor) -> _PendingChunk:
+    def _start(self, frames: PosedSkeleton, pool: ThreadPoolExecutor) -> _PendingChunk:
         shape = (len(frames.times), self.vertices, 3)
         wanted = (True, self.normals, self.tangents)
         whole = OutputSlice(0, *(np.empty(shape, np.float32) if each else NO_OUTPUT for each in wanted))
         return _PendingChunk(frames, whole, [pool.submit(_submit, jobs, whole) for jobs in self._thread_jobs(frames)])
 
-    def _thread_jobs(self, frames: PoseBlock) -> list[list[Job]]:
+    def _thread_jobs(self, frames: PosedSkeleton) -> list[list[Job]]:
         """Return the jobs of each thread: vertices of large layers are divided, in blocks of frames."""
         shares: list[list[Job]] = [[] for _ in range(self.threads)]
         next_share = cycle(shares)
@@ -90,7 +90,7 @@ class ChunkPipeline:
 class _PendingChunk:
     """A chunk in progress."""
 
-    frames: PoseBlock
+    frames: PosedSkeleton
     output: OutputSlice
     futures: list[Future[None]]
 

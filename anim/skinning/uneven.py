@@ -6,9 +6,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import Clip, Skeleton
+from anim.sampling import PoseSampler
 from anim.skinning.bake import Baker
 from anim.skinning.bound_mesh import BoundMesh
-from anim.skinning.pose_blocks import PosePlayback
 from anim.skinning.weighted_joints import bind_shape
 
 UNEVEN_SCALE = 1e-3  # relative difference of scale factors; rounding in files leaves less
@@ -31,10 +31,10 @@ class UnevenScale:
         """
         if _scales_evenly(self._skeleton, clip):  # what remains is of the bind matrices, equal at all times
             times = times[:1]
-        playback = PosePlayback(self._skeleton, clip)
+        sampler = PoseSampler(self._skeleton, clip)
         found: set[int] = set()
         for first in range(0, len(times), CHUNK_FRAMES):
-            frames = playback.at(times[first : first + CHUNK_FRAMES])
+            frames = sampler.posed(times[first : first + CHUNK_FRAMES])
             for mesh in self._meshes:
                 found |= mesh.uneven(mesh.layer.matrices(frames, slice(None)))
         return tuple(sorted(found))

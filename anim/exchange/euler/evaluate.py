@@ -12,7 +12,7 @@ from anim.exchange.euler.curve import Curve, evaluate
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths import euler, quaternion
 from anim.model import Skeleton
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 
 def evaluate_rotation(node: EulerNode, at: Floats, before: bool = False) -> Floats:
@@ -67,7 +67,7 @@ def skeleton(motion: EulerMotion) -> Skeleton:
 
 def rest_positions(skeleton: Skeleton) -> Floats:
     """Return the rest positions of all nodes in world space (N, 3) in metres."""
-    return world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
+    return rest_world(skeleton)[:, :, 3]
 
 
 def bounding_size(skeleton: Skeleton) -> float:

@@ -19,7 +19,7 @@ from anim.maths.euler import AxesConvention
 from anim.model import Clip, Skeleton, TimeAxis
 from anim.model.skeleton import ancestors, nearest_ancestor
 from anim.sampling import rest_pose, sample_pose, world_matrices
-from anim.sampling.pose import world_rotations
+from anim.sampling.world import world_rotations
 
 GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 MAX_FRAMES = 10_000_000

@@ -16,7 +16,7 @@ from anim.exchange.retarget.joint_matching import JointMatch, match_joints, matc
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.retarget import GroundMode, retarget
 from anim.model import Clip, Scene, Skeleton
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 MIN_AXIS_FRACTION = 0.8  # fraction of the length along the axis; 37°
 FEET = ("left_foot", "right_foot")
@@ -148,7 +148,7 @@ def up_axis(skeleton: Skeleton, roles: Mapping[str, int]) -> str:
     Without feet, from the hips to the head. "" if these are unknown, or the direction is along no axis clearly: an
     animal's back points forward, its legs still point down.
     """
-    places = world_matrices(skeleton, rest_pose(skeleton))[0, :, :3, 3]
+    places = rest_world(skeleton)[:, :3, 3]
     feet = [places[roles[role]] for role in FEET if role in roles]
     if "hips" not in roles or not (feet or "head" in roles):
         return ""

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, Skin, TimeAxis, Track
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 MIN_OFFSET_FRACTION = 1e-3  # minimum offset of a joint from its bind position, as a fraction of the joints' size
 MIN_ANGLE_RAD = np.radians(1)
@@ -33,7 +33,7 @@ def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose
     kept. Other nodes, and joints with a matrix of another scale than the others', keep their local transform.
     skins: by the node of the mesh, see `reader.skins`.
     """
-    world = world_matrices(skeleton, rest_pose(skeleton))[0]
+    world = rest_world(skeleton)
     bound: dict[int, Floats] = {}
     for holder, skin in skins:
         for node, place in _bind_matrices(skeleton, world, (holder, skin), bound).items():

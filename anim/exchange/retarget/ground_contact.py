@@ -12,7 +12,7 @@ from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.model import MeshInstance, Scene, Skeleton
 from anim.model.skeleton import nearest_ancestor
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 SOLE_PERCENTILE = 5.0  # percentile of a foot's lowest height, taken as its ground
 MAX_CONTACT_FRACTION = 0.03  # fraction of the height; of the lowest foot above its ground during contact
@@ -51,7 +51,7 @@ def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]
     positions: (N, 3) of all nodes at rest. roles: (role, node), with a foot or toe among them (`has_feet`). Without
     skin there, the joints themselves.
     """
-    world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
+    world = rest_world(scene.skeleton)
     feet = {node for role, node in roles if role.endswith(FEET)}
     below = {int(node) for node in with_descendants(scene.skeleton, feet)}
     nodes, points, lowest = list[int](), list[Floats](), [float(positions[sorted(below), 1].min())]

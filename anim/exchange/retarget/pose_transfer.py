@@ -16,9 +16,9 @@ from anim.exchange.retarget.rest_pose import UP, RestPose, rest_corrections
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
 from anim.model.skeleton import ancestors
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_pose, rest_world, world_matrices
 from anim.sampling import sample_pose as posed
-from anim.sampling.pose import local_by_node, with_scale_signs, world_by_node, world_rotations
+from anim.sampling.world import local_by_node, with_scale_signs, world_by_node, world_rotations
 
 MIN_SCALE_VOLUME = 1e-9  # of a unit cube's volume; a smaller scale flattens an axis
 NUM_HEIGHT_SAMPLES = 64  # times at which the height of the motion is sampled
@@ -237,7 +237,7 @@ def _local_rotations(skeleton: Skeleton, wanted: dict[int, Floats]) -> dict[int,
 
 def _origin(source: Skeleton, clip: Clip, target: RestPose, top: int) -> Floats:
     """Positions (N, 3) of the source's nodes at rest, with feet on the floor."""
-    at_rest = world_matrices(source, rest_pose(source))[0, :, :, 3]
+    at_rest = rest_world(source)[:, :, 3]
     looks = np.linspace(clip.start, clip.end, NUM_HEIGHT_SAMPLES)
     heights = world_by_node(source, posed(source, clip, looks))[top, :, 1, 3]
     return at_rest + floor_offset(at_rest, target.positions, heights, top) * UP

@@ -13,8 +13,8 @@ from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.model.skeleton import ancestors, nearest_ancestor
 from anim.sampling import sample_pose
-from anim.sampling.pose import world_by_node
 from anim.sampling.times import key_times
+from anim.sampling.world import world_by_node
 
 SAME_SCALE = 1e-6  # relative difference of float32 scales by rounding
 

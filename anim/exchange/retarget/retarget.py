@@ -20,7 +20,7 @@ from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.step_keys import as_linear, as_step, inside_interval, is_step
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Scene, Track
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 from anim.sampling.times import just_before
 
 MAX_CONTACT_DURATION_S = 86_400.0  # limit of a motion sampled for contacts, 30 times a second and more
@@ -147,7 +147,7 @@ def _height_above_floor(follow: PoseTransfer, target: Scene, matching: JointMatc
 def _metres_per_unit(follow: PoseTransfer) -> dict[int, float]:
     """Metres per unit of the parent space of each matched target node, at rest."""
     skeleton = follow.target
-    world = world_matrices(skeleton, rest_pose(skeleton))[0]
+    world = rest_world(skeleton)
     lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
     return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
 

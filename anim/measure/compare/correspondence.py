@@ -21,7 +21,7 @@ from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
 from anim.model import Mesh, MeshInstance, Scene, Skin
 from anim.sampling import rest_pose as rest
-from anim.sampling.pose import local_by_node
+from anim.sampling.world import local_by_node
 
 SAME_SPACE_TOLERANCE = 0.01  # of a mesh's size: vertices at a larger distance are different ones
 SINGULAR = 1e-12  # determinants below this, relative to the cube of the size, have no inverse

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, unique_sorted
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.displacement import max_displacement
-from anim.measure.error.point_groups import PointGroups, PosedScene, SkinnedGroups
+from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
 from anim.measure.error.surface import diagonal, has_vertices, surfaces
 from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
 from anim.model.time_axis import merge_times
 from anim.sampling.players import parse_pair, sampler, sampler_for
-from anim.sampling.pose import PoseSampler
+from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.sampling.times import check_fps, frame_times
 
 NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no vertex is searched
@@ -71,8 +71,8 @@ class Block:
     """Some of the times (F,) in s, with the poses of both versions."""
 
     times: Floats
-    old: PosedScene
-    new: PosedScene
+    old: PosedSkeleton
+    new: PosedSkeleton
 
 
 class ErrorMetric:
@@ -149,8 +149,7 @@ class ErrorMetric:
         )
         for start in range(0, max(len(times) - overlap, 1), self.length):
             chosen = times[start : start + self.length + overlap]
-            poses = old.at(chosen), new.at(chosen)
-            yield Block(chosen, PosedScene(self.scene.skeleton, poses[0]), PosedScene(self.other.skeleton, poses[1]))
+            yield Block(chosen, old.posed(chosen), new.posed(chosen))
 
     @property
     def length(self) -> int:
@@ -158,7 +157,9 @@ class ErrorMetric:
         matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
         return max(BLOCK // max(matrices, 1), 8)
 
-    def posed(self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]) -> tuple[PosedScene, PosedScene]:
+    def posed(
+        self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]
+    ) -> tuple[PosedSkeleton, PosedSkeleton]:
         """Return both clips posed at some times (F,) in s by one player, at others by the next, concatenated.
 
         asked: names in PLAYERS, each with its times; not more times than `length` in total.
@@ -170,11 +171,11 @@ class ErrorMetric:
         return (self.scene.skeleton.names[node] or f"node {node}") if node >= 0 else ""
 
 
-def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> PosedScene:
+def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> PosedSkeleton:
     poses = PoseSampler(skeleton, clip)
     each = [poses.sampled(sampler(player)).at(times) for player, times in asked]
     weights = {node: np.concatenate([one.weights[node] for one in each]) for node in each[0].weights}
-    return PosedScene(
+    return PosedSkeleton(
         skeleton,
         Pose(
             np.concatenate([one.times for one in each]),

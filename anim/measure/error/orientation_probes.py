@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.model import Skeleton
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 PROBE_DISTANCE = 0.05  # of the skeleton's size: distance of points from a node, for its rotation
 SPEED_STEP = 1e-4  # s; step of one-sided differences for velocities at an end
@@ -21,6 +21,6 @@ def probe_size(places: Floats) -> float:
 
 def shell_points(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
     """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
-    axes = world_matrices(skeleton, rest_pose(skeleton))[0][nodes, :, :3]
+    axes = rest_world(skeleton)[nodes, :, :3]
     scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
     return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])

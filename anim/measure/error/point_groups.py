@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -25,8 +24,8 @@ from anim.measure.error.displacement import (
 )
 from anim.measure.error.morph_bounds import SIDES, Change, MorphBounds
 from anim.measure.error.surface import Surface, morph_points, skin_points
-from anim.model import Pose, Skeleton
-from anim.sampling.pose import world_by_node
+from anim.model import Pose
+from anim.sampling.pose import PosedSkeleton
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,24 +49,6 @@ class Binding:
         return np.broadcast_to(self.rest_weights, (len(pose.times), len(self.rest_weights)))
 
 
-class PosedScene:
-    """One version at F times: its pose, and world matrices (N, F, 3, 4), computed on demand."""
-
-    def __init__(self, skeleton: Skeleton, pose: Pose) -> None:
-        self.skeleton, self.pose = skeleton, pose
-
-    @cached_property
-    def world(self) -> Floats:
-        """World matrices (N, F, 3, 4)."""
-        return world_by_node(self.skeleton, self.pose)
-
-    def of(self, nodes: Ints) -> Floats:
-        """Return the world matrices (J, F, 3, 4) of some nodes; −1 is the world itself."""
-        found: Floats = self.world[nodes]
-        found[nodes < 0] = np.eye(4)[:3]
-        return found
-
-
 class PointGroups(Protocol):
     """Points that move together: those of a mesh, or shells. name: of the mesh, empty if each group has its own."""
 
@@ -81,11 +62,11 @@ class PointGroups(Protocol):
         """Name of the mesh or node, for reports; empty if each group has its own."""
         ...
 
-    def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
+    def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
         """Return the displacement of every point at every time, None without points."""
         ...
 
-    def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
+    def weights(self, old: PosedSkeleton, new: PosedSkeleton) -> list[tuple[int, Floats, Floats]]:
         """Return the nodes with morph weights, in the first scene, with the weights (F, M) of both versions."""
         ...
 
@@ -129,7 +110,7 @@ class SkinnedGroups:
         corners = self._boxes(surface.points) if len(surface.targets) else self._still.corners
         self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.fraction)
 
-    def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
+    def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
         """Return the displacement of every vertex at every time, None without joints."""
         if not self.groups or not len(old.pose.times):
             return None
@@ -151,7 +132,7 @@ class SkinnedGroups:
             rates=lambda step: self._boxed.rates(change, step),
         )
 
-    def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
+    def weights(self, old: PosedSkeleton, new: PosedSkeleton) -> list[tuple[int, Floats, Floats]]:
         """Return the node with morph weights, in the first scene, with the weights (F, M) of both versions."""
         if not len(self.surface.targets):
             return []
@@ -203,7 +184,7 @@ class SkinnedGroups:
             result[rows, columns] += np.where(weights > 0, weights, 0)[:, None] * whole
         return result.reshape(len(group), -1)
 
-    def _displaced(self, frames: Ints, old: PosedScene, new: PosedScene) -> Floats:
+    def _displaced(self, frames: Ints, old: PosedSkeleton, new: PosedSkeleton) -> Floats:
         """Displacement of every vertex (V, 3, f) in some frames, morphed and then skinned."""
         result = np.zeros((*self.surface.points.shape, len(frames)))
         for carried, posed, sign in ((self.new, new, 1), (self.old, old, -1)):

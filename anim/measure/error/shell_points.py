@@ -7,9 +7,9 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
 from anim.measure.error.orientation_probes import shell_points
-from anim.measure.error.point_groups import PosedScene
 from anim.measure.error.surface import Surface
 from anim.model import Skeleton
+from anim.sampling.pose import PosedSkeleton
 
 
 class ShellPoints:
@@ -33,13 +33,13 @@ class ShellPoints:
         """Empty: each group has the name of its node."""
         return ""
 
-    def field(self, old: PosedScene, new: PosedScene) -> DisplacementField | None:
+    def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
         """Return the displacement of the points at every time, None without points."""
         if not len(self.nodes) or not len(old.pose.times):
             return None
         return SkinnedDisplacement(self._groups, new.world[self.partners] - old.world[self.nodes])
 
-    def weights(self, old: PosedScene, new: PosedScene) -> list[tuple[int, Floats, Floats]]:
+    def weights(self, old: PosedSkeleton, new: PosedSkeleton) -> list[tuple[int, Floats, Floats]]:
         """Return an empty list: shells are not morphed."""
         del old, new
         return []

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.model import MeshInstance, Scene
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's diagonal
 
@@ -56,7 +56,7 @@ def diagonal(scene: Scene) -> float:
 
     Of the vertices, skinned and morphed; of the nodes without any vertex.
     """
-    world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
+    world = rest_world(scene.skeleton)
     meshes = [_of_instance(scene, i) for i in scene.instances if len(i.mesh.positions)]
     points = [place_points(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [
         world[:, :, 3]

@@ -12,7 +12,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import Clip, Skeleton
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import sample_clips, world_by_node
+from anim.sampling.pose import sample_clips
+from anim.sampling.world import world_by_node
 
 MIN_DISPLACEMENT_PER_PATH = 0.7
 

@@ -11,8 +11,9 @@ from anim.arrays import Floats
 from anim.measure.error import orientation_probes
 from anim.model import Clip, Skeleton
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import sample_clips, world_by_node
+from anim.sampling.pose import sample_clips
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
+from anim.sampling.world import world_by_node
 
 # Rows are differences, columns the times start, just after it, one probe later, one frame later, and the same
 # before the end. Rows: pose; velocity (× probe); first and last frame's motion; start against extrapolated end.

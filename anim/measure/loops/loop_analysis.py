@@ -12,7 +12,8 @@ from anim.measure.inspect import frame_rate
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import JointGap, Seam, SkinMotion
 from anim.model import Clip, Scene
-from anim.sampling.pose import sample_pose, world_by_node
+from anim.sampling.pose import sample_pose
+from anim.sampling.world import world_by_node
 
 NOISE_PER_SIZE = 1e-5  # of the model's size; smaller gaps are rounding
 VISIBLE_GAP_PER_SIZE = 1e-3  # of the model's size; larger gaps are visible

@@ -17,7 +17,8 @@ from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Pose, Scene
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import rest_pose, sample_clips, sample_pose, world_by_node
+from anim.sampling.pose import PosedSkeleton, sample_clips, sample_pose
+from anim.sampling.world import world_by_node
 
 PARTS = ("translation", "rotation", "scale")
 MOTION = np.array([-1.0, 1])  # weights of two frames: the motion between them
@@ -67,7 +68,7 @@ class SkinMotion:
         self._scene = scene
         self.is_skin = has_vertices(scene)
         self._surfaces = surfaces(scene) if self.is_skin else []
-        self._rest_world = world_by_node(scene.skeleton, rest_pose(scene.skeleton))
+        self._rest_world = PosedSkeleton.at_rest(scene.skeleton).world
         self._lever = (
             orientation_probes.PROBE_DISTANCE * orientation_probes.probe_size(self._rest_world[..., 3])
             if len(scene.skeleton)

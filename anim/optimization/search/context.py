@@ -16,7 +16,7 @@ from anim.model import Clip, Scene, Skeleton
 from anim.optimization.options import Bounds, Effort, Policy
 from anim.optimization.tracks import morph_weights
 from anim.optimization.tracks.quantization import Encoding
-from anim.sampling.pose import rest_pose, world_by_node
+from anim.sampling.pose import rest_world
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def build_context(
     shells = set(np.flatnonzero(unseen & _moving_nodes(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
-    world = world_by_node(skeleton, rest_pose(skeleton))[:, 0]
+    world = rest_world(skeleton)
     points = points_.sample_points(scene, shells, bounds.shell, extra)
     driven = sorted({track.node for clip in clips for track in clip.tracks if track.node is not None})
     places = points.places(world[:, None])[:, 0]

@@ -9,8 +9,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
-from anim.sampling.pose import local_matrices
 from anim.sampling.track import KeyInterval
+from anim.sampling.world import local_matrices
 
 
 def slerp_raw(keys: Floats, place: KeyInterval) -> Floats:

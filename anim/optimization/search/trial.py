@@ -22,7 +22,7 @@ from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
 from anim.optimization.search.time_axes import SharedAxis, TimeAxisSearch
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
-from anim.sampling.pose import local_matrices
+from anim.sampling.world import local_matrices
 
 CONSTANT_BUDGET_FACTOR = 1.5  # times a track's budget: tolerance for dropping it, or for a single key
 QUANTIZATION_BUDGET_FRACTION = 0.5  # of a budget

@@ -9,7 +9,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
-from anim.sampling.pose import PoseSampler, world_matrices
+from anim.sampling.pose import PoseSampler
+from anim.sampling.world import world_matrices
 
 CHUNK_STEPS = 256  # poses of all nodes are in memory for this many
 

@@ -13,7 +13,7 @@ from anim.gltf.reading.meshes import Meshes
 from anim.maths import matrix
 from anim.model import Skeleton
 from anim.sampling import rest_pose
-from anim.sampling.pose import local_by_node
+from anim.sampling.world import local_by_node
 from anim.simulation.rigid_bodies.description import Shape
 from anim.simulation.rigid_bodies.extension_values import read_item, read_number, read_numbers, read_object
 from anim.simulation.rigid_bodies.shapes import join_meshes, mesh_shape

@@ -11,7 +11,8 @@ from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.writing.writer import replace_clips
 from anim.model import Clip, Scene, Skeleton, Track
-from anim.sampling.pose import sample_pose, world_matrices
+from anim.sampling.pose import sample_pose
+from anim.sampling.world import world_matrices
 from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
 from anim.simulation.report import SimulationReport
 from anim.simulation.rigid_bodies import tracks

@@ -10,8 +10,9 @@ from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import greedy_indices
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
-from anim.sampling.pose import PoseSampler, local_by_node
+from anim.sampling.pose import PoseSampler
 from anim.sampling.times import distinct_float32
+from anim.sampling.world import local_by_node
 from anim.simulation.rigid_bodies.impacts import find_impacts
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene

@@ -9,7 +9,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling.pose import PoseSampler, local_by_node
+from anim.sampling.pose import PoseSampler
+from anim.sampling.world import local_by_node
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from anim.arrays import Bools, Floats
 from anim.errors import AnimError, FormatError, NotFoundError, UnsupportedError
 from anim.maths import matrix
 from anim.model import Skeleton
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
 
 SCALE_TOLERANCE = 1e-3  # of a scale of 1
@@ -89,7 +89,7 @@ def _check_node(skeleton: Skeleton, node: int, what: str) -> None:
 
 def scaled_colliders(skeleton: Skeleton, bones: SpringBones) -> tuple[str, ...]:
     """Return a note for each collider in use on a node with a world scale other than 1: its radius is not scaled."""
-    matrices = world_matrices(skeleton, rest_pose(skeleton))[0]
+    matrices = rest_world(skeleton)
     notes = []
     for index in sorted({index for chain in bones.chains for index in chain.colliders}):
         collider = bones.colliders[index]

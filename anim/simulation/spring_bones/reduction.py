@@ -11,7 +11,7 @@ from anim.errors import RangeError
 from anim.measure.continuous_bound.largest_error import largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.model import Clip, Skeleton, Track
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 
 MAX_TRIALS = 12
 MIN_GAIN = 1.15  # a trial whose tolerance is nearer to the best one is not worth its time
@@ -45,7 +45,7 @@ def reduce_keys(prover: Prover, clip: Clip, joints: Collection[int], *, max_erro
 
 def _reaches(skeleton: Skeleton, joints: Collection[int]) -> dict[int, float]:
     """Distance in metres from each joint to the farthest node below, at least to its parent: a measure of its skin."""
-    positions = world_matrices(skeleton, rest_pose(skeleton))[0, :, :, 3]
+    positions = rest_world(skeleton)[:, :, 3]
     reach = {}
     for node in joints:
         others = np.flatnonzero(skeleton.descendants(node))

@@ -9,12 +9,12 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
 from anim.model import Clip, Scene, Skeleton
+from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh
 from anim.skinning.kernels.layout import LANES, FloatArray, group_influences
 from anim.skinning.methods.skinner import fill_lanes, lanes
 from anim.skinning.polar_decomposition import decompose, joint_origins
-from anim.skinning.pose_blocks import PosePlayback, rest_block
 
 MIN_TWIST_COSINE = 0.7  # between rotation axis and bone, above which the rotation is a twist
 
@@ -61,16 +61,16 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
     from anim.skinning.kernels.volume_ratio import volume_ratio
 
     rig = layer.rig
-    playback = PosePlayback(scene.skeleton, clip)
+    sampler = PoseSampler(scene.skeleton, clip)
     influences, sides = (
         group_influences(rig.influences),
-        _mirror_signs(rig, layer.matrices(rest_block(scene.skeleton), slice(None))[0]),
+        _mirror_signs(rig, layer.matrices(PosedSkeleton.at_rest(scene.skeleton), slice(None))[0]),
     )
     least = np.full(len(rig.points), np.inf, np.float32)
     when = np.zeros(len(rig.points), np.int64)
     by_frame = np.zeros(len(times))
     for first in range(0, len(times), LANES):
-        matrices = layer.matrices(playback.at(times[first : first + LANES]), slice(None))
+        matrices = layer.matrices(sampler.posed(times[first : first + LANES]), slice(None))
         factors: FloatArray = np.empty((len(rig.points), len(matrices)), np.float32)
         volume_ratio(influences, lanes(matrices), _log_volumes(matrices), factors)
         factors *= sides[:, None]
@@ -83,7 +83,7 @@ def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) 
     root = np.sqrt(np.clip(least.astype(np.float64), 0, None))
     worst = int(least.argmin())
     time = float(times[when[worst]])
-    narrow = _collapse_point(scene.skeleton, layer, playback, worst, time, float(root[worst]))
+    narrow = _collapse_point(scene.skeleton, layer, sampler, worst, time, float(root[worst]))
     return CollapseIndices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
 
 
@@ -102,14 +102,14 @@ def _log_volumes(matrices: Floats) -> FloatArray:
 
 
 def _collapse_point(
-    names: Skeleton, layer: BoundMesh, playback: PosePlayback, vertex: int, time: float, index: float
+    names: Skeleton, layer: BoundMesh, sampler: PoseSampler, vertex: int, time: float, index: float
 ) -> CollapsePoint:
     rig = layer.rig
     influences = rig.joint[rig.start[vertex] : rig.start[vertex + 1]].tolist()
     if not influences:
         return CollapsePoint(index, vertex, "", "", time, 0.0, False)
     a, b = influences[0], influences[1] if len(influences) > 1 else influences[0]
-    matrices = layer.matrices(playback.at(np.array([time])), slice(None))
+    matrices = layer.matrices(sampler.posed(np.array([time])), slice(None))
     places = joint_origins(rig)[[a, b]]
     first, second = decompose(matrices[:, [a, b]], places).rotation[0]
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(first), second))

@@ -9,13 +9,13 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.model import Clip, FrameChunk, Skeleton
+from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces
 from anim.skinning.analysis.method_deviation import max_distance, model_size
 from anim.skinning.bake import Baker
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh
 from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, clamp_positions
-from anim.skinning.pose_blocks import PoseBlock, PosePlayback, rest_block
 from anim.skinning.weighted_joints import is_ancestor
 
 BULGE_RATIO = 1.05  # distance from the bones relative to bind pose, above which a vertex bulges
@@ -65,7 +65,7 @@ def bind_measures(layer: BoundMesh, skeleton: Skeleton) -> BindMeasures:
     rig = layer.rig
     faces = rig.faces[watertight_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
-    volume *= np.sign(_common_volume(rig, layer.matrices(rest_block(skeleton), slice(None)))[0])
+    volume *= np.sign(_common_volume(rig, layer.matrices(PosedSkeleton.at_rest(skeleton), slice(None)))[0])
     of = bone_segments(rig)
     shared = of.fraction > 0
     middle = float(np.median(of.distance[shared])) if shared.any() else 0.0
@@ -78,11 +78,11 @@ def score_method(
 ) -> Iterator[MethodScore]:
     """Yield the score of each of the baker's meshes at `times` (F,) s of a clip. linear: the same by lbs."""
     seen = [_Extremes(each, len(times)) for each in subjects]
-    playback, limit = PosePlayback(baker.scene.skeleton, clip), model_size(baker)
+    sampler, limit = PoseSampler(baker.scene.skeleton, clip), model_size(baker)
     chunks = baker.bake(clip, times=times).chunks()
     alone = ((chunk, chunk) for chunk in chunks)
     for chunk, other in alone if baker is linear else zip(chunks, linear.bake(clip, times=times).chunks(), strict=True):
-        frames = playback.at(times[chunk.first : chunk.first + len(chunk.positions)])
+        frames = sampler.posed(times[chunk.first : chunk.first + len(chunk.positions)])
         for each in seen:
             each.add(chunk, other, frames)
     for each in seen:
@@ -99,7 +99,7 @@ class _Extremes:
         self._when = np.zeros(len(of.watched), np.int64)
         self._off = np.zeros(frames)
 
-    def add(self, chunk: FrameChunk, linear: FrameChunk, frames: PoseBlock) -> None:
+    def add(self, chunk: FrameChunk, linear: FrameChunk, frames: PosedSkeleton) -> None:
         """Add some frames. linear: the same frames by linear blending."""
         of, rig = self._of, self._of.layer.rig
         matrices = of.layer.matrices(frames, slice(None))

@@ -14,11 +14,10 @@ from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.sampling import sample_pose
-from anim.sampling.pose import world_by_node
+from anim.sampling.pose import PosedSkeleton
 from anim.sampling.times import frame_times
 from anim.skinning.bake import prepare_bake
 from anim.skinning.bound_mesh import BoundMesh
-from anim.skinning.pose_blocks import PoseBlock
 from tests.anim.skinning.odd_rigs import with_root_without_weight
 from tests.files import opened_path
 
@@ -47,7 +46,7 @@ def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
         times = frame_times(played.start, played.end, fps=6)
         whole = made.bake(played, times=times).load_all().positions
         local = sample_pose(of.skeleton, played, times)
-        frames = PoseBlock(times, world_by_node(of.skeleton, local), local.weights)
+        frames = PosedSkeleton(of.skeleton, local)
         for layer in made.layers:
             if layer.instance.skin is None:
                 continue

@@ -11,10 +11,10 @@ import pytest
 
 from anim.arrays import AnyArray
 from anim.model import Clip, MeshInstance, Scene
+from anim.sampling import PoseSampler
 from anim.skinning import chunk_pipeline
 from anim.skinning.bake import bake, prepare_bake
 from anim.skinning.methods.registry import SKINNING_METHODS
-from anim.skinning.pose_blocks import PosePlayback
 from tests.anim.skinning.methods.test_linear_blend import moving
 from tests.anim.skinning.scenes import TRIANGLE, mesh, random_scene
 from tests.clips import clip, track
@@ -54,18 +54,6 @@ def test_same_bytes_for_any_chunk_and_number_of_threads(
         assert np.array_equal(_baked(of, played, method=method, threads=threads), once)
 
 
-def test_parts_of_frames_are_the_frames_at_those_times() -> None:
-    of, played = _scene("lbs")
-    playback, times = PosePlayback(of.skeleton, played), np.linspace(0, 2, 9)
-    part, wanted = playback.at(times).part(slice(3, 7)), playback.at(times[3:7])
-    assert np.array_equal(part.times, wanted.times)
-    assert np.array_equal(part.world, wanted.world)
-    assert part.weights.keys() == wanted.weights.keys() == {of.instances[0].node}
-    for node, weights in wanted.weights.items():
-        assert np.array_equal(part.weights[node], weights)
-        assert np.ptp(weights) > 0
-
-
 def test_chunks_that_are_kept_stay_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chunk_pipeline, "CHUNK_BYTES", 1)
     of, played = _scene("lbs")
@@ -97,14 +85,14 @@ def test_what_is_packed_at_a_time_is_bounded_for_shapes_too(monkeypatch: pytest.
     """Morphed points are as many as those that come out: packed for a whole clip they would take as much."""
     of, played = _scene("lbs")
     seen: list[int] = []
-    usual = PosePlayback.at
+    usual = PoseSampler.posed
 
-    def counted(self: PosePlayback, times: Any) -> Any:
+    def counted(self: PoseSampler, times: Any) -> Any:
         seen.append(len(times))
         return usual(self, times)
 
     made = prepare_bake(of, rigid=True)
-    monkeypatch.setattr(PosePlayback, "at", counted)
+    monkeypatch.setattr(PoseSampler, "posed", counted)
     monkeypatch.setattr(chunk_pipeline, "PACKED_BYTES", 64 * 36 * 150 + 64 * 96 * 40)
     for _ in made.bake(played, times=np.linspace(0, 2, FRAMES)).chunks():
         pass

@@ -17,7 +17,7 @@ from anim.exchange.retarget.retarget import GroundMode
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.model import Pose, Scene, Skeleton, Skin
-from anim.sampling import rest_pose, sample_pose, world_matrices
+from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, recorded
 
 Skins: TypeAlias = list[tuple[int, Skin]]
@@ -54,7 +54,7 @@ def in_centimeters(rig: Rig) -> Rig:
 def with_a_placed_mesh(rig: Rig) -> Rig:
     """Vertices in the space of a mesh node that is moved, turned and twice as large, as Blender exports them."""
     bones = _placed(rig, 2.0)
-    world = world_matrices(bones, rest_pose(bones))[0]
+    world = rest_world(bones)
     return bones, [(holder, _times(skin, world[holder])) for holder, skin in rig[1]]
 
 
@@ -66,7 +66,7 @@ def with_an_ignored_placement(rig: Rig) -> Rig:
 def with_a_placed_mesh_in_centimeters(rig: Rig) -> Rig:
     """Both: a mesh node that is moved and turned, without the scale that its vertices need."""
     bones = _placed(rig, 1.0)
-    world = world_matrices(bones, rest_pose(bones))[0]
+    world = rest_world(bones)
     return bones, [(h, _times(skin, matrix.multiply(world[h], CENTIMETERS))) for h, skin in rig[1]]
 
 
@@ -104,7 +104,7 @@ def under_a_scaled_armature(rig: Rig) -> Rig:
         np.concatenate((rotation, [turn])),
         np.concatenate((bones.scale, [[0.01] * 3])),
     )
-    world = world_matrices(armature, rest_pose(armature))[0]
+    world = rest_world(armature)
     return armature, [
         (holder, replace(skin, inverse_bind=matrix.inverse(world[skin.joints]))) for holder, skin in rig[1]
     ]
@@ -156,7 +156,7 @@ def test_the_skins_rest_is_found(build: Callable[[Rig], Rig], name: str, asset: 
     found = bind_pose(dancing, skins)
     joints = np.unique(np.concatenate([skin.joints for _, skin in skins]))
     assert found.num_joints > 3
-    expected, made = (world_matrices(each, rest_pose(each))[0, joints] for each in (bones, found.skeleton))
+    expected, made = (rest_world(each)[joints] for each in (bones, found.skeleton))
     np.testing.assert_allclose(made, expected, atol=FILE_ERROR)
 
 

@@ -18,9 +18,9 @@ from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Interpolation, Scene, TimeAxis, Track
 from anim.sampling import frame_times, sample_pose, world_matrices
-from anim.sampling.pose import world_rotations
 from anim.sampling.times import key_times
 from anim.sampling.track import sample
+from anim.sampling.world import world_rotations
 from tests.anim.exchange.figures import tail
 
 

@@ -14,7 +14,7 @@ import fixtures
 from anim.errors import FormatError
 from anim.gltf.reading import reader
 from anim.model import Scene
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 from fixtures.broken.pieces import buffered, text
 from tests.anim.gltf.pieces import CORNERS, triangle
 from tests.files import opened, opened_fixture, opened_path
@@ -161,7 +161,7 @@ def test_vertices_and_faces_are_those_that_trimesh_finds(name: str, asset: Calla
 def test_bind_poses_put_the_biped_where_its_mesh_is() -> None:
     """World matrix times inverse bind matrix is the identity in the rest pose that the biped was bound in."""
     scene: Scene = reader.scene(opened_fixture("biped"))
-    world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
+    world = rest_world(scene.skeleton)
     skin = scene.instances[0].skin
     assert skin is not None
     for joint, inverse in zip(skin.joints, skin.inverse_bind, strict=True):

@@ -16,7 +16,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.error.surface import SHELL, diagonal, place_points, surfaces
 from anim.model import Scene
-from anim.sampling import rest_pose, world_matrices
+from anim.sampling import rest_world
 from fixtures.broken.pieces import buffered, data_uri, text
 from tests.clips import skeleton
 from tests.files import opened, opened_fixture, opened_path
@@ -54,7 +54,7 @@ def test_real_models_have_their_known_sizes(asset: Find) -> None:
     """Heights that players show: the man is 1.5 m, the fox about 79 of its units."""
     for name, height in (("CesiumMan.glb", 1.5), ("Fox.glb", 79)):
         scene = reader.scene(opened_path(asset(name)))
-        world = world_matrices(scene.skeleton, rest_pose(scene.skeleton))[0]
+        world = rest_world(scene.skeleton)
         (surface,) = surfaces(scene)
         points = place_points(surface, world[surface.nodes], surface.rest_weights)
         assert np.ptp(points[:, 1]) == pytest.approx(height, rel=0.01)

@@ -13,7 +13,8 @@ import fixtures
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Pose
-from anim.sampling.pose import sample_pose, world_by_node
+from anim.sampling.pose import sample_pose
+from anim.sampling.world import world_by_node
 from anim.simulation.spring_bones.solver import SpringSolver
 from tests import three_vrm
 from tests.anim.simulation.spring_bones.cases import ROOT, STEP, Case, chord, swaying

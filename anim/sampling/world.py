@@ -1,0 +1,58 @@
+"""Pose → local and world matrices of all nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import matrix, quaternion
+from anim.model import Pose, Skeleton
+
+
+def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return world_from_node (F, N, 3, 4) for every time and node of a pose."""
+    return world_by_node(skeleton, pose).transpose(1, 0, 2, 3)
+
+
+def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return world_from_node (N, F, 3, 4), in the memory order of the computation."""
+    return matrix.accumulate_world(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
+
+
+def world_rotations(skeleton: Skeleton, local: Floats) -> dict[int, Floats]:
+    """Return the world rotation (F, 4) of every node from local ones (F, N, 4).
+
+    Scales count by the signs of the rest pose only. Below an odd count of negative scales the result is the rotation
+    in −1 times the orthogonal world matrix: the −1 cancels between two poses.
+    """
+    world: dict[int, Floats] = {}
+    for level in skeleton.levels():
+        for node in level.tolist():
+            parent = int(skeleton.parents[node])
+            own = local[:, node]
+            world[node] = own if parent < 0 else quaternion.multiply(with_scale_signs(skeleton, parent, world), own)
+    return world
+
+
+def with_scale_signs(skeleton: Skeleton, node: int, world: Mapping[int, Floats]) -> Floats:
+    """Return a node's world rotation (..., 4) times the signs of its scale: the space of its children."""
+    signs = np.where(skeleton.scale[node] < 0, -1.0, 1.0)
+    signs = signs * signs.prod()  # none or two are negative: a rotation by 180° about the third axis
+    if (signs > 0).all():
+        return world[node]
+    return quaternion.multiply(world[node], np.append(signs > 0, 0.0))
+
+
+def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return parent_from_node (N, F, 3, 4) for every node and time of a pose."""
+    return local_matrices(skeleton, [np.swapaxes(part, 0, 1) for part in (pose.translation, pose.rotation, pose.scale)])
+
+
+def local_matrices(skeleton: Skeleton, parts: Sequence[Floats]) -> Floats:
+    """Return parent_from_node (N, F, 3, 4) of all nodes from translation, rotation and scale (N, F, ·)."""
+    local = matrix.from_trs(*parts)
+    if len(skeleton.sheared):
+        local[skeleton.sheared] = skeleton.sheared_local[:, None]
+    return local
