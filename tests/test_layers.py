@@ -82,7 +82,7 @@ PUBLIC = {
     "measure.inspect": (
         "clip_findings file_findings frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"
     ),
-    "measure.loops": "loop_analysis recommendations seam",
+    "measure.loops": "loop_analysis recommendations seam skin_motion",
     "optimization.search": "plan",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (

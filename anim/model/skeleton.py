@@ -64,6 +64,10 @@ class Skeleton:
         """Return the name of a node for messages: "node 7 'hip'"."""
         return f"node {node} '{self.names[node]}'" if self.names[node] else f"node {node}"
 
+    def display_name(self, node: int) -> str:
+        """Return the name of a node for reports: its own, or "node 7"."""
+        return self.names[node] or f"node {node}"
+
     def descendants(self, node: int) -> Bools:
         """Return a mask (N,) of `node` and its descendants."""
         found = np.zeros(len(self.parents), np.bool_)

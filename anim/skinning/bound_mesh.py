@@ -116,7 +116,7 @@ def bind_mesh(
 
     make: called with its rig, and whether its points are constant and need no directions.
     """
-    name = instance.mesh.name or skeleton.names[instance.node] or f"node {instance.node}"
+    name = instance.mesh.name or skeleton.display_name(instance.node)
     try:
         bound = bind_skin(instance, skeleton.parents, normals=normals, tangents=tangents)
     except AnimError as error:

@@ -15,7 +15,7 @@ from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge_range
 from anim.measure.loops.recommendations import recommend
-from anim.measure.loops.seam import SkinMotion
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
 from anim.operations import loop as closing
 from anim.operations.selection import Selection

@@ -176,8 +176,8 @@ def _targets(ruler: ErrorMetric, clip: Clip, *, is_old: bool) -> Iterator[tuple[
         else:
             node = int(ruler.pairs.nodes[track.node]) if is_old else track.node
             key = node if node >= 0 else ("unmatched", track.node)
-            yield (key, track.path), (scene.skeleton.names[track.node] or f"node {track.node}", track.path)
+            yield (key, track.path), (scene.skeleton.display_name(track.node), track.path)
 
 
 def _names(scene: Scene, nodes: Ints) -> tuple[str, ...]:
-    return tuple(scene.skeleton.names[i] or f"node {i}" for i in nodes.tolist())
+    return tuple(scene.skeleton.display_name(i) for i in nodes.tolist())

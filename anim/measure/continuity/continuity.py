@@ -118,7 +118,7 @@ def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
     analysis = _Analysis(track)
     keys = analysis.at_keys()
     count = {grade: keys.grades.count(grade) for grade in ContinuityClass}
-    target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
+    target = track.pointer if track.node is None else skeleton.display_name(track.node)
     return TrackContinuity(
         target=target or "",
         path=track.path,

@@ -168,7 +168,7 @@ class ErrorMetric:
 
     def called(self, node: int) -> str:
         """Return the name of a node of the first scene for reports: its own, or "node 7"; "" for −1."""
-        return (self.scene.skeleton.names[node] or f"node {node}") if node >= 0 else ""
+        return self.scene.skeleton.display_name(node) if node >= 0 else ""
 
 
 def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> PosedSkeleton:

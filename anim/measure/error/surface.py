@@ -91,7 +91,7 @@ def skin_points(surface: Surface, points: Floats, bound: Floats) -> Floats:
 
 def _of_instance(scene: Scene, instance: MeshInstance) -> Surface:
     mesh = instance.mesh
-    name = mesh.name or scene.skeleton.names[instance.node] or f"node {instance.node}"
+    name = mesh.name or scene.skeleton.display_name(instance.node)
     if instance.skin is not None:
         carried = (instance.skin.joints, instance.skin.inverse_bind, mesh.joints, mesh.weights)
     else:
@@ -105,7 +105,7 @@ def _of_nodes(scene: Scene) -> Iterator[Surface]:
     cube = size * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     for node in range(len(scene.skeleton)):
         nodes, bind, joints, weights = _rigid(node, len(cube))
-        name = scene.skeleton.names[node] or f"node {node}"
+        name = scene.skeleton.display_name(node)
         yield Surface(name, nodes, bind, cube, np.empty((0, 8, 3)), joints, weights, node, np.empty(0))
 
 

@@ -20,7 +20,8 @@ from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackRepo
 from anim.measure.inspect.stored_bytes import stored_bytes as stored
 from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.measure.loops.clip_ends import LoopRange
-from anim.measure.loops.seam import Seam, SkinMotion
+from anim.measure.loops.seam import Seam, measure_seams
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.model.scene import MeshInstance
 from anim.sampling.batch import ConcatenatedTracks, concatenate
@@ -104,7 +105,7 @@ def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]
     """Loop gaps of whole clips, measured like those of `loop`."""
     roots = (root_motion.root_motion_node(skin.skeleton, clip) for clip in clips)
     parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
-    return skin.seams(parts, groups)
+    return measure_seams(skin, parts, groups)
 
 
 def _clip(
@@ -152,7 +153,7 @@ def _clip(
         seam_m=seam.gap,
         seam_speed_m_per_s=seam.speed,
         seam_measured_on=measured_on,
-        root=(skeleton.names[way.root] or f"node {way.root}") if way.root >= 0 else "",
+        root=skeleton.display_name(way.root) if way.root >= 0 else "",
         root_distance_m=way.distance,
         root_speed_m_per_s=way.speed,
         track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
@@ -186,7 +187,7 @@ def _repeating(clip: Clip, counted: TrackStats) -> int:
 
 
 def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackReport:
-    target = track.pointer if track.node is None else skeleton.names[track.node] or f"node {track.node}"
+    target = track.pointer if track.node is None else skeleton.display_name(track.node)
     return TrackReport(
         target or "",
         track.path,

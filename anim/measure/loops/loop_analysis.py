@@ -10,7 +10,9 @@ import numpy as np
 from anim.arrays import Floats
 from anim.measure.inspect import frame_rate
 from anim.measure.loops.clip_ends import LoopRange
-from anim.measure.loops.seam import JointGap, Seam, SkinMotion
+from anim.measure.loops.joint_gaps import JointGap, joint_gaps, moving_nodes
+from anim.measure.loops.seam import Seam, measure_seams
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
 from anim.sampling.pose import sample_pose
 from anim.sampling.world import world_by_node
@@ -124,9 +126,9 @@ def _judge(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) ->
     if not len(skin.points) or frame_step == 0:
         kind = LoopKind.NOT_A_LOOP if end > start else LoopKind.SINGLE_POSE
         return Loop(kind, start, end, 0.0, 0.0, "", 0.0, Steps(), 0.0, fps)
-    (seam,) = skin.seams([LoopRange(clip, start, end, frame_step, root)])
+    (seam,) = measure_seams(skin, [LoopRange(clip, start, end, frame_step, root)])
     inside = _steps(skin, clip, start, end, frame_step, root)
-    gaps = skin.gaps(clip, start, end, root)
+    gaps = joint_gaps(skin, clip, start, end, root)
     size = seam.gap
     joints = tuple(each for each in gaps if each.gap > NOISE_PER_SIZE * skin.size)
     if size <= min(
@@ -135,7 +137,7 @@ def _judge(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) ->
     ):
         kind, joints = LoopKind.CLOSED, ()
     else:
-        closing = skin.moving(clip, start, end, frame_step, root) - {each.node for each in joints}
+        closing = moving_nodes(skin, clip, start, end, frame_step, root) - {each.node for each in joints}
         kind = _open_kind(seam, size, inside.largest, few=len(joints) < len(closing))
     worst = joints[0].joint if joints else seam.fastest
     travel = _travel(skin, clip, start, end, root)

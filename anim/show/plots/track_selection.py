@@ -156,7 +156,7 @@ def _rate(clip: Clip) -> float | None:
 def _target(track: Track, skeleton: Skeleton) -> str:
     if track.node is None:
         return track.pointer or ""
-    return skeleton.names[track.node] or f"node {track.node}"
+    return skeleton.display_name(track.node)
 
 
 def _labels(track: Track, targets: Mapping[str, Sequence[str]], view: str) -> tuple[str, ...]:

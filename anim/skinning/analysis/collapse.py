@@ -96,7 +96,7 @@ class Comparison:
             seen = collapse_indices(self._scene, each.layer, clip, times)
             found.append(
                 MeshCollapse(
-                    instance.mesh.name or self._scene.skeleton.names[instance.node] or f"node {instance.node}",
+                    instance.mesh.name or self._scene.skeleton.display_name(instance.node),
                     instance.node,
                     len(rig.points),
                     times,

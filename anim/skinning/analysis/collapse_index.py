@@ -116,8 +116,6 @@ def _collapse_point(
     angle, link = float(np.linalg.norm(turn)), places[1] - places[0]
     along = abs(float(turn @ link))
     is_twist = along > MIN_TWIST_COSINE * angle * float(np.linalg.norm(link)) and along > 0
-    return CollapsePoint(index, vertex, _name(names, rig.nodes[a]), _name(names, rig.nodes[b]), time, angle, is_twist)
-
-
-def _name(skeleton: Skeleton, node: int) -> str:
-    return skeleton.names[node] or f"node {node}"
+    return CollapsePoint(
+        index, vertex, names.display_name(rig.nodes[a]), names.display_name(rig.nodes[b]), time, angle, is_twist
+    )

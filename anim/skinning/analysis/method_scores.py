@@ -142,7 +142,7 @@ class _Extremes:
         vertex = int(of.watched[most])
         node = int(rig.nodes[rig.joint[rig.start[vertex]]])
         bulging = float((self._bulge > BULGE_RATIO).sum()) / len(rig.points)
-        where = (vertex, skeleton.names[node] or f"node {node}", float(times[self._when[most]]))
+        where = (vertex, skeleton.display_name(node), float(times[self._when[most]]))
         return MethodScore(method, volume, float(self._bulge[most]), bulging, *where, *away)
 
 

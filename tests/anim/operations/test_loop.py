@@ -13,7 +13,7 @@ from anim.maths import quaternion
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import LoopKind, best_ranges
 from anim.measure.loops.loop_analysis import analyze_loop as judged
-from anim.measure.loops.seam import SkinMotion
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene, Track
 from anim.operations.loop import append_first_frame, loop
 from anim.operations.spline import spline

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 import fixtures
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
-from anim.measure.loops import seam
+from anim.measure.loops import skin_motion
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.loop_analysis import LoopKind, analyze_loop
-from anim.measure.loops.seam import SkinMotion
+from anim.measure.loops.seam import measure_seams
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene
 from anim.sampling import sample_pose, world_matrices
 from anim.skinning.bake import bake
@@ -154,7 +155,7 @@ def test_the_seam_is_that_of_a_plain_loop_over_vertices() -> None:
     mesh = instance.mesh
     first, end = looped(mesh.positions, mesh.joints, mesh.weights, bound)
     expected = np.linalg.norm(end - first, axis=1).max()
-    (found,) = SkinMotion(scene).seams([LoopRange(turn, 0.0, 1.0)])
+    (found,) = measure_seams(SkinMotion(scene), [LoopRange(turn, 0.0, 1.0)])
     assert found.gap == pytest.approx(expected, rel=1e-6)
 
 
@@ -172,7 +173,7 @@ def test_the_seam_is_how_far_a_bake_ends_from_its_start(name: str) -> None:
 @pytest.mark.parametrize("name", ["arm", "biped", "morph_cube"])
 def test_steps_inside_are_those_of_a_bake(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of every vertex, skinned and morphed, whatever the number of frames that are looked at together."""
-    monkeypatch.setattr(seam, "MAX_BATCH_VALUES", 20_000)
+    monkeypatch.setattr(skin_motion, "MAX_BATCH_VALUES", 20_000)
     document = opened(fixtures.build(name))
     scene = reader.scene(document)
     for each in reader.clips(document):
@@ -244,8 +245,8 @@ def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike 
     drifting = _swinging(j1=3.0)
     skin = SkinMotion(_chain(targets))
     whole = LoopRange(drifting, drifting.start, drifting.end)
-    (alone,) = skin.seams([whole])
-    both = skin.seams([whole, replace(whole, frame=1 / FPS)])
+    (alone,) = measure_seams(skin, [whole])
+    both = measure_seams(skin, [whole, replace(whole, frame=1 / FPS)])
     assert both[0] == pytest.approx(alone)
     assert (alone.gap, alone.speed, alone.fastest) == pytest.approx((both[1].gap, both[1].speed, both[1].fastest))
     assert (alone.frame, alone.going_on) == (0.0, alone.gap)
