@@ -22,7 +22,8 @@ FORBIDDEN = frozenset(
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
 ADVICE = (  # modules that compose command lines, the advice of findings
-    "anim/measure/inspect/",
+    "anim/check/",
+    "anim/gltf/reading/reader.py",
     "anim/measure/loops/recommendations.py",
     "anim/simulation/report.py",
     "anim/skinning/analysis/recommendations.py",

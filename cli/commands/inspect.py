@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import json
 from copy import copy
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from enum import StrEnum
 from typing import Annotated, Any
 
 import typer
 
+from anim.check.checked_file import CheckedFile
+from anim.check.find import find_grouped
+from anim.check.finding import Severity
+from anim.check.rules.invalid import RULE as INVALID
+from anim.check.rules.invalid import fault_occurrences
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container
 from anim.gltf.io.buffers import Resolve
 from anim.gltf.io.lenient import BrokenFile, read_broken, unread_buffers
 from anim.gltf.reading import reader
-from anim.gltf.reading.accessors import Accessors
-from anim.measure.inspect import file_findings
-from anim.measure.inspect.file_findings import Finding, Severity
+from anim.measure.inspect.contents import FileContents, read_contents
 from anim.measure.inspect.inspect import inspect as facts_of
 from anim.measure.inspect.report import Facts
 from anim.operations.selection import Selection
@@ -31,7 +34,6 @@ from cli.reports.inspect_report import Inspected, Smoothness
 from cli.text import Reporter
 
 SCHEMA = 1
-LOST_NOTE = "put it there, or fix the URI"
 
 
 class Format(StrEnum):
@@ -83,14 +85,14 @@ def command(
             inspected, tracks_of_clips = _unreadable(path, error), ()
         done.append(inspected)
         smooth.append(tracks_of_clips)
-        refused += [_named(fault, inspected[0]) for fault in inspected[2].faults[:1]]
+        refused += [_named(fault, inspected.name) for fault in inspected.facts.faults[:1]]
     if format is Format.JSON:
         documents.write_text(_json(done, smooth))
     elif format is Format.CSV:
         documents.write_text(_csv(done, smooth, tracks=tracks, continuity=continuity))
     elif not quiet:
-        for i, (name, size, facts) in enumerate(done):
-            page = inspect_report.page(name, size, facts, smooth[i], tracks=tracks)
+        for i, inspected in enumerate(done):
+            page = inspect_report.page(inspected, smooth[i], tracks=tracks)
             documents.write_text(("\n" if i else "") + page)
     worst = max(map(errors.report_error, refused), default=errors.DONE)
     if fail_on is not None:
@@ -108,7 +110,7 @@ def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, conti
         header, rows = inspect_report.track_rows(done) if tracks else inspect_report.clip_rows(done)
     filled: list[list[tables.Cell]] = [[*row, ""] for row in rows]
     empty = [""] * (len(header) - 1)
-    filled += [[name, *empty, str(facts.faults[0])] for name, _, facts in done if facts.faults]
+    filled += [[each.name, *empty, str(each.facts.faults[0])] for each in done if each.facts.faults]
     return tables.comma_separated([*header, "error"], filled)
 
 
@@ -128,10 +130,10 @@ def _unreadable(path: str, error: AnimError) -> Inspected:
         animation_json_bytes=0,
         clips=(),
         skins=(),
-        findings=tuple(file_findings.fault_findings([fault])),
         faults=(fault,),
     )
-    return name, 0, facts
+    findings = [INVALID.finding([each], (), INVALID.severity) for each in fault_occurrences([fault])]
+    return Inspected(name, 0, facts, tuple(findings))
 
 
 def _named(fault: AnimError, name: str) -> AnimError:
@@ -140,12 +142,11 @@ def _named(fault: AnimError, name: str) -> AnimError:
 
 def _check(done: list[Inspected], limit: Severity) -> None:
     """Raise CheckError if a finding has severity `limit` or higher."""
-    order = list(Severity)  # most severe first
     bad = [
-        (name, each)
-        for name, _, facts in done
-        for each in facts.findings
-        if each.name != file_findings.INVALID and order.index(each.severity) <= order.index(limit)
+        (each.name, finding)
+        for each in done
+        for finding in each.findings
+        if finding.code != INVALID.code and finding.severity.is_at_least(limit)
     ]
     if bad:
         name, first = bad[0]
@@ -158,14 +159,11 @@ def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: boo
     with documents.source(path, Reporter(quiet=True), opener.open) as source:
         document = source.document
         chosen = selection.chosen_clips(reader.names(document)) if selection.clips else None
-        facts = facts_of(document, file_bytes=source.size, chosen=chosen, tracks=tracks, broken=opener.broken)
-        lost = (
-            Finding("missing-file", Severity.WARNING, *each, LOST_NOTE)
-            for each in documents.missing(document, source.folder)
-        )
-        facts = replace(facts, findings=(*facts.findings, *lost))
-        smooth = _smooth(document, facts) if continuity else ()
-        return (source.name, source.size, facts), smooth
+        contents = read_contents(document, file_bytes=source.size, broken=opener.broken)
+        facts = facts_of(contents, chosen=chosen, tracks=tracks)
+        file = CheckedFile(contents, facts, tuple(documents.missing(document, source.folder)))
+        smooth = _smooth(contents, facts) if continuity else ()
+        return Inspected(source.name, source.size, facts, find_grouped(file)), smooth
 
 
 class _Opener:
@@ -188,16 +186,14 @@ class _Opener:
         return document
 
 
-def _smooth(document: Document, facts: Facts) -> Smoothness:
+def _smooth(contents: FileContents, facts: Facts) -> Smoothness:
     from anim.measure.continuity.continuity import continuity
 
-    clips, _ = reader.readable_clips(document, Accessors(document))
-    skeleton = reader.skeleton(document)
-    return tuple(continuity(clips[each.index], skeleton) for each in facts.clips)
+    return tuple(continuity(contents.clips[each.index], contents.skeleton) for each in facts.clips)
 
 
 def _json(done: list[Inspected], smooth: list[Smoothness]) -> str:
-    files = [{"file": name, "bytes": size, **_plain(asdict(facts))} for name, size, facts in done]
+    files = [{"file": each.name, "bytes": each.file_bytes, **_plain(each)} for each in done]
     if any(smooth):
         _add_smoothness(files, smooth)
     return json.dumps({"schema": SCHEMA, "files": files}, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
@@ -211,9 +207,11 @@ def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> No
             clip["continuity"] = [continuity_report.json(track) for track in tracks]
 
 
-def _plain(facts: dict[str, Any]) -> dict[str, Any]:
+def _plain(inspected: Inspected) -> dict[str, Any]:
     """Report as JSON values: tracks only if requested, and the first error as text."""
+    facts = asdict(inspected.facts)
     faults = facts.pop("faults")
+    facts["findings"] = [asdict(each) for each in inspected.findings]
     facts["error"] = str(faults[0]) if faults else None
     for clip in facts["clips"]:
         listed = clip.pop("track_list")

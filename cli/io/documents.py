@@ -202,8 +202,8 @@ def _stdin() -> Bytes:
     return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
 
 
-def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]]:
-    """Yield position and problem of every image that is not found from the input's folder."""
+def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str, str]]:
+    """Yield label, JSON pointer and problem of every image that is not found from the input's folder."""
     for i, about in enumerate(json_array(document.json, "images")):
         address = about.get("uri")
         if folder is None or address is None or uri.is_data(address):
@@ -211,4 +211,4 @@ def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str]
         try:
             resolver.locate(folder, uri.relative_path(address))
         except FormatError as error:
-            yield f"image {i}", error.problem
+            yield f"image {i}", f"/images/{i}/uri", error.problem

@@ -55,9 +55,9 @@ def rows(files: Sequence[Inspected], smooth: Sequence[Smoothness]) -> tuple[list
     """Return header and rows of one table: a row per track of every clip of every file, with its keys by smoothness."""
     header = ["file", "clip", *cells(None)]
     lines: list[list[Cell]] = [
-        [name, clip_name(clip.name, clip.index), *cells(track).values()]
-        for (name, _, facts), of_clips in zip(files, smooth, strict=True)
-        for clip, tracks in zip(facts.clips, of_clips, strict=True)
+        [inspected.name, clip_name(clip.name, clip.index), *cells(track).values()]
+        for inspected, of_clips in zip(files, smooth, strict=True)
+        for clip, tracks in zip(inspected.facts.clips, of_clips, strict=True)
         for track in tracks
     ]
     return header, lines

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from anim.check.finding import Finding
 from anim.gltf.reading.reader import clip_name
-from anim.measure.inspect.file_findings import Finding
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
 from cli import tables
 from cli.tables import Cell
@@ -20,15 +20,25 @@ if TYPE_CHECKING:
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 MIN_ROOT_DISTANCE_M = 1e-4  # smaller displacements of the root show no speed
 MARKS = {"error": "error  ", "warning": "warning", "info": "info   "}
-Inspected: TypeAlias = tuple[str, int, Facts]  # name, size in bytes, contents
 Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip and track
 
 
-def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, tracks: bool) -> str:
+@dataclass(frozen=True, slots=True)
+class Inspected:
+    """A file's name, size, contents and findings."""
+
+    name: str
+    file_bytes: int
+    facts: Facts
+    findings: tuple[Finding, ...]
+
+
+def page(inspected: Inspected, smooth: Smoothness = (), *, tracks: bool) -> str:
     """Return the page of one file: headline, clips, skins, findings. smooth: tracks of each clip, or ()."""
-    if facts.faults and not file_bytes:
-        return tables.escape_control(f"{name}: nothing can be read") + "\n" + _findings(facts.findings)
-    parts = [_headline(name, file_bytes, facts)]
+    facts = inspected.facts
+    if facts.faults and not inspected.file_bytes:
+        return tables.escape_control(f"{inspected.name}: nothing can be read") + "\n" + _findings(inspected.findings)
+    parts = [_headline(inspected.name, inspected.file_bytes, facts)]
     if facts.clips:
         parts.append(_clips(facts.clips))
     if tracks:
@@ -39,7 +49,7 @@ def page(name: str, file_bytes: int, facts: Facts, smooth: Smoothness = (), *, t
         parts += [continuity_report.table(*each) for each in zip(facts.clips, smooth, strict=False)]
     if facts.skins:
         parts.append(_skins(facts.skins))
-    parts.append(_findings(facts.findings))
+    parts.append(_findings(inspected.findings))
     return "\n".join(parts)
 
 
@@ -49,13 +59,13 @@ def clip_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
     header = ["file", *plain, *(f"{path}_tracks" for path in PATHS), "interpolations"]
     rows = [
         [
-            name,
+            each.name,
             *(getattr(clip, key) for key in plain),
             *(clip.tracks.get(path, 0) for path in PATHS),
             " ".join(sorted(clip.interpolations)),
         ]
-        for name, _, facts in files
-        for clip in facts.clips
+        for each in files
+        for clip in each.facts.clips
     ]
     return header, rows
 
@@ -64,9 +74,9 @@ def track_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]
     """Return header and rows of one table: a row per track of every clip of every file."""
     header = ["file", "clip", *_fields(TrackReport)]
     rows: list[list[Cell]] = [
-        [name, clip_name(clip.name, clip.index), *asdict(track).values()]
-        for name, _, facts in files
-        for clip in facts.clips
+        [each.name, clip_name(clip.name, clip.index), *asdict(track).values()]
+        for each in files
+        for clip in each.facts.clips
         for track in clip.track_list
     ]
     return header, rows

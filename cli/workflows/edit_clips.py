@@ -14,11 +14,11 @@ from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.reader import clip_name
+from anim.gltf.validation.animation_storage import badly_stored
 from anim.gltf.writing import writer
 from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.measure.error.metric import ErrorMetric
-from anim.measure.inspect.file_findings import badly_stored
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -161,6 +161,14 @@ def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
     names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:MAX_LISTED_CLIPS]]
     more = f" and {len(clips) - MAX_LISTED_CLIPS} more" if len(clips) > MAX_LISTED_CLIPS else ""
     return f"clips {', '.join(names)}{more}"
+
+
+def choose_option(numbers: Collection[int]) -> str:
+    """Return the options that select clips by index; "" if they are too many to list.
+
+    choose_option([0, 2]) → " --clip '#0' --clip '#2'"
+    """
+    return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= MAX_LISTED_CLIPS else ""
 
 
 def clip_name(name: str, number: int) -> str:

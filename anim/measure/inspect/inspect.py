@@ -1,4 +1,4 @@
-"""Inspection of a file: reports on clips, tracks and skins, and findings with advice."""
+"""Inspection of a file: reports on clips, tracks and skins."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools
-from anim.errors import AnimError
 from anim.gltf.document import Document, json_array
-from anim.gltf.io.lenient import BrokenFile
-from anim.gltf.reading import reader
-from anim.gltf.reading.accessors import Accessors
-from anim.measure.inspect import clip_findings, file_findings, frame_rate, root_motion, storage_cost
-from anim.measure.inspect.file_findings import Finding
+from anim.measure.inspect import frame_rate, root_motion, storage_cost
+from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
 from anim.measure.inspect.stored_bytes import stored_bytes as stored
 from anim.measure.inspect.track_statistics import TrackStats, stats
@@ -27,34 +23,19 @@ from anim.model.scene import MeshInstance
 from anim.sampling.batch import ConcatenatedTracks, concatenate
 
 
-def inspect(
-    document: Document,
-    *,
-    file_bytes: int,
-    chosen: Iterable[int] | None = None,
-    tracks: bool = False,
-    broken: BrokenFile | None = None,
-) -> Facts:
-    """Return the report on a document.
+def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, tracks: bool = False) -> Facts:
+    """Return the report on a file.
 
-    file_bytes: size of the file, for fractions of it. chosen: indices of the clips to report, None for all.
-    tracks: report every track too. broken: the faults of a file of which the document is only a part.
-    Unreadable clips become faults and findings, unreadable vertices become a finding.
+    chosen: indices of the clips to report, None for all. tracks: report every track too.
     """
+    document, skeleton, scene, clips = contents.document, contents.skeleton, contents.scene, contents.clips
     json = document.json
-    accessors = Accessors(document)
-    clips, unread = reader.readable_clips(document, accessors)
-    skeleton = reader.skeleton(document)
-    lost_clips, lost_skins = (broken.lost_clips, broken.lost_skins) if broken else (frozenset(), frozenset())
-    faults = (*broken.faults, *unread) if broken else tuple(unread)
-    wanted = clips.keys() if chosen is None else chosen
-    numbers = [i for i in wanted if i in clips and i not in lost_clips]
+    numbers = [i for i in (clips if chosen is None else chosen) if i in clips]
     looked_at = [clips[i] for i in numbers]
     groups = concatenate([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
     ways = root_motion.root_motions(skeleton, looked_at, groups, figure=root_motion.figure_nodes(json, skeleton))
-    scene, hidden = _scene(document, accessors)
     skin = SkinMotion(scene or Scene(skeleton, ()))
     seams = _seams(skin, looked_at, groups)
     measured_on = "skin" if skin.is_skin else "nodes"
@@ -72,12 +53,12 @@ def inspect(
             counted[ends[n] : ends[n + 1]],
             costs[i],
             packed,
-            file_bytes,
+            contents.file_bytes,
             tracks=tracks,
         )
         for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
     )
-    skins = tuple(_skin(i, document, scene) for i in range(len(json_array(json, "skins"))) if i not in lost_skins)
+    skins = range(len(json_array(json, "skins")))
     return Facts(
         str(json["asset"].get("generator", "")),
         tuple(json.get("extensionsUsed", ())),
@@ -88,16 +69,9 @@ def inspect(
         stored_bytes,
         cost.json,
         clip_facts,
-        skins,
-        (
-            *file_findings.fault_findings(faults),
-            *file_findings.document_findings(document),
-            *hidden,
-            *clip_findings.clip_findings(clip_facts),
-            *clip_findings.skin_findings(skins),
-        ),
-        faults,
-        sum(i in lost_clips or i not in clips for i in range(len(json_array(json, "animations")))),
+        tuple(_skin(i, document, scene) for i in skins if i not in contents.lost_skins),
+        contents.faults,
+        contents.unreadable_clips,
     )
 
 
@@ -203,14 +177,6 @@ def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> Track
         int(facts.wide[i]),
         float(facts.widest[i]),
     )
-
-
-def _scene(document: Document, accessors: Accessors) -> tuple[Scene | None, list[Finding]]:
-    try:
-        return reader.scene(document, accessors), []
-    except AnimError as error:
-        advice_text = "skins are counted without their vertices"
-        return None, [Finding("vertices-unread", file_findings.Severity.WARNING, "meshes", str(error), advice_text)]
 
 
 def _skin(number: int, document: Document, scene: Scene | None) -> SkinReport:

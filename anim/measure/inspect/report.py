@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from anim.errors import AnimError
-from anim.measure.inspect.file_findings import Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +109,5 @@ class Facts:
     animation_json_bytes: int
     clips: tuple[ClipReport, ...]
     skins: tuple[SkinReport, ...]
-    findings: tuple[Finding, ...]
     faults: tuple[AnimError, ...] = ()
     unreadable_clips: int = 0

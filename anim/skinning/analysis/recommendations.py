@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from anim.measure.inspect.clip_findings import choose_option
+from anim.gltf.reading.reader import choose_option
 from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
 from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed, linear_volume
 from anim.skinning.analysis.method_scores import MethodScore

@@ -1,0 +1,36 @@
+"""Advice as command lines: the frame rate and the options that select the clips of a finding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from anim.gltf.reading import reader
+from anim.measure.inspect.report import ClipReport
+
+MIN_REGULAR_FRACTION = 0.9  # fraction of keys on the grid below which a frame rate is not reliable
+MAX_IRREGULAR_FPS = 60.0  # advised where keys are on no frame grid; the spacing of the closest ones says little
+DEFAULT_FPS = 60.0  # advised for clips without a frame rate of their own
+
+
+def clip_advice(advice: str, clips: Sequence[ClipReport], numbers: Sequence[int]) -> str:
+    """Return advice for the clips at some indices.
+
+    {fps} becomes their frame rate, {finer} twice that, and {clips} the options that select them.
+    """
+    if "{" not in advice:
+        return advice
+    by_number = {clip.index: clip for clip in clips}
+    fps = frame_rate([by_number[i] for i in numbers])
+    return advice.format(fps=fps, finer=2 * fps, clips=reader.choose_option(numbers))
+
+
+def frame_rate(clips: Sequence[ClipReport]) -> int:
+    """Return the smallest whole frame rate with a frame at every key of the clips, else DEFAULT_FPS."""
+    return math.ceil(max(map(_frame_rate, clips)) - 1e-3)
+
+
+def _frame_rate(clip: ClipReport) -> float:
+    """Frame rate of a clip; of irregular keys at most MAX_IRREGULAR_FPS, however close some of them are."""
+    fps = clip.frame_rate_fps or DEFAULT_FPS
+    return fps if (clip.frame_rate_regular or 0.0) >= MIN_REGULAR_FRACTION else min(fps, MAX_IRREGULAR_FPS)

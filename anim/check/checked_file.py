@@ -1,0 +1,80 @@
+"""A file as rules see it: document, clips, skeleton, scene and the report of `inspect`, each read once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from anim.check.finding import Occurrence
+from anim.gltf.document import Document, Json, node_label
+from anim.gltf.reading import reader
+from anim.measure.error.surface import diagonal
+from anim.measure.inspect.contents import FileContents
+from anim.measure.inspect.report import ClipReport, Facts
+from anim.model import Clip, Scene, Skeleton
+
+
+@dataclass(frozen=True)
+class CheckedFile:
+    """A file to check. contents: its readable parts. facts: their report; rules look at its clips only.
+
+    missing: label, JSON pointer and problem of each file that it names and that isn't there.
+    """
+
+    contents: FileContents
+    facts: Facts
+    missing: Sequence[tuple[str, str, str]] = ()
+
+    @property
+    def document(self) -> Document:
+        """The document, or the readable part of an invalid one."""
+        return self.contents.document
+
+    @property
+    def json(self) -> Json:
+        """The JSON of the document."""
+        return self.contents.document.json
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """All nodes in their rest pose."""
+        return self.contents.skeleton
+
+    @property
+    def scene(self) -> Scene:
+        """Skeleton and meshes; without meshes if their vertices can't be read."""
+        return self.contents.scene or Scene(self.contents.skeleton, ())
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the model at rest in metres (of its nodes if it has no vertices)."""
+        return diagonal(self.scene)
+
+    def clips(self) -> Iterator[tuple[ClipReport, Clip]]:
+        """Yield the chosen, readable clips with their reports."""
+        for report in self.facts.clips:
+            yield report, self.contents.clips[report.index]
+
+    def in_clip(
+        self, number: int, count: int = 1, value: float = 0.0, *, problem: str = "", time_s: float | None = None
+    ) -> Occurrence:
+        """Return an occurrence in a clip by its index."""
+        name = self.contents.clips[number].name
+        label = reader.clip_label(name, number)
+        return Occurrence(
+            label, f"/animations/{number}", count, value, problem, number=number, name=name, time_s=time_s
+        )
+
+    def in_node(self, number: int, count: int = 1, value: float = 0.0, *, problem: str = "") -> Occurrence:
+        """Return an occurrence in a node by its index."""
+        name = self.skeleton.names[number]
+        return Occurrence(
+            node_label(self.json, number), f"/nodes/{number}", count, value, problem, number=number, name=name
+        )
+
+    def in_skin(self, number: int, count: int = 1, value: float = 0.0, *, problem: str = "") -> Occurrence:
+        """Return an occurrence in a skin by its index."""
+        name = self.json["skins"][number].get("name", "")
+        label = reader.clip_label(name, number, "skin")
+        return Occurrence(label, f"/skins/{number}", count, value, problem, number=number, name=name)

@@ -1,0 +1,37 @@
+"""Apply rules to a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Finding, Occurrence
+from anim.check.rule import Rule
+from anim.check.selection import RuleSelection
+
+DEFAULT = RuleSelection()
+
+
+def find_all(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple[Finding, ...]:
+    """Return one finding per occurrence, in the order of the rules."""
+    return tuple(
+        rule.finding([each], file.facts.clips, selection.severity(rule))
+        for rule, found in occurrences(file, selection)
+        for each in found
+    )
+
+
+def find_grouped(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple[Finding, ...]:
+    """Return one finding per rule for those that can sum up occurrences, else one per occurrence."""
+    result: list[Finding] = []
+    for rule, found in occurrences(file, selection):
+        parts: Sequence[Sequence[Occurrence]] = [found] if rule.problem is not None else [[each] for each in found]
+        result += (rule.finding(part, file.facts.clips, selection.severity(rule)) for part in parts)
+    return tuple(result)
+
+
+def occurrences(file: CheckedFile, selection: RuleSelection = DEFAULT) -> Iterator[tuple[Rule, list[Occurrence]]]:
+    """Yield each selected rule with its occurrences, if it has any."""
+    for rule in selection.rules():
+        if found := list(rule.find(file, selection.values(rule))):
+            yield rule, found

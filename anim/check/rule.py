@@ -1,0 +1,96 @@
+"""A rule of `check` and `inspect`: what it finds, why it matters, and how to fix it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TypeAlias
+
+from anim.check.advice import clip_advice
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Finding, Occurrence, Severity
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.measure.inspect.report import ClipReport
+
+MAX_LISTED_PARTS = 3  # parts of a file in one finding
+Parameters: TypeAlias = Mapping[str, float]
+_NONE: Mapping[str, Parameter] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """Number that a rule depends on. unit: "deg", "%", "s", "fps", "x" (a factor), or "" for a count."""
+
+    default: float
+    unit: str
+    about: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """Change of a document after which the rule finds nothing.
+
+    is_safe: no vertex moves by more than 1e-6 of the model's diagonal, which `fixing` measures on the written bytes.
+    """
+
+    about: str
+    apply: Callable[[CheckedFile, Sequence[Occurrence], Parameters], Document]
+    is_safe: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One rule.
+
+    code: stable; its first digit is the group. about: one line. why: evidence, and who is hurt. find: occurrences in a
+    file. problem: text on several occurrences, which `inspect` lists as one finding; None: each has its own text.
+    advice: the remedy, with {fps}, {finer} and {clips} for a command on these clips (see `advice.clip_advice`), or ""
+    if each occurrence has its own. is_default: False for rules that only `--select` turns on.
+    targets: severities for players named by `--target`.
+    """
+
+    code: str
+    name: str
+    severity: Severity
+    about: str
+    why: str
+    find: Callable[[CheckedFile, Parameters], Iterable[Occurrence]]
+    problem: Callable[[Sequence[Occurrence]], str] | None = None
+    advice: str = ""
+    fix: Fix | None = None
+    parameters: Mapping[str, Parameter] = field(default_factory=lambda: _NONE)
+    is_default: bool = True
+    targets: Mapping[str, Severity] = field(default_factory=lambda: MappingProxyType({}))
+
+    def defaults(self) -> dict[str, float]:
+        """Return the default of each parameter."""
+        return {name: each.default for name, each in self.parameters.items()}
+
+    def finding(self, found: Sequence[Occurrence], clips: Sequence[ClipReport], severity: Severity) -> Finding:
+        """Return one finding for some occurrences (one or more). clips: of the file, for advice."""
+        first = found[0]
+        problem = first.problem if self.problem is None else self.problem(found)
+        advice = first.advice or clip_advice(self.advice, clips, [each.number for each in found])
+        where = first.label if len(found) == 1 else _labels(found)
+        fixable = "" if self.fix is None else ("safe" if self.fix.is_safe else "unsafe")
+        return Finding(self.name, severity, where, problem, advice, self.code, first.pointer, first.time_s, fixable)
+
+
+def _labels(found: Sequence[Occurrence]) -> str:
+    """Label of several parts: "clips 'walk', #3, 'run' and 4 more"."""
+    if all(each.label.startswith("clip ") and each.pointer.startswith("/animations/") for each in found):
+        return reader.clip_labels([(each.name, each.number) for each in found])
+    more = f" and {len(found) - MAX_LISTED_PARTS} more" if len(found) > MAX_LISTED_PARTS else ""
+    return ", ".join(each.label for each in found[:MAX_LISTED_PARTS]) + more
+
+
+def counted(one: str, many: str) -> Callable[[Sequence[Occurrence]], str]:
+    """Return a `Rule.problem` that writes the total count before a text in the singular or plural."""
+
+    def problem(found: Sequence[Occurrence]) -> str:
+        count = sum(each.count for each in found)
+        return f"{count} {one if count == 1 else many}"
+
+    return problem

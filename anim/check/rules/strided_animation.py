@@ -1,0 +1,31 @@
+"""GA017: animation data in buffer views with byteStride."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence, Severity
+from anim.check.rule import Parameters, Rule
+from anim.check.rules.unused_samplers import REWRITE
+from anim.gltf.document import json_array
+from anim.gltf.validation.animation_storage import strided
+
+
+def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield one occurrence for all accessors."""
+    found: set[int] = set().union(*(strided(file.json, each) for each in json_array(file.json, "animations")))
+    if found:
+        problem = f"{len(found)} accessors are in views with byteStride"
+        yield Occurrence("animations", f"/accessors/{min(found)}", len(found), problem=problem)
+
+
+RULE = Rule(
+    "GA017",
+    "strided-animation",
+    Severity.ERROR,
+    "Keys are in buffer views with byteStride.",
+    "glTF 2.0 allows byteStride for vertex attributes only; players that ignore it read other numbers.",
+    find,
+    advice=REWRITE,
+)

@@ -1,0 +1,37 @@
+"""Storage of animations against the specification: samplers without a channel, missing bounds, strided views."""
+
+from __future__ import annotations
+
+from anim.gltf.document import Json, json_array
+
+
+def badly_stored(json: Json) -> frozenset[int]:
+    """Return the indices of clips with unused samplers, or with keys stored against the specification.
+
+    Commands that edit clips rewrite them, even if no key changes.
+    """
+    clips = enumerate(json_array(json, "animations"))
+    return frozenset(i for i, each in clips if unused_samplers(each) or unbounded(json, each) or strided(json, each))
+
+
+def unused_samplers(animation: Json) -> set[int]:
+    """Return the indices of a clip's samplers without a channel."""
+    return set(range(len(animation["samplers"]))) - {channel["sampler"] for channel in animation["channels"]}
+
+
+def unbounded(json: Json, animation: Json) -> set[int]:
+    """Return the indices of a clip's accessors of key times without min and max."""
+    accessors = json_array(json, "accessors")
+    return {n for s in animation["samplers"] if not {"min", "max"} <= accessors[n := s["input"]].keys()}
+
+
+def strided(json: Json, animation: Json) -> set[int]:
+    """Return the indices of a clip's accessors in buffer views with byteStride, which is for vertex attributes."""
+    named = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
+    return {n for n in named if has_stride(json, n)}
+
+
+def has_stride(json: Json, accessor: int) -> bool:
+    """Return whether an accessor is in a buffer view with byteStride."""
+    about = json_array(json, "accessors")[accessor]
+    return "bufferView" in about and "byteStride" in json_array(json, "bufferViews")[about["bufferView"]]
