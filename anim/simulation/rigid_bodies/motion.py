@@ -11,6 +11,7 @@ from anim.errors import UnstableError
 from anim.maths import quaternion
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.driver import AnimatedBodies
+from anim.simulation.rigid_bodies.impacts import Impact, ImpactFinder
 from anim.simulation.rigid_bodies.rapier_world import RapierWorld
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from anim.simulation.steps import Steps
@@ -26,6 +27,7 @@ class RigidMotion:
 
     times: (S,) s. positions (S, M, 3) m, rotations (S, M, 4) in world space. energies: (frames, 2) J, kinetic and
     potential. penetration: m, the deepest in a sample of steps. overlaps: pairs of bodies that overlap at the start.
+    impacts: of each moving body, in order of time; none in a run with a stride.
     """
 
     times: Floats
@@ -34,6 +36,7 @@ class RigidMotion:
     energies: Floats
     penetration: float
     overlaps: list[tuple[int, int, float]]
+    impacts: list[list[Impact]]
 
     def at(self, body: int, times: Floats) -> tuple[Floats, Floats]:
         """Return positions (K, 3) and rotations (K, 4) of a body at times (K,), linear between steps."""
@@ -64,20 +67,25 @@ def run_scene(
     states = np.empty((count, len(rigid.moving), 7), np.float32)  # what Rapier has
     energies: list[tuple[float, float]] = []
     overlaps: list[tuple[int, int, float]] = []
+    finder = ImpactFinder(rigid, world, steps.step_s) if stride == 1 else None
     limit: _EnergyLimit | None = None
     penetration, sampled = 0.0, max(1, steps.num_steps // NUM_CONTACT_SAMPLES)
     for index in range(first, steps.num_steps + 1):
         if index > first:
-            if animated:
-                for i, position, rotation in zip(animated, *driver.at(index), strict=True):
+            driven = driver.at(index) if animated else None
+            if driven is not None:
+                for i, position, rotation in zip(animated, *driven, strict=True):
                     world.move(i, position, rotation)
             world.step()
             if world.has_failed():
                 raise _unstable(index, steps.step_s, "a body's state isn't finite")
             if limit is None:  # masses are known after the first step, whose contacts are those before it
                 limit, overlaps = _EnergyLimit(rigid, world), [pair for pair in world.contacts() if pair[2] > 0]
+            if finder is not None:
+                row = np.array(world.states())
+                finder.update(index, row, driven and (animated, driven[0] - world.center, driven[1]))
         if index >= 0 and index % stride == 0:
-            states[index // stride] = world.states()
+            states[index // stride] = row if finder is not None and index > first else world.states()
         is_start = index == max(first, 0) + 1  # stands for the start, at which Rapier has no masses yet
         if (index % substeps == 0 and index > max(first, 0)) or is_start:
             energy = world.energy()
@@ -91,7 +99,8 @@ def run_scene(
     positions = np.asarray(exact[..., :3] + world.center, np.float64)
     rotations = quaternion.normalize(exact[..., 3:])
     figures: Floats = np.array(energies, np.float64).reshape(-1, 2)
-    return RigidMotion(times, positions, rotations, figures, penetration, overlaps)
+    impacts = [] if finder is None else finder.found
+    return RigidMotion(times, positions, rotations, figures, penetration, overlaps, impacts)
 
 
 class _EnergyLimit:

@@ -22,6 +22,7 @@ from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Fra
 SUBSTEPS = 4
 MAX_PENETRATION_M = 0.005  # that Rapier leaves; of small bodies MAX_PENETRATION_PER_RADIUS
 MAX_PENETRATION_PER_RADIUS, MIN_PENETRATION_M = 0.01, 1e-5
+MAX_RECYCLED_M = 1e-3  # motion since the distances of contacts were measured; impacts need those of the step
 INFINITE_MASS_KG = 1e9
 PLANE_REACH_M, PLANE_DEPTH_M = 500.0, 50.0  # half the size of a plane's box; at 10 km contacts are wrong by its depth
 CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
@@ -39,6 +40,7 @@ class RapierWorld:
         self._world = world
         parameters = world.integration_parameters
         parameters.dt, parameters.num_solver_iterations = step, SUBSTEPS
+        parameters.normalized_contact_recycle_distance = MAX_RECYCLED_M
         parameters.normalized_allowed_linear_error = _allowed_penetration(scene)
         parameters.normalized_max_linear_velocity = MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
@@ -106,6 +108,36 @@ class RapierWorld:
                 first, second = sorted(ends)
                 found.append((first, second, max(depths)))
         return found
+
+    def centers_of_mass(self) -> Floats:
+        """Return the centers of mass (M, 3) of the moving bodies in their own frames; after the first step."""
+        return np.array([body.local_center_of_mass.to_tuple() for body in self._read]).reshape(-1, 3)
+
+    def impulses(self, index: int) -> list[tuple[int, float, Floats, Floats]]:
+        """Return the contacts that pushed a body in the last step, the strongest of each pair of colliders.
+
+        Each: the other body, the distance of the shapes at the start of the step, the normal (3,) from the other, and
+        the point (3,).
+        """
+        found = []
+        for handle in self._bodies[index].colliders:
+            for pair in self._world.narrow_phase.contact_pairs_with(handle):
+                is_second = self._colliders[pair.collider2.index][0] == index
+                other = self._colliders[(pair.collider1 if is_second else pair.collider2).index][0]
+                contacts = [(point, manifold.data) for manifold in pair.manifolds for point in manifold.points]
+                contacts = [each for each in contacts if each[0].impulse > 0]
+                if contacts:
+                    point, data = max(contacts, key=lambda each: each[0].impulse)
+                    sign = 1.0 if is_second else -1.0
+                    at = self._contact_point(index, data)
+                    found.append((other, float(point.dist), sign * np.array(data.normal.to_tuple()), at))
+        return found
+
+    def _contact_point(self, index: int, data: Any) -> Floats:
+        """World position of a manifold's contacts, in the middle; the body's own without any."""
+        sets = self._world.rigid_bodies
+        points = [data.solver_contact_world_points(each, sets)[0].to_tuple() for each in data.solver_contacts]
+        return np.asarray(np.mean(points or [self._bodies[index].translation.to_tuple()], axis=0))
 
     def has_failed(self) -> bool:
         """Return whether Rapier took a body out in this step, whose state was no longer finite."""

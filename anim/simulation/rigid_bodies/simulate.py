@@ -31,6 +31,7 @@ class RigidOptions:
     """Gravity and time of a run. step: s, the longest; it is shortened so that it divides a frame.
 
     max_error: m, of any point of a body's colliders, within which keys are removed; 0 for none.
+    estimate_error: run again with half the step, which takes twice as long.
     """
 
     gravity: Vector = EARTH_GRAVITY_M_S2
@@ -39,6 +40,7 @@ class RigidOptions:
     duration: float = 5.0
     warm_up: float = 0.0
     max_error: float = 0.0
+    estimate_error: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

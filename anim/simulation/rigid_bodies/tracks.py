@@ -13,7 +13,6 @@ from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling.pose import PoseSampler
 from anim.sampling.times import distinct_float32
 from anim.sampling.world import local_by_node
-from anim.simulation.rigid_bodies.impacts import find_impacts
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 
@@ -80,11 +79,13 @@ def make_tracks(
     total, shear = 0, 0.0
     for k, i in enumerate(rigid.moving):
         body = rigid.bodies[i]
-        gravity = np.array(rigid.gravity) * body.motion.gravity_factor
-        impacts, points = find_impacts(motion.times, motion.positions[:, k], gravity)
-        times, is_impact = _merge(frames, impacts)
+        impacts = motion.impacts[k]
+        times, indices = _merge(frames, np.array([each.time for each in impacts]))
         positions, rotations = motion.at(k, times)
-        positions[is_impact >= 0] = points[is_impact[is_impact >= 0]]
+        for key in np.flatnonzero(indices >= 0).tolist():
+            impact = impacts[indices[key]]
+            same = slice(key, max(key + 1, int(np.searchsorted(times, impact.until))))
+            positions[same], rotations[same] = impact.position, impact.rotation
         parent = worlds.world(int(skeleton.parents[body.node]), times)
         local = matrix.multiply(matrix.inverse(parent), worlds.body(body.node, positions, rotations))
         translation, rotation, scale, sheared = matrix.decompose(local)

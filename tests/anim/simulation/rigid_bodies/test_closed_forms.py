@@ -7,7 +7,6 @@ import pytest
 
 from anim.maths import quaternion
 from anim.simulation.rigid_bodies.description import JointLimit, Material, Motion, Shape
-from anim.simulation.rigid_bodies.impacts import find_impacts
 from anim.simulation.rigid_bodies.rapier_world import RapierWorld
 from anim.simulation.rigid_bodies.rigid_scene import WORLD, RigidJoint, RigidScene
 from tests.anim.simulation.rigid_bodies.cases import G, body, frame, ground, needs_rapier, run
@@ -37,13 +36,35 @@ def test_a_bounce_keeps_the_square_of_the_restitution(e: float, step: float, lea
     assert height.min() > -0.04
 
 
-def test_the_time_of_an_impact_is_found_inside_the_step() -> None:
-    material = Material(0, 0, 0.8)
-    motion = run(ground(material), body(BALL, (0, 1.1, 0), material=material), seconds=1.0)
-    times, points = find_impacts(motion.times, motion.positions[:, 0], np.array([0, -G, 0]))
-    assert len(times) == 1
-    assert times[0] == pytest.approx(np.sqrt(2 / G), abs=1.5e-3)  # Rapier bounces at the end of a substep
-    np.testing.assert_allclose(points[0], [0, 0.1, 0], atol=6e-3)
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("height", [1.1, 1.234, 5.37])  # from the last one Rapier finds the ball inside the floor
+def test_the_time_of_an_impact_is_that_of_the_parabola(e: float, height: float) -> None:
+    material = Material(0, 0, e)
+    motion = run(ground(material), body(BALL, (0, height, 0), material=material), seconds=1.2)
+    first = motion.impacts[0][0]
+    assert first.time == pytest.approx(np.sqrt(2 * (height - 0.1) / G), abs=5e-6)
+    np.testing.assert_allclose(first.position, [0, 0.1, 0], atol=1e-6)
+
+
+def test_two_balls_meet_when_their_distance_says() -> None:
+    balls = [body(BALL, (-1, 0, 0), velocity=(3, 0, 0)), body(BALL, (1, 0, 0), velocity=(-1, 0, 0))]
+    motion = run(*balls, seconds=1.0, gravity=(0, 0, 0))
+    for own, x in zip(motion.impacts, (0.35, 0.55), strict=True):
+        assert [each.time for each in own] == [pytest.approx(0.45, abs=5e-6)]
+        np.testing.assert_allclose(own[0].position, [x, 0, 0], atol=1e-4)
+
+
+def test_a_spinning_box_hits_with_its_lowest_corner() -> None:
+    spin, corners = np.array([3.0, 4.0, 5.0]), np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    motion = run(ground(), body(Shape("box", (0.2, 0.2, 0.2)), (0, 1.5, 0), spin=spin), seconds=0.8)
+    first = motion.impacts[0][0]
+
+    def lowest(t: float) -> float:  # a cube's angular velocity is constant
+        turned = quaternion.rotate(quaternion.from_rotation_vector(spin * t), 0.1 * corners)
+        return float(turned[:, 1].min()) + 1.5 - G / 2 * t * t
+
+    assert lowest(first.time - 1e-4) > 0 > lowest(first.time + 1e-4)
+    np.testing.assert_allclose(first.rotation, quaternion.from_rotation_vector(spin * first.time), atol=1e-3)
 
 
 @pytest.mark.parametrize(("friction", "degrees"), [(0.3, 30), (0.6, 25)])

@@ -111,7 +111,7 @@ def test_impacts_are_keys_between_frames() -> None:
     made = document([node((0, 1.5, 0), **FALLING), node(collider=collider(1))], BALL)
     times = simulate(made, duration=1.0).tracks[0].times
     between = times[np.abs(times * 60 - np.round(times * 60)) > 1e-3]
-    np.testing.assert_allclose(between, [np.sqrt(2 / G)], atol=2e-3)
+    np.testing.assert_allclose(between, [np.sqrt(2 / G)], atol=1e-5)
 
 
 @pytest.mark.parametrize("max_error", [1e-4, 1e-2])
