@@ -41,6 +41,7 @@ class RapierWorld:
         parameters = world.integration_parameters
         parameters.dt, parameters.num_solver_iterations = step, SUBSTEPS
         parameters.normalized_contact_recycle_distance = MAX_RECYCLED_M
+        parameters.contact_softness = parameters.static_contact_softness  # bodies sink half as deep into each other
         parameters.normalized_allowed_linear_error = _allowed_penetration(scene)
         parameters.normalized_max_linear_velocity = MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)

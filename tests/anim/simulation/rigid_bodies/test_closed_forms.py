@@ -109,7 +109,7 @@ def test_a_pendulum_has_the_period_of_the_elliptic_integral() -> None:
 def test_a_stack_of_boxes_stays_and_sleeps() -> None:
     boxes = [body(CUBE, (0, 0.25 + 0.5 * i, 0)) for i in range(13)]
     motion = run(ground(), *boxes, seconds=4.0)
-    np.testing.assert_allclose(motion.positions[-1, :, 1], 0.25 + 0.5 * np.arange(13), atol=0.04)
+    np.testing.assert_allclose(motion.positions[-1, :, 1], 0.25 + 0.5 * np.arange(13), atol=0.02)
     np.testing.assert_allclose(motion.positions[-1, :, [0, 2]], 0, atol=0.01)
     np.testing.assert_array_equal(motion.positions[-1], motion.positions[-60])
     assert motion.energies[-1, 0] == 0
