@@ -11,6 +11,7 @@ from anim.errors import RangeError, check_number
 from anim.maths import hermite, quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
+from anim.operations.trim import cut_spline
 from anim.sampling.derivatives import rates
 from anim.sampling.times import check_fps, distinct_float32, min_interval
 from anim.sampling.track import sample
@@ -73,14 +74,16 @@ def _append_key(track: Track, clip: Clip, end: float, *, travels: bool) -> Track
     if len(track.times) == 1 or track.times[-1] < clip.end - 1e-6:
         return track
     last = _continue_travel(track, clip, end) if travels else sample(track, np.array([clip.start]))
+    sign = 1.0
     if track.kind is ValueKind.ROTATION:
-        last = last * np.where(quaternion.dot(last, track.values[-1:]) < 0, -1.0, 1.0)
+        sign = -1.0 if quaternion.dot(last, track.values[-1:])[0] < 0 else 1.0
+    last = last * sign
     times, values = np.append(track.times, end), np.concatenate((track.values, last))
     if track.in_tangents is None or track.out_tangents is None:
         return track.with_keys(times, values)
     chord = (values[-1:] - values[-2:-1]) / (times[-1] - times[-2])
     leaving = np.concatenate((track.out_tangents[:-1], track.in_tangents[-1:], np.zeros_like(chord)))
-    arriving = np.concatenate((track.in_tangents, track.out_tangents[:1]))
+    arriving = np.concatenate((track.in_tangents, track.out_tangents[:1] * sign))
     return track.with_keys(times, values, arriving, leaving)
 
 
@@ -179,7 +182,8 @@ def _times(track: Track, start: float, end: float) -> Floats:
     keys = track.times
     inside = keys[(keys > start) & (keys < end)]
     more = np.array([start, end])
-    if len(inside) < MIN_BLEND_KEYS or end - inside[-1] > (end - start) / MIN_BLEND_KEYS:
+    rotates = track.in_tangents is not None and track.kind is ValueKind.ROTATION  # normalized anew between its keys
+    if rotates or len(inside) < MIN_BLEND_KEYS or end - inside[-1] > (end - start) / MIN_BLEND_KEYS:
         more = np.linspace(start, end, max(2 * MIN_BLEND_KEYS, round((end - start) * BLEND_FPS) + 1))
     more = more[distinct_float32(more)]
     more = more[np.abs(more[:, None] - keys).min(axis=1) > min_interval(end, MIN_INTERVAL_S)]
@@ -199,4 +203,23 @@ def _correct_spline(track: Track, times: Floats, correction: _Correction) -> Tra
     if track.kind is ValueKind.ROTATION:
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0
-    return track.with_keys(times, values, before, after)
+    corrected = track.with_keys(times, values, before, after)
+    cut = int(np.abs(times - correction.start).argmin())
+    if track.kind is not ValueKind.ROTATION or cut == 0:
+        return corrected
+    return _join_splines(cut_spline(track, float(times[0]), float(times[cut])), corrected, cut)
+
+
+def _join_splines(first: Track, second: Track, index: int) -> Track:
+    """Return `first` followed by the keys of `second` after `index`, where `first` ends; signs follow from `first`."""
+    assert first.in_tangents is not None
+    assert first.out_tangents is not None
+    assert second.in_tangents is not None
+    assert second.out_tangents is not None
+    sign = -1.0 if quaternion.dot(first.values[-1], second.values[index]) < 0 else 1.0
+    return first.with_keys(
+        np.concatenate((first.times, second.times[index + 1 :])),
+        np.concatenate((first.values, second.values[index + 1 :] * sign)),
+        np.concatenate((first.in_tangents, second.in_tangents[index + 1 :] * sign)),
+        np.concatenate((first.out_tangents[:-1], second.out_tangents[index:] * sign)),
+    )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Bools, Floats
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys
 from anim.errors import RangeError, check_number
 from anim.maths import quaternion
@@ -70,11 +70,11 @@ def _trim_track(track: Track, start: float, end: float) -> Track:
     if len(track.times) == 1 or not (inner.any() or _changes(track, start, end)):
         return _single_key(track, start)
     if track.interpolation is Interpolation.CUBICSPLINE:
-        return _cut_spline(track, start, end, inner)
+        return cut_spline(track, start, end)
     times = np.concatenate(([start], track.times[inner], [end]))
     values = np.concatenate((sample(track, times[:1]), track.values[inner], sample(track, times[-1:])))
     if track.kind is ValueKind.ROTATION:
-        values = quaternion.align_signs(values)
+        values *= _cut_signs(values, np.concatenate(([False], np.ones(inner.sum(), bool), [False])))
     return track.with_keys(times, values)
 
 
@@ -91,17 +91,20 @@ def _single_key(track: Track, start: float) -> Track:
     return track.with_keys([start], values, interpolation=linear)
 
 
-def _cut_spline(track: Track, start: float, end: float, inner: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Track:
+def cut_spline(track: Track, start: float, end: float) -> Track:
+    """Return the part of a CUBICSPLINE track from `start` to `end`: keys between are unchanged, the ends are exact."""
+    inner = (track.times > start) & (track.times < end)
     times = np.concatenate(([start], track.times[inner], [end]))
     if track.kind is ValueKind.ROTATION:
         times = _insert_cut_times(track, times)
     values = sample(track, times)
     before, after = rates(track, times, before=True), rates(track, times, before=False)
-    if track.kind is ValueKind.ROTATION:
-        values = quaternion.align_signs(values)
-        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     exact = np.isin(times, track.times)
-    _restore(track, times, exact, values, before, after)
+    values[exact] = track.values[np.isin(track.times, times)]
+    if track.kind is ValueKind.ROTATION:
+        values *= _cut_signs(values, exact)
+        before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
+    _restore_tangents(track, times, exact, before, after)
     before[0], after[-1] = 0.0, 0.0
     return track.with_keys(times, values, before, after)
 
@@ -118,22 +121,26 @@ def _insert_cut_times(track: Track, times: Floats) -> Floats:
     return np.unique(np.concatenate(parts))
 
 
-def _restore(
-    track: Track,
-    times: Floats,
-    exact: np.ndarray[tuple[int], np.dtype[np.bool_]],
-    values: Floats,
-    before: Floats,
-    after: Floats,
-) -> None:
-    """Restore original keys bit for bit except for signs; on the side of a cut the tangent is new."""
+def _cut_signs(values: Floats, exact: Bools) -> Floats:
+    """Signs (K, 1) for quaternion keys, with which those of cut segments are in the hemisphere of their neighbors.
+
+    Original keys (`exact`) keep theirs: a spline between q and −q takes the long arc, and would change with its signs.
+    """
+    aligned = quaternion.align_signs(values)
+    signs = np.where(quaternion.dot(aligned, values) < 0, -1.0, 1.0)
+    if exact.any():
+        first, last = np.flatnonzero(exact)[[0, -1]]
+        signs[:first] *= signs[first]
+        signs[last + 1 :] *= signs[last]
+        signs[first : last + 1] = 1.0
+    return signs[:, None]
+
+
+def _restore_tangents(track: Track, times: Floats, exact: Bools, before: Floats, after: Floats) -> None:
+    """Restore the tangents of original keys bit for bit, except on the side of a cut."""
     assert track.in_tangents is not None
     assert track.out_tangents is not None
     at = np.searchsorted(track.times, times[exact])
-    signs = np.ones(len(at))
-    if track.kind is ValueKind.ROTATION:
-        signs = np.where(quaternion.dot(values[exact], track.values[at]) < 0, -1.0, 1.0)
-    values[exact] = track.values[at] * signs[:, None]
     whole_before, whole_after = exact & np.insert(exact[:-1], 0, False), exact & np.append(exact[1:], False)
-    before[whole_before] = (track.in_tangents[at] * signs[:, None])[whole_before[exact]]
-    after[whole_after] = (track.out_tangents[at] * signs[:, None])[whole_after[exact]]
+    before[whole_before] = track.in_tangents[at][whole_before[exact]]
+    after[whole_after] = track.out_tangents[at][whole_after[exact]]

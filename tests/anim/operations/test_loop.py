@@ -169,3 +169,27 @@ def test_a_seam_without_a_corner_has_no_speed() -> None:
     smooth = spline(WALK, tangents=TANGENTS["natural"], cyclic=True)
     assert judged(SCENE, WALK).speed_seam > 0.1
     assert judged(SCENE, smooth).speed_seam < 0.01
+
+
+@pytest.mark.parametrize("key", [key for key in TRACKS if "short" not in key])
+def test_a_blend_leaves_what_is_before_it(key: str) -> None:
+    """Tangents of rotation splines with a part along the quaternion, or over the long arc, were replaced."""
+    track = TRACKS[key]
+    new = loop(Clip("", (track,)), blend=0.4).tracks[0]
+    before = np.linspace(0, 2.6, 997)
+    a, b = sample(track, before), sample(new, before)
+    if track.path == "rotation":
+        assert float(np.degrees(quaternion.angle_between(a, b)).max()) < 0.0011
+    else:
+        np.testing.assert_allclose(a, b, atol=1e-12)
+
+
+def test_a_wheel_turns_on_in_the_appended_frame() -> None:
+    """Its last key is in the other hemisphere than its first one, whose tangent needs the sign of the new key."""
+    angles = np.radians(30 * np.arange(12))
+    keys = np.stack((np.sin(angles / 2), 0 * angles, 0 * angles, np.cos(angles / 2)), axis=1)
+    wheel = spline(Clip("", (track("rotation", np.arange(12) / 12, keys, LINEAR),)), tangents="time-aware")
+    closed = append_first_frame(wheel, fps=12).tracks[0]
+    half = np.radians(345) / 2
+    shown = sample(closed, np.array([11.5 / 12]))[0]
+    np.testing.assert_allclose(np.abs(shown @ [np.sin(half), 0, 0, np.cos(half)]), 1, atol=1e-6)

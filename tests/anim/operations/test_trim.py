@@ -44,10 +44,12 @@ def test_ends_are_exact_in_value_and_rate(key: str) -> None:
         np.testing.assert_allclose(got, rates(track, ends[side : side + 1], before=before), atol=1e-9)
 
 
-def test_inner_keys_stay_to_the_bit() -> None:
-    new = cut(TRACKS["cubic"])
+@pytest.mark.parametrize("key", ["cubic", "turning", "flipped", "long arc"])
+def test_inner_keys_stay_to_the_bit(key: str) -> None:
+    """The signs of quaternions too: a spline between q and −q takes the long arc."""
+    new = cut(TRACKS[key])
     at = np.searchsorted(new.times, KEYS[1:3])
-    np.testing.assert_array_equal(new.values[at], TRACKS["cubic"].values[1:3])
+    np.testing.assert_array_equal(new.values[at], TRACKS[key].values[1:3])
 
 
 def test_a_held_part_is_one_key() -> None:

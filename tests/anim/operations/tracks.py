@@ -27,6 +27,8 @@ TRACKS = {
     "step": clips.track("translation", KEYS, RNG.normal(size=(4, 3)), STEP),
     "short": clips.track("translation", KEYS[1:3], RNG.normal(size=(2, 3))),
     "short step": clips.track("translation", KEYS[1:3], RNG.normal(size=(2, 3)), STEP),
+    "flipped": clips.track("rotation", KEYS, TURNS * [[1], [-1], [-1], [1]]),
+    "long arc": clips.track("rotation", KEYS, TURNS * [[1], [1], [-1], [1]], CUBICSPLINE, tangents=_tangents(4)),
 }
 ANCHOR = clips.track("scale", [0, 3], np.ones((2, 3)), node=9)  # gives every clip the range 0 … 3 s
 
