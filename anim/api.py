@@ -190,7 +190,11 @@ def bake(
     bake("walk.glb", "walk", method="dqs", fps=24).save("walk.usdc")
     """
     asset = as_asset(asset)
-    scene = asset.scene if not (normals or tangents) else reader.scene(asset.document, normals=True, tangents=tangents)
+    scene = (
+        asset.scene
+        if not (normals or tangents)
+        else reader.scene(container.check_edits(asset.document), normals=True, tangents=tangents)
+    )
     globs = glob_list(meshes, "meshes")
     names = [each.mesh.name or f"#{i}" for i, each in enumerate(scene.instances)]
     nodes = [scene.instances[i].node for i in match_names(globs, names, "mesh")] if globs else None

@@ -20,7 +20,7 @@ from anim.files import resolver
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
 from anim.gltf.document import Document, json_array
-from anim.gltf.io import container
+from anim.gltf.io import container, json_text
 from anim.gltf.io.source import Source, glb_chunks, open_bytes, open_file, write_file
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
@@ -37,8 +37,8 @@ class Asset:
     """A glTF file: its document, and views of its contents, read on first use.
 
     document: JSON and buffers. source: the input it was read from, or None.
-    The dicts and lists of `document.json` may be edited before the views are used; buffers may be appended, with a data
-    URI. The views and `save` check the JSON again, as `load` does.
+    The dicts and lists of `document.json` may be edited; buffers may be appended, with a data URI. Functions, methods
+    and views check the JSON again, as `load` does; a view stays as it was when first used.
     """
 
     document: Document
@@ -47,17 +47,32 @@ class Asset:
     @cached_property
     def clips(self) -> Clips:
         """The animations, by name or index. Raises FormatError with the position of the first error."""
-        return Clips(reader.clips(container.check_edits(self.document)))
+        return Clips(reader.clips(self._checked()))
 
     @cached_property
     def skeleton(self) -> Skeleton:
         """All nodes in their rest pose, with the indices of the file."""
-        return reader.skeleton(container.check_edits(self.document))
+        return reader.skeleton(self._checked())
 
     @cached_property
     def scene(self) -> Scene:
         """The skeleton with all meshes. Raises UnsupportedError if vertices can't be read."""
-        return reader.scene(container.check_edits(self.document))
+        return reader.scene(self._checked())
+
+    @cached_property
+    def _viewed_json(self) -> bytes:
+        """The JSON at the first use of a view."""
+        return json_text.dump(self.document.json)
+
+    def _checked(self) -> Document:
+        document = container.check_edits(self.document)
+        _ = self._viewed_json
+        return document
+
+    def reread(self) -> Asset:
+        """Return the asset itself, or one with new views if its JSON was edited since a view was used."""
+        is_same = "_viewed_json" not in vars(self) or json_text.dump(self.document.json) == self._viewed_json
+        return self if is_same else replace(self)
 
     @property
     def name(self) -> str:
@@ -73,9 +88,9 @@ class Asset:
         """
         check_function(change, "change", "a function from Clip to Clip")
         globs = glob_list(clips, "clips")
-        new = {}
-        for i in match_names(globs, self.clips.names, "clip"):
-            old = self.clips[i]
+        new, views = {}, self.reread()
+        for i in match_names(globs, views.clips.names, "clip"):
+            old = views.clips[i]
             try:
                 changed = change(old)
                 if not isinstance(changed, Clip):
@@ -164,9 +179,9 @@ def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
 
 
 def as_asset(value: Asset | Document | PathName) -> Asset:
-    """Return an asset unchanged, or the asset of a document or a path."""
+    """Return an asset with the JSON as it is now, or the asset of a document or a path."""
     if isinstance(value, Asset):
-        return value
+        return value.reread()
     return Asset(value) if isinstance(value, Document) else load(value)
 
 

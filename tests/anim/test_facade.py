@@ -463,3 +463,38 @@ def test_what_is_optimized_already_has_an_error_of_zero_for_each_clip(biped: Pat
     again = anim.optimize(small.asset, max_error="1mm", effort="fast")
     assert again.errors == dict.fromkeys(small.errors, 0.0)
     assert again.max_error == 0
+
+
+# Documents edited by hand.
+
+
+def test_edits_after_a_view_was_used_are_seen(biped: Path) -> None:
+    asset = anim.load(biped)
+    assert asset.clips.names == ("walk", "wave", "jump")
+    asset.document.json["animations"].reverse()
+    halved = asset.map_clips(lambda clip: ops.retime(clip, speed=2), clips="walk")
+    assert [(clip.name, clip.end) for clip in halved.clips] == [("jump", np.float32(1.6)), ("wave", 2), ("walk", 0.5)]
+    assert list(anim.optimize(asset, clips="jump").errors) == ["jump"]
+    assert np.allclose(anim.sample(asset, 0, times=[0.8]), anim.sample(biped, "jump", times=[0.8]))
+    del asset.document.json["animations"][0]
+    assert asset.map_clips(lambda clip: ops.retime(clip, speed=2)).clips.names == ("wave", "walk")
+    assert anim.diff(biped, asset).max_error == float("inf")
+
+
+@pytest.mark.parametrize("normals", [False, True])
+def test_a_bake_checks_edits(normals: bool, biped: Path) -> None:
+    asset = anim.load(biped)
+    asset.document.json["nodes"][3]["rotation"] = [0, 0, 1, "a"]
+    with pytest.raises(anim.FormatError, match=re.escape("nodes[3].rotation: holds a string")):
+        anim.bake(asset, "walk", normals=normals)
+
+
+def test_a_pointer_track_names_its_extension(biped: Path) -> None:
+    pointer = "/materials/0/pbrMetallicRoughness/metallicFactor"
+    track = anim.Track(None, "pointer", "LINEAR", [0, 1], [[1], [0]], pointer=pointer)
+    asset = anim.load(biped)
+    added = asset.add_clips([anim.Clip("shine", (track,))])
+    changed = asset.map_clips(lambda clip: replace(clip, tracks=(*clip.tracks, track)), clips="walk")
+    for each in (added, changed, changed.map_clips(lambda clip: ops.retime(clip, speed=2))):
+        assert each.document.json["extensionsUsed"] == ["KHR_animation_pointer"]
+    assert "extensionsUsed" not in asset.document.json

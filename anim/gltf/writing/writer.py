@@ -33,8 +33,9 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, extension: s
     returned.
 
     Unsupported channels are kept with their samplers; channels without a track are removed; tracks without a channel
-    get one, and their nodes TRS instead of a `matrix`. Names, extras and extensions of animations, channels and
-    samplers are kept; name, extras and index of an accessor if its keys replace those of exactly one.
+    get one, and their nodes TRS instead of a `matrix`. With a pointer track, `extensionsUsed` has its extension.
+    Names, extras and extensions of animations, channels and samplers are kept; name, extras and index of an accessor
+    if its keys replace those of exactly one.
     Rotation keys are normalized, with their tangents, unless the track was not unit in the document before.
     extension: meshopt extension that compresses new views where that is smaller, empty for none. An `EncodedTrack` is
     stored as its codes.
@@ -58,7 +59,17 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, extension: s
         for i, animation in enumerate(json_array(document.json, "animations"))
     ]
     written = insert_accessors(document, animations, set(clips), pool.contents, extension, pool.sources)
-    return replace(written, json=copy_json(expand_matrices(written.json)[0]))
+    json = copy_json(expand_matrices(written.json)[0])
+    if any(track.pointer is not None for clip in clips.values() for track in clip.tracks):
+        _name_extension(json, channel_targets.EXTENSION)
+    return replace(written, json=json)
+
+
+def _name_extension(json: Json, name: str) -> None:
+    """Add an extension to `extensionsUsed`, in place: glTF requires it there."""
+    used: list[str] = json.get("extensionsUsed", [])
+    if name not in used:
+        json["extensionsUsed"] = [*used, name]
 
 
 def _check_index(number: object, count: int) -> int:
