@@ -39,6 +39,15 @@ COMMANDS = {
             "gltf-anim inspect *.glb --fail-on error > health.txt",
         ),
     ),
+    "check": CommandInfo(
+        "Check files by rules, and fail on errors.",
+        (
+            "gltf-anim check walk.glb hero.glb",
+            "gltf-anim check . --fail-on warning --ignore GA113",
+            "gltf-anim check --explain GA101",
+            "gltf-anim check '**/*.glb' --format sarif > findings.sarif",
+        ),
+    ),
     "sample": CommandInfo(
         "Sample the pose of every node at chosen times.",
         (

@@ -30,11 +30,14 @@ class RuleSelection:
     target: str = ""
     parameters: Mapping[str, str] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Raise NotFoundError or RangeError for an unknown rule, target or parameter, or a wrong value."""
         if self.target and self.target not in TARGETS:
             raise NotFoundError(f"there is no target '{self.target}'", help=f"targets: {', '.join(TARGETS)}")
-        for key in self.parameters:
-            parameter_of(key)
+        self.rules()
+        for key, text in self.parameters.items():
+            rule, name = parameter_of(key)
+            parse_parameter(text, key, rule.parameters[name])
 
     def rules(self) -> list[Rule]:
         """Return the selected rules in the table's order."""
@@ -106,8 +109,7 @@ def _number(number: str, text: str, key: str, parameter: Parameter) -> float:
 
 
 def _unknown(word: str) -> NotFoundError:
-    words = [each for rule in RULES for each in (rule.code, rule.name)]
-    near = difflib.get_close_matches(word, words, n=1) or difflib.get_close_matches(word.upper(), words, n=1)
+    near = difflib.get_close_matches(word.lower(), [rule.name for rule in RULES], n=1)
     return NotFoundError(
         f"there is no rule '{word}'", help=f"did you mean {near[0]}?" if near else "gltf-anim check --list shows them"
     )

@@ -10,19 +10,12 @@ from typing import Annotated, Any
 
 import typer
 
-from anim.check.checked_file import CheckedFile
 from anim.check.find import find_grouped
 from anim.check.finding import Severity
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.rules.invalid import fault_occurrences
 from anim.errors import AnimError, FormatError
-from anim.gltf.document import Bytes, Document
-from anim.gltf.io import container
-from anim.gltf.io.buffers import Resolve
-from anim.gltf.io.lenient import BrokenFile, read_broken, unread_buffers
-from anim.gltf.reading import reader
-from anim.measure.inspect.contents import FileContents, read_contents
-from anim.measure.inspect.inspect import inspect as facts_of
+from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import Facts
 from anim.operations.selection import Selection
 from cli import errors, tables
@@ -31,7 +24,7 @@ from cli.io import documents
 from cli.options import common
 from cli.reports import inspect_report
 from cli.reports.inspect_report import Inspected, Smoothness
-from cli.text import Reporter
+from cli.workflows import checked_files
 
 SCHEMA = 1
 
@@ -114,28 +107,6 @@ def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, conti
     return tables.comma_separated([*header, "error"], filled)
 
 
-def _unreadable(path: str, error: AnimError) -> Inspected:
-    """Report of a file that can't be read at all."""
-    name = documents.called(path)
-    fault = copy(error)
-    fault.where = fault.where.removeprefix(name).removeprefix(": ")
-    facts = Facts(
-        generator="",
-        extensions_used=(),
-        nodes=0,
-        meshes=0,
-        vertices=None,
-        animation_data_bytes=0,
-        animation_stored_bytes=0,
-        animation_json_bytes=0,
-        clips=(),
-        skins=(),
-        faults=(fault,),
-    )
-    findings = [INVALID.finding([each], (), INVALID.severity) for each in fault_occurrences([fault])]
-    return Inspected(name, 0, facts, tuple(findings))
-
-
 def _named(fault: AnimError, name: str) -> AnimError:
     return copy(fault).at(name, ": ")
 
@@ -155,35 +126,16 @@ def _check(done: list[Inspected], limit: Severity) -> None:
 
 
 def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:
-    opener = _Opener()
-    with documents.source(path, Reporter(quiet=True), opener.open) as source:
-        document = source.document
-        chosen = selection.chosen_clips(reader.names(document)) if selection.clips else None
-        contents = read_contents(document, file_bytes=source.size, broken=opener.broken)
-        facts = facts_of(contents, chosen=chosen, tracks=tracks)
-        file = CheckedFile(contents, facts, tuple(documents.missing(document, source.folder)))
-        smooth = _smooth(contents, facts) if continuity else ()
-        return Inspected(source.name, source.size, facts, find_grouped(file)), smooth
+    with checked_files.open_checked(path, selection, tracks=tracks) as (source, file):
+        smooth = _smooth(file.contents, file.facts) if continuity else ()
+        return Inspected(source.name, source.size, file.facts, find_grouped(file)), smooth
 
 
-class _Opener:
-    """Opens a document, or the readable parts of an invalid one. broken: its errors."""
-
-    def __init__(self) -> None:
-        self.broken: BrokenFile | None = None
-
-    def open(self, data: Bytes, resolve: Resolve | None) -> Document:
-        """Return the document in `data`; of an invalid one the readable parts."""
-        self.broken = None
-        try:
-            document = container.read(data, resolve)
-            reader.skeleton(document)
-        except AnimError as refusal:
-            self.broken = read_broken(data, resolve, refusal)
-            return self.broken.document
-        if faults := unread_buffers(document):
-            self.broken = BrokenFile(document, faults, frozenset(), frozenset())
-        return document
+def _unreadable(path: str, error: AnimError) -> Inspected:
+    """Report of a file that can't be read at all."""
+    fault = checked_files.fault_of(path, error)
+    findings = [INVALID.finding([each], (), INVALID.severity) for each in fault_occurrences([fault])]
+    return Inspected(documents.called(path), 0, checked_files.facts_of_unreadable(fault), tuple(findings))
 
 
 def _smooth(contents: FileContents, facts: Facts) -> Smoothness:

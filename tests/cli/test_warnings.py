@@ -96,6 +96,7 @@ def test_reports_of_sound_files_have_no_warnings(
 
 QUIET = {  # a line for each command, and how its product on stdout begins; b"" for none
     "inspect": (("arm.glb",), b""),
+    "check": (("arm.glb",), b""),
     "loop": (("arm.glb",), b""),
     "collapse": (("arm.glb", "--samples-per-second", "4"), b""),
     "diff": (("arm.glb", "arm.glb"), b""),

@@ -1,0 +1,51 @@
+"""Baseline: known findings, so that only new ones count."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from anim.check.finding import Finding
+from anim.errors import FormatError
+
+SCHEMA = 1
+FileFinding = tuple[str, Finding]  # path of the file (with "/"), finding
+
+
+def fingerprint(path: str, finding: Finding) -> str:
+    """Return the key of a finding: rule, file and part, without numbers that change with the content."""
+    return f"{finding.code}:{path}:{finding.where}"
+
+
+def dump(found: Iterable[FileFinding]) -> str:
+    """Return the JSON of a baseline, sorted, so that versions of it can be compared line by line."""
+    counts = Counter(fingerprint(*each) for each in found)
+    return json.dumps({"schema": SCHEMA, "findings": dict(sorted(counts.items()))}, indent=1, ensure_ascii=False) + "\n"
+
+
+def load(text: str) -> Counter[str]:
+    """Return the counts by fingerprint. Raises FormatError if the text is no baseline."""
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        content = None
+    findings = content.get("findings") if isinstance(content, dict) else None
+    if not isinstance(findings, dict) or content.get("schema") != SCHEMA:
+        raise FormatError("is no baseline (expected JSON of --write-baseline)")
+    if not all(isinstance(count, int) and count > 0 for count in findings.values()):
+        raise FormatError("has a count that is no whole number above 0")
+    return Counter(findings)
+
+
+def split(found: Sequence[FileFinding], known: Counter[str]) -> tuple[list[FileFinding], Counter[str]]:
+    """Return the findings that are not known, and the known ones that are gone, with their counts."""
+    left = known.copy()
+    new = []
+    for each in found:
+        key = fingerprint(*each)
+        if left[key] > 0:
+            left[key] -= 1
+        else:
+            new.append(each)
+    return new, +left

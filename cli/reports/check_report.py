@@ -1,0 +1,115 @@
+"""Reports of `check`: text, JSON, and Markdown for the summary of a job."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+
+from anim.check.baseline import FileFinding, fingerprint
+from anim.check.finding import Severity
+from anim.errors import AnimError
+from cli.tables import escape_control
+from cli.text import plural
+
+SCHEMA = 1
+MAX_OF_RULE = 3  # findings of a rule listed per file in the text
+MAX_SUMMARY_BYTES = 1_000_000  # of a job summary on GitHub, 1 MiB
+
+
+@dataclass(frozen=True, slots=True)
+class CheckReport:
+    """Result of a check. files: paths of all files. found: new findings. refused: unreadable files.
+
+    known: number of findings in the baseline; gone: fingerprints of those that no longer exist, with their counts.
+    """
+
+    files: Sequence[str]
+    found: Sequence[FileFinding]
+    refused: Sequence[tuple[str, AnimError]]
+    known: int = 0
+    gone: Sequence[tuple[str, int]] = ()
+
+    def count(self, severity: Severity) -> int:
+        """Return the number of findings of a severity."""
+        return sum(finding.severity is severity for _, finding in self.found)
+
+
+def text(report: CheckReport) -> str:
+    """Return the findings by file and rule, with the advice of each rule, and a summary."""
+    lines: list[str] = []
+    previous = None
+    for (path, code), group in groupby(report.found, key=lambda each: (each[0], each[1].code)):
+        if path != previous:
+            lines += [*([""] if lines else []), path]
+        previous = path
+        found = [each for _, each in group]
+        shown = found if len(found) <= MAX_OF_RULE + 1 else found[:MAX_OF_RULE]
+        lines += [f"  {each.severity:7}  {code} {each.name}  {each.where}: {each.problem}" for each in shown]
+        if len(shown) < len(found):
+            lines.append(f"           and {len(found) - len(shown)} more of this rule (all: --format json)")
+        lines.append(f"           {found[0].advice}")
+    lines += ["", summary(report)] if lines else [summary(report)]
+    return "\n".join(map(escape_control, lines)) + "\n"
+
+
+def summary(report: CheckReport) -> str:
+    """Return one line: files, findings by severity, fixable ones, known and gone ones."""
+    counts = [plural(report.count(each), each.value) for each in (Severity.ERROR, Severity.WARNING)]
+    counts.append(f"{report.count(Severity.INFO)} info")
+    line = f"{plural(len(report.files), 'file')} checked: {', '.join(counts)}"
+    fixes = [each.fixable for _, each in report.found]
+    if safe := fixes.count("safe"):
+        line += f"; {safe} fixable with --fix"
+    if unsafe := fixes.count("unsafe"):
+        line += f"; {unsafe} more with --unsafe-fixes" if safe else f"; {unsafe} fixable with --unsafe-fixes"
+    if report.known:
+        line += f"; {report.known} known from the baseline"
+    if report.gone:
+        count = sum(count for _, count in report.gone)
+        line += f"; {count} in the baseline no longer found (--write-baseline renews it)"
+    if report.refused:
+        line += f"; {plural(len(report.refused), 'file')} unreadable"
+    return line
+
+
+def as_json(report: CheckReport) -> str:
+    """Return one JSON document."""
+    content = {
+        "schema": SCHEMA,
+        "files": list(report.files),
+        "findings": [
+            {"file": path, **asdict(each), "fingerprint": fingerprint(path, each)} for path, each in report.found
+        ],
+        "errors": [{"file": path, "error": str(error)} for path, error in report.refused],
+        "known": report.known,
+        "gone": dict(report.gone),
+        "counts": {each.value: report.count(each) for each in Severity},
+    }
+    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+
+
+def as_markdown(report: CheckReport) -> str:
+    """Return a table for the summary of a job, cut where GitHub would refuse it."""
+    lines = [f"**{summary(report)}**", ""]
+    if report.found:
+        lines += ["| file | severity | rule | where | problem |", "|---|---|---|---|---|"]
+    size = sum(len(line.encode()) + 1 for line in lines)
+    for i, (path, each) in enumerate(report.found):
+        cells = (path, each.severity.value, f"{each.code} {each.name}", each.where, each.problem)
+        line = "| " + " | ".join(_cell(cell) for cell in cells) + " |"
+        size += len(line.encode()) + 1
+        if size > MAX_SUMMARY_BYTES:
+            lines += ["", f"and {len(report.found) - i} more findings"]
+            break
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+def _cell(words: str) -> str:
+    """Text in a table of Markdown, where names of a file are plain text."""
+    escaped = escape_control(words)
+    for character in "\\`*_{}[]<>#|~&":
+        escaped = escaped.replace(character, f"&#{ord(character)};" if character in "<>|&" else f"\\{character}")
+    return escaped

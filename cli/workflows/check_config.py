@@ -1,0 +1,147 @@
+"""Configuration of `check`: `gltf-anim.toml`, or `[tool.gltf-anim]` of pyproject.toml, nearest upwards of a file."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from anim.check.finding import Severity
+from anim.check.selection import RuleSelection
+from anim.errors import AnimError
+from cli.errors import UsageError
+
+NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
+_KEYS: Mapping[str, Mapping[str, type]] = {
+    "": {"check": dict},
+    "check": {"select": list, "extend-select": list, "ignore": list, "target": str, "fail-on": str}
+    | {"files": list, "params": dict},
+    "check.files": {"match": str, "ignore": list},
+}
+
+
+@dataclass(frozen=True)
+class CheckConfig:
+    """Settings of one configuration file; folder: its folder. files: pattern, and rules ignored in matching files."""
+
+    path: str = ""
+    folder: Path = field(default_factory=Path)
+    select: Sequence[str] = ()
+    extend: Sequence[str] = ()
+    ignore: Sequence[str] = ()
+    target: str = ""
+    fail_on: Severity | None = None
+    files: Sequence[tuple[str, Sequence[str]]] = ()
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+    def ignored_in(self, path: Path) -> Sequence[str]:
+        """Return the rules ignored in a file: those of the first pattern that matches its path from the folder."""
+        absolute = path.resolve()
+        if not absolute.is_relative_to(self.folder):
+            return ()
+        relative = absolute.relative_to(self.folder).as_posix()
+        return next((ignored for pattern, ignored in self.files if matches(relative, pattern)), ())
+
+
+def matches(path: str, pattern: str) -> bool:
+    """Return whether a path with "/" matches a pattern; "**" stands for any number of folders."""
+    return _match(PurePosixPath(path).parts, PurePosixPath(pattern).parts)
+
+
+def _match(parts: tuple[str, ...], patterns: tuple[str, ...]) -> bool:
+    if not patterns:
+        return not parts
+    if patterns[0] == "**":
+        return _match(parts, patterns[1:]) or (bool(parts) and _match(parts[1:], patterns))
+    return bool(parts) and PurePosixPath(parts[0]).match(patterns[0]) and _match(parts[1:], patterns[1:])
+
+
+@cache
+def nearest(folder: Path) -> CheckConfig:
+    """Return the configuration of a folder: the nearest one, from the folder upwards; an empty one without any."""
+    for each in (folder, *folder.parents):
+        own, project = each / NAME, each / PROJECT
+        tables = [(path, table) for path in (own, project) if (table := _table(path)) is not None]
+        if len(tables) > 1:
+            raise UsageError(f"{each}: has {NAME} and [tool.gltf-anim] in {PROJECT} (expected one of them)")
+        if tables:
+            return _config(*tables[0])
+    return CheckConfig()
+
+
+def read_config(path: str) -> CheckConfig:
+    """Return the configuration in a file."""
+    table = _table(Path(path))
+    if table is None:
+        problem = "has no [tool.gltf-anim]" if Path(path).is_file() else "there is no such file"
+        raise UsageError(f"{path}: {problem}")
+    return _config(Path(path), table)
+
+
+def _table(path: Path) -> dict[str, Any] | None:
+    """The settings in a file, None if it has none."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:  # of TOML, or of UTF-8
+        raise UsageError(f"{path}: {error}") from None
+    if path.name != PROJECT:
+        return content
+    table = content.get("tool", {}).get("gltf-anim")
+    return table if isinstance(table, dict) else None
+
+
+def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
+    _check_keys(path, "", table)
+    about = table.get("check", {})
+    _check_keys(path, "check", about)
+    for entry in about.get("files", ()):
+        _check_keys(path, "check.files", entry)
+        if "match" not in entry:
+            raise UsageError(f"{path}: [[check.files]] has no match")
+    try:
+        fail_on = Severity(about["fail-on"]) if "fail-on" in about else None
+    except ValueError:
+        choices = ", ".join(Severity)
+        raise UsageError(f"{path}: fail-on is '{about['fail-on']}' (expected one of {choices})") from None
+    select, extend, ignore = (tuple(map(str, about.get(key, ()))) for key in ("select", "extend-select", "ignore"))
+    return CheckConfig(
+        str(path),
+        path.resolve().parent,
+        select,
+        extend,
+        ignore,
+        target=about.get("target", ""),
+        fail_on=fail_on,
+        files=tuple((each["match"], tuple(map(str, each.get("ignore", ())))) for each in about.get("files", ())),
+        parameters={key: str(value) for key, value in about.get("params", {}).items()},
+    )
+
+
+def _check_keys(path: Path, section: str, table: Any) -> None:
+    """Raise UsageError for an unknown key or a value of another type."""
+    known = _KEYS[section]
+    if not isinstance(table, dict):
+        raise UsageError(f"{path}: [{section}] is no table")
+    for key, value in table.items():
+        where = f"{section}.{key}".lstrip(".")
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            raise UsageError(f"{path}: unknown key '{where}'", help=f"did you mean {near[0]}?" if near else "")
+        if not isinstance(value, known[key]):
+            raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {known[key].__name__})")
+
+
+def check_rules(config: CheckConfig) -> None:
+    """Raise UsageError, with the configuration file's name, for an unknown rule, parameter or target."""
+    try:
+        RuleSelection(config.select, config.extend, config.ignore, config.target, config.parameters).check()
+        for _, ignored in config.files:
+            RuleSelection(ignore=ignored).check()
+    except AnimError as error:
+        raise UsageError(f"{config.path}: {error}", help=error.help) from None

@@ -1,0 +1,84 @@
+"""Files opened for `inspect` and `check`, also invalid ones as far as they can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+
+from anim.check.checked_file import CheckedFile
+from anim.errors import AnimError
+from anim.gltf.document import Bytes, Document
+from anim.gltf.io import container
+from anim.gltf.io.buffers import Resolve
+from anim.gltf.io.lenient import BrokenFile, read_broken, unread_buffers
+from anim.gltf.io.source import Source
+from anim.gltf.reading import reader
+from anim.measure.inspect.contents import read_contents
+from anim.measure.inspect.inspect import inspect
+from anim.measure.inspect.report import Facts
+from anim.operations.selection import Selection
+from cli.io import documents
+from cli.text import Reporter
+
+
+@contextmanager
+def open_checked(
+    path: str, selection: Selection | None = None, *, tracks: bool = False
+) -> Iterator[tuple[Source, CheckedFile]]:
+    """Open a file and inspect it. selection: its clips. tracks: report every track too.
+
+    Raises an AnimError if nothing of it can be read.
+    """
+    opener = _Opener()
+    with documents.source(path, Reporter(quiet=True), opener.open) as source:
+        document = source.document
+        chosen = selection.chosen_clips(reader.names(document)) if selection and selection.clips else None
+        contents = read_contents(document, file_bytes=source.size, broken=opener.broken)
+        facts = inspect(contents, chosen=chosen, tracks=tracks)
+        yield source, CheckedFile(contents, facts, tuple(documents.missing(document, source.folder)))
+
+
+def fault_of(path: str, error: AnimError) -> AnimError:
+    """Return the error of an unreadable file, without the file's name."""
+    name = documents.called(path)
+    fault = copy(error)
+    fault.where = fault.where.removeprefix(name).removeprefix(": ")
+    return fault
+
+
+def facts_of_unreadable(fault: AnimError) -> Facts:
+    """Return the report of a file that can't be read at all."""
+    return Facts(
+        generator="",
+        extensions_used=(),
+        nodes=0,
+        meshes=0,
+        vertices=None,
+        animation_data_bytes=0,
+        animation_stored_bytes=0,
+        animation_json_bytes=0,
+        clips=(),
+        skins=(),
+        faults=(fault,),
+    )
+
+
+class _Opener:
+    """Opens a document, or the readable parts of an invalid one. broken: its errors."""
+
+    def __init__(self) -> None:
+        self.broken: BrokenFile | None = None
+
+    def open(self, data: Bytes, resolve: Resolve | None) -> Document:
+        """Return the document in `data`; of an invalid one the readable parts."""
+        self.broken = None
+        try:
+            document = container.read(data, resolve)
+            reader.skeleton(document)
+        except AnimError as refusal:
+            self.broken = read_broken(data, resolve, refusal)
+            return self.broken.document
+        if faults := unread_buffers(document):
+            self.broken = BrokenFile(document, faults, frozenset(), frozenset())
+        return document

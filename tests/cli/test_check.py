@@ -1,0 +1,231 @@
+"""`check`: rules over files and folders, settings, baselines, and reports for CI."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from anim.check.finding import Severity
+from anim.check.registry import RULES
+from tests.cli.conftest import Call
+from tests.cli.running import built
+
+LATE = ("GA105", "late-start")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Three files: one with findings, one without, one that is not glTF."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "crowd").mkdir()
+    (tmp_path / "noop.glb").write_bytes(built("noop"))
+    (tmp_path / "crowd" / "arm 1.glb").write_bytes(built("arm"))
+    return tmp_path
+
+
+def codes(report: Any) -> set[str]:
+    return {each["code"] for each in report["findings"]}
+
+
+def test_findings_are_those_of_inspect_one_per_clip(folder: Path, call: Call) -> None:
+    run = call("check", "noop.glb", "--format", "json")
+    assert run.code == 0
+    found = run.json["findings"]
+    inspected = call("inspect", "noop.glb", "--format", "json").json["files"][0]["findings"]
+    assert {each["name"] for each in found} == {each["name"] for each in inspected}
+    flips = [each for each in found if each["name"] == "sign-flips"]
+    assert [each["where"] for each in flips] == ["clip 'signs'"]
+    assert flips[0]["pointer"].startswith("/animations/")
+    assert flips[0]["fingerprint"] == "GA103:noop.glb:clip 'signs'"
+
+
+def test_folders_and_patterns_are_searched(folder: Path, call: Call) -> None:
+    for words in ((".",), ("**/*.glb",), ("crowd", "noop.glb", "noop.glb")):
+        files = call("check", *words, "--format", "json").json["files"]
+        assert sorted(files) == ["crowd/arm 1.glb", "noop.glb"]
+
+
+@pytest.mark.parametrize(("word", "problem"), [("*.gltf", "matches no file"), ("empty", "has no .glb")])
+def test_a_pattern_or_folder_without_files_is_an_error(word: str, problem: str, folder: Path, call: Call) -> None:
+    (folder / "empty").mkdir()
+    run = call("check", word)
+    assert (run.code, run.text) == (5, "")
+    assert problem in run.err
+
+
+def test_the_exit_code_is_6_from_a_severity_on(folder: Path, call: Call) -> None:
+    assert call("check", "noop.glb").code == 0
+    run = call("check", "noop.glb", "--fail-on", "info", "-q")
+    assert (run.code, run.text) == (6, "")
+    assert run.err.startswith("gltf-anim: noop.glb: ")
+
+
+def test_unreadable_files_exit_3_and_the_others_are_checked(folder: Path, call: Call) -> None:
+    for name in ("a.glb", "b.glb"):
+        (folder / name).write_bytes(b"no glTF")
+    run = call("check", ".", "--format", "json", "--fail-on", "info")
+    assert run.code == 3
+    assert run.err == "gltf-anim: 2 of 4 files can't be read: a.glb, b.glb\n"
+    report = run.json
+    assert [each["file"] for each in report["errors"]] == ["a.glb", "b.glb"]
+    assert any(each["file"] == "noop.glb" for each in report["findings"])
+
+
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [
+        (("--select", "GA103"), {"GA103"}),
+        (("--select", "sign-flips,GA112"), {"GA103", "GA112"}),
+        (("--select", "GA1", "--ignore", "GA103,GA101"), {"GA104", "GA105", "GA111", "GA112", "GA113"}),
+    ],
+)
+def test_rules_are_selected_by_code_prefix_and_name(
+    options: tuple[str, ...], kept: set[str], folder: Path, call: Call
+) -> None:
+    found = codes(call("check", "noop.glb", "--format", "json", *options).json)
+    assert found == kept & found
+    assert found
+
+
+def test_parameters_and_targets_change_findings(folder: Path, call: Call) -> None:
+    def severity(*options: str) -> str:
+        found = call("check", "late.glb", "--format", "json", "--select", "GA105", *options).json["findings"]
+        return str(found[0]["severity"])
+
+    (folder / "arm.glb").write_bytes(built("arm"))
+    assert call("retime", "arm.glb", "late.glb", "--offset", "0.5").code == 0
+    assert (severity(), severity("--target", "unity")) == ("info", "warning")
+    found = codes(call("check", "noop.glb", "--format", "json", "--param", "GA109.regular=0").json)
+    assert "GA109" not in found
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--select", "wide-step"), "did you mean wide-steps?"),
+        (("--select", "GA999"), "there is no rule 'GA999'"),
+        (("--explain", "GA10"), "there is no rule 'GA10'"),
+        (("--param", "GA201.influence=3"), "parameters of GA201 many-influences: GA201.influences"),
+        (("--param", "GA201.influences=many"), "expected a number like 4"),
+        (("--param", "GA201.influences"), "expected RULE.NAME=VALUE"),
+        (("--baseline", "a", "--write-baseline", "b"), "can't be combined"),
+        (("--config", "none.toml"), "there is no such file"),
+    ],
+)
+def test_wrong_options_get_one_line(options: tuple[str, ...], words: str, folder: Path, call: Call) -> None:
+    run = call("check", "noop.glb", *options)
+    assert run.code in (2, 5)
+    assert (run.text, run.err.count("gltf-anim:")) == ("", 1)
+    assert words in run.err
+
+
+def test_settings_come_from_the_nearest_file_upwards(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(
+        '[check]\nselect = ["GA1"]\nfail-on = "info"\nparams = {"GA109.regular" = 0.5}\n'
+        '[[check.files]]\nmatch = "noop.*"\nignore = ["GA103"]\n'
+    )
+    run = call("check", "noop.glb", "--format", "json")
+    assert run.code == 6
+    assert "GA103" not in codes(run.json)
+    (folder / "crowd" / "pyproject.toml").write_text('[tool.gltf-anim.check]\nignore = ["ALL"]\n')
+    assert call("check", "crowd", "--fail-on", "info").code == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[check]\nselct = []\n", "unknown key 'check.selct'"),
+        ("[checks]\n", "did you mean check?"),
+        ('[check]\nselect = "GA1"\n', "check.select is str (expected list)"),
+        ('[check]\nfail-on = "bad"\n', "expected one of error, warning, info"),
+        ('[check]\nselect = ["GA999"]\n', "gltf-anim.toml: there is no rule 'GA999'"),
+        ('[check]\ntarget = "nobody"\n', "there is no target"),
+        ('[[check.files]]\nignore = ["GA1"]\n', "has no match"),
+        ("[check\n", "gltf-anim.toml: "),
+    ],
+)
+def test_wrong_settings_are_refused(text: str, words: str, folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(text)
+    run = call("check", "noop.glb")
+    assert (run.code, run.text) == (2, "")
+    assert words in run.err
+
+
+def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text("[check]\n")
+    (folder / "pyproject.toml").write_text("[tool.gltf-anim]\n")
+    assert "expected one of them" in call("check", "noop.glb").err
+
+
+def test_only_what_is_new_counts_with_a_baseline(folder: Path, call: Call) -> None:
+    assert call("check", "noop.glb", "--write-baseline", "known.json", "--fail-on", "info").code == 0
+    run = call("check", "noop.glb", "--baseline", "known.json", "--fail-on", "info", "--format", "json")
+    assert run.code == 0
+    assert run.json["findings"] == []
+    run = call("check", "crowd/arm 1.glb", "--baseline", "known.json", "--format", "json")
+    assert run.json["gone"]
+    (folder / "known.json").write_text("[]")
+    run = call("check", "noop.glb", "--baseline", "known.json")
+    assert (run.code, run.err) == (3, "gltf-anim: known.json: is no baseline (expected JSON of --write-baseline)\n")
+
+
+def test_github_shows_ten_of_a_severity_and_escapes_names(folder: Path, call: Call) -> None:
+    for i in range(12):
+        (folder / f"{i}, a%.glb").write_bytes(built("noop"))
+    lines = call("check", ".", "--format", "github", "--select", "GA103").text.splitlines()
+    notices = [line for line in lines if line.startswith("::notice")]
+    assert len(notices) == 10
+    assert notices[0].startswith("::notice file=0%2C a%25.glb,title=GA103 sign-flips::")
+    assert "4 more" in notices[-1]
+
+
+def test_sarif_has_a_region_and_an_encoded_path_in_every_result(folder: Path, call: Call) -> None:
+    (folder / "a b#.glb").write_bytes(built("noop"))
+    run = call("check", "a b#.glb", "--format", "sarif").json["runs"][0]
+    rules = run["tool"]["driver"]["rules"]
+    assert run["results"]
+    for result in run["results"]:
+        place = result["locations"][0]["physicalLocation"]
+        assert place == {"artifactLocation": {"uri": "a%20b%23.glb"}, "region": {"startLine": 1}}
+        assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
+    prints = [result["partialFingerprints"]["gltfAnim/v1"] for result in run["results"]]
+    assert len(set(prints)) == len(prints)
+
+
+def test_junit_has_a_case_per_file(folder: Path, call: Call) -> None:
+    (folder / "bad.glb").write_bytes(b"no glTF")
+    root = ElementTree.fromstring(call("check", ".", "--format", "junit").text)
+    cases = {case.attrib["name"]: [child.tag for child in case] for case in root.iter("testcase")}
+    assert cases["bad.glb"] == ["error"]
+    assert cases["noop.glb"] == ["system-out"]
+    assert root.attrib["tests"] == "3"
+
+
+def test_markdown_is_a_table_that_names_cannot_break(folder: Path, call: Call) -> None:
+    (folder / "a_b [x].glb").write_bytes(built("noop"))
+    out = call("check", "a_b [x].glb", "--format", "md", "--select", "GA103").text
+    assert "| a\\_b \\[x\\].glb | info | GA103 sign-flips |" in out
+
+
+def test_every_rule_is_listed_and_explained(call: Call) -> None:
+    listed = call("check", "--list").text
+    for rule in RULES:
+        assert f"{rule.code}  {rule.name}" in listed
+        text = call("check", "--explain", rule.name).text
+        assert text.startswith(f"{rule.code} {rule.name}  [")
+        assert rule.about in text
+        assert "{" not in text
+
+
+def test_codes_and_names_of_rules_are_unique_and_severities_ordered() -> None:
+    assert len({rule.code for rule in RULES}) == len({rule.name for rule in RULES}) == len(RULES)
+    assert Severity.ERROR.is_at_least(Severity.INFO)
+    assert not Severity.INFO.is_at_least(Severity.WARNING)
+
+
+def test_files_are_read_from_stdin(call: Call) -> None:
+    run = call("check", "--format", "json", stdin=built("noop"))
+    assert run.json["files"] == ["stdin"]
