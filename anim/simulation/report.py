@@ -90,6 +90,11 @@ def advise_step(omega_h: float, limit: float, step: float, integrator: str) -> s
     return f"{words}: --step 1/{per_second}{other}"
 
 
+def advise_half_step(step: float) -> str:
+    """Return advice for a run that diverges by a method without a stability limit: "--step 1/1200"."""
+    return f"--step 1/{math.ceil(2 / step - 1e-6)}"
+
+
 def describe_elongation(worst: Mapping[str, Any] | None, substeps: int, limit: float | None) -> str:
     """Return "stretched by 5 % at 0.4 s with 80 substeps a frame (limit 2 %)"; "" for a cloth within the limit."""
     if worst is None or limit is None or worst["fraction"] <= limit:

@@ -17,7 +17,8 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing.append import append_mesh, append_nodes
 from anim.model import Clip
-from anim.simulation.cloth.simulate import ClothOptions, simulate_cloth
+from anim.simulation.cloth.options import ClothOptions
+from anim.simulation.cloth.simulate import simulate_cloth
 from anim.simulation.particles.emission import Births
 from anim.simulation.particles.forces import Forces
 from anim.simulation.particles.obstacles import Floor

@@ -166,6 +166,18 @@ def test_a_flag_blows_on_its_swaying_pole(fixture: Fixture, call: Call, tmp_path
         assert np.abs(cloth["positions"] - rigid["positions"][:61]).max() > 0.2
 
 
+def test_a_loop_of_cloth_states_its_seam(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    args = ("--mesh", "flag", "--pin", "x-min", "--damping", "3", "--loop")
+    run = call("simulate", "cloth", fixture("flag"), tmp_path / "out.npz", *args)
+    assert run.code == 0, run.err
+    assert "181 frames" in run.err
+    assert "rounds, seam " in run.err
+    with np.load(tmp_path / "out.npz") as cache:
+        np.testing.assert_array_equal(cache["positions"][0], cache["positions"][-1])
+    refused = call("simulate", "cloth", fixture("flag"), tmp_path / "none.npz", *args, "--duration", "1")
+    assert (refused.code, "expected no --duration" in refused.err) == (2, True)
+
+
 @needs_validator
 def test_cloth_as_morph_targets_is_valid(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     out = tmp_path / "out.glb"

@@ -8,30 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import RangeError
 from anim.model import Clip, Scene
 from anim.sampling.sample import sample
+from anim.simulation.cloth.colliders import Obstacle, place_obstacles
 from anim.skinning.bake import Baker
 
 MOVED_M = 1e-9  # a mesh that moves less is at rest
-
-
-@dataclass(frozen=True, slots=True)
-class Capsule:
-    """Collider between two points, each (3,) m in the space of a node, or of the scene for None; a ball if equal.
-
-    Raises RangeError for a radius that isn't above 0.
-    """
-
-    start: tuple[float, float, float]
-    end: tuple[float, float, float]
-    radius: float
-    start_node: int | None = None
-    end_node: int | None = None
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.radius) and self.radius > 0):
-            raise RangeError(f"the radius of a collider is {self.radius:g} m (expected above 0)")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,14 +21,16 @@ class ClothDriver:
     """Driver of one cloth.
 
     baker, clip: of its mesh. vertices: (N,) of the pinned points. scene: for the colliders' nodes.
-    Times count from the clip's start, before which the pose is that of the start.
+    Times count from the clip's start, before which the pose is that of the start. period: s, after which the clip is
+    repeated; None to keep its last pose.
     """
 
     baker: Baker
     clip: Clip
     vertices: Ints
     scene: Scene
-    capsules: Sequence[Capsule] = ()
+    obstacles: Sequence[Obstacle] = ()
+    period: float | None = None
 
     def targets(self, times: Floats) -> Floats:
         """Return the positions of the pinned points (S, N, 3) m at times (S,) s."""
@@ -56,25 +40,18 @@ class ClothDriver:
 
     def all_vertices(self, time: float) -> Floats:
         """Return all vertices (V, 3) m at a time."""
-        return np.asarray(self._bake(np.array([self.clip.start + max(time, 0.0)]))[0])
+        return np.asarray(self._unique(np.array([time]), self._bake)[0])
 
     def colliders(self, times: Floats) -> Floats:
-        """Return both centers and the radius (S, C, 7) m of all colliders at times (S,) s."""
-        if not self.capsules:
-            return np.zeros((len(times), 0, 7))
-        return self._unique(times, self._place_capsules)
+        """Return the colliders (S, C, 8) at times (S,) s, in the scene, as of `place_obstacles`."""
+        if not self.obstacles:
+            return np.zeros((len(times), 0, 8))
+        return self._unique(times, self._place)
 
-    def _place_capsules(self, times: Floats) -> Floats:
+    def _place(self, times: Floats) -> Floats:
         world = sample(self.scene.skeleton, self.clip, times, space="world").world
         assert world is not None
-        result = np.empty((len(times), len(self.capsules), 7))
-        for k, each in enumerate(self.capsules):
-            for point, node, first in ((each.start, each.start_node, 0), (each.end, each.end_node, 3)):
-                matrix = None if node is None else world[:, node]
-                at = np.asarray(point) if matrix is None else matrix[:, :, :3] @ np.asarray(point) + matrix[:, :, 3]
-                result[:, k, first : first + 3] = at
-            result[:, k, 6] = each.radius
-        return result
+        return place_obstacles(self.obstacles, world)
 
     def _bake(self, times: Floats) -> Floats:
         cache = self.baker.bake(self.clip, times=times)
@@ -82,5 +59,9 @@ class ClothDriver:
 
     def _unique(self, times: Floats, evaluate: Callable[[Floats], Floats]) -> Floats:
         """Evaluate at times that may repeat and come before 0, where the pose is that of 0."""
-        at, inverse = np.unique(self.clip.start + np.maximum(times, 0.0), return_inverse=True)
+        past = np.maximum(times, 0.0)
+        past = past if self.period is None else past % self.period
+        if not self.clip.tracks:
+            past = np.zeros_like(past)
+        at, inverse = np.unique(self.clip.start + past, return_inverse=True)
         return evaluate(at)[inverse.reshape(-1)]

@@ -43,9 +43,9 @@ def run_mass_spring(
     num_frames: int,
     substeps: int,
     warm_up_frames: int = 0,
-) -> Iterator[tuple[Floats, Floats]]:
-    """Yield positions and velocities (P, 3) at frames, as `run_xpbd`. Wind is left out. Raises UnstableError."""
-    from anim.simulation.cloth.kernels.xpbd import push_out
+) -> Iterator[tuple[Floats, float]]:
+    """Yield positions (P, 3) and the energy in J at frames, as `run_xpbd`. Wind is left out. Raises UnstableError."""
+    from anim.simulation.cloth.kernels.collisions import push_out
 
     method = find_integrator(integrator)
     h = 1.0 / (fps * substeps)
@@ -57,7 +57,7 @@ def run_mass_spring(
     for frame in range(first, num_frames):
         if frame > first:
             times = (frame - 1) / fps + h * np.arange(substeps + 1, dtype=np.float64)
-            targets, capsules = driver.targets(times[1:]), driver.colliders(times)
+            targets, colliders = driver.targets(times[1:]), driver.colliders(times)
             with np.errstate(all="ignore"):
                 for s in range(substeps):
                     x, v = _step(model, system, method.step, float(times[s]), x, v, h, targets[s])
@@ -66,8 +66,8 @@ def run_mass_spring(
                         moved,
                         x,
                         model.inverse_masses,
-                        capsules[s + 1],
-                        capsules[s],
+                        colliders[s + 1],
+                        colliders[s],
                         floor,
                         fabric.thickness,
                         fabric.friction,
@@ -77,7 +77,7 @@ def run_mass_spring(
             if not (np.isfinite(x).all() and speed < MAX_SPEED_M_S):
                 raise UnstableError(f"the simulation diverges at frame {frame}")
         if frame >= 0:
-            yield x.copy(), method.velocity(system, frame / fps, (x, v), h)
+            yield x.copy(), system.energy(x, method.velocity(system, frame / fps, (x, v), h))
 
 
 def _step(

@@ -8,7 +8,8 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.errors import NotFoundError, RangeError
-from anim.simulation.cloth.topology import ClothTopology, build_topology, tether_lengths
+from anim.simulation.cloth.tethers import order_outward, tether_lengths
+from anim.simulation.cloth.topology import ClothTopology, build_topology
 
 WELD_PER_DIAGONAL = 1e-6  # vertices closer than this fraction of the diagonal are one point
 SELF_COLLISION_PER_EDGE = 0.9  # thickness, of the shortest edge
@@ -43,7 +44,8 @@ class ClothModel:
 
     topology: of its mesh. rest: (P, 3) m, the shape without strain. inverse_masses: (P,) 1/kg, 0 for pinned points.
     pinned: (N,) indices of points that follow the animation. edge_lengths, hinge_lengths: (E,), (H,) m at rest.
-    anchors, tethers: for each point its nearest pinned one, −1 for none, and the length along the mesh (P,) m.
+    anchors, tethers: for each point K pinned ones, the nearest first, −1 for none, and the lengths along the mesh,
+    (P, K) m. outward: (E,) indices of the edges, those near pinned points first.
     self_collision: m, distance that points keep from each other; 0 for none.
     """
 
@@ -55,6 +57,7 @@ class ClothModel:
     hinge_lengths: Floats
     anchors: Ints
     tethers: Floats
+    outward: Ints
     self_collision: float
 
 
@@ -79,9 +82,12 @@ def build_cloth(
     inverse[fixed] = 0.0
     indices = np.flatnonzero(fixed & used)
     anchors, tethers = tether_lengths(topology, x, indices)
+    outward = order_outward(topology.edges, tethers[:, 0])
     edge_lengths, hinge_lengths = _lengths(x, topology.edges), _lengths(x, topology.hinges)
     gap = SELF_COLLISION_PER_EDGE * float(edge_lengths.min()) if self_collision else 0.0
-    return ClothModel(topology, x, inverse, np.flatnonzero(fixed), edge_lengths, hinge_lengths, anchors, tethers, gap)
+    return ClothModel(
+        topology, x, inverse, np.flatnonzero(fixed), edge_lengths, hinge_lengths, anchors, tethers, outward, gap
+    )
 
 
 def _lengths(x: Floats, pairs: Ints) -> Floats:

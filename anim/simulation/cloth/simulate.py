@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,50 +11,17 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError, UnstableError
 from anim.model import Clip, FrameChunk, Scene, VertexCache
-from anim.simulation.cloth.driver import Capsule, ClothDriver
+from anim.simulation.cloth.driver import ClothDriver
+from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop
 from anim.simulation.cloth.mass_spring_solver import as_mass_spring, run_mass_spring
-from anim.simulation.cloth.model import ClothModel, Fabric, build_cloth
-from anim.simulation.cloth.solver import Environment, run_xpbd
-from anim.simulation.comparison import Comparison, compare_integrators
-from anim.simulation.integrators import INTEGRATORS
-from anim.simulation.report import SimulationReport, advise_elongation, advise_step, describe_elongation
+from anim.simulation.cloth.model import ClothModel, build_cloth
+from anim.simulation.cloth.options import SOLVERS, ClothOptions
+from anim.simulation.cloth.report import ClothFrames, make_failed_report, make_report, worst_edges
+from anim.simulation.cloth.solver import MAX_ELONGATION, XPBD_SWEEPS, run_xpbd
+from anim.simulation.report import SimulationReport
 from anim.skinning.bake import prepare_bake
 
-SOLVERS = {
-    "xpbd": "extended position-based dynamics, stiff at any step",
-    "mass-spring": "springs, by a time integrator",
-    "relaxation": "Verlet with relaxed distances, as stiff as it has iterations",
-}
 MAX_SUBSTEPS = 80
-XPBD_SWEEPS = 2  # of the constraints per substep: half the stretch for 1.5 times the time
-COMPARED_S = 1.0  # of the integrators
-
-
-@dataclass(frozen=True, slots=True)
-class ClothOptions:
-    """Fabric, surroundings, solver and time of a cloth.
-
-    solver: a name in SOLVERS. substeps: per frame. iterations: of the constraints per substep, for relaxation.
-    max_stretch: doubles the substeps until no edge is longer than this fraction; None for no limit.
-    stiffness: N/m, of mass-spring. self_collision, tethers: switches. estimate_error: simulate a second time with half
-    the step. duration, warm_up: s, rounded to whole frames.
-    """
-
-    fabric: Fabric = field(default_factory=Fabric)
-    environment: Environment = field(default_factory=Environment)
-    capsules: tuple[Capsule, ...] = ()
-    solver: str = "xpbd"
-    integrator: str = "velocity-verlet"
-    substeps: int = 10
-    iterations: int = 20
-    max_stretch: float | None = None
-    stiffness: float = 500.0
-    self_collision: bool = False
-    tethers: bool = True
-    fps: float = 60.0
-    duration: float = 2.0
-    warm_up: float = 0.0
-    estimate_error: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,12 +32,6 @@ class ClothRun:
     report: SimulationReport
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Frames:
-    positions: Floats  # (F, P, 3)
-    energies: Floats | None  # (F,)
-
-
 def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: ClothOptions) -> ClothRun:
     """Return the cloth of a mesh over a clip.
 
@@ -78,12 +40,14 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     """
     if options.solver not in SOLVERS:
         raise RangeError(f"unknown `solver` '{options.solver}' (expected {', '.join(SOLVERS)})")
+    options = _with_period(options) if options.loop else options
     baker = prepare_bake(scene, rigid=True, nodes=[node])
     template = baker.bake(Clip("", ()), times=np.zeros(1))
     start = np.concatenate([chunk.positions for chunk in template.chunks()])[0].astype(np.float64)
     model = build_cloth(start, template.faces, pinned, options.fabric, self_collision=options.self_collision)
-    driver = ClothDriver(baker, clip, model.topology.first_vertex[model.pinned], scene, options.capsules)
-    substeps, frames = _run(model, driver, options)
+    followers = model.topology.first_vertex[model.pinned]
+    driver = ClothDriver(baker, clip, followers, scene, options.obstacles, options.environment.period)
+    substeps, frames = _simulate_under_limit(model, driver, options)
     error = None
     if options.estimate_error:
         finer = _simulate(model, driver, options, 2 * substeps)
@@ -91,138 +55,75 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     times = clip.start + np.arange(len(frames.positions), dtype=np.float64) / options.fps
     positions = frames.positions[:, model.topology.point_of_vertex].astype(np.float32)
     cache = replace(template, times=times, chunks=lambda: iter((FrameChunk(0, positions),)), rest=start)
-    return ClothRun(cache, _report(model, options, substeps, frames, error))
+    return ClothRun(cache, make_report(model, driver, options, substeps, frames, error))
 
 
-def _run(model: ClothModel, driver: ClothDriver, options: ClothOptions) -> tuple[int, _Frames]:
+def _with_period(options: ClothOptions) -> ClothOptions:
+    """Options of a loop: whole frames, and gusts that repeat."""
+    if not options.duration > 0:
+        raise RangeError(f"`duration` is {options.duration:g} s (expected above 0, for a loop)")
+    count = max(options.num_frames - 1, 1)
+    environment = replace(options.environment, period=options.duration)
+    return replace(options, fps=count / options.duration, environment=environment)
+
+
+def _simulate_under_limit(model: ClothModel, driver: ClothDriver, options: ClothOptions) -> tuple[int, ClothFrames]:
     """Frames with as many substeps as `max_stretch` needs, up to MAX_SUBSTEPS."""
     substeps = options.substeps
-    while True:
-        frames = _simulate(model, driver, options, substeps)
-        enough = options.max_stretch is None or _elongation(model, frames.positions).max() <= options.max_stretch
-        if enough or 2 * substeps > MAX_SUBSTEPS:
+    while options.max_stretch is not None and 2 * substeps <= MAX_SUBSTEPS:
+        frames = _simulate(model, driver, options, substeps, stop_above=options.max_stretch)
+        if worst_edges(model, frames.positions)[1].max() <= options.max_stretch:
             return substeps, frames
         substeps *= 2
+    return substeps, _simulate(model, driver, options, substeps)
 
 
-def _simulate(model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int) -> _Frames:
-    num_frames = round(options.duration * options.fps) + 1
+def _simulate(
+    model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int, stop_above: float = np.inf
+) -> ClothFrames:
+    """All frames; without a loop, only those up to the first with an edge that is longer than `stop_above`."""
+    positions: list[Floats] = []
+    energies: list[float] = []
+    num_done = 0
+
+    def counted() -> Iterator[tuple[Floats, float]]:
+        nonlocal num_done
+        for frame in _frames(model, driver, options, substeps):
+            num_done += 1
+            yield frame
+
+    try:
+        if options.loop:
+            return ClothFrames(*close_loop(counted(), options.num_frames, options.fps))
+        for x, energy in counted():
+            positions.append(x)
+            energies.append(energy)
+            if stop_above < np.inf and worst_edges(model, x[None])[1][0] > stop_above:
+                break
+    except UnstableError as error:
+        found = make_failed_report(model, options, substeps, num_done)
+        raise error.with_report(found).advise(found.advice) from None
+    return ClothFrames(np.array(positions), np.array(energies))
+
+
+def _frames(
+    model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int
+) -> Iterator[tuple[Floats, float]]:
+    """Positions (P, 3) and energy of each frame; for a loop, of all rounds."""
+    rounds = MAX_ROUNDS if options.loop else 1
     timing: dict[str, Any] = {
         "fps": options.fps,
-        "num_frames": num_frames,
+        "num_frames": rounds * (options.num_frames - 1) + 1,
         "substeps": substeps,
         "warm_up_frames": round(options.warm_up * options.fps),
     }
+    fabric, environment = options.fabric, options.environment
     if options.solver == "mass-spring":
-        return _simulate_mass_spring(model, driver, options, timing)
-    fabric, iterations = options.fabric, XPBD_SWEEPS
+        system = as_mass_spring(model, fabric, environment, options.stiffness)
+        return run_mass_spring(model, system, fabric, environment, driver, integrator=options.integrator, **timing)
+    iterations, elongation = XPBD_SWEEPS, min(MAX_ELONGATION, (options.max_stretch or 1.0) / 2)
+    limits: dict[str, Any] = {"iterations": iterations, "max_elongation": elongation}
     if options.solver == "relaxation":
-        fabric, iterations = replace(fabric, stretch_compliance=0.0, bend_compliance=0.0), options.iterations
-    try:
-        found = list(
-            run_xpbd(
-                model, fabric, options.environment, driver, **timing, iterations=iterations, tethers=options.tethers
-            )
-        )
-    except UnstableError as error:
-        raise error.with_report(_report(model, options, substeps, None, None)) from None
-    return _Frames(np.array(found), None)
-
-
-def _simulate_mass_spring(
-    model: ClothModel, driver: ClothDriver, options: ClothOptions, timing: dict[str, Any]
-) -> _Frames:
-    system = as_mass_spring(model, options.fabric, options.environment, options.stiffness)
-    positions, energies = [], []
-    try:
-        for x, v in run_mass_spring(
-            model, system, options.fabric, options.environment, driver, integrator=options.integrator, **timing
-        ):
-            positions.append(x)
-            energies.append(system.energy(x, v))
-    except UnstableError as error:
-        found = _report(model, options, timing["substeps"], None, None, first_bad_frame=len(positions))
-        raise error.with_report(found).advise(found.advice) from None
-    return _Frames(np.array(positions), np.array(energies))
-
-
-def _elongation(model: ClothModel, positions: Floats) -> Floats:
-    """Relative elongation (F, E) of the edges with a free end; 0 where there is none."""
-    a, b = model.topology.edges.T
-    lengths = np.linalg.norm(positions[:, a] - positions[:, b], axis=2)
-    free = (model.inverse_masses[a] + model.inverse_masses[b]) > 0
-    return np.asarray(np.where(free, lengths / model.edge_lengths - 1, 0.0))
-
-
-def _report(
-    model: ClothModel,
-    options: ClothOptions,
-    substeps: int,
-    frames: _Frames | None,
-    error: float | None,
-    first_bad_frame: int | None = None,
-) -> SimulationReport:
-    step = 1.0 / (options.fps * substeps)
-    omega_h = limit = None
-    advice = ""
-    if options.solver == "mass-spring":
-        system = as_mass_spring(model, options.fabric, options.environment, options.stiffness)
-        omega_h, limit = system.max_frequency() * step, INTEGRATORS[options.integrator].limit
-        advice = advise_step(omega_h, limit, step, options.integrator)
-    worst = None if frames is None else _worst_stretch(model, frames.positions, options.fps)
-    if not advice and describe_elongation(worst, substeps, options.max_stretch):
-        advice = advise_elongation(options.solver)
-    return SimulationReport(
-        "cloth",
-        step,
-        round(options.duration / step),
-        options.fps,
-        options.duration,
-        options.warm_up,
-        options.integrator if options.solver == "mass-spring" else "",
-        omega_h,
-        limit,
-        energy_j=None if frames is None or frames.energies is None else _energy(frames.energies),
-        worst_stretch=worst,
-        first_bad_step=None if first_bad_frame is None else first_bad_frame * substeps,
-        error_estimate_m=error,
-        figures={
-            "solver": options.solver,
-            "substeps": substeps,
-            "points": len(model.rest),
-            "pinned": len(model.pinned),
-            "edges": len(model.topology.edges),
-        },
-        advice=advice,
-    )
-
-
-def _energy(energies: Floats) -> dict[str, float]:
-    return {"start": float(energies[0]), "end": float(energies[-1]), "peak": float(energies.max())}
-
-
-def _worst_stretch(model: ClothModel, positions: Floats, fps: float) -> dict[str, Any]:
-    found = _elongation(model, positions)
-    frame, edge = np.unravel_index(int(found.argmax()), found.shape)
-    where = positions[frame, model.topology.edges[edge]].mean(axis=0)
-    return {
-        "fraction": float(found[frame, edge]),
-        "where": [round(float(value), 6) for value in where],
-        "time_s": float(frame / fps),
-        "at_end": float(found[-1].max()),
-    }
-
-
-def compare(scene: Scene, node: int, pinned: Bools, options: ClothOptions) -> Comparison:
-    """Return the same cloth as masses and springs by every integrator, over a second at the pose of 0 s."""
-    baker = prepare_bake(scene, rigid=True, nodes=[node])
-    template = baker.bake(Clip("", ()), times=np.zeros(1))
-    start = np.concatenate([chunk.positions for chunk in template.chunks()])[0].astype(np.float64)
-    model = build_cloth(start, template.faces, pinned, options.fabric)
-    system = as_mass_spring(model, options.fabric, options.environment, options.stiffness)
-    x, v = model.rest, np.zeros_like(model.rest)
-    step, duration = 1.0 / (options.fps * options.substeps), min(options.duration, COMPARED_S)
-    damped = compare_integrators(system, x, v, step=step, duration=duration, names=["implicit-euler"])[0]
-    lowest = float(damped.energies.min()) - 1e-3 * abs(float(np.ptp(damped.energies)))
-    runs = compare_integrators(system, x, v, step=step, duration=duration, lowest_energy=lowest)
-    return Comparison(runs, system.max_frequency() * step, step, model.topology.edges)
+        fabric = replace(fabric, stretch_compliance=0.0)
+        limits = {"iterations": options.iterations, "max_elongation": None}
+    return run_xpbd(model, fabric, environment, driver, tethers=options.tethers, **timing, **limits)

@@ -16,13 +16,17 @@ NO_FLOOR_M = -1e30
 AIR_KG_M3 = 1.2
 MAX_SPEED_M_S = 1e4
 GUST_RATES_HZ = (0.31, 0.73, 1.37, 2.9)
+XPBD_SWEEPS = 2  # of the constraints per substep: half the stretch for 1.5 times the time
+MAX_ELONGATION = 0.01  # of edges, beyond the fabric's own elongation
+LIMIT_SWEEPS = 8  # at most, per substep; most find nothing to do
+PEAK_LOAD = 4.0  # largest tension, of the weight: 3 at the bottom of a swing from the horizontal
 
 
 @dataclass(frozen=True, slots=True)
 class Environment:
     """Forces on a cloth: gravity (3,) m/s², wind (3,) m/s, gusts as a fraction of its speed, floor m or None.
 
-    air: kg/m³. seed: of the gusts.
+    air: kg/m³. seed: of the gusts. period: s, after which they repeat; None for no period.
     """
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
@@ -31,6 +35,7 @@ class Environment:
     air: float = AIR_KG_M3
     floor: float | None = None
     seed: int = 0
+    period: float | None = None
 
     def wind_at(self, times: Floats) -> Floats:
         """Return the wind (S, 3) m/s at times (S,) s: its mean, and sines in all directions as gusts."""
@@ -40,7 +45,10 @@ class Environment:
             random.uniform(0, 2 * np.pi, (len(GUST_RATES_HZ), 3)),
             random.uniform(0.5, 1, (len(GUST_RATES_HZ), 3)),
         )
-        angles = 2 * np.pi * np.asarray(GUST_RATES_HZ)[:, None] * times[:, None, None] + phases
+        rates = np.asarray(GUST_RATES_HZ)
+        if self.period is not None:
+            rates = np.maximum(np.round(rates * self.period), 1) / self.period
+        angles = 2 * np.pi * rates[:, None] * times[:, None, None] + phases
         gusts = (parts * np.sin(angles)).mean(axis=1)
         return np.asarray(np.asarray(self.wind) + self.gusts * speed * gusts)
 
@@ -55,13 +63,15 @@ def run_xpbd(
     num_frames: int,
     substeps: int,
     warm_up_frames: int = 0,
-    iterations: int = 1,
+    iterations: int = XPBD_SWEEPS,
     tethers: bool = True,
-) -> Iterator[Floats]:
-    """Yield the points (P, 3) m at frames 0 … num_frames − 1 of `fps` per second.
+    max_elongation: float | None = MAX_ELONGATION,
+) -> Iterator[tuple[Floats, float]]:
+    """Yield the points (P, 3) m and the energy in J at frames 0 … num_frames − 1 of `fps` per second.
 
     substeps: per frame. warm_up_frames: simulated before, at the pose of 0 s. iterations: of the constraints in each
-    substep. Raises UnstableError.
+    substep. max_elongation: limit of the edges' elongation beyond the fabric's own; None for none. The energy is
+    kinetic, elastic by the compliances, and potential. Raises UnstableError.
     """
     from anim.simulation.cloth.kernels.xpbd import step_frame
 
@@ -72,8 +82,43 @@ def run_xpbd(
     first = -warm_up_frames
     p = driver.all_vertices(first / fps)[topology.first_vertex]
     v = np.zeros_like(p)
-    anchors = model.anchors if tethers else np.full(len(p), -1)
-    numbers = np.array(
+    masses = np.where(model.inverse_masses > 0, 1 / np.maximum(model.inverse_masses, 1e-300), 0.0)
+    elastic = 0.0
+    anchors = model.anchors if tethers else np.full((len(p), 1), -1)
+    slack = 1 + (max_elongation or 0.0) + _elastic_elongation(model, fabric, environment)
+    numbers = _numbers(h, model, fabric, environment, max_elongation or 0.0)
+    for frame in range(first, num_frames):
+        if frame > first:
+            times = (frame - 1) / fps + h * np.arange(substeps + 1, dtype=np.float64)
+            elastic = step_frame(
+                p,
+                v,
+                model.inverse_masses,
+                model.pinned,
+                driver.targets(times[1:]),
+                topology.edges,
+                model.edge_lengths,
+                topology.hinges,
+                model.hinge_lengths,
+                anchors,
+                model.tethers * slack,
+                model.outward,
+                topology.faces,
+                driver.colliders(times),
+                environment.wind_at(times[1:]),
+                model.rest,
+                numbers,
+                iterations,
+                0 if max_elongation is None else LIMIT_SWEEPS,
+            )
+            _check(p, v, frame)
+        if frame >= 0:
+            yield p.copy(), elastic + _energy(masses, environment, p, v)
+
+
+def _numbers(h: float, model: ClothModel, fabric: Fabric, environment: Environment, max_elongation: float) -> Floats:
+    """The numbers of `step_frame`, in its order."""
+    return np.array(
         [
             h,
             *environment.gravity,
@@ -85,36 +130,25 @@ def run_xpbd(
             fabric.thickness,
             fabric.friction,
             model.self_collision,
+            max_elongation,
         ]
     )
-    for frame in range(first, num_frames):
-        if frame > first:
-            times = (frame - 1) / fps + h * np.arange(substeps + 1, dtype=np.float64)
-            step_frame(
-                p,
-                v,
-                model.inverse_masses,
-                model.pinned,
-                driver.targets(times[1:]),
-                topology.edges,
-                model.edge_lengths,
-                topology.hinges,
-                model.hinge_lengths,
-                anchors,
-                model.tethers,
-                topology.faces,
-                driver.colliders(times),
-                environment.wind_at(times[1:]),
-                model.rest,
-                numbers,
-                iterations,
-            )
-            _check(p, v, frame)
-        if frame >= 0:
-            yield p.copy()
+
+
+def _elastic_elongation(model: ClothModel, fabric: Fabric, environment: Environment) -> float:
+    """Elongation of the edges at the pinned points under the largest load, by the fabric's own compliance."""
+    free = model.inverse_masses > 0
+    weight = float((1 / model.inverse_masses[free]).sum()) * float(np.linalg.norm(environment.gravity))
+    holding = max(len(np.unique(model.anchors[:, 0])), 1)
+    return PEAK_LOAD * fabric.stretch_compliance * weight / (holding * float(model.edge_lengths.mean()))
+
+
+def _energy(masses: Floats, environment: Environment, p: Floats, v: Floats) -> float:
+    """Kinetic and potential energy in J of masses (P,), 0 for pinned points; the potential is 0 at the origin."""
+    return float(masses @ (0.5 * np.einsum("pc,pc->p", v, v) - p @ np.asarray(environment.gravity)))
 
 
 def _check(p: Floats, v: Floats, frame: int) -> None:
     speed = float(np.abs(v).max(initial=0.0))
     if not (np.isfinite(p).all() and speed < MAX_SPEED_M_S):
-        raise UnstableError(f"the simulation diverges at frame {frame}", help="raise the substeps, or the compliance")
+        raise UnstableError(f"the simulation diverges at frame {frame}")

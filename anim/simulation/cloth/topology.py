@@ -9,8 +9,6 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError
 
-PATH_TOLERANCE = 0.03  # of the lengths of ways along the mesh
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClothTopology:
@@ -73,29 +71,3 @@ def _color_order(pairs: Ints, count: int) -> Ints:
         used[i] |= 1 << color
         used[j] |= 1 << color
     return np.ascontiguousarray(pairs[np.argsort(colors, kind="stable")])
-
-
-def tether_lengths(topology: ClothTopology, x: Floats, pinned: Ints) -> tuple[Ints, Floats]:
-    """Return for each point the nearest pinned one along the mesh, −1 for none, and its distance: (P,), (P,) m.
-
-    The way leads over straight lines between points up to three edges apart, which is at most 3 % too long; where it is
-    no longer than that, the mesh is flat between both, and the straight distance is taken.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import dijkstra
-
-    count = len(x)
-    if not len(pinned):
-        return np.full(count, -1), np.zeros(count)
-    a, b = topology.edges.T
-    near = coo_array((np.ones(len(a)), (a, b)), shape=(count, count)).tocsr()
-    near = near + near.T
-    rings = (near + near @ near + near @ near @ near).tocoo()
-    lengths = np.linalg.norm(x[rings.row] - x[rings.col], axis=1)
-    graph = coo_array((lengths, (rings.row, rings.col)), shape=(count, count)).tocsr()
-    distance, _, source = dijkstra(graph, directed=False, indices=pinned, min_only=True, return_predecessors=True)
-    reached = np.isfinite(distance)
-    anchors = np.where(reached, source, pinned[0]).astype(np.int64)
-    straight = np.linalg.norm(x - x[anchors], axis=1)
-    lengths = np.where(distance <= (1 + PATH_TOLERANCE) * straight, straight, distance)
-    return np.where(reached, anchors, -1), np.where(reached, lengths, 0.0)

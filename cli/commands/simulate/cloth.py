@@ -20,10 +20,12 @@ from anim.gltf.reading import reader
 from anim.model import Scene
 from anim.operations.selection import Selection
 from anim.show.plots.stability_plot import stability_plot
-from anim.simulation.cloth.driver import Capsule
+from anim.simulation.cloth.colliders import Capsule
+from anim.simulation.cloth.comparison import compare
 from anim.simulation.cloth.model import Fabric
+from anim.simulation.cloth.options import SOLVERS, ClothOptions
 from anim.simulation.cloth.selection import select_vertices
-from anim.simulation.cloth.simulate import SOLVERS, ClothOptions, ClothRun, compare, simulate_cloth
+from anim.simulation.cloth.simulate import ClothRun, simulate_cloth
 from anim.simulation.cloth.solver import Environment
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport, describe_elongation
@@ -92,7 +94,9 @@ def command(
     max_stretch: Annotated[
         str | None,
         typer.Option(
-            "--max-stretch", metavar="PERCENT", help="Halve the step until no edge is stretched by more; else exit 6."
+            "--max-stretch",
+            metavar="PERCENT",
+            help="Halve the step until no edge is stretched by more at any frame; else exit 6.",
         ),
     ] = None,
     tethers: Annotated[
@@ -102,6 +106,7 @@ def command(
     fps: simulation.Fps = simulation.DEFAULT_FPS,
     duration: simulation.Duration = None,
     warm_up: simulation.WarmUp = 0.0,
+    loop: simulation.Loop = False,
     seed: simulation.Seed = 0,
     clip: simulation.Clip = None,
     report: simulation.ReportFile = None,
@@ -134,6 +139,8 @@ def command(
         document = source.document
         scene = scenes.read_scene(document, source.name, voice)
         number = driving_clip(document, clip)
+        if loop and duration is not None and number is not None:
+            raise UsageError("--loop closes the whole clip (expected no --duration)")
         driver = NO_CLIP if number is None else reader.clips(document)[number]
         node = _mesh_node(scene, mesh)
         options = ClothOptions(
@@ -155,6 +162,7 @@ def command(
             fps,
             duration if duration is not None else driver.end - driver.start or 2.0,
             warm_up,
+            loop,
             estimate_error=kind == ".json",
         )
         pinned = _pinned(document, scene, node, cloth, pin)
@@ -225,7 +233,15 @@ def _summary(run: ClothRun) -> str:
         f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s",
         f"stretched by {100 * worst['fraction']:.2g} % at most, at {worst['time_s']:.2f} s",
     ]
+    if run.report.loop_seam_m is not None:
+        parts.append(_loop(figures["loop_rounds"], run.report.loop_seam_m, settled=figures["loop_settled"]))
     return ", ".join(parts)
+
+
+def _loop(rounds: int, seam: float, *, settled: bool) -> str:
+    if settled:
+        return f"loop after {rounds} rounds, seam {text.format_length(seam)}"
+    return f"no loop after {rounds} rounds: a seam of {text.format_length(seam)} is blended"
 
 
 def _mesh_node(scene: Scene, mesh: list[str] | None) -> int:

@@ -1,0 +1,150 @@
+"""Report of a cloth's simulation: stability, energy, elongation and penetration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.simulation.cloth.driver import ClothDriver
+from anim.simulation.cloth.loop import LoopSeam
+from anim.simulation.cloth.mass_spring_solver import as_mass_spring
+from anim.simulation.cloth.model import ClothModel
+from anim.simulation.cloth.options import ClothOptions
+from anim.simulation.cloth.solver import NO_FLOOR_M
+from anim.simulation.integrators import INTEGRATORS
+from anim.simulation.report import (
+    SimulationReport,
+    advise_elongation,
+    advise_half_step,
+    advise_step,
+    describe_elongation,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClothFrames:
+    """Frames of all points (F, P, 3) m, their energies (F,) J, and the seam of a loop."""
+
+    positions: Floats
+    energies: Floats
+    seam: LoopSeam | None = None
+
+
+def make_report(
+    model: ClothModel,
+    driver: ClothDriver,
+    options: ClothOptions,
+    substeps: int,
+    frames: ClothFrames,
+    error: float | None,
+) -> SimulationReport:
+    """Return the report of a run. error: m, largest distance to the same run with half the step."""
+    worst = _worst_stretch(model, frames.positions, options.fps)
+    advice = ""
+    if describe_elongation(worst, substeps, options.max_stretch):
+        advice = advise_elongation(options.solver)
+    seam = frames.seam
+    return _report(
+        model,
+        options,
+        substeps,
+        advice,
+        {} if seam is None else {"loop_rounds": seam.rounds, "loop_settled": seam.settled},
+        energy_j=_energy(frames.energies),
+        drift_per_s=_drift(model, options, frames),
+        worst_stretch=worst,
+        penetration_m=_penetration(model, driver, options, frames.positions),
+        error_estimate_m=error,
+        loop_seam_m=None if seam is None else seam.distance,
+    )
+
+
+def make_failed_report(model: ClothModel, options: ClothOptions, substeps: int, bad_frame: int) -> SimulationReport:
+    """Return the report of a run that diverges. bad_frame: index of the first frame without a finite result."""
+    advice = advise_half_step(1.0 / (options.fps * substeps))
+    return _report(model, options, substeps, advice, {}, first_bad_step=max(bad_frame - 1, 0) * substeps + 1)
+
+
+def worst_edges(model: ClothModel, positions: Floats) -> tuple[Ints, Floats]:
+    """Return the edge (F,) with a free end that is stretched most at each frame, and its relative elongation (F,)."""
+    from anim.simulation.cloth.kernels.constraints import find_longest
+
+    edges, elongation = np.empty(len(positions), np.int64), np.empty(len(positions))
+    find_longest(positions, model.inverse_masses, model.topology.edges, model.edge_lengths, edges, elongation)
+    return edges, elongation
+
+
+def _report(
+    model: ClothModel, options: ClothOptions, substeps: int, advice: str, figures: dict[str, Any], **measured: Any
+) -> SimulationReport:
+    step = 1.0 / (options.fps * substeps)
+    omega_h = limit = None
+    is_mass_spring = options.solver == "mass-spring"
+    if is_mass_spring:
+        system = as_mass_spring(model, options.fabric, options.environment, options.stiffness)
+        omega_h, limit = system.max_frequency() * step, INTEGRATORS[options.integrator].limit
+        advice = advise_step(omega_h, limit, step, options.integrator) or advice
+    return SimulationReport(
+        "cloth",
+        step,
+        round(options.duration / step),
+        options.fps,
+        options.duration,
+        options.warm_up,
+        options.integrator if is_mass_spring else "",
+        omega_h,
+        limit,
+        figures={
+            "solver": options.solver,
+            "substeps": substeps,
+            "points": len(model.rest),
+            "pinned": len(model.pinned),
+            "edges": len(model.topology.edges),
+            "colliders": len(options.obstacles),
+            **figures,
+        },
+        advice=advice,
+        **measured,
+    )
+
+
+def _energy(energies: Floats) -> dict[str, float]:
+    return {"start": float(energies[0]), "end": float(energies[-1]), "peak": float(energies.max())}
+
+
+def _drift(model: ClothModel, options: ClothOptions, frames: ClothFrames) -> float | None:
+    """Change of energy per second, of the largest kinetic and elastic energy; None for a cloth without motion."""
+    free = model.inverse_masses > 0
+    heights = frames.positions[:, free] @ np.asarray(options.environment.gravity)
+    moving = float((frames.energies + heights @ (1 / model.inverse_masses[free])).max())
+    duration = (len(frames.energies) - 1) / options.fps
+    if moving <= 0 or duration <= 0:
+        return None
+    return float(frames.energies[-1] - frames.energies[0]) / (moving * duration)
+
+
+def _penetration(model: ClothModel, driver: ClothDriver, options: ClothOptions, positions: Floats) -> float | None:
+    """Largest depth in m of a point in a collider or below the floor, at frames; None where there is neither."""
+    from anim.simulation.cloth.kernels.collisions import deepest_penetration
+
+    floor = options.environment.floor
+    if not options.obstacles and floor is None:
+        return None
+    colliders = driver.colliders(np.arange(len(positions), dtype=np.float64) / options.fps)
+    deepest = deepest_penetration(positions, model.inverse_masses, colliders, NO_FLOOR_M if floor is None else floor)
+    return float(deepest)
+
+
+def _worst_stretch(model: ClothModel, positions: Floats, fps: float) -> dict[str, Any]:
+    edges, found = worst_edges(model, positions)
+    frame = int(found.argmax())
+    where = positions[frame, model.topology.edges[edges[frame]]].mean(axis=0)
+    return {
+        "fraction": float(found[frame]),
+        "where": [round(float(value), 6) for value in where],
+        "time_s": float(frame / fps),
+        "at_end": float(found[-1]),
+    }
