@@ -90,7 +90,7 @@ PUBLIC = {
     ),
     "simulation.cloth": "colliders comparison model options selection simulate solver",
     "simulation.particles": "emission forces obstacles simulate solver",
-    "simulation.rigid_bodies": "description node_globs simulate",
+    "simulation.rigid_bodies": "description node_globs options simulate",
     "simulation.spring_bones": "chain_globs chains colliders json_reader penetration read reduction report simulate",
     "skinning.analysis": (
         "collapse collapsed_clips inbetween_error method_deviation method_scores recommendations weight_sums"

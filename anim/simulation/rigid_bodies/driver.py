@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from anim.arrays import Floats
@@ -11,27 +9,32 @@ from anim.maths import matrix
 from anim.model import Clip, Skeleton
 from anim.sampling.pose import PoseSampler
 from anim.sampling.world import world_matrices
+from anim.simulation.rigid_bodies.rigid_scene import RigidScene
+from anim.simulation.steps import Steps
 
 CHUNK_STEPS = 256  # poses of all nodes are in memory for this many
 
 
 class AnimatedBodies:
-    """Positions and rotations of some nodes while the clip plays; before 0 s it has the pose of 0 s."""
+    """Positions and rotations of a scene's animated bodies while the clip plays. bodies: their indices."""
 
-    def __init__(self, skeleton: Skeleton, clip: Clip, nodes: Sequence[int], step: float, first: int) -> None:
-        """first: index of the first step, ≤ 0; step n is at n · `step` seconds."""
+    def __init__(self, skeleton: Skeleton, clip: Clip, rigid: RigidScene, steps: Steps) -> None:
+        """clip: begins at 0 s; step n is at n steps."""
+        self.bodies = rigid.animated
         self._skeleton = skeleton
         self._sampler = PoseSampler(skeleton, clip)
-        self._nodes = list(nodes)
-        self._step = step
-        self._begin = self._end = first
-        self._positions = self._rotations = np.empty((0, 0, 0))
+        self._nodes = [rigid.bodies[i].node for i in self.bodies]
+        self._step = steps.step_s
+        self._begin = self._end = 0
+        self._positions, self._rotations = np.empty((1, 0, 3)), np.empty((1, 0, 4))
 
     def at(self, index: int) -> tuple[Floats, Floats]:
-        """Return positions (n, 3) and rotations (n, 4) of the nodes at a step; steps are asked for in order."""
-        if index >= self._end:
+        """Return positions (n, 3) and rotations (n, 4) of the bodies at a step."""
+        if not self._nodes:
+            return self._positions[0], self._rotations[0]
+        if not self._begin <= index < self._end:
             self._begin, self._end = index, index + CHUNK_STEPS
-            times = np.maximum(np.arange(self._begin, self._end) * self._step, 0.0)
+            times = np.arange(self._begin, self._end, dtype=np.float64) * self._step
             world = world_matrices(self._skeleton, self._sampler.at(times))[:, self._nodes]
             self._positions, self._rotations, _, _ = matrix.decompose(world)
         return self._positions[index - self._begin], self._rotations[index - self._begin]

@@ -44,7 +44,7 @@ class _Frames:
 
 
 class ImpactFinder:
-    """Impacts of a scene's moving bodies, found while it is stepped. found: by index into `scene.moving`."""
+    """Impacts of a scene's moving bodies, found while it is stepped."""
 
     def __init__(self, scene: RigidScene, world: RapierWorld, step: float) -> None:
         self._world = world
@@ -61,9 +61,15 @@ class ImpactFinder:
         self._has_offsets = False
         self._recent: dict[tuple[int, int], int] = {}
         self._num_steps = 0
-        self.found: list[list[Impact]] = [[] for _ in scene.moving]
+        self._found: list[list[Impact]] = [[] for _ in scene.moving]
 
-    def update(self, index: int, states: Floats, animated: tuple[list[int], Floats, Floats] | None = None) -> None:
+    def begin_round(self) -> list[list[Impact]]:
+        """Count steps from 0 again, and return the lists of impacts by index into `scene.moving`, empty at first."""
+        self._found = [[] for _ in self._moving]
+        self._recent = {}
+        return self._found
+
+    def update(self, index: int, states: Floats, animated: tuple[list[int], Floats, Floats]) -> None:
         """Take the states (M, 7) at a step, relative to the world's center, and find its impacts.
 
         animated: bodies that the clip moves, their positions and rotations relative to the center.
@@ -75,8 +81,7 @@ class ImpactFinder:
         self._num_steps += 1
         positions, rotations = self._previous.positions.copy(), self._previous.rotations.copy()
         positions[self._moving], rotations[self._moving] = states[:, :3], states[:, 3:]
-        if animated is not None:
-            positions[animated[0]], rotations[animated[0]] = animated[1:]
+        positions[animated[0]], rotations[animated[0]] = animated[1:]
         now = self._frames(positions, rotations)
         if self._num_steps > 1:
             h, m = self._step, self._moving
@@ -102,7 +107,7 @@ class ImpactFinder:
             if delay is not None and (first is None or delay < first):
                 first = delay
         if first is not None:
-            self.found[k].append(self._at((index - 1) * self._step, first, body))
+            self._found[k].append(self._at((index - 1) * self._step, first, body))
 
     def _delay(self, body: int, other: int, distance: float, normal: Floats, point: Floats) -> float | None:
         """Time from the start of the step until the shapes touch; None if they don't approach.

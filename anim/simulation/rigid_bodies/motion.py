@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats
 from anim.errors import UnstableError
@@ -18,6 +19,7 @@ from anim.simulation.steps import Steps
 
 NUM_CONTACT_SAMPLES = 60  # steps of a run at which penetration is measured
 MAX_ENERGY_FACTOR = 1e3  # of the energy at the start and of the fall, beyond which a run diverges
+SETTLED_M = 1e-4  # largest distance of a body between both ends of a round that counts as none
 SPEED_ENERGY_J_PER_KG = 1.0  # 1.4 m/s: contacts at the start may give this without a fall
 
 
@@ -25,18 +27,20 @@ SPEED_ENERGY_J_PER_KG = 1.0  # 1.4 m/s: contacts at the start may give this with
 class RigidMotion:
     """States of M bodies at the steps from 0 s on.
 
-    times: (S,) s. positions (S, M, 3) m, rotations (S, M, 4) in world space. energies: (frames, 2) J, kinetic and
-    potential. penetration: m, the deepest in a sample of steps. overlaps: pairs of bodies that overlap at the start.
-    impacts: of each moving body, in order of time; none in a run with a stride.
+    times: (S,) s. positions (S, M, 3) m, rotations (S, M, 4) in world space. energies: (E, 2) J, kinetic and
+    potential, at energy_times (E,) s. penetration: m, the deepest in a sample of steps. overlaps: pairs of bodies that
+    overlap at the start. impacts: of each moving body, in order of time. num_rounds: of the clip, until this one.
     """
 
     times: Floats
     positions: Floats
     rotations: Floats
+    energy_times: Floats
     energies: Floats
     penetration: float
     overlaps: list[tuple[int, int, float]]
     impacts: list[list[Impact]]
+    num_rounds: int = 1
 
     def at(self, body: int, times: Floats) -> tuple[Floats, Floats]:
         """Return positions (K, 3) and rotations (K, 4) of a body at times (K,), linear between steps."""
@@ -51,56 +55,135 @@ class RigidMotion:
         return points, quaternion.nlerp(a, b, u[:, 0])
 
 
+@dataclass(slots=True, eq=False)
+class Recorder:
+    """States and figures of one round of a run, as far as it has come. num_states: stored so far.
+
+    states: (S, M, 7) relative to `center`, in float32, as Rapier has them. energies: step, kinetic and potential.
+    """
+
+    states: NDArray[np.float32]
+    step_s: float
+    center: Floats
+    num_states: int = 0
+    energies: list[tuple[int, float, float]] = field(default_factory=list)
+    penetration: float = 0.0
+    overlaps: list[tuple[int, int, float]] = field(default_factory=list)
+    impacts: list[list[Impact]] = field(default_factory=list)
+    num_rounds: int = 1
+
+    def motion(self) -> RigidMotion:
+        """Return the motion recorded so far."""
+        exact = np.asarray(self.states[: self.num_states], np.float64)
+        energies = np.array([each[1:] for each in self.energies], np.float64).reshape(-1, 2)
+        return RigidMotion(
+            np.arange(len(exact), dtype=np.float64) * self.step_s,
+            np.asarray(exact[..., :3] + self.center),
+            quaternion.normalize(exact[..., 3:]),
+            np.array([each[0] for each in self.energies]) * self.step_s,
+            energies,
+            self.penetration,
+            self.overlaps,
+            self.impacts,
+            self.num_rounds,
+        )
+
+
 def run_scene(
-    rigid: RigidScene, skeleton: Skeleton, clip: Clip, steps: Steps, *, substeps: int, stride: int = 1
+    rigid: RigidScene,
+    skeleton: Skeleton,
+    clip: Clip,
+    steps: Steps,
+    *,
+    substeps: int,
+    finds_impacts: bool = True,
+    max_rounds: int = 1,
 ) -> RigidMotion:
     """Return the motion of a scene; steps before 0 s are not in it.
 
-    substeps: steps of a frame. stride: keep every so many steps; penetration is measured with 1.
-    Raises UnstableError for a run that diverges.
+    clip: the driver, from 0 s on. substeps: steps of a frame. max_rounds: the clip is repeated until the bodies end a
+    round as they began it; the motion is that of the last round.
+    Raises UnstableError for a run that diverges, with the Recorder as its report.
     """
     world = RapierWorld(rigid, steps.step_s)
-    first = -steps.num_warm_up_steps
-    animated = rigid.animated
-    driver = AnimatedBodies(skeleton, clip, [rigid.bodies[i].node for i in animated], steps.step_s, first)
-    count = steps.num_steps // stride + 1
-    states = np.empty((count, len(rigid.moving), 7), np.float32)  # what Rapier has
-    energies: list[tuple[float, float]] = []
-    overlaps: list[tuple[int, int, float]] = []
-    finder = ImpactFinder(rigid, world, steps.step_s) if stride == 1 else None
-    limit: _EnergyLimit | None = None
-    penetration, sampled = 0.0, max(1, steps.num_steps // NUM_CONTACT_SAMPLES)
-    for index in range(first, steps.num_steps + 1):
-        if index > first:
-            driven = driver.at(index) if animated else None
-            if driven is not None:
-                for i, position, rotation in zip(animated, *driven, strict=True):
-                    world.move(i, position, rotation)
-            world.step()
-            if world.has_failed():
-                raise _unstable(index, steps.step_s, "a body's state isn't finite")
-            if limit is None:  # masses are known after the first step, whose contacts are those before it
-                limit, overlaps = _EnergyLimit(rigid, world), [pair for pair in world.contacts() if pair[2] > 0]
-            if finder is not None:
-                row = np.array(world.states())
-                finder.update(index, row, driven and (animated, driven[0] - world.center, driven[1]))
-        if index >= 0 and index % stride == 0:
-            states[index // stride] = row if finder is not None and index > first else world.states()
-        is_start = index == max(first, 0) + 1  # stands for the start, at which Rapier has no masses yet
-        if (index % substeps == 0 and index > max(first, 0)) or is_start:
-            energy = world.energy()
-            if limit is not None and not limit.allows(*energy):
-                raise _unstable(index, steps.step_s, "the energy grows")
-            energies += [energy] * (index >= 0)
-        if index > 0 and index % sampled == 0 and stride == 1:
-            penetration = max([penetration, *(depth for _, _, depth in world.contacts())])
-    times = np.asarray(np.arange(count) * (steps.step_s * stride), np.float64)
-    exact = np.asarray(states, np.float64)
-    positions = np.asarray(exact[..., :3] + world.center, np.float64)
-    rotations = quaternion.normalize(exact[..., 3:])
-    figures: Floats = np.array(energies, np.float64).reshape(-1, 2)
-    impacts = [] if finder is None else finder.found
-    return RigidMotion(times, positions, rotations, figures, penetration, overlaps, impacts)
+    states = np.empty((steps.num_steps + 1, len(rigid.moving), 7), np.float32)
+    recorder = Recorder(states, steps.step_s, world.center)
+    run = _Run(rigid, world, AnimatedBodies(skeleton, clip, rigid, steps), recorder, substeps, finds_impacts)
+    for index in range(-steps.num_warm_up_steps + 1, 1):
+        run.advance(index, 0)
+    while True:
+        run.begin_round()
+        for index in range(1, steps.num_steps + 1):
+            run.advance(index, index)
+        if recorder.num_rounds >= max_rounds or _seam(states) < SETTLED_M:
+            return recorder.motion()
+        recorder.num_rounds += 1
+
+
+class _Run:
+    """World of a scene, advanced step by step and recorded."""
+
+    def __init__(
+        self,
+        rigid: RigidScene,
+        world: RapierWorld,
+        driver: AnimatedBodies,
+        recorder: Recorder,
+        substeps: int,
+        finds_impacts: bool,
+    ) -> None:
+        self._rigid = rigid
+        self._world = world
+        self._driver = driver
+        self._recorder = recorder
+        self._substeps = substeps
+        self._sampled = max(1, len(recorder.states) // NUM_CONTACT_SAMPLES)
+        self._finder = ImpactFinder(rigid, world, recorder.step_s) if finds_impacts else None
+        self._limit: _EnergyLimit | None = None
+
+    def begin_round(self) -> None:
+        """Store the present states as those of 0 s."""
+        recorder = self._recorder
+        recorder.states[0] = self._world.states()
+        recorder.num_states = 1
+        recorder.energies, recorder.penetration = [], 0.0
+        if self._finder is not None:
+            recorder.impacts = self._finder.begin_round()
+
+    def advance(self, index: int, clip_index: int) -> None:
+        """Advance to step `index` of this round, with the clip at step `clip_index`."""
+        world, recorder = self._world, self._recorder
+        driven = self._driver.at(clip_index)
+        for i, position, rotation in zip(self._driver.bodies, *driven, strict=True):
+            world.move(i, position, rotation)
+        world.step()
+        if world.has_failed():
+            raise _unstable(recorder, index, "a body's state isn't finite")
+        if self._limit is None:  # masses are known after the first step, whose contacts are those before it
+            self._limit = _EnergyLimit(self._rigid, world)
+            recorder.overlaps = [pair for pair in world.contacts() if pair[2] > 0]
+        states = np.array(world.states()).reshape(-1, 7)
+        if self._finder is not None:
+            self._finder.update(index, states, (self._driver.bodies, driven[0] - world.center, driven[1]))
+        if index % self._substeps == 0 or index == 1:
+            self._check_energy(index)
+        if index > 0:
+            recorder.states[index] = states
+            recorder.num_states = index + 1
+            if index % self._sampled == 0:
+                recorder.penetration = max([recorder.penetration, *(pair[2] for pair in world.contacts())])
+
+    def _check_energy(self, index: int) -> None:
+        """Record the energy; that of step 1 stands for the start, at which Rapier has no masses yet."""
+        kinetic, potential = self._world.energy()
+        if self._limit is not None and not self._limit.allows(kinetic, potential):
+            raise _unstable(self._recorder, index, "the energy grows")
+        if index > 0:
+            self._recorder.energies.append((0 if index == 1 else index, kinetic, potential))
+
+
+def _seam(states: NDArray[np.float32]) -> float:
+    return float(np.linalg.norm(states[-1, :, :3] - states[0, :, :3], axis=-1).max(initial=0.0))
 
 
 class _EnergyLimit:
@@ -118,6 +201,7 @@ class _EnergyLimit:
         return not self._is_bounded or kinetic <= MAX_ENERGY_FACTOR * available
 
 
-def _unstable(index: int, step: float, problem: str) -> UnstableError:
-    finer = round(2 / step)
-    return UnstableError(f"the simulation diverges in step {index}: {problem}", help=f"a smaller `step`: 1/{finer}")
+def _unstable(recorder: Recorder, index: int, problem: str) -> UnstableError:
+    finer = round(2 / recorder.step_s)
+    words = f"the simulation diverges in step {index}: {problem}"
+    return UnstableError(words, help=f"a smaller `step`: 1/{finer}").with_report(recorder)

@@ -69,18 +69,21 @@ def make_tracks(
     motion: RigidMotion,
     frames: Floats,
     worlds: WorldAtTimes,
+    *,
+    start: float = 0.0,
     max_error: float = 0.0,
 ) -> BodyTracks:
     """Return the tracks of all moving bodies: keys at frames and impacts, without those that change nothing.
 
-    frames: (F,) s. max_error: m, of any point of a body's colliders, from which keys may go too; 0 for none.
+    frames: (F,) s. start: s, added to the times of keys. max_error: m, of any point of a body's colliders, within which
+    keys may go too; 0 for none.
     """
     tracks: list[Track] = []
     total, shear = 0, 0.0
     for k, i in enumerate(rigid.moving):
         body = rigid.bodies[i]
         impacts = motion.impacts[k]
-        times, indices = _merge(frames, np.array([each.time for each in impacts]))
+        times, indices = _merge(frames, np.array([each.time for each in impacts]), start)
         positions, rotations = motion.at(k, times)
         for key in np.flatnonzero(indices >= 0).tolist():
             impact = impacts[indices[key]]
@@ -94,7 +97,7 @@ def make_tracks(
         kept = _needed(translation, rotation)
         if max_error > 0:
             kept = kept[_reduce(times[kept], stretch * translation[kept], rotation[kept], body.radius, max_error)]
-        axis = TimeAxis(times[kept])
+        axis = TimeAxis(_stored(start + times[kept]))
         parts = {"translation": translation, "rotation": rotation}
         if np.ptp(scale, axis=0).max() > SCALE_TOLERANCE * np.abs(scale).max():
             parts["scale"] = scale
@@ -109,14 +112,20 @@ def drop_replaced(clip: Clip, new: list[Track]) -> list[Track]:
     return [track for track in clip.tracks if (track.node, track.path) not in replaced]
 
 
-def _merge(frames: Floats, impacts: Floats) -> tuple[Floats, Ints]:
-    """Times of frames and impacts as float32 has them, and the index of the impact at each, −1 for frames."""
-    times = np.concatenate([frames, impacts[(impacts > frames[0]) & (impacts < frames[-1])]])
-    numbers = np.concatenate([np.full(len(frames), -1), np.flatnonzero((impacts > frames[0]) & (impacts < frames[-1]))])
+def _merge(frames: Floats, impacts: Floats, start: float) -> tuple[Floats, Ints]:
+    """Times of frames and impacts that float32 tells apart, and the index of the impact at each, −1 for frames."""
+    inside = np.flatnonzero((impacts > frames[0]) & (impacts < frames[-1]))
+    times = np.concatenate([frames, impacts[inside]])
+    indices = np.concatenate([np.full(len(frames), -1), inside])
     order = np.argsort(times, kind="stable")
-    times, numbers = times[order], numbers[order]
-    kept = distinct_float32(times)
-    return times[kept].astype(np.float32).astype(np.float64), numbers[kept]
+    times, indices = times[order], indices[order]
+    kept = distinct_float32(start + times)
+    return _stored(start + times[kept]) - start, indices[kept]
+
+
+def _stored(times: Floats) -> Floats:
+    """Times as float32 has them."""
+    return np.asarray(times.astype(np.float32), np.float64)
 
 
 def _needed(translation: Floats, rotation: Floats) -> Ints:

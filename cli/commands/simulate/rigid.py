@@ -16,8 +16,8 @@ from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.simulation.rigid_bodies.description import WATER_KG_M3, Material, Motion, PhysicsDescription
 from anim.simulation.rigid_bodies.node_globs import SHAPES, ChosenNodes, add_chosen
+from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.simulate import (
-    RigidOptions,
     add_rigid_motion,
     read_description,
     simulate_rigid_bodies,
@@ -63,6 +63,7 @@ def command(
     fps: simulation.Fps = simulation.DEFAULT_FPS,
     duration: simulation.Duration = None,
     warm_up: simulation.WarmUp = 0.0,
+    loop: simulation.Loop = False,
     max_error: simulation.MaxError = None,
     clip: simulation.Clip = None,
     merge: simulation.Merge = False,
@@ -80,7 +81,14 @@ def command(
     bytes on the same kind of processor. Requires rapier3d: pip install 'gltf-anim[physics]'.
     """
     simulation.check_fps(fps)
-    options = RigidOptions(parse_vector(gravity, "--gravity"), parse_seconds(step, "--step"), fps, warm_up=warm_up)
+    options = RigidOptions(
+        parse_vector(gravity, "--gravity"),
+        parse_seconds(step, "--step"),
+        fps,
+        warm_up=warm_up,
+        loop=loop,
+        estimate_error=report is not None,
+    )
     material = Material(friction, friction, restitution)
     voice = Reporter(quiet, verbose)
 
@@ -97,7 +105,7 @@ def command(
         )
         description = replace(add_chosen(description, scene, chosen), floor=floor, floor_material=material)
         description = _with_velocities(description, scene, velocity or [])
-        seconds = duration if duration is not None else driver.end or DEFAULT_DURATION_S
+        seconds = duration if duration is not None else driver.end - driver.start or DEFAULT_DURATION_S
         error = units.parse_length(max_error, "--max-error", lambda: diagonal(scene)) if max_error else 0.0
         run = simulate_rigid_bodies(scene, driver, description, replace(options, duration=seconds, max_error=error))
         for note in run.notes:
@@ -135,6 +143,9 @@ def _summary(report: SimulationReport) -> str:
         text.plural(figures["keys"], "key"),
         f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
     ]
+    if report.loop_seam_m is not None:
+        rounds = text.plural(figures["loop_rounds"], "round")
+        parts.append(f"loop after {rounds}, a seam of {text.format_length(report.loop_seam_m)} closed")
     if report.error_estimate_m and report.error_estimate_m > ROUNDING_M:
         parts.append(f"half the step differs by {text.format_length(report.error_estimate_m)}")
     return ", ".join(parts)

@@ -17,9 +17,10 @@ from anim.gltf.reading import reader
 from anim.model import Clip
 from anim.simulation.rigid_bodies.description import CollisionFilter, Material, Motion, Shape
 from anim.simulation.rigid_bodies.motion import RigidMotion, run_scene
+from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidJoint, RigidScene
 from anim.simulation.rigid_bodies.shapes import bounding_radius
-from anim.simulation.rigid_bodies.simulate import RigidOptions, RigidRun, read_description, simulate_rigid_bodies
+from anim.simulation.rigid_bodies.simulate import RigidRun, read_description, simulate_rigid_bodies
 from anim.simulation.steps import Steps
 
 Array = NDArray[np.float64]

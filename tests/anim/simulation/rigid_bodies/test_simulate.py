@@ -14,13 +14,13 @@ from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Track
+from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.sampling.sample import sample
 from anim.sampling.track import sample as sample_track
 from anim.simulation.rigid_bodies.description import Material
 from anim.simulation.rigid_bodies.node_globs import ChosenNodes, add_chosen
+from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.simulate import (
-    RigidOptions,
     add_rigid_motion,
     read_description,
     simulate_rigid_bodies,
@@ -149,6 +149,78 @@ def test_a_state_that_is_not_finite_ends_the_run() -> None:
     made = document([node(motion={"angularVelocity": [1e30, 0, 0]}, collider=collider(0))], BALL)
     with pytest.raises(UnstableError, match="diverges in step"):
         simulate(made, duration=1.0)
+
+
+def test_a_run_that_diverges_has_a_report() -> None:
+    made = document([node(motion={"angularVelocity": [1e30, 0, 0]}, collider=collider(0))], BALL)
+    with pytest.raises(UnstableError) as error:
+        simulate(made, duration=1.0)
+    report = error.value.report
+    assert (report.kind, report.first_bad_step) == ("rigid", 1)
+    assert report.advice.endswith("--step 1/480")
+
+
+def test_the_report_states_energy_drift_and_the_error_of_the_step() -> None:
+    made = document([node((0, 1, 0), **FALLING), node(collider=collider(1))], BALL)
+    report = simulate(made, duration=1.0, estimate_error=True).report
+    assert report.energy_j is not None
+    assert report.drift_per_s == pytest.approx(-1, abs=0.05)  # it falls and stays
+    assert report.history is not None
+    assert len(report.history.times) == len(report.history.errors) == 61
+    assert report.error_estimate_m == pytest.approx(report.history.errors.max(), abs=1e-3)
+    assert simulate(made, duration=1.0).report.error_estimate_m is None
+
+
+@pytest.mark.parametrize("step", [1 / 120, 1 / 240])
+def test_half_the_step_changes_the_result_by_less_than_the_estimate(step: float) -> None:
+    made = document(
+        [node((0, 2, 0), motion={"linearVelocity": [1, 0, 0]}, collider=collider(0)), node(collider=collider(1))], BALL
+    )
+    coarse = simulate(made, duration=2.0, step=step, estimate_error=True)
+    fine = simulate(made, duration=2.0, step=step / 2)
+    at = np.arange(121) / 60
+    both = [sample_track(next(t for t in run.tracks if t.path == "translation"), at) for run in (coarse, fine)]
+    assert np.linalg.norm(both[0] - both[1], axis=1).max() <= 1.001 * (coarse.report.error_estimate_m or 0) + 1e-6
+
+
+def test_a_loop_ends_as_it_begins() -> None:
+    made = document([node((0, 1, 0), **FALLING), node(collider=collider(1))], BALL)
+    run = simulate(made, duration=1.0, loop=True)
+    assert run.report.loop_seam_m == pytest.approx(0.5, abs=0.01)
+    for track in run.tracks:
+        np.testing.assert_allclose(track.values[-1], track.values[0], atol=1e-6)
+    before = path(simulate(made, duration=1.0), 0)
+    keys = path(run, 0)
+    np.testing.assert_array_equal(keys[:20], before[:20])  # only the end is changed
+
+
+def test_a_driven_loop_runs_until_it_repeats() -> None:
+    """A paddle swings under a heavy ball on it: the ball's motion is that of the paddle in each round."""
+    made = document([node((0, 0.75, 0), **FALLING), node((0, 0, 0), collider=collider(2))], [*BALL, {"type": "box"}])
+    times, heights = np.linspace(0, 2, 41), 0.1 * np.sin(np.pi * np.linspace(0, 2, 41))
+    values = np.stack([0 * heights, heights, 0 * heights], axis=1)
+    clip = Clip("up", (Track(1, "translation", Interpolation.LINEAR, TimeAxis(times), values),))
+    scene = reader.scene(made)
+    run = simulate_rigid_bodies(
+        scene, clip, read_description(made, scene.skeleton), RigidOptions(duration=2.0, loop=True)
+    )
+    assert 1 < run.report.figures["loop_rounds"] <= 20
+    assert (run.report.loop_seam_m or 0) < 2e-3
+
+
+def test_a_late_clip_begins_the_simulation_at_its_start() -> None:
+    made = document([node((0, 1, 0), **FALLING), node((3, 0, 0), collider=collider(2))], [*BALL, {"type": "box"}])
+    scene = reader.scene(made)
+    description = read_description(made, scene.skeleton)
+    runs = []
+    for start in (0.0, 600.0):
+        axis = TimeAxis(np.array([start, start + 1]))
+        clip = Clip("side", (Track(1, "translation", Interpolation.LINEAR, axis, np.array([[3.0, 0, 0], [4, 0, 0]])),))
+        runs.append(simulate_rigid_bodies(scene, clip, description, RigidOptions(duration=1.0)))
+    first, late = (next(t for t in run.tracks if t.path == "translation") for run in runs)
+    assert (late.times[0], late.times[-1]) == (600.0, 601.0)
+    np.testing.assert_allclose(late.values[-1], first.values[-1], atol=1e-6)
+    assert runs[1].report.figures["animated"] == 1
 
 
 def test_a_document_without_bodies_is_refused() -> None:
