@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.assembly import ancestors
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.rapier_joints import find_approximations
+from anim.simulation.rigid_bodies.rapier_world import PLANE_REACH_M
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 
 MIN_OVERLAP_PER_RADIUS = 0.02  # of the smaller body; less is the tolerance of contacts
-FRICTION_DIFFERENCE = 0.2  # of static and dynamic friction, relative, that is worth a word
 SHEAR_TOLERANCE = 1e-3
 MAX_LISTED = 3
 
@@ -18,7 +20,7 @@ def find_notes(rigid: RigidScene, skeleton: Skeleton, clip: Clip, motion: RigidM
     """Return remarks: overlaps at the start, approximations, animated parents, shear; empty for none."""
     return [
         *_overlaps(rigid, skeleton, motion),
-        *_friction(rigid),
+        *_far(rigid, motion),
         *sorted({words for joint in rigid.joints for words in find_approximations(joint)}),
         *_animated_parents(rigid, skeleton, clip),
         *(
@@ -42,12 +44,15 @@ def _overlaps(rigid: RigidScene, skeleton: Skeleton, motion: RigidMotion) -> lis
     return [*found[:MAX_LISTED], f"{more} more pairs overlap at the start"] if more > 0 else found
 
 
-def _friction(rigid: RigidScene) -> list[str]:
-    materials = {each.material for body in rigid.bodies for each in body.colliders}
-    differing = [
-        m for m in materials if abs(m.static_friction - m.dynamic_friction) > FRICTION_DIFFERENCE * m.dynamic_friction
-    ]
-    return ["static friction differs from dynamic friction, which is used for both"] if differing else []
+def _far(rigid: RigidScene, motion: RigidMotion) -> list[str]:
+    """Bodies that reach the end of the box that stands for a plane, where hulls fall."""
+    shapes = [each.shape.kind for body in rigid.bodies for each in body.colliders]
+    if "plane" not in shapes or not {"hull", "mesh"} & set(shapes):
+        return []
+    apart = np.linalg.norm(motion.positions - motion.positions[0].mean(axis=0), axis=-1).max(initial=0.0)
+    return [f"a body is {apart:.0f} m from the others' start: planes end at {PLANE_REACH_M:.0f} m for hulls"] * bool(
+        apart > PLANE_REACH_M
+    )
 
 
 def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:

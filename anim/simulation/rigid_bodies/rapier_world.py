@@ -1,4 +1,4 @@
-"""Engine Rapier: scenes become its world, centered, in float32.
+"""Engine Rapier: scenes become its world, centered, in float32. No module but those named rapier_* knows Rapier.
 
 Rapier solves each step in SUBSTEPS substeps of symplectic Euler, which moves a free fall ½·g·t·h/SUBSTEPS ahead of
 its parabola. All velocities begin half a substep earlier, as in leapfrog; then a free flight is exact.
@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError, UnsupportedError
+from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.simulation.rigid_bodies import rapier_joints
-from anim.simulation.rigid_bodies.description import MAX_SPEED_M_S, combine
+from anim.simulation.rigid_bodies.description import MAX_SPEED_M_S
+from anim.simulation.rigid_bodies.rapier_contacts import MaterialHooks, interaction_groups, needs_hooks
 from anim.simulation.rigid_bodies.rapier_package import load_package
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidScene
 
@@ -26,7 +27,6 @@ MAX_RECYCLED_M = 1e-3  # motion since the distances of contacts were measured; i
 INFINITE_MASS_KG = 1e9
 PLANE_REACH_M, PLANE_DEPTH_M = 500.0, 50.0  # half the size of a plane's box; at 10 km contacts are wrong by its depth
 CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
-MAX_FILTERS = 32
 
 
 class RapierWorld:
@@ -45,8 +45,8 @@ class RapierWorld:
         parameters.normalized_allowed_linear_error = _allowed_penetration(scene)
         parameters.normalized_max_linear_velocity = MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
-        self._groups = _interaction_groups(self._rapier, scene)
-        self._hooked = _has_mixed_modes(scene)
+        self._groups = interaction_groups(self._rapier, scene)
+        self._hooked = needs_hooks(scene)
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
@@ -57,7 +57,7 @@ class RapierWorld:
             ends = (self._handles[i] if i >= 0 else anchor for i in joint.bodies)
             world.impulse_joints.insert(*ends, rapier_joints.build_joint(joint), True)
         if self._hooked:
-            world.physics_hooks = _CombineHooks(self._colliders)
+            world.physics_hooks = MaterialHooks(self._colliders)
 
     def step(self) -> None:
         """Advance the world by a step."""
@@ -158,7 +158,7 @@ class RapierWorld:
             factor = body.motion.gravity_factor if kind is BodyKind.DYNAMIC else 0.0
             builder = builder.linvel(tuple(body.linear_velocity + factor * self._early)).gravity_scale(factor)
             builder = builder.angvel(tuple(body.angular_velocity))
-        shapes = [self._shape(each, kind) for each in body.colliders]
+        shapes = [self._shape(each, body) for each in body.colliders]
         if kind is BodyKind.DYNAMIC:
             builder = builder.additional_mass_properties(self._mass(body, shapes))
         handle = self._world.add_body(builder)
@@ -178,15 +178,15 @@ class RapierWorld:
         builder = builder.collision_groups(self._groups[collider.filter])
         return builder.active_hooks(rapier.ActiveHooks.MODIFY_SOLVER_CONTACTS) if self._hooked else builder
 
-    def _shape(self, collider: BodyCollider, kind: BodyKind) -> Any:
+    def _shape(self, collider: BodyCollider, body: RigidBody) -> Any:
         """Rapier's shape. A dynamic mesh, which has no inside, becomes its hull, or convex pieces of it."""
-        shape, make = collider.shape, self._rapier.SharedShape
+        shape, kind, make = collider.shape, body.kind, self._rapier.SharedShape
         if shape.kind == "sphere":
             return make.ball(*shape.size)
         if shape.kind == "box":
             return make.cuboid(*(length / 2 for length in shape.size))
         if shape.kind == "plane":
-            return self._plane(kind)
+            return self._plane(collider, body)
         if shape.kind in ("capsule", "cylinder"):
             height, radius, _ = shape.size
             return (make.capsule_y if shape.kind == "capsule" else make.cylinder)(height / 2, radius)
@@ -198,14 +198,23 @@ class RapierWorld:
             return hull
         return make.convex_decomposition(points, faces)
 
-    def _plane(self, kind: BodyKind) -> Any:
-        """A half-space; where hulls fall, which topple on it (Rapier 0.36), the top of a large box."""
+    def _plane(self, collider: BodyCollider, body: RigidBody) -> Any:
+        """A half-space; where hulls fall, which topple on it (Rapier 0.36), the top of a large box under the bodies."""
         has_hulls = any(each.shape.kind in ("hull", "mesh") for body in self._scene.bodies for each in body.colliders)
         make = self._rapier.SharedShape
-        if kind is BodyKind.DYNAMIC or not has_hulls:
+        if body.kind is BodyKind.DYNAMIC or not has_hulls:
             return make.halfspace((0.0, 1.0, 0.0))
-        down = self._rapier.Isometry3(translation=(0.0, -PLANE_DEPTH_M, 0.0))
+        x, z = self._beside(collider, body) if body.kind is BodyKind.STATIC else (0.0, 0.0)
+        down = self._rapier.Isometry3(translation=(x, -PLANE_DEPTH_M, z))
         return make.compound([(down, make.cuboid(PLANE_REACH_M, PLANE_DEPTH_M, PLANE_REACH_M))])
+
+    def _beside(self, collider: BodyCollider, body: RigidBody) -> tuple[float, float]:
+        """Position of the bodies along a plane's own x and z."""
+        own = _shape_frame(collider)
+        back = quaternion.conjugate(quaternion.multiply(body.frame.rotation, own.rotation))
+        origin = body.frame.position + quaternion.rotate(body.frame.rotation, own.position)
+        x, _, z = quaternion.rotate(back, self._center - origin).tolist()
+        return x, z
 
     def _hull(self, points: Any) -> Any:
         flat = RangeError("the collider is flat: its hull has no volume")
@@ -249,20 +258,6 @@ class RapierWorld:
         return self._rapier.Isometry3(translation=tuple(frame.position.tolist()), rotation=rotation)
 
 
-class _CombineHooks:
-    """Friction and restitution of pairs by glTF's order of combine modes, where colliders have different ones."""
-
-    def __init__(self, colliders: dict[int, tuple[int, BodyCollider]]) -> None:
-        self._colliders = colliders
-
-    def modify_solver_contacts(self, context: Any) -> None:
-        first, second = (self._colliders[h.index][1].material for h in (context.collider1, context.collider2))
-        modes = (first.friction_combine, second.friction_combine)
-        context.friction = combine(modes, first.dynamic_friction, second.dynamic_friction)
-        modes = (first.restitution_combine, second.restitution_combine)
-        context.restitution = combine(modes, first.restitution, second.restitution)
-
-
 def _shape_frame(collider: BodyCollider) -> Frame:
     """The shape's own frame in the body, its center included."""
     offset = quaternion.rotate(collider.frame.rotation, np.array(collider.shape.center))
@@ -282,20 +277,3 @@ def _allowed_penetration(scene: RigidScene) -> float:
     radii = [scene.bodies[i].radius for i in scene.moving if scene.bodies[i].radius > 0]
     least = MAX_PENETRATION_PER_RADIUS * min(radii, default=1.0)
     return float(np.clip(least, MIN_PENETRATION_M, MAX_PENETRATION_M))
-
-
-def _has_mixed_modes(scene: RigidScene) -> bool:
-    materials = [each.material for body in scene.bodies for each in body.colliders]
-    return len({(m.friction_combine, m.restitution_combine) for m in materials}) > 1
-
-
-def _interaction_groups(rapier: Any, scene: RigidScene) -> dict[Any, Any]:
-    """A bit for each distinct filter, and the bits of those that it collides with."""
-    filters = list(dict.fromkeys(each.filter for body in scene.bodies for each in body.colliders))
-    if len(filters) > MAX_FILTERS:
-        raise UnsupportedError(f"{len(filters)} different collision filters (limit {MAX_FILTERS})")
-    groups = {}
-    for i, own in enumerate(filters):
-        bits = sum(1 << j for j, other in enumerate(filters) if own.accepts(other) and other.accepts(own))
-        groups[own] = rapier.InteractionGroups(rapier.Group(1 << i), rapier.Group(bits))
-    return groups

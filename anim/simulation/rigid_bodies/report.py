@@ -6,7 +6,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.simulation.report import RunHistory, SimulationReport
+from anim.simulation.report import RunHistory, SimulationReport, advise_half_step
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.rigid_scene import BodyKind, Frame, RigidScene
@@ -74,7 +74,7 @@ def _num_at_rest(motion: RigidMotion) -> int:
 
 
 def _advice(rigid: RigidScene, motion: RigidMotion, steps: Steps, first_bad_step: int | None) -> str:
-    finer = f"--step 1/{round(2 / steps.step_s)}"
+    finer = advise_half_step(steps.step_s)
     if first_bad_step is not None:
         return f"the simulation diverges at step {first_bad_step}: {finer}"
     radii = [rigid.bodies[i].radius for i in rigid.moving if rigid.bodies[i].radius > 0]

@@ -77,6 +77,22 @@ def test_a_box_slides_down_an_incline_or_sticks(friction: float, degrees: float)
     assert motion.positions[-1, 0, 0] == pytest.approx(expected, rel=0.005, abs=1e-3)
 
 
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_static_friction_holds_a_box_and_dynamic_friction_brakes_it(speed: float) -> None:
+    """tan 30° = 0.58 lies between both: at rest it sticks, once pushed it slides faster and faster."""
+    angle, material = np.radians(30), Material(0.9, 0.3)
+    box = body(CUBE, (0, 0.25, 0), material=material, velocity=(speed, 0, 0))
+    motion = run(ground(material), box, seconds=2.0, gravity=(G * np.sin(angle), -G * np.cos(angle), 0.0))
+    slid = 2 * speed + 2 * G * (np.sin(angle) - 0.3 * np.cos(angle))
+    assert motion.positions[-1, 0, 0] == pytest.approx(slid if speed else 0.0, rel=1e-3, abs=1e-4)
+
+
+def test_a_box_that_slides_stops_and_sticks() -> None:
+    material = Material(0.9, 0.3)
+    motion = run(ground(material), body(CUBE, (0, 0.25, 0), material=material, velocity=(2, 0, 0)), seconds=2.0)
+    assert motion.positions[-1, 0, 0] == pytest.approx(4 / (2 * 0.3 * G), rel=0.01)
+
+
 def test_a_free_body_keeps_its_angular_momentum() -> None:
     inertia = np.array([1.0, 2.0, 3.0])
     spinning = body(BALL, spin=(0.01, 5, 0.01), motion=Motion(mass=1.0, inertia_diagonal=(1.0, 2.0, 3.0)))

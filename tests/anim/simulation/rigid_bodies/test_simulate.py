@@ -17,7 +17,7 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.sampling.sample import sample
 from anim.sampling.track import sample as sample_track
-from anim.simulation.rigid_bodies.description import Material
+from anim.simulation.rigid_bodies.description import Material, Shape
 from anim.simulation.rigid_bodies.node_globs import ChosenNodes, add_chosen
 from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.simulate import (
@@ -26,6 +26,7 @@ from anim.simulation.rigid_bodies.simulate import (
     simulate_rigid_bodies,
 )
 from tests.anim.simulation.rigid_bodies.cases import NO_CLIP, G, collider, document, needs_rapier, node, path, simulate
+from tests.cli.running import ROOT
 from tests.files import glb_of, opened, opened_fixture
 
 pytestmark = needs_rapier
@@ -137,12 +138,28 @@ def test_a_body_inside_another_is_noted() -> None:
     assert simulate(made, duration=0.2).notes == ["node 0 and node 1 overlap by 20 cm at the start"]
 
 
-def test_different_static_friction_is_noted() -> None:
-    nodes = [node((0, 2, 0), motion={}, collider=collider(0, physicsMaterial=0))]
-    made = document(nodes, BALL, physicsMaterials=[{"staticFriction": 0.9, "dynamicFriction": 0.3}])
-    assert simulate(made, duration=0.2).notes == [
-        "static friction differs from dynamic friction, which is used for both"
-    ]
+def test_only_modules_of_its_name_know_rapier() -> None:
+    folder = ROOT / "anim" / "simulation"
+    found = {path.stem for path in folder.rglob("*.py") if "import rapier3d" in path.read_text()}
+    assert found == {"rapier_package"}
+    users = {path.stem for path in folder.rglob("*.py") if "load_package" in path.read_text()}
+    assert all(name.startswith("rapier_") for name in users)
+
+
+def test_an_endless_plane_supports_hulls_far_from_its_node() -> None:
+    made = document(
+        [
+            node((0, 0, 0), motion={}, collider={"geometry": {"shape": 0}}),
+            node((9000, -1, -4000), collider=collider(1)),
+        ],
+        [{"type": "box"}, {"type": "plane"}],
+    )
+    scene = reader.scene(made)
+    description = read_description(made, scene.skeleton)
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    hull = {0: replace(description.colliders[0], shape=Shape("hull", points=corners)), 1: description.colliders[1]}
+    run = simulate_rigid_bodies(scene, NO_CLIP, replace(description, colliders=hull), RigidOptions(duration=2.0))
+    np.testing.assert_allclose(path(run, 0)[-1], [0, -0.5, 0], atol=0.01)
 
 
 def test_a_state_that_is_not_finite_ends_the_run() -> None:
