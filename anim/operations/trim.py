@@ -30,7 +30,8 @@ def trim(
     """Return the clip from `start` to `end` seconds; keys between are unchanged, keys at the ends are exact.
 
     New end keys have the track's value and, under CUBICSPLINE, its tangent; a cut segment of a rotation spline gets
-    more keys if its normalization needs them. A constant track without a key in between becomes one key.
+    more keys if its normalization needs them. A constant track without a key in between becomes one key; if all do, the
+    first keeps a key at the end, since the keys alone give the clip its duration.
     start, end: by default the clip's own; times outside are clamped to it, others rounded to float32 like keys.
     Without both, or if the clip has one time only, nothing is cut.
     rebase: shift the part to start at 0 s. Raises RangeError for an empty part.
@@ -54,6 +55,8 @@ def _trim_clip(clip: Clip, start: float | None, end: float | None, chosen: froze
     if not last > first:
         raise RangeError(_nothing_left(clip, start, end))
     new = [_trim_track(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
+    if chosen and all(track.times[-1] < last for track in new):
+        new[min(chosen)] = _constant_keys(new[min(chosen)], first, last)
     return Clip(clip.name, tuple(new))
 
 
@@ -89,6 +92,11 @@ def _single_key(track: Track, start: float) -> Track:
     values = sample(track, np.array([start]))
     linear = Interpolation.LINEAR if track.interpolation is Interpolation.CUBICSPLINE else track.interpolation
     return track.with_keys([start], values, interpolation=linear)
+
+
+def _constant_keys(track: Track, start: float, end: float) -> Track:
+    """A track of one key with equal keys at both ends."""
+    return track.with_keys([start, end], np.repeat(track.values, 2, axis=0))
 
 
 def cut_spline(track: Track, start: float, end: float) -> Track:

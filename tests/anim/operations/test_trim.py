@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.errors import RangeError
-from anim.model import Clip, Track
+from anim.model import Clip, Interpolation, Track
 from anim.operations.retime import shift_time
 from anim.operations.trim import trim
 from anim.sampling.derivatives import rates
@@ -53,7 +53,7 @@ def test_inner_keys_stay_to_the_bit(key: str) -> None:
 
 
 def test_a_held_part_is_one_key() -> None:
-    assert len(trim(Clip("", (TRACKS["short"], ANCHOR)), start=1.5, end=2.5).tracks[0].times) == 1
+    assert len(trim(Clip("", (ANCHOR, TRACKS["short"])), start=1.5, end=2.5).tracks[1].times) == 1
 
 
 def test_by_hand() -> None:
@@ -96,3 +96,16 @@ def test_rebase_moves_a_clip_of_one_moment_too() -> None:
 def test_rebase_leaves_what_starts_at_0() -> None:
     clip = Clip("", (TRACKS["short"], ANCHOR))
     assert trim(clip, rebase=True) is clip
+
+
+@pytest.mark.parametrize("interpolation", [Interpolation.STEP, Interpolation.LINEAR, Interpolation.CUBICSPLINE])
+def test_constant_clip_keeps_the_duration_asked_for(interpolation: Interpolation) -> None:
+    flat = np.zeros((2, 3)) if interpolation is Interpolation.CUBICSPLINE else None
+    poses = [
+        Track(node, "translation", interpolation, [0.0, 2.0], np.ones((2, 3)), in_tangents=flat, out_tangents=flat)
+        for node in (0, 1)
+    ]
+    new = trim(Clip("", tuple(poses)), start=0.25, end=0.75)
+    assert (new.start, new.end) == (0.25, 0.75)
+    assert [len(track.times) for track in new.tracks] == [2, 1]
+    assert np.array_equal(new.tracks[0].values, np.ones((2, 3)))
