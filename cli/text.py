@@ -84,6 +84,11 @@ def format_time(seconds: float) -> str:
     return f"{_round_significant(seconds)} s"
 
 
+def format_instant(seconds: float) -> str:
+    """Return a time in a clip rounded to 1 ms, also of a late clip: "0.267 s", "5001.8 s"."""
+    return f"{f'{seconds:.3f}'.rstrip('0').rstrip('.')} s"
+
+
 def format_span(start: float, end: float) -> str:
     """Return the time span of a clip: "1.5 s", or "0.0417–2 s" if it starts after 0."""
     begins = _round_significant(start)

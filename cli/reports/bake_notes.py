@@ -28,7 +28,7 @@ def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: 
         voice.warn(
             f"{method} can't be used: a vertex is {text.format_length(worst.distance)} from where linear blending "
             f"(lbs), and so every player, has it, more than the model's size of {text.format_length(worst.size)}, at "
-            f"{worst.time:.3g} s of {name}"
+            f"{text.format_instant(worst.time)} of {name}"
         )
 
 
@@ -64,5 +64,5 @@ def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, vo
         others = f" ({len(seen)} clips are affected)" if len(seen) > 1 else ""
         voice.warn(
             f"linear interpolation between frames: error of {text.format_length(missed.distance)} or more at "
-            f"{missed.time:.3g} s of {name}{others} (reduce with --fps)"
+            f"{text.format_instant(missed.time)} of {name}{others} (reduce with --fps)"
         )

@@ -13,7 +13,7 @@ from anim.measure.inspect.report import ClipReport
 from cli import tables
 from cli.reports.inspect_report import Inspected, Smoothness
 from cli.tables import Cell
-from cli.text import format_length, format_number, plural
+from cli.text import format_instant, format_length, format_number, plural
 
 
 def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
@@ -35,7 +35,7 @@ def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
             track.interior_keys,
             *(str(count or "") for count in (track.jumps, track.c0, track.g1, track.c1, track.c2)),
             *(
-                f"{_amount(largest.size, track.unit, per)} at {largest.time_s:.3g} s" if largest else ""
+                f"{_amount(largest.size, track.unit, per)} at {format_instant(largest.time_s)}" if largest else ""
                 for largest, per in (
                     (track.largest_value_jump, ""),
                     (track.largest_speed_jump, "/s"),

@@ -75,7 +75,9 @@ def counts(made: ConversionReport) -> str:
     tracks = made.converted.clip.tracks
     most = max((len(track.times) for track in tracks), default=0)
     joints = len(made.converted.skeleton) - len(made.converted.ends)
-    return f"{text.plural(joints, 'joint')}, {text.plural(most, 'key')} at most, {made.converted.clip.end:.3g} s long"
+    clip = made.converted.clip
+    long = text.format_time(clip.end - clip.start)
+    return f"{text.plural(joints, 'joint')}, {text.plural(most, 'key')} at most, {long} long"
 
 
 def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
@@ -84,7 +86,7 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
         "schema": SCHEMA,
         "format": made.format,
         "clip": made.converted.clip.name,
-        "duration_s": made.converted.clip.end,
+        "duration_s": made.converted.clip.end - made.converted.clip.start,
         "joints": len(made.converted.skeleton) - len(made.converted.ends),
         "keys": sum(len(track.times) for track in made.converted.clip.tracks),
         "meters_per_unit": made.meters_per_unit,
@@ -121,7 +123,7 @@ def _gimbal_line(rows: tuple[GimbalStats, ...]) -> str:
     near = [row for row in rows if row.nearest_deg < NEAR_DEG]
     worst = min(rows, key=lambda row: row.nearest_deg)
     words = f"gimbal: {len(near)} of {text.plural(len(rows), 'joint')} within {NEAR_DEG}° of lock; nearest "
-    words += f"'{worst.node}', {round(worst.nearest_deg, 2):.2g}° at {worst.at_s:.3g} s"
+    words += f"'{worst.node}', {round(worst.nearest_deg, 2):.2g}° at {text.format_instant(worst.at_s)}"
     if worst.best_order != worst.order:
         words += f" ({worst.order}; {worst.best_order} would keep {worst.best_nearest_deg:.2g}°)"
     return words

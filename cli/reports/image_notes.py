@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from anim.errors import FormatError
 from anim.gltf.document import Document, json_array
+from anim.gltf.io import uri
 from anim.gltf.io.images import external_uri, read_image
 from cli import text
 
@@ -25,8 +27,24 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
     elif found:
         verb = "stays" if len(found) == 1 else "stay"
         yield f"note: {text.plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
-    if lost:
+    away = [address for address in lost if folder is not None and _is_outside(address)]
+    if away:
+        words = "refers" if len(away) == 1 else "refer"
+        yield (
+            f"note: {text.plural(len(away), 'image')} {words} out of the file's folder, never copied, and missing "
+            f"unless the same address is right for the output ({_listed(away)})"
+        )
+    if lost := [address for address in lost if address not in away]:
         yield f"note: {text.plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
+
+
+def _is_outside(address: str) -> bool:
+    """Return whether an address is a URL, absolute, or above the file's folder: it is never read."""
+    try:
+        uri.relative_path(address)
+    except FormatError:
+        return True
+    return False
 
 
 def _listed(names: list[str]) -> str:

@@ -249,6 +249,20 @@ def test_embed_does_what_it_can_and_says_what_is_missing(call: Call, tmp_path: P
     assert "note: 2 images missing" in piped.err
 
 
+def test_images_outside_the_folder_are_not_called_missing(call: Call, tmp_path: Path) -> None:
+    path = with_images(tmp_path / "in")
+    scene = json.loads(path.read_text())
+    scene["images"][0]["uri"], scene["images"][1]["uri"] = "../skin.png", "https://example.org/skin.jpg"
+    path.write_text(json.dumps(scene))
+    (tmp_path / "skin.png").write_bytes(PNG)
+    (tmp_path / "out").mkdir()
+    run = call("convert", path, tmp_path / "out" / "scene.gltf")
+    assert run.code == 0
+    assert "note: 2 images refer out of the file's folder" in run.err
+    assert "(../skin.png, https://example.org/skin.jpg)" in run.err
+    assert "no such file" not in run.err
+
+
 @pytest.mark.parametrize("link", ["buffer", "image"])
 def test_links_that_lead_out_of_the_folder_are_not_followed(link: str, call: Call, tmp_path: Path) -> None:
     secret, folder = tmp_path / "secret", tmp_path / "in"

@@ -88,6 +88,15 @@ def test_it_says_what_it_guessed(call: Call) -> None:
     assert [line.split(":")[0] for line in quiet] == ["warning"] * 2
 
 
+def test_a_late_clip_is_as_long_as_its_keys(call: Call) -> None:
+    late = CURVES.replace(b"\n0,", b"\n5000,").replace(b"\n1,", b"\n5001,")
+    run = call("from-euler", "-", "-", *XYZ, stdin=late)
+    assert ", 1 s long" in run.err
+    assert "at 5001 s" in run.err
+    report = json.loads(call("from-euler", "-", "/dev/null", *XYZ, "--format", "json", stdin=late).out)
+    assert report["duration_s"] == 1
+
+
 def test_scale_and_up(call: Call) -> None:
     document = opened(call("from-euler", "-", "-", "--scale", "0.5", "--up", "z", stdin=SMALL).product())
     np.testing.assert_allclose(reader.skeleton(document).translation[1], (0, 0, 42.5), atol=1e-6)
