@@ -15,7 +15,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from functools import cache
 from pathlib import Path
 
 import cli.main
@@ -47,12 +46,7 @@ def pictures(text: str) -> list[str]:
 def write_inputs(folder: Path) -> None:
     """Write the fixtures that pages use into a folder."""
     for name in INPUTS:
-        (folder / f"{name}.glb").write_bytes(_built(name))
-
-
-@cache
-def _built(name: str) -> bytes:
-    return fixtures.build(name)
+        (folder / f"{name}.glb").write_bytes(fixtures.build(name))
 
 
 def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -67,8 +61,8 @@ def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def _run_here(command: str, folder: Path) -> tuple[int, str]:
-    """Run a line, in this process where it needs no shell, which saves half of the time: (exit code, text)."""
+def run_here(command: str, folder: Path) -> tuple[int, str]:
+    """Run a line, in this process where it needs no shell, which saves half of the time: (exit code, all it prints)."""
     if not command.startswith("gltf-anim ") or SHELL.search(re.sub(r"'[^']*'", "", command)):
         done = run(command, folder)
         return done.returncode, done.stdout
@@ -87,7 +81,7 @@ def updated(text: str, folder: Path) -> str:
 def _updated_block(block: re.Match[str], folder: Path) -> str:
     printed = []
     for command in commands(block["commands"]):
-        code, text = _run_here(command, folder)
+        code, text = run_here(command, folder)
         if code:
             raise RuntimeError(f"{command}: exit {code}\n{text}")
         printed.append(text)

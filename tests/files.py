@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -53,13 +52,8 @@ def opened_path(path: Path) -> Document:
 
 def opened_fixture(name: str) -> Document:
     """Return the document of a fixture, with what lies beside it."""
-    files = _built(name)
+    files = fixtures.build_files(name)
     return opened(next(iter(files.values())), files)
-
-
-@cache
-def _built(name: str) -> dict[str, bytes]:
-    return fixtures.build_files(name)
 
 
 def joined(pieces: Sequence[Bytes]) -> bytes:

@@ -27,8 +27,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_command_runs(command: str, folder: Path) -> None:
-    done = pages.run(command, folder)
-    assert done.returncode == 0, done.stdout
+    code, text = pages.run_here(command, folder)
+    assert code == 0, text
 
 
 @pytest.mark.parametrize("example", PYTHON)
@@ -41,8 +41,8 @@ def test_example_runs(example: str, folder: Path) -> None:
 def test_curve_examples_are_read(kind: str, folder: Path) -> None:
     (content,) = re.findall(rf"```{kind}\n(.*?)```", TEXT, re.DOTALL)
     (folder / f"curves.{kind}").write_text(content)
-    done = pages.run(f"gltf-anim from-euler curves.{kind} curves.glb", folder)
-    assert done.returncode == 0, done.stdout
+    code, text = pages.run_here(f"gltf-anim from-euler curves.{kind} curves.glb", folder)
+    assert code == 0, text
 
 
 def test_commands_are_found() -> None:

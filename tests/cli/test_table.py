@@ -17,8 +17,9 @@ from anim.errors import RangeError
 from cli import main
 from cli.commands import simulate
 from cli.typer_options import name_options
+from docs import pages
 from tests.cli.conftest import Call
-from tests.cli.running import ROOT, built, shell
+from tests.cli.running import ROOT, built
 from tests.fixtures.reading import split
 
 EXAMPLES = [(command, example) for command, row in main.COMMANDS.items() for example in row.examples]
@@ -146,7 +147,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "curves.csv").write_text(CURVES)
     for line in MAKING:
         if line.split()[0] in main.COMMANDS:
-            shell(f"gltf-anim {line}", folder)  # where one fails, only the examples that need it do
+            pages.run_here(f"gltf-anim {line}", folder)  # where one fails, only the examples that need it do
     return folder
 
 
@@ -168,8 +169,8 @@ def test_every_example_runs(command: str, example: str, examples: Path) -> None:
     assert "gltf-anim" in words
     assert command in words
     before = {path: path.read_bytes() for path in examples.glob("walk.*")}
-    run = shell(example, examples)
-    assert run.code == 0, run.err
-    assert "Traceback" not in run.err
+    code, text = pages.run_here(example, examples)
+    assert code == 0, text
+    assert "Traceback" not in text
     for path, data in before.items():  # what other examples read
         path.write_bytes(data)

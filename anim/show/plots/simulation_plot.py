@@ -14,6 +14,7 @@ from anim.show.plots.figure import (
     TEXT,
     TITLE,
     Figure,
+    edge_lines,
     format_number,
     separate_labels,
     style,
@@ -130,9 +131,10 @@ def _draw_poses(sheet: Figure, history: RunHistory) -> None:
     for i, frame in enumerate(np.linspace(0, len(points) - 1, NUM_POSES).astype(int)):
         alpha = 0.12 + 0.88 * i / (NUM_POSES - 1)
         pose = points[frame]
-        for edge in history.edges.tolist():
-            axes.plot(pose[edge, 0], pose[edge, 1], color=COLORS[2], linewidth=1, alpha=alpha)
-        if not len(history.edges):
+        if len(history.edges):
+            lines = edge_lines(pose, history.edges)
+            axes.plot(lines[:, 0], lines[:, 1], color=COLORS[2], linewidth=1, alpha=alpha)
+        else:
             axes.plot(pose[:, 0], pose[:, 1], "o", color=COLORS[2], markersize=3, alpha=alpha, markeredgewidth=0)
 
 

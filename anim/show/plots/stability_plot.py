@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.show.plots.figure import FAINT, HAIR, INK, SMALL, SOFT, TEXT, TITLE, Figure, separate_labels, style
+from anim.show.plots.figure import (
+    FAINT,
+    HAIR,
+    INK,
+    SMALL,
+    SOFT,
+    TEXT,
+    TITLE,
+    Figure,
+    edge_lines,
+    separate_labels,
+    style,
+)
 from anim.simulation.comparison import Comparison, IntegratorRun
 from anim.simulation.integrators import INTEGRATORS
 
@@ -205,5 +217,5 @@ def _draw_motion(
 def _draw_poses(axes: Axes, poses: Floats, springs: Ints, color: str) -> None:
     for i, pose in enumerate(poses):
         alpha = 0.15 + 0.85 * i / (NUM_POSES - 1)
-        for a, b in springs.tolist():
-            axes.plot(pose[[a, b], 0], pose[[a, b], 1], "-o", color=color, markersize=2, linewidth=1, alpha=alpha)
+        lines = edge_lines(pose, springs)
+        axes.plot(lines[:, 0], lines[:, 1], "-o", color=color, markersize=2, linewidth=1, alpha=alpha)

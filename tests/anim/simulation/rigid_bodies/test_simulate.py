@@ -282,4 +282,4 @@ def test_a_wall_by_globs_is_the_same_bytes_twice() -> None:
     assert written[0] == written[1]
     clip = reader.clips(opened(written[0]))[0]
     assert (clip.name, len(clip.tracks), clip.end) == ("fall", 2 * 30, 0.5)
-    assert fixtures.build("wall") == fixtures.build("wall")
+    assert fixtures.FIXTURES["wall"]() == fixtures.build("wall")
