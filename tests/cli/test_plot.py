@@ -10,6 +10,8 @@ import pytest
 
 from anim.gltf.authoring import build_document
 from anim.model import Clip
+from anim.show.plots.figure import TITLE, text_width
+from anim.show.plots.stability_plot import LEFT, WIDTH
 from tests import clips
 from tests.anim.show.reading import png_size, words
 from tests.cli.conftest import Call, Fixture
@@ -134,12 +136,27 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
 def test_integrators_of_an_oscillator(call: Call) -> None:
     said = words(call("plot", "--integrators", "--omega", "20", "--step", "1/9", "--format", "svg").product())
     title = next(each for each in said if each.startswith("Step 1/9 s, ω·h = 2.22: "))
-    assert title.endswith("diverge; rk4, implicit-euler do not")
+    assert title.endswith(": all but rk4, implicit-euler diverge")
     assert any(each.startswith("Largest stable steps of this system: verlet 1/10 s, rk4 1/7.071 s") for each in said)
     assert {"verlet", "rk4", "explicit-euler", "this run"} <= set(said) | {each.split("\n")[0] for each in said}
     calm = words(call("plot", "--integrators", "--format", "svg").product())
     assert any(each.startswith("Step 1/60 s, ω·h = 0.33: explicit-euler (2.20 s) diverges") for each in calm)
     assert call("plot", "--integrators").product() == call("plot", "--integrators").product()
+
+
+@pytest.mark.parametrize(
+    ("omega", "step", "title"),
+    [
+        ("1", "0.001", "Step 1/1000 s, ω·h = 0.001: no integrator diverges within 63 s"),
+        ("100", "0.0283", "Step 1/35.34 s, ω·h = 2.83: all but rk4, implicit-euler diverge"),
+        ("100", "0.0285", "Step 1/35.09 s, ω·h = 2.85: all but rk4, implicit-euler diverge"),
+        ("100", "0.05", "Step 1/20 s, ω·h = 5.00: all but implicit-euler diverge"),
+    ],
+)
+def test_the_title_of_integrators_fits(omega: str, step: str, title: str, call: Call) -> None:
+    drawn = call("plot", "--integrators", "--omega", omega, "--step", step, "--format", "svg").product()
+    assert title in words(drawn)
+    assert text_width(title, TITLE + 2, "bold") < WIDTH - LEFT
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from anim.show.plots.figure import (
     TITLE,
     Figure,
     edge_lines,
+    format_number,
     separate_labels,
     style,
 )
@@ -60,19 +61,31 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
         top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
         width = (WIDTH - LEFT - 0.2) / len(SHOWN)
         shown = [run for name in SHOWN for run in runs if run.name == name]
-        span = _span(shown, springs)
-        for i, run in enumerate(shown):
-            _draw_motion(sheet, run, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
+        drawn = [motion_points(run, springs, omega_h / step) for run in shown]
+        span = _span(shown, drawn)
+        for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
+            _draw_motion(sheet, run, points, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
         return sheet.render(kind)
 
 
 def _title(runs: Sequence[IntegratorRun], omega_h: float, step: float) -> str:
-    gone = [f"{run.name} ({run.diverged_at:.2f} s)" for run in runs if run.diverged_at is not None]
+    gone = [run for run in runs if run.diverged_at is not None]
     stable = [run.name for run in runs if run.diverged_at is None]
-    result = f"{', '.join(gone)} diverge{'s' if len(gone) == 1 else ''}" if gone else "no integrator diverges"
-    if gone and stable:
-        result += f"; {', '.join(stable)} {'does' if len(stable) == 1 else 'do'} not" if len(stable) < len(gone) else ""
-    return f"Step {_seconds(step)}, ω·h = {omega_h:.2f}: {result}"
+    if not gone:
+        result = f"no integrator diverges within {max(float(run.times[-1]) for run in runs):.2g} s"
+    elif len(gone) == len(runs):
+        result = "every integrator diverges"
+    elif len(gone) > len(stable):
+        result = f"all but {', '.join(stable)} diverge"
+    else:
+        words = [f"{run.name} ({run.diverged_at:.2f} s)" if len(gone) < 3 else run.name for run in gone]
+        result = f"{', '.join(words)} diverge{'s' if len(gone) == 1 else ''}"
+    return f"Step {_seconds(step)}, ω·h = {_product(omega_h)}: {result}"
+
+
+def _product(omega_h: float) -> str:
+    """ω·h with two decimals, or two digits if it is small."""
+    return f"{omega_h:.2f}" if omega_h >= 0.1 else format_number(float(f"{omega_h:.2g}"))
 
 
 def _subtitle(omega_h: float, step: float) -> str:
@@ -159,41 +172,43 @@ def _draw_gain(sheet: Figure, omega_h: float) -> None:
         axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
         for name in SHOWN:
             gain = float(INTEGRATORS[name].gain(np.array(omega_h)))
-            axes.plot([omega_h], [min(gain, MAX_GAIN)], "o", color=COLORS[name], markersize=5, clip_on=False)
-        axes.text(omega_h + 0.05, MIN_GAIN + 0.1, f"this run\nω·h = {omega_h:.2f}", fontsize=SMALL)
+            if MIN_GAIN <= gain <= MAX_GAIN:
+                axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
+        axes.text(omega_h + 0.05, MIN_GAIN + 0.1, f"this run\nω·h = {_product(omega_h)}", fontsize=SMALL)
     axes.set_xlim(0, MAX_OMEGA_H)
     axes.set_ylim(MIN_GAIN, MAX_GAIN)
     axes.set_xlabel("ω·h: angular frequency of the stiffest part × step", fontsize=SMALL, color=SOFT)
     sheet.text(left, HEAD - 0.1, "Amplitude gained per step", fontsize=TEXT)
 
 
-def _span(runs: Sequence[IntegratorRun], springs: Ints) -> tuple[Floats, float]:
+def _span(runs: Sequence[IntegratorRun], drawn: Sequence[Floats]) -> tuple[Floats, float]:
     """Center and half size of the motion's pictures, from the start and what stays near it."""
-    drawn = [_drawn(run, springs)[:1] for run in runs] + [
-        _drawn(run, springs) for run in runs if run.diverged_at is None
-    ]
-    points = np.concatenate([each.reshape(-1, 2) for each in drawn])
+    near = [each[:1] if run.diverged_at is not None else each for run, each in zip(runs, drawn, strict=True)]
+    points = np.concatenate([each.reshape(-1, 2) for each in near])
     low, high = points.min(axis=0), points.max(axis=0)
     return (low + high) / 2, 0.6 * float((high - low).max()) or 1.0
 
 
-def _drawn(run: IntegratorRun, springs: Ints) -> Floats:
-    """Points (n, P, 2) to draw: x and y, or in phase space position and velocity of the one moving point."""
+def motion_points(run: IntegratorRun, springs: Ints, omega: float) -> Floats:
+    """Points (n, P, 2) to draw: x and y, or in phase space position and velocity / ω of the one moving point."""
     if len(springs) > 1:
         return run.positions[..., :2]
-    omega = np.abs(run.velocities[:, -1, 0]).max() / max(float(np.abs(run.positions[:, -1, 0]).max()), 1e-300)
-    return np.stack([run.positions[:, -1:, 0], run.velocities[:, -1:, 0] / max(float(omega), 1e-300)], axis=-1)
+    return np.stack([run.positions[:, -1:, 0], run.velocities[:, -1:, 0] / max(omega, 1e-300)], axis=-1)
 
 
 def _draw_motion(
-    sheet: Figure, run: IntegratorRun, springs: Ints, place: tuple[float, float, float], span: tuple[Floats, float]
+    sheet: Figure,
+    run: IntegratorRun,
+    points: Floats,
+    springs: Ints,
+    place: tuple[float, float, float],
+    span: tuple[Floats, float],
 ) -> None:
     x, y, width = place
-    points = _drawn(run, springs)
     last = len(run.times) - 1
     phase = len(springs) <= 1
     until = min(last, int(np.searchsorted(run.times, 1.0)) if not phase else last)
-    what = "phase space: velocity against position" if phase else f"0 to {run.times[until]:.2f} s"
+    what = "phase space: velocity / ω against position" if phase else f"0 to {run.times[until]:.2f} s"
     wide = sheet.text(x, y - 0.12, run.name, color=COLORS[run.name], weight="bold")
     sheet.text(x + wide + 0.1, y - 0.12, what, fontsize=SMALL, color=SOFT)
     axes = sheet.panel(x, y, width, POSES)

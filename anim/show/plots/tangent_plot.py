@@ -243,7 +243,7 @@ def _smoothness(jumps: KeyJumps) -> str:
     """Continuity at the interior keys: "C1 at every key", "C0 at 1 key, C1 at 3 keys"."""
     counts = Counter(jumps.grades)
     if not counts:
-        return "one piece"
+        return "one segment"
     if len(counts) == 1:
         grade = jumps.grades[0]
         return "jumps at every key" if grade is ContinuityClass.JUMP else f"{grade} at every key"

@@ -90,7 +90,7 @@ def test_all_rules_can_be_drawn() -> None:
 
 
 def test_two_values_are_one_piece() -> None:
-    assert "one piece; no overshoot" in words(tangent_plot([0, 1], [0, 1], ["natural"], kind="svg"))
+    assert "one segment; no overshoot" in words(tangent_plot([0, 1], [0, 1], ["natural"], kind="svg"))
 
 
 def test_equal_values() -> None:
