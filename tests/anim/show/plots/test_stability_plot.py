@@ -15,4 +15,4 @@ def test_phase_space_has_the_same_scale_for_every_integrator() -> None:
     start = np.array([[0.0, 0, 0], [1, 0, 0]])
     runs = compare_integrators(system, start, np.zeros((2, 3)), step=0.1, duration=1.0, names=["implicit-euler"])
     points = motion_points(runs[0], system.springs, 20.0)
-    np.testing.assert_allclose(points[:2, 0], [[1, 0], [0.2, -0.4]], atol=1e-12)
+    np.testing.assert_allclose(points[:2, 0], np.array([[1.0, 0.0], [0.2, -0.4]]), atol=1e-12)
