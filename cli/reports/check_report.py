@@ -16,6 +16,7 @@ from cli.text import plural
 SCHEMA = 1
 MAX_OF_RULE = 3  # findings of a rule listed per file in the text
 MAX_SUMMARY_BYTES = 1_000_000  # of a job summary on GitHub, 1 MiB
+MARKDOWN_ESCAPES = {ord(c): f"&#{ord(c)};" if c in "<>|&" else f"\\{c}" for c in "\\`*_{}[]<>#|~&"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,4 @@ def as_markdown(report: CheckReport) -> str:
 
 def _cell(words: str) -> str:
     """Text in a table of Markdown, where names of a file are plain text."""
-    escaped = escape_control(words)
-    for character in "\\`*_{}[]<>#|~&":
-        escaped = escaped.replace(character, f"&#{ord(character)};" if character in "<>|&" else f"\\{character}")
-    return escaped
+    return escape_control(words).translate(MARKDOWN_ESCAPES)

@@ -208,6 +208,9 @@ def test_markdown_is_a_table_that_names_cannot_break(folder: Path, call: Call) -
     (folder / "a_b [x].glb").write_bytes(built("noop"))
     out = call("check", "a_b [x].glb", "--format", "md", "--select", "GA103").text
     assert "| a\\_b \\[x\\].glb | info | GA103 sign-flips |" in out
+    (folder / "<a|b>&.glb").write_bytes(built("noop"))
+    out = call("check", "<a|b>&.glb", "--format", "md", "--select", "GA103").text
+    assert "| &#60;a&#124;b&#62;&#38;.glb | info |" in out
 
 
 def test_every_rule_is_listed_and_explained(call: Call) -> None:
