@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,8 @@ def _details(option: Any, default: Any) -> Iterator[str]:
 
 
 def _paragraph(text: str | None) -> str:
+    if text and text.startswith("\b\n"):  # lines that the help keeps as they are
+        return f"```\n{textwrap.dedent(text.partition(chr(10))[2])}\n```"
     return _escaped(" ".join((text or "").split()))
 
 

@@ -107,6 +107,7 @@ def command(
     Settings are read from the nearest gltf-anim.toml, or [tool.gltf-anim] in pyproject.toml, from the file's folder
     upwards; options replace them:
 
+    \b
         [check]
         ignore = ["GA113"]
         fail-on = "warning"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -232,3 +233,10 @@ def test_codes_and_names_of_rules_are_unique_and_severities_ordered() -> None:
 def test_files_are_read_from_stdin(call: Call) -> None:
     run = call("check", "--format", "json", stdin=built("noop"))
     assert run.json["files"] == ["stdin"]
+
+
+def test_settings_in_the_help_are_toml(call: Call) -> None:
+    text = call("check", "--help").text
+    settings = tomllib.loads(text[text.index("[check]") : text.index("--write-baseline")])
+    assert settings["check"]["fail-on"] == "warning"
+    assert settings["check"]["files"] == [{"match": "crowd/**", "ignore": ["GA2"]}]
