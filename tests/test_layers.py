@@ -88,7 +88,7 @@ PUBLIC = {
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations simulation_plot "
         "stability_plot tangent_plot track_plot track_selection"
     ),
-    "simulation.cloth": "colliders comparison model options selection simulate solver",
+    "simulation.cloth": "colliders model options selection simulate solver",
     "simulation.particles": "emission forces obstacles simulate solver",
     "simulation.rigid_bodies": "description node_globs options simulate",
     "simulation.spring_bones": "chain_globs chains colliders json_reader penetration read reduction report simulate",

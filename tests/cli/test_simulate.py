@@ -13,6 +13,9 @@ import pytest
 from typer.models import OptionInfo
 
 import anim
+from anim.gltf.io import container
+from anim.gltf.reading import reader
+from anim.sampling.sample import sample
 from anim.simulation.registry import SIMULATIONS
 from cli.commands import simulate
 from tests.cli.conftest import Call, Fixture
@@ -178,6 +181,78 @@ def test_a_loop_of_cloth_states_its_seam(fixture: Fixture, call: Call, tmp_path:
     assert (refused.code, "expected no --duration" in refused.err) == (2, True)
 
 
+COLLIDERS = {
+    "schema": "spring-bones/1",
+    "colliders": [
+        {"node": "pole", "capsule": {"offset": [0.5, 0, 0.25], "tail": [0.5, 2, 0.25], "radius": 0.1}},
+        {"plane": {"offset": [0, 1.15, 0], "normal": [0, 1, 0]}},
+    ],
+}
+
+
+def test_cloth_meets_colliders_of_a_file_and_of_nodes(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    out, report, given = tmp_path / "out.npz", tmp_path / "report.json", tmp_path / "colliders.json"
+    given.write_text(json.dumps(COLLIDERS))
+    args = ("--mesh", "flag", "--pin", "x-min", "--wind", "0,0,6", "--duration", "1.5", "--thickness", "1cm")
+    run = call("simulate", "cloth", fixture("flag"), out, *args, "--colliders", given, "--report", report)
+    assert run.code == 0, run.err
+    found = json.loads(report.read_text())
+    assert (found["colliders"], found["penetration_m"]) == (2, 0.0)
+    document = container.read(np.frombuffer(fixture("flag").read_bytes(), np.uint8))
+    skeleton, clip = reader.scene(document).skeleton, reader.clips(document)[0]
+    world = sample(skeleton, clip, np.arange(91) / 60, space="world").world
+    assert world is not None
+    pole = world[:, skeleton.names.index("pole")]
+    with np.load(out) as cache:
+        frames = cache["positions"].astype(float)
+        free = cache["rest"][:, 0] > 0.01
+    local = np.einsum("fij,fvi->fvj", pole[:, :, :3], frames - pole[:, None, :, 3])[:, free]
+    assert np.hypot(local[..., 0] - 0.5, local[..., 2] - 0.25).min() > 0.105  # both push at once
+    assert frames[:, free, 1].min() > 1.16 - 1e-5
+    plane = ("--plane", "0,1.15,0,0,1,0", "--capsule", "pole,post,0.05")
+    assert call("simulate", "cloth", fixture("flag"), out, *args, *plane).code == 0
+
+
+def test_cloth_meets_the_colliders_of_spring_bones(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    report = tmp_path / "report.json"
+    args = ("--mesh", "flag", "--pin", "x-min", "--duration", "0.2", "--colliders", "vrm", "--report", report)
+    given = tmp_path / "flag.gltf"
+    call("convert", fixture("flag"), given).product()
+    document = json.loads(given.read_text())
+    shape = {"sphere": {"offset": [0, 1, 0], "radius": 0.2}}
+    document["extensions"] = {"VRMC_springBone": {"specVersion": "1.0", "colliders": [{"node": 0, "shape": shape}]}}
+    document["extensionsUsed"] = ["VRMC_springBone"]
+    given.write_text(json.dumps(document))
+    run = call("simulate", "cloth", given, tmp_path / "out.npz", *args)
+    assert run.code == 0, run.err
+    assert json.loads(report.read_text())["colliders"] == 1
+
+
+def test_halving_the_step_changes_the_cloth_by_less_than_the_estimate(
+    fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    args = ("--mesh", "flag", "--pin", "x-min", "--wind", "3,0,1", "--duration", "0.7")
+    report, paths = tmp_path / "report.json", (tmp_path / "a.npz", tmp_path / "b.npz")
+    for step, path in zip(("1/600", "1/1200"), paths, strict=True):
+        name = report if path == paths[0] else tmp_path / "other.json"
+        call("simulate", "cloth", fixture("flag"), path, *args, "--step", step, "--report", name).product()
+    with np.load(paths[0]) as a, np.load(paths[1]) as b:
+        change = np.linalg.norm(a["positions"] - b["positions"], axis=2).max()
+    found = json.loads(report.read_text())
+    assert 0 < change <= found["error_estimate_m"]
+    assert found["energy_j"]["peak"] >= found["energy_j"]["end"]
+    assert found["drift_per_s"] < 0
+
+
+def test_the_picture_of_cloth_draws_every_solver(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    report = tmp_path / "report.svg"
+    args = ("--mesh", "flag", "--pin", "x-min", "--duration", "0.1", "--step", "1/240", "--report", report)
+    call("simulate", "cloth", fixture("flag"), tmp_path / "out.npz", *args).product()
+    drawn = report.read_text()
+    assert "Step 1/240 s, ω·h = 20.67: all but implicit-euler, relaxation, xpbd diverge" in drawn
+    assert "this run: ω·h = 20.67 →" in drawn
+
+
 @needs_validator
 def test_cloth_as_morph_targets_is_valid(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     out = tmp_path / "out.glb"
@@ -230,7 +305,11 @@ def test_cloth_beyond_its_largest_stretch_ends_with_a_report_and_no_cache(
         (("--mesh", "flag", "--sphere", "1,2"), 5, "no node"),
         (("--mesh", "flag", "--sphere", "0,0,0,0"), 2, "radius"),
         (("--mesh", "flag", "--capsule", "pole,post"), 2, "expected NODE,NODE,R"),
-        (("--mesh", "flag", "--report", "x.png"), 2, "needs --solver mass-spring"),
+        (("--mesh", "flag", "--plane", "0,0,0,0,0,0"), 2, "normal of a plane"),
+        (("--mesh", "flag", "--plane", "0,0,0"), 2, "expected NODE, NODE,NX,NY,NZ or X,Y,Z,NX,NY,NZ"),
+        (("--mesh", "flag", "--colliders", "vrm"), 5, "has no colliders"),
+        (("--mesh", "flag", "--pin", "weight:hip,0.2"), 5, "has no skin"),
+        (("--mesh", "flag", "--pin", "weight:hip"), 2, "expected weight:GLOB,MIN"),
         (("--mesh", "flag", "--report", "x.txt"), 2, "unsupported report format"),
         (("--mesh", "flag", "--step", "0"), 2, "--step is '0'"),
         (("--mesh", "flag", "--pin", "box:0,0,0,9,9,9"), 5, "every point"),

@@ -35,10 +35,13 @@ COLORS = {
     "velocity-verlet": "#56b4e9",
     "rk4": "#0072b2",
     "implicit-euler": "#7a7f87",
+    "relaxation": "#cc79a7",
+    "xpbd": "#7b3294",
 }
-SHOWN = ("explicit-euler", "verlet", "implicit-euler")  # drawn as poses: gains, keeps, loses energy
+SHOWN = ("explicit-euler", "verlet", "implicit-euler", "xpbd")  # drawn as poses: gains, keeps, loses energy
 THICK, THIN = 2.0, 1.2
 NUM_POSES = 9
+MANY_SPRINGS = 200  # drawn as thin lines without points
 VERLET_LIMIT = 2.0  # ω·h
 MAX_OMEGA_H, MIN_GAIN, MAX_GAIN = 3.4, 0.5, 1.6
 WIDTH, LEFT, HEAD, GAP = 11.6, 0.65, 0.95, 0.6  # inches
@@ -59,8 +62,8 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
         _draw_energy(sheet, runs)
         _draw_gain(sheet, omega_h)
         top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
-        width = (WIDTH - LEFT - 0.2) / len(SHOWN)
         shown = [run for name in SHOWN for run in runs if run.name == name]
+        width = (WIDTH - LEFT - 0.2) / len(shown)
         drawn = [motion_points(run, springs, omega_h / step) for run in shown]
         span = _span(shown, drawn)
         for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
@@ -137,7 +140,7 @@ def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float) -> None
 
 def _keeps_energy(run: IntegratorRun) -> bool:
     """True for a run of a symplectic integrator that doesn't diverge: its energy oscillates about the start's."""
-    return run.diverged_at is None and INTEGRATORS[run.name].limit == VERLET_LIMIT
+    return run.diverged_at is None and run.name in INTEGRATORS and INTEGRATORS[run.name].limit == VERLET_LIMIT
 
 
 def _change(run: IntegratorRun) -> str:
@@ -170,11 +173,13 @@ def _draw_gain(sheet: Figure, omega_h: float) -> None:
         )
     if omega_h <= MAX_OMEGA_H:
         axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
-        for name in SHOWN:
+        for name in (each for each in SHOWN if each in INTEGRATORS):
             gain = float(INTEGRATORS[name].gain(np.array(omega_h)))
             if MIN_GAIN <= gain <= MAX_GAIN:
                 axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
         axes.text(omega_h + 0.05, MIN_GAIN + 0.1, f"this run\nω·h = {_product(omega_h)}", fontsize=SMALL)
+    else:
+        axes.text(MAX_OMEGA_H - 0.05, 1.06, f"this run: ω·h = {_product(omega_h)} →", fontsize=SMALL, ha="right")
     axes.set_xlim(0, MAX_OMEGA_H)
     axes.set_ylim(MIN_GAIN, MAX_GAIN)
     axes.set_xlabel("ω·h: angular frequency of the stiffest part × step", fontsize=SMALL, color=SOFT)
@@ -192,7 +197,8 @@ def _span(runs: Sequence[IntegratorRun], drawn: Sequence[Floats]) -> tuple[Float
 def motion_points(run: IntegratorRun, springs: Ints, omega: float) -> Floats:
     """Points (n, P, 2) to draw: x and y, or in phase space position and velocity / ω of the one moving point."""
     if len(springs) > 1:
-        return run.positions[..., :2]
+        spread = np.ptp(run.positions[0], axis=0)  # seen from the side that shows more of the start
+        return np.asarray(run.positions[..., [0 if spread[0] >= spread[2] else 2, 1]])
     return np.stack([run.positions[:, -1:, 0], run.velocities[:, -1:, 0] / max(omega, 1e-300)], axis=-1)
 
 
@@ -233,4 +239,6 @@ def _draw_poses(axes: Axes, poses: Floats, springs: Ints, color: str) -> None:
     for i, pose in enumerate(poses):
         alpha = 0.15 + 0.85 * i / (NUM_POSES - 1)
         lines = edge_lines(pose, springs)
-        axes.plot(lines[:, 0], lines[:, 1], "-o", color=color, markersize=2, linewidth=1, alpha=alpha)
+        look = "-o" if len(springs) < MANY_SPRINGS else "-"
+        width = 1.0 if len(springs) < MANY_SPRINGS else 0.4
+        axes.plot(lines[:, 0], lines[:, 1], look, color=color, markersize=2, linewidth=width, alpha=alpha)

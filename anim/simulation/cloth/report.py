@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.simulation.cloth.comparison import compare
 from anim.simulation.cloth.driver import ClothDriver
 from anim.simulation.cloth.loop import LoopSeam
 from anim.simulation.cloth.mass_spring_solver import as_mass_spring
@@ -49,6 +50,7 @@ def make_report(
     seam = frames.seam
     return _report(
         model,
+        driver,
         options,
         substeps,
         advice,
@@ -62,10 +64,13 @@ def make_report(
     )
 
 
-def make_failed_report(model: ClothModel, options: ClothOptions, substeps: int, bad_frame: int) -> SimulationReport:
+def make_failed_report(
+    model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int, bad_frame: int
+) -> SimulationReport:
     """Return the report of a run that diverges. bad_frame: index of the first frame without a finite result."""
     advice = advise_half_step(1.0 / (options.fps * substeps))
-    return _report(model, options, substeps, advice, {}, first_bad_step=max(bad_frame - 1, 0) * substeps + 1)
+    bad_step = max(bad_frame - 1, 0) * substeps + 1
+    return _report(model, driver, options, substeps, advice, {}, first_bad_step=bad_step)
 
 
 def worst_edges(model: ClothModel, positions: Floats) -> tuple[Ints, Floats]:
@@ -78,7 +83,13 @@ def worst_edges(model: ClothModel, positions: Floats) -> tuple[Ints, Floats]:
 
 
 def _report(
-    model: ClothModel, options: ClothOptions, substeps: int, advice: str, figures: dict[str, Any], **measured: Any
+    model: ClothModel,
+    driver: ClothDriver,
+    options: ClothOptions,
+    substeps: int,
+    advice: str,
+    figures: dict[str, Any],
+    **measured: Any,
 ) -> SimulationReport:
     step = 1.0 / (options.fps * substeps)
     omega_h = limit = None
@@ -107,6 +118,7 @@ def _report(
             **figures,
         },
         advice=advice,
+        compare=lambda: compare(model, driver, options, substeps),
         **measured,
     )
 

@@ -15,7 +15,7 @@ from anim.model import MeshInstance
 SIDES = tuple(f"{axis}-{end}" for axis in "xyz" for end in ("min", "max"))
 SIDE_FRACTION = 0.01  # of the extent along the axis
 MIN_JOINT_WEIGHT = 0.5
-KINDS = f"{', '.join(SIDES)}, joint:GLOB, material:GLOB, box:X,Y,Z,SX,SY,SZ"
+KINDS = f"{', '.join(SIDES)}, joint:GLOB, weight:GLOB,MIN, material:GLOB, box:X,Y,Z,SX,SY,SZ"
 
 
 def select_vertices(
@@ -24,8 +24,9 @@ def select_vertices(
     """Return the selected vertices (V,) of a mesh instance.
 
     selector: "x-min" … "z-max", the vertices within 1 % of that side of the box around positions (V, 3);
-    "joint:GLOB", those that these joints hold by half or more; "material:GLOB"; "box:X,Y,Z,SX,SY,SZ", center and size
-    in metres. joint_names: of all nodes. materials: names by index.
+    "joint:GLOB", those that these joints hold by half or more; "weight:GLOB,MIN", by this weight or more;
+    "material:GLOB"; "box:X,Y,Z,SX,SY,SZ", center and size in metres.
+    joint_names: of all nodes. materials: names by index.
     Raises RangeError for another selector, NotFoundError if no vertex is selected.
     """
     kind, _, rest = selector.partition(":")
@@ -35,6 +36,8 @@ def select_vertices(
         chosen = along <= along.min() + SIDE_FRACTION * np.ptp(along)
     elif kind == "joint":
         chosen = _joint_weights(rest, instance, joint_names) >= MIN_JOINT_WEIGHT
+    elif kind == "weight":
+        chosen = _heavier(rest, instance, joint_names)
     elif kind == "material":
         chosen = _of_materials(rest, instance, materials)
     elif kind == "box":
@@ -49,9 +52,20 @@ def select_vertices(
 def _joint_weights(glob: str, instance: MeshInstance, names: Sequence[str]) -> Floats:
     """Sum of the weights (V,) of the matching joints."""
     if instance.skin is None:
-        raise NotFoundError(f"mesh '{instance.mesh.name}' has no skin, and 'joint:{glob}' needs one")
+        raise NotFoundError(f"mesh '{instance.mesh.name}' has no skin, and joints need one")
     matching = np.array([fnmatchcase(names[node], glob) for node in instance.skin.joints.tolist()])
     return np.asarray((instance.mesh.weights * matching[instance.mesh.joints]).sum(axis=1))
+
+
+def _heavier(text: str, instance: MeshInstance, names: Sequence[str]) -> Bools:
+    glob, _, least = text.rpartition(",")
+    try:
+        weight = float(least)
+    except ValueError:
+        weight = math.nan
+    if not glob or not 0 < weight <= 1:
+        raise RangeError(f"'weight:{text}' has no weight (expected weight:GLOB,MIN with a number up to 1)")
+    return np.asarray(_joint_weights(glob, instance, names) >= weight)
 
 
 def _of_materials(glob: str, instance: MeshInstance, materials: Sequence[str]) -> Bools:

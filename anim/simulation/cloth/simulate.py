@@ -13,11 +13,10 @@ from anim.errors import RangeError, UnstableError
 from anim.model import Clip, FrameChunk, Scene, VertexCache
 from anim.simulation.cloth.driver import ClothDriver
 from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop
-from anim.simulation.cloth.mass_spring_solver import as_mass_spring, run_mass_spring
 from anim.simulation.cloth.model import ClothModel, build_cloth
 from anim.simulation.cloth.options import SOLVERS, ClothOptions
 from anim.simulation.cloth.report import ClothFrames, make_failed_report, make_report, worst_edges
-from anim.simulation.cloth.solver import MAX_ELONGATION, XPBD_SWEEPS, run_xpbd
+from anim.simulation.cloth.runs import run_solver
 from anim.simulation.report import SimulationReport
 from anim.skinning.bake import prepare_bake
 
@@ -52,6 +51,7 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     if options.estimate_error:
         finer = _simulate(model, driver, options, 2 * substeps)
         error = float(np.linalg.norm(finer.positions - frames.positions, axis=2).max())
+        error += float(np.spacing(np.float32(np.abs(finer.positions).max())))  # of the cache's float32
     times = clip.start + np.arange(len(frames.positions), dtype=np.float64) / options.fps
     positions = frames.positions[:, model.topology.point_of_vertex].astype(np.float32)
     cache = replace(template, times=times, chunks=lambda: iter((FrameChunk(0, positions),)), rest=start)
@@ -101,7 +101,7 @@ def _simulate(
             if stop_above < np.inf and worst_edges(model, x[None])[1][0] > stop_above:
                 break
     except UnstableError as error:
-        found = make_failed_report(model, options, substeps, num_done)
+        found = make_failed_report(model, driver, options, substeps, num_done)
         raise error.with_report(found).advise(found.advice) from None
     return ClothFrames(np.array(positions), np.array(energies))
 
@@ -117,13 +117,4 @@ def _frames(
         "substeps": substeps,
         "warm_up_frames": round(options.warm_up * options.fps),
     }
-    fabric, environment = options.fabric, options.environment
-    if options.solver == "mass-spring":
-        system = as_mass_spring(model, fabric, environment, options.stiffness)
-        return run_mass_spring(model, system, fabric, environment, driver, integrator=options.integrator, **timing)
-    iterations, elongation = XPBD_SWEEPS, min(MAX_ELONGATION, (options.max_stretch or 1.0) / 2)
-    limits: dict[str, Any] = {"iterations": iterations, "max_elongation": elongation}
-    if options.solver == "relaxation":
-        fabric = replace(fabric, stretch_compliance=0.0)
-        limits = {"iterations": options.iterations, "max_elongation": None}
-    return run_xpbd(model, fabric, environment, driver, tethers=options.tethers, **timing, **limits)
+    return run_solver(model, driver, options, **timing)

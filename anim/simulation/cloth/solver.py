@@ -66,12 +66,14 @@ def run_xpbd(
     iterations: int = XPBD_SWEEPS,
     tethers: bool = True,
     max_elongation: float | None = MAX_ELONGATION,
+    start: Floats | None = None,
 ) -> Iterator[tuple[Floats, float]]:
     """Yield the points (P, 3) m and the energy in J at frames 0 … num_frames − 1 of `fps` per second.
 
     substeps: per frame. warm_up_frames: simulated before, at the pose of 0 s. iterations: of the constraints in each
     substep. max_elongation: limit of the edges' elongation beyond the fabric's own; None for none. The energy is
-    kinetic, elastic by the compliances, and potential. Raises UnstableError.
+    kinetic, elastic by the compliances, and potential. start: (P, 3) m; the mesh at its pose without it.
+    Raises UnstableError.
     """
     from anim.simulation.cloth.kernels.xpbd import step_frame
 
@@ -80,7 +82,7 @@ def run_xpbd(
     h = 1.0 / (fps * substeps)
     topology = model.topology
     first = -warm_up_frames
-    p = driver.all_vertices(first / fps)[topology.first_vertex]
+    p = driver.all_vertices(first / fps)[topology.first_vertex] if start is None else start.copy()
     v = np.zeros_like(p)
     masses = np.where(model.inverse_masses > 0, 1 / np.maximum(model.inverse_masses, 1e-300), 0.0)
     elastic = 0.0

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from enum import StrEnum
-from pathlib import PurePath
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,17 +16,13 @@ from anim.errors import UnstableError
 from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.model import Scene
-from anim.operations.selection import Selection
-from anim.show.plots.stability_plot import stability_plot
-from anim.simulation.cloth.colliders import Capsule
-from anim.simulation.cloth.comparison import compare
 from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.options import SOLVERS, ClothOptions
 from anim.simulation.cloth.selection import select_vertices
 from anim.simulation.cloth.simulate import ClothRun, simulate_cloth
 from anim.simulation.cloth.solver import Environment
 from anim.simulation.registry import SIMULATIONS
-from anim.simulation.report import SimulationReport, describe_elongation
+from anim.simulation.report import describe_elongation
 from cli import text, units
 from cli.errors import CheckError, UsageError
 from cli.io import cache_files, documents, scenes
@@ -36,11 +30,13 @@ from cli.options import caches, common, meshes, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
 from cli.text import Reporter
+from cli.workflows.cloth_colliders import parse_colliders
 from cli.workflows.simulate_clip import NO_CLIP, driving_clip
+from cli.workflows.simulation_report import check_report, write_report
 
 Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
 XPBD, MASS_SPRING = Solver("xpbd"), Solver("mass-spring")
-SELECTOR = "x-min … z-max, joint:GLOB, material:GLOB or box:X,Y,Z,SX,SY,SZ"
+SELECTOR = "x-min … z-max, joint:GLOB, weight:GLOB,MIN, material:GLOB or box:X,Y,Z,SX,SY,SZ"
 
 
 def command(
@@ -77,6 +73,22 @@ def command(
     capsule: Annotated[
         list[str] | None,
         typer.Option("--capsule", metavar="A,B,R", help="A capsule from node A to node B; may be repeated."),
+    ] = None,
+    plane: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--plane",
+            metavar="AT,N",
+            help="A plane at X,Y,Z or at a node, and its normal NX,NY,NZ (a node's y axis without); may be repeated.",
+        ),
+    ] = None,
+    colliders: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--colliders",
+            metavar="vrm|FILE",
+            help="Colliders of the file's own VRM spring bones, or of a JSON file as of simulate springs.",
+        ),
     ] = None,
     thickness: Annotated[
         str, typer.Option("--thickness", metavar="LENGTH", help="Distance that is kept from colliders.")
@@ -124,12 +136,13 @@ def command(
     Vertices chosen by --pin, and all but those of --cloth, follow the clip at every step; the others keep the lengths
     of the mesh's edges, and are moved by gravity, wind, colliders and the floor. xpbd is stiff at any step.
     mass-spring and relaxation are the classic methods, to see what a step that is too long does: --report
-    stability.png draws mass-spring by every integrator. --self-collision takes about five times as long.
+    stability.png draws the cloth by every solver and integrator. Colliders move with their nodes at every step.
+    --self-collision takes about five times as long.
     """
     voice = Reporter(quiet, verbose)
     began = time.perf_counter()
     simulation.check_fps(fps)
-    kind = _report_kind(report, solver)
+    kind = check_report(report)
     ending = cache_files.check(output, None if format is None else f".{format}")
     given = {"quantize": quantize, "layout": layout}
     caches.write_options(ending, given | {"max_error": max_error})
@@ -150,7 +163,9 @@ def command(
             Environment(
                 parse_vector(gravity, "--gravity"), parse_vector(wind, "--wind"), gusts, floor=floor, seed=seed
             ),
-            (*(_sphere(each, scene) for each in sphere or ()), *(_capsule(each, scene) for each in capsule or ())),
+            parse_colliders(
+                document, scene, spheres=sphere or (), capsules=capsule or (), planes=plane or (), files=colliders or ()
+            ),
             solver.value,
             integrator.value,
             substeps,
@@ -163,22 +178,20 @@ def command(
             duration if duration is not None else driver.end - driver.start or 2.0,
             warm_up,
             loop,
-            estimate_error=kind == ".json",
+            estimate_error=kind == "json",
         )
         pinned = _pinned(document, scene, node, cloth, pin)
         announce_compiling(voice)
         try:
             run = simulate_cloth(scene, driver, node, pinned, options)
         except UnstableError as error:
-            if kind == ".json" and error.report is not None and not dry_run:
-                _write_report(error.report, str(report))
-            _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
+            if report is not None and error.report is not None and not dry_run:
+                write_report(error.report, report)
             raise
     excess = describe_elongation(run.report.worst_stretch, run.report.figures["substeps"], limit)
     if excess:
-        if kind == ".json" and not dry_run:
-            _write_report(run.report, str(report))
-        _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
+        if report is not None and not dry_run:
+            write_report(run.report, report)
         raise CheckError(excess, help=run.report.advice)
     cache = run.cache if up is None else up_axis.to_up_axis(run.cache, str(up))
     meters = (
@@ -187,9 +200,8 @@ def command(
     saved = cache_files.save(
         cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
     )
-    if kind == ".json" and not dry_run:
-        _write_report(run.report, str(report))
-    _draw_report(scene, node, pinned, options, report, kind, dry_run=dry_run)
+    if report is not None and not dry_run:
+        write_report(run.report, report)
     for note in saved.written.notes:
         voice.info(f"note: {note}")
     name = "stdout" if output == documents.PIPE else output
@@ -197,32 +209,6 @@ def command(
     voice.info(f"{name}  {text.format_bytes(saved.size)}, {_summary(run)}, {took}{' (dry run)' if dry_run else ''}")
     if run.report.advice:
         voice.warn(run.report.advice)
-
-
-def _report_kind(report: str | None, solver: Solver) -> str:
-    """Ending of the report's name; "" without a report."""
-    if report is None:
-        return ""
-    kind = PurePath(report).suffix.lower()
-    if kind not in (".json", ".png", ".svg"):
-        raise UsageError(f"--report {report}: unsupported report format (expected .json, .png or .svg)")
-    if kind != ".json" and solver is not MASS_SPRING:
-        raise UsageError("--report as a picture needs --solver mass-spring: it draws every integrator")
-    documents.check_file(report)
-    return kind
-
-
-def _write_report(report: SimulationReport, path: str) -> None:
-    documents.write_text(json.dumps(report.to_json(), indent=2, ensure_ascii=False) + "\n", path)
-
-
-def _draw_report(
-    scene: Scene, node: int, pinned: Bools, options: ClothOptions, report: str | None, kind: str, *, dry_run: bool
-) -> None:
-    if report is None or kind == ".json" or dry_run:
-        return
-    picture = stability_plot(compare(scene, node, pinned, options), kind=kind[1:])
-    documents.write_bytes([np.frombuffer(picture, np.uint8)], report)
 
 
 def _summary(run: ClothRun) -> str:
@@ -266,36 +252,3 @@ def _pinned(document: Document, scene: Scene, node: int, cloth: list[str] | None
 
     pinned = select(pin or [])
     return pinned | ~select(cloth) if cloth else pinned
-
-
-def _sphere(given: str, scene: Scene) -> Capsule:
-    parts = given.split(",")
-    if len(parts) == 2:
-        node, radius = _node(parts[0], scene), _radius(parts[1], "--sphere", given)
-        return Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), radius, node, node)
-    if len(parts) != 4:
-        raise UsageError(f"--sphere is '{given}' (expected NODE,R or X,Y,Z,R)")
-    at = parse_vector(",".join(parts[:3]), "--sphere")
-    return Capsule(at, at, _radius(parts[3], "--sphere", given))
-
-
-def _capsule(given: str, scene: Scene) -> Capsule:
-    parts = given.split(",")
-    if len(parts) != 3:
-        raise UsageError(f"--capsule is '{given}' (expected NODE,NODE,R)")
-    radius = _radius(parts[2], "--capsule", given)
-    return Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), radius, _node(parts[0], scene), _node(parts[1], scene))
-
-
-def _node(glob: str, scene: Scene) -> int:
-    found = sorted(Selection((), (glob,)).chosen_nodes(scene.skeleton))
-    if len(found) > 1:
-        raise UsageError(f"'{glob}' names {len(found)} nodes (expected one)")
-    return found[0]
-
-
-def _radius(given: str, option: str, whole: str) -> float:
-    try:
-        return float(given)
-    except ValueError:
-        raise UsageError(f"{option} is '{whole}': '{given}' is no radius in metres") from None
