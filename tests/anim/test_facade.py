@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 import inspect
 import io
 import json
 import pickle
-import pydoc
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -26,19 +22,7 @@ import fixtures
 from anim import ops
 
 Array = NDArray[np.float64]
-ROOT = Path(__file__).resolve().parents[2]
-MAX_MAP_LINES = 60
 NAMES = [name for name in fixtures.FIXTURES if name in ("biped", "tube", "cubes", "noop")]
-
-
-@pytest.fixture
-def biped(tmp_path: Path) -> Path:
-    path = tmp_path / "biped.glb"
-    path.write_bytes(fixtures.build("biped"))
-    return path
-
-
-# Loading and saving.
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -106,64 +90,6 @@ def test_a_full_disk_is_an_output_error(buffering: int, biped: Path) -> None:
     assert raised == ["/dev/full: can't be written (no space left on device)"]
 
 
-def test_paths_bytes_and_files_load_alike(biped: Path) -> None:
-    data = biped.read_bytes()
-    for given in (str(biped), data, bytearray(data), memoryview(data), np.frombuffer(data, np.uint8), io.BytesIO(data)):
-        out = io.BytesIO()
-        anim.save(anim.load(given), out)
-        assert out.getvalue() == data
-
-
-@pytest.mark.parametrize("kind", [bytearray, memoryview, np.ndarray])
-def test_an_asset_does_not_share_memory_that_can_change(kind: Any, biped: Path) -> None:
-    """A reader's buffer, used again for the next file, changed the figure."""
-    data = biped.read_bytes()
-    buffer = bytearray(data)
-    given: Any = {bytearray: buffer, memoryview: memoryview(buffer), np.ndarray: np.frombuffer(buffer, np.uint8)}[kind]
-    asset = anim.load(given)
-    buffer[len(buffer) // 2 :] = bytes(len(buffer) - len(buffer) // 2)
-    np.testing.assert_array_equal(anim.sample(asset, "walk"), anim.sample(anim.load(data), "walk"))
-    out = io.BytesIO()
-    asset.save(out)
-    assert out.getvalue() == data
-
-
-def test_bytes_that_are_not_contiguous_load(biped: Path) -> None:
-    data = biped.read_bytes()
-    spread = bytearray(2 * len(data))
-    spread[::2] = data
-    assert len(anim.load(memoryview(spread)[::2]).clips) == len(anim.load(data).clips)
-    assert len(anim.load(np.frombuffer(spread, np.uint8)[::2]).clips) == len(anim.load(data).clips)
-
-
-@pytest.mark.parametrize("content", ["short", "zeros"])
-def test_a_file_rewritten_in_place_does_not_change_what_was_loaded(content: str, biped: Path) -> None:
-    """The interpreter was killed by SIGBUS: the pages of a mapped file were gone. So in a process of its own."""
-    lines = (
-        "import io, sys, anim",
-        f"path = {str(biped)!r}",
-        "data = open(path, 'rb').read()",
-        "asset = anim.load(path)",
-        f"other = b'short' if {content!r} == 'short' else data[: len(data) // 2].ljust(len(data), b'0')",
-        "open(path, 'wb').write(other)",
-        "out = io.BytesIO()",
-        "asset.save(out)",
-        "assert out.getvalue() == data",
-        "assert (anim.sample(asset, 'walk') == anim.sample(anim.load(data), 'walk')).all()",
-    )
-    run = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=False)
-    assert run.returncode == 0, (run.returncode, run.stderr)
-
-
-def test_a_file_that_fails_to_be_read_is_an_error_of_ours() -> None:
-    class Failing(io.BytesIO):
-        def read(self, size: int | None = -1) -> bytes:
-            raise OSError(5, "Input/output error")
-
-    with pytest.raises(anim.FormatError, match=r"can't be read \(input/output error\)"):
-        anim.load(Failing())
-
-
 @pytest.mark.parametrize(
     "call",
     [
@@ -191,114 +117,6 @@ def test_an_unknown_path_of_tracks_is_refused(biped: Path) -> None:
     assert ops.select_tracks(asset.clips[0], asset.skeleton, paths=["rotation", "pointer"])
 
 
-# Edits of the JSON.
-
-
-def _with_buffer(biped: Path) -> anim.Asset:
-    """The biped with a buffer of six floats, a view and an accessor appended to its JSON."""
-    asset, data = anim.load(biped), np.arange(6, dtype="<f4").tobytes()
-    address = f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
-    content = asset.document.json
-    content["buffers"].append({"byteLength": len(data), "uri": address})
-    content["bufferViews"].append({"buffer": len(content["buffers"]) - 1, "byteLength": len(data)})
-    view = len(content["bufferViews"]) - 1
-    content["accessors"].append({"bufferView": view, "componentType": 5126, "count": 6, "type": "SCALAR"})
-    return asset
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda asset: asset,
-        lambda asset: asset.map_clips(lambda clip: ops.retime(clip, speed=2)),
-        lambda asset: anim.optimize(asset, max_error="1mm", effort="fast").asset,
-    ],
-    ids=["save", "map_clips", "optimize"],
-)
-@pytest.mark.parametrize("ending", ["glb", "gltf"])
-def test_a_buffer_appended_to_the_json_is_saved(
-    change: Callable[[anim.Asset], anim.Asset], ending: str, biped: Path, tmp_path: Path
-) -> None:
-    change(_with_buffer(biped)).save(tmp_path / f"out.{ending}")
-    again = anim.load(tmp_path / f"out.{ending}").document
-    assert again.buffers[1].data.tobytes() == np.arange(6, dtype="<f4").tobytes()
-    assert [accessor["count"] for accessor in again.json["accessors"]].count(6) >= 1
-
-
-BROKEN: dict[str, tuple[Callable[[Any], object], str]] = {
-    "sampler": (lambda j: j["animations"][0]["channels"][0].update(sampler=999), "animations[0].channels[0].sampler"),
-    "negative": (lambda j: j["animations"][0]["channels"][0].update(sampler=-1), "animations[0].channels[0].sampler"),
-    "accessors": (lambda j: j["accessors"].clear(), "animations[0].samplers[0].input"),
-    "buffers": (lambda j: j["buffers"].pop(), "bufferViews[0].buffer"),
-    "channels": (lambda j: j["animations"][0].pop("channels"), "animations[0]"),
-}
-
-
-@pytest.mark.parametrize("fault", BROKEN)
-def test_references_broken_by_an_edit_are_named_with_their_path(fault: str, biped: Path) -> None:
-    edit, where = BROKEN[fault]
-    uses: tuple[Callable[[Any], object], ...] = (
-        lambda asset: asset.clips,
-        lambda asset: asset.scene,
-        lambda asset: asset.map_clips(lambda clip: ops.retime(clip, speed=2)),
-        lambda asset: asset.save(io.BytesIO()),
-    )
-    for use in uses:
-        asset = anim.load(biped)
-        edit(asset.document.json)
-        with pytest.raises(anim.FormatError) as caught:
-            use(asset)
-        assert caught.value.where == where
-
-
-@pytest.mark.parametrize(
-    ("extras", "where"),
-    [
-        ({"weight": np.float32(1)}, "nodes[0].extras.weight"),
-        ({"tags": [1, {"a"}]}, "nodes[0].extras.tags[1]"),
-        ({"by": {(1, 2): 3}}, "nodes[0].extras.by"),
-    ],
-)
-def test_values_that_are_no_json_are_named_with_their_path(extras: Any, where: str, biped: Path) -> None:
-    asset = anim.load(biped)
-    asset.document.json["nodes"][0]["extras"] = extras
-    with pytest.raises(anim.FormatError, match="is no JSON value") as caught:
-        asset.save(io.BytesIO())
-    assert caught.value.where == where
-
-
-def test_a_gltf_gets_its_bin_beside_it_and_loads_from_there(biped: Path, tmp_path: Path) -> None:
-    asset = anim.load(biped)
-    asset.save(tmp_path / "walk.gltf")
-    again = anim.load(tmp_path / "walk.gltf")
-    assert {path.name for path in tmp_path.iterdir()} == {"biped.glb", "walk.gltf", "walk.bin"}
-    assert anim.diff(asset, again).max_error == 0
-    other = tmp_path / "other"
-    other.mkdir()
-    again.save(other / "copy.gltf")
-    assert {path.name for path in other.iterdir()} == {"copy.gltf", "copy.bin"}
-
-
-@pytest.mark.parametrize("address", ["../secret.bin", "/etc/hostname", "link.bin", "%2e%2e/secret.bin"])
-def test_buffers_stay_in_the_folder_of_a_gltf(address: str, biped: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "folder"
-    folder.mkdir()
-    anim.load(biped).save(folder / "walk.gltf")
-    (folder / "walk.bin").rename(tmp_path / "secret.bin")
-    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
-    content = json.loads((folder / "walk.gltf").read_text())
-    content["buffers"][0]["uri"] = address
-    (folder / "walk.gltf").write_text(json.dumps(content))
-    with pytest.raises(anim.FormatError):
-        list(anim.load(folder / "walk.gltf").clips)
-
-
-def test_bytes_have_no_folder(biped: Path, tmp_path: Path) -> None:
-    anim.load(biped).save(tmp_path / "walk.gltf")
-    with pytest.raises(anim.FormatError, match="lies beside the file, but bytes have no folder"):
-        list(anim.load((tmp_path / "walk.gltf").read_bytes()).clips)
-
-
 @pytest.mark.parametrize(
     ("wrong", "error", "said"),
     [
@@ -314,9 +132,6 @@ def test_bytes_have_no_folder(biped: Path, tmp_path: Path) -> None:
 def test_slips_are_told(wrong: Callable[[Path], object], error: type[anim.AnimError], said: str, biped: Path) -> None:
     with pytest.raises(error, match=said):
         wrong(biped.parent)
-
-
-# Clips.
 
 
 def test_clips_are_taken_by_name_and_index(biped: Path) -> None:
@@ -387,48 +202,6 @@ def test_operations_are_in_the_docstring_and_take_tracks(name: str, biped: Path)
     assert all(new is old for new, old in zip(changed.tracks, clip.tracks, strict=True))
 
 
-# The package.
-
-
-def test_import_loads_nothing_until_it_is_used() -> None:
-    script = "import anim, sys; dir(anim); print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = set(run.stdout.split())
-    assert {name for name in loaded if name.startswith("anim")} == {"anim"}
-    assert not loaded & {"numpy", "scipy", "typer", "cli", "asyncio", "inspect"}
-
-
-def test_every_name_is_there_and_on_the_map() -> None:
-    text = inspect.getdoc(anim) or ""
-    assert len(text.splitlines()) <= MAX_MAP_LINES
-    for name in anim.__all__:
-        assert getattr(anim, name) is not None
-        assert name in text or name in ("BakedCache", "OptimizeResult", "Interpolation")
-    assert set(anim.__all__) <= set(dir(anim))
-    assert "anim.load(" in pydoc.plain(pydoc.render_doc(anim))
-    with pytest.raises(AttributeError, match="'lode'"):
-        anim.lode  # noqa: B018
-
-
-def test_the_hints_for_type_checkers_name_the_same() -> None:
-    lines = [line.split() for line in inspect.getsource(anim).splitlines() if line.startswith("    from anim")]
-    assert {line[-1]: line[1] for line in lines if line[-1] != "ops"} == anim._HOMES
-    assert (ROOT / "anim" / "py.typed").is_file()
-
-
-def test_functions_keep_their_names_when_rooms_are_imported() -> None:
-    """A room of the same name would take the place of a function when it is first imported."""
-    rooms = {path.name for path in (ROOT / "anim").iterdir() if path.is_dir()}
-    assert not rooms & set(anim.__all__)
-    assert {path.stem for path in (ROOT / "anim").glob("*.py")} & set(anim.__all__) == {"ops"}
-
-
-def test_the_module_runs_the_command() -> None:
-    run = subprocess.run([sys.executable, "-m", "anim", "--version"], cwd=ROOT, capture_output=True, text=True)
-    assert (run.returncode, run.stderr) == (0, "")
-    assert anim.__version__ in run.stdout
-
-
 def test_clips_made_in_python_are_appended(biped: Path) -> None:
     asset = anim.load(biped)
     rise = anim.Track(0, "translation", "LINEAR", [0, 1], [[0, 0, 0], [0, 1, 0]])
@@ -463,38 +236,3 @@ def test_what_is_optimized_already_has_an_error_of_zero_for_each_clip(biped: Pat
     again = anim.optimize(small.asset, max_error="1mm", effort="fast")
     assert again.errors == dict.fromkeys(small.errors, 0.0)
     assert again.max_error == 0
-
-
-# Documents edited by hand.
-
-
-def test_edits_after_a_view_was_used_are_seen(biped: Path) -> None:
-    asset = anim.load(biped)
-    assert asset.clips.names == ("walk", "wave", "jump")
-    asset.document.json["animations"].reverse()
-    halved = asset.map_clips(lambda clip: ops.retime(clip, speed=2), clips="walk")
-    assert [(clip.name, clip.end) for clip in halved.clips] == [("jump", np.float32(1.6)), ("wave", 2), ("walk", 0.5)]
-    assert list(anim.optimize(asset, clips="jump").errors) == ["jump"]
-    assert np.allclose(anim.sample(asset, 0, times=[0.8]), anim.sample(biped, "jump", times=[0.8]))
-    del asset.document.json["animations"][0]
-    assert asset.map_clips(lambda clip: ops.retime(clip, speed=2)).clips.names == ("wave", "walk")
-    assert anim.diff(biped, asset).max_error == float("inf")
-
-
-@pytest.mark.parametrize("normals", [False, True])
-def test_a_bake_checks_edits(normals: bool, biped: Path) -> None:
-    asset = anim.load(biped)
-    asset.document.json["nodes"][3]["rotation"] = [0, 0, 1, "a"]
-    with pytest.raises(anim.FormatError, match=re.escape("nodes[3].rotation: holds a string")):
-        anim.bake(asset, "walk", normals=normals)
-
-
-def test_a_pointer_track_names_its_extension(biped: Path) -> None:
-    pointer = "/materials/0/pbrMetallicRoughness/metallicFactor"
-    track = anim.Track(None, "pointer", "LINEAR", [0, 1], [[1], [0]], pointer=pointer)
-    asset = anim.load(biped)
-    added = asset.add_clips([anim.Clip("shine", (track,))])
-    changed = asset.map_clips(lambda clip: replace(clip, tracks=(*clip.tracks, track)), clips="walk")
-    for each in (added, changed, changed.map_clips(lambda clip: ops.retime(clip, speed=2))):
-        assert each.document.json["extensionsUsed"] == ["KHR_animation_pointer"]
-    assert "extensionsUsed" not in asset.document.json

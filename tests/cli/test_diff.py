@@ -17,8 +17,9 @@ from anim.model import Clip
 from tests.anim.show.reading import words
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
+from tests.cli.test_diff_matching import saved
 from tests.clips import about, clip, track
-from tests.files import glb_of, opened_fixture, opened_path
+from tests.files import opened_fixture, opened_path
 
 LIFT = 0.0005  # m
 
@@ -27,7 +28,7 @@ LIFT = 0.0005  # m
 def lifted(tmp_path: Path) -> tuple[Path, Path]:
     """The biped, and the same with one key of its walk's hips half a millimeter higher."""
     document = opened_fixture("biped")
-    return _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", _lifted(document))
+    return saved(tmp_path / "a.glb", document), saved(tmp_path / "b.glb", _lifted(document))
 
 
 def test_a_file_is_0_away_from_itself(fixture: Fixture, call: Call) -> None:
@@ -93,7 +94,7 @@ def test_a_missing_clip_is_named_and_stops_the_gate(tmp_path: Path, call: Call) 
     document = opened_fixture("biped")
     kept = [each for each in document.json["animations"] if each["name"] != "walk"]
     less = replace(document, json={**document.json, "animations": kept})
-    paths = _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", less)
+    paths = saved(tmp_path / "a.glb", document), saved(tmp_path / "b.glb", less)
     page = call("diff", *paths)
     assert page.code == 0
     assert f"1 clip only in {paths[0]}: 'walk'" in page.text
@@ -128,7 +129,7 @@ def test_a_shell_shows_nodes_without_vertices(tmp_path: Path, call: Call) -> Non
     document = replace(document, json={**document.json, "nodes": nodes, "scenes": _with_root(document, number)})
     turned = clip(*reader.clips(document)[0].tracks, track("rotation", [0], about("y", [2]), node=number))
     changed = writer.replace_clips(document, {0: Clip(reader.names(document)[0], turned.tracks)})
-    paths = _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", changed)
+    paths = saved(tmp_path / "a.glb", document), saved(tmp_path / "b.glb", changed)
     found = call("diff", *paths, "--format", "json").json
     chord = 2 * np.sin(np.radians(1))
     assert found["shell_m"] == pytest.approx(0.01 * found["diagonal_m"])
@@ -165,7 +166,7 @@ def test_a_picture_counts_what_it_leaves_out(asset: Find, tmp_path: Path, call: 
     document = opened_path(asset("Fox.glb"))
     clips = reader.clips(document)
     other = writer.replace_clips(document, {1: replace(clips[1], tracks=clips[1].tracks[:-3])})
-    changed = _saved(tmp_path / "b.glb", other)
+    changed = saved(tmp_path / "b.glb", other)
     call("diff", asset("Fox.glb"), changed, "--plot", tmp_path / "e.svg", "-q").product()
     said = words((tmp_path / "e.svg").read_bytes())
     assert "1 clip that differs, 2 without difference" in said
@@ -194,61 +195,6 @@ def test_bad_input_names_the_file_that_is_bad(lifted: tuple[Path, Path], tmp_pat
     assert "nowhere.glb" in refusal(call("diff", lifted[0], tmp_path / "nowhere.glb"), 3)
 
 
-def test_files_without_clips_can_be_held_against_each_other(tmp_path: Path, call: Call) -> None:
-    document = opened_fixture("biped")
-    bare = replace(document, json={key: value for key, value in document.json.items() if key != "animations"})
-    path = _saved(tmp_path / "bare.glb", bare)
-    assert "no clips to compare" in call("diff", path, path).text
-    run = call("diff", path, path, "--fail-above", "1m")
-    assert (run.code, run.err) == (6, f"gltf-anim: {path}, {path}: no clips to compare\n")
-    full = _saved(tmp_path / "full.glb", document)
-    assert call("diff", path, full, "--fail-above", "1m", "-q").code == 6
-    found = call("diff", path, path, "--format", "json").json
-    assert (found["clips"], found["max_error_m"]) == ([], 0)
-
-
-def test_strangers_are_called_that_before_anything_else(tmp_path: Path, call: Call) -> None:
-    """Nothing has the same name: clips and nodes are held against each other by order, which proves nothing."""
-    paths = _saved(tmp_path / "a.glb", opened_fixture("arm")), _saved(tmp_path / "b.glb", opened_fixture("biped"))
-    run = call("diff", *paths)
-    problem = "no clip and no node has the same name in both files"
-    assert run.code == 0
-    assert run.err == f"warning: {problem}: are they two versions of one thing?\n"
-    assert run.text.startswith(f"{problem}: ")
-    assert call("diff", *paths, "-q").err == run.err
-    found = call("diff", *paths, "--format", "json").json
-    assert (found["clips_matched_by_name"], found["nodes_matched_by_name"]) == (0, 0)
-    assert call("diff", *paths, "--fail-above", "1%").code == 6
-
-
-@pytest.mark.parametrize(("clips", "nodes"), [(True, False), (False, True), (True, True)])
-def test_one_name_in_common_makes_no_strangers(clips: bool, nodes: bool, tmp_path: Path, call: Call) -> None:
-    document = opened_fixture("biped")
-    names = {"animations": clips, "nodes": nodes}
-    other = {
-        key: [{**each, "name": each["name"] if kept else f"{each['name']} 2"} for each in document.json[key]]
-        for key, kept in names.items()
-    }
-    renamed = replace(document, json={**document.json, **other})
-    run = call("diff", _saved(tmp_path / "a.glb", document), _saved(tmp_path / "b.glb", renamed), "--format", "json")
-    assert run.err == ""
-    found = run.json
-    assert found["clips_matched_by_name"] == 3 * clips
-    assert found["nodes_matched_by_name"] == len(document.json["nodes"]) * nodes
-    assert found["max_error_m"] == 0  # by order they are the same all the same
-
-
-def test_files_without_names_are_no_strangers(tmp_path: Path, call: Call) -> None:
-    document = opened_fixture("biped")
-    bare = {key: [{**each, "name": ""} for each in document.json[key]] for key in ("animations", "nodes")}
-    nameless = _saved(tmp_path / "b.glb", replace(document, json={**document.json, **bare}))
-    assert "\nwave → #1 " in call("diff", _saved(tmp_path / "a.glb", document), nameless).text
-    for other in (nameless, _saved(tmp_path / "a.glb", document)):
-        run = call("diff", other, nameless)
-        assert run.err == ""
-        assert "3 clips compared, max 0 mm" in run.text
-
-
 def _lifted(document: Document) -> Document:
     number = reader.names(document).index("walk")
     walk = reader.clips(document)[number]
@@ -265,11 +211,6 @@ def _with_root(document: Document, node: int) -> list[dict[str, Any]]:
     return scenes
 
 
-def _saved(path: Path, document: Document) -> Path:
-    path.write_bytes(glb_of(document))
-    return path
-
-
 def test_the_moment_before_a_key_counts(tmp_path: Path, call: Call) -> None:
     """Quaternions too long, played as three.js does: an arc as it is, too large, up to a key; from it on the chord,
     normalized. No time that is looked at first shows the end of the arc."""
@@ -279,7 +220,7 @@ def test_the_moment_before_a_key_counts(tmp_path: Path, call: Call) -> None:
     true = clip(track("rotation", [0, 0.5, 1, 1.5], keys, node=joint), name="walk")
     long = clip(track("rotation", [0, 0.5, 1, 1.5], keys * [[1], [1.007], [1.007], [1]], node=joint), name="walk")
     paths = [
-        _saved(tmp_path / f"{i}.glb", writer.replace_clips(document, {0: each})) for i, each in enumerate((true, long))
+        saved(tmp_path / f"{i}.glb", writer.replace_clips(document, {0: each})) for i, each in enumerate((true, long))
     ]
     options = ("--clip", "walk", "--format", "json", "--player")
     (three,) = call("diff", *paths, *options, "three").json["clips"]
@@ -318,19 +259,3 @@ def test_one_file_as_two_players_show_it(fixture: Fixture, call: Call, tmp_path:
 )
 def test_players_that_can_t_be_compared(args: list[str], problem: str, fixture: Fixture, call: Call) -> None:
     assert problem in refusal(call("diff", fixture("arm"), *args), 2)
-
-
-@pytest.mark.parametrize(("lost", "said"), [(0, True), (1, True), (None, False)])
-def test_clips_of_one_name_are_said_to_be_matched_in_order(
-    lost: int | None, said: bool, tmp_path: Path, call: Call
-) -> None:
-    document = opened_fixture("arm")
-    clips = [{**each, "name": "c0"} for each in document.json["animations"]]
-    left = [each for i, each in enumerate(clips) if i != lost]
-    one, other = (
-        _saved(tmp_path / f"{name}.glb", replace(document, json={**document.json, "animations": animations}))
-        for name, animations in (("a", clips), ("b", left))
-    )
-    run = call("diff", one, other, "--format", "json", "-q")
-    assert bool(run.json["warnings"]) is said
-    assert ("2 clips named 'c0'" in run.err) is said

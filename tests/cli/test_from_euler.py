@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,52 +10,18 @@ import pytest
 
 from anim.exchange.formats import bvh_reader
 from anim.gltf.reading import reader
-from anim.gltf.writing import writer
-from anim.measure.error.metric import ErrorMetric
-from anim.model import Clip
 from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
-from tests.cli.running import Run, built, help_line, refusal, shell
-from tests.clips import track
-from tests.files import glb_of, opened, opened_fixture, opened_path
-
-SMALL = b"""HIERARCHY
-ROOT hip
-{
-  OFFSET 0 90 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT knee
-  {
-    OFFSET 0 -85 0
-    CHANNELS 3 Zrotation Xrotation Yrotation
-    End Site
-    {
-      OFFSET 0 -85 0
-    }
-  }
-}
-MOTION
-Frames: 2
-Frame Time: 0.033333
-0 90 0 0 0 0 0 0 0
-1 90 0 0 0 90 0 90 0
-"""
-CURVES = b"time,door.rx,door.ry,door.rz\n0,0,0,0\n1,90,90,0\n"
-XYZ = ("--order", "XYZ", "--axes", "intrinsic", "--unit", "deg")
-
-
-def _valid(data: bytes) -> None:
-    if not khronos.missing():
-        report = khronos.validate(data)
-        assert khronos.errors(report) == []
-        assert report["issues"]["numWarnings"] == 0
+from tests.cli.curve_files import CURVES, SMALL, XYZ, valid
+from tests.cli.running import Run, help_line, refusal, shell
+from tests.files import opened, opened_path
 
 
 @pytest.mark.parametrize("mesh", ["none", "sticks"])
 def test_a_bvh_through_a_pipe(call: Call, mesh: str) -> None:
     run = call("from-euler", "-", "-", "--skeleton-mesh", mesh, stdin=SMALL)
     document = opened(run.product())
-    _valid(run.out)
+    valid(run.out)
     bones, clip = reader.skeleton(document), reader.clips(document)[0]
     assert bones.names[:3] == ("hip", "knee", "knee_end")
     assert clip.name == "motion"
@@ -74,7 +38,7 @@ def test_two_figures_in_a_bvh(call: Call) -> None:
     text = f"HIERARCHY\n{roots}{roots.replace('hip', 'pelvis')}MOTION\nFrames: 2\nFrame Time: 0.1\n{rows}\n"
     run = call("from-euler", "-", "-", "--skeleton-mesh", "sticks", stdin=text.encode())
     document = opened(run.product())
-    _valid(run.out)
+    valid(run.out)
     assert [skin["joints"] for skin in document.json["skins"]] == [[0, 1], [3, 4]]
     assert "names that appear twice got numbers: knee.2" in run.err
 
@@ -109,7 +73,7 @@ def test_a_giant_is_told(call: Call) -> None:
 
 def test_csv_keys_follow_the_motion(call: Call) -> None:
     run = call("from-euler", "-", "-", *XYZ, "--angle-tolerance", "0.1deg", stdin=CURVES)
-    _valid(run.out)
+    valid(run.out)
     assert 3 < len(reader.clips(opened(run.product()))[0].tracks[0].times) <= 17
 
 
@@ -122,7 +86,7 @@ def test_the_range_of_angles_shows_a_wrong_unit(call: Call) -> None:
 def test_a_body_without_a_size(call: Call) -> None:
     """Hidden things have a scale of 0, whose matrix has no inverse."""
     flat = b"#node,door,,0,0,0,0,0,0,0,1,1\n#node,knob,door,1,0,0\n" + CURVES
-    _valid(call("from-euler", "-", "-", *XYZ, "--skeleton-mesh", "sticks", stdin=flat).product())
+    valid(call("from-euler", "-", "-", *XYZ, "--skeleton-mesh", "sticks", stdin=flat).product())
 
 
 def test_an_order_in_small_letters_and_keys_before_zero(call: Call) -> None:
@@ -141,157 +105,10 @@ def test_a_gltf_with_its_bin(call: Call, tmp_path: Path) -> None:
 def test_real_files_are_valid(name: str, call: Call, asset: Find) -> None:
     run = call("from-euler", asset(f"bvh/{name}"), "-", "--skeleton-mesh", "sticks")
     document = opened(run.product())
-    _valid(run.out)
+    valid(run.out)
     assert reader.clips(document)[0].name == name.removesuffix(".bvh")
     nodes = bvh_reader.read(asset(f"bvh/{name}").read_bytes()).nodes
     assert len(document.json["skins"][0]["joints"]) == sum(not node.end for node in nodes)
-
-
-def test_onto_a_character(call: Call, asset: Find, fixture: Fixture) -> None:
-    run = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", fixture("biped"), "-v")
-    document = opened(run.product())
-    _valid(run.out)
-    assert [clip.name for clip in reader.clips(document)] == ["walk", "wave", "jump", "cmu_01_01"]
-    assert "onto: 21 of 31 joints matched; not: 'LHipJoint', 'RHipJoint'" in run.err
-    assert "LeftUpLeg → left_upper_leg" in run.err
-
-
-@pytest.mark.parametrize("axis", ["Z", "X"])
-def test_a_character_that_lies_at_rest_is_warned_of(axis: str, call: Call, asset: Find) -> None:
-    """The biped's nodes, without its skin, below a node that is turned by 90°."""
-    document = opened_fixture("biped")
-    nodes = [{key: each[key] for key in each if key not in ("mesh", "skin")} for each in document.json["nodes"]]
-    turn = [0.5**0.5, 0, 0, 0.5**0.5] if axis == "Z" else [0, 0, 0.5**0.5, 0.5**0.5]
-    nodes.append({"name": "armature", "rotation": turn, "children": document.json["scenes"][0]["nodes"]})
-    rest = {key: each for key, each in document.json.items() if key not in ("skins", "meshes")}
-    json = {**rest, "nodes": nodes, "scenes": [{"nodes": [len(nodes) - 1]}]}
-    lying = glb_of(replace(document, json=json))
-    run = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", "-", stdin=lying)
-    run.product()
-    words = f"the motion's figure stands along Y, the character along {axis}: it will lie; is its file {axis}-up?"
-    assert words in run.err
-    standing = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", "-", stdin=built("biped"))
-    assert "it will lie" not in standing.err
-    turned = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--up", "z", "--onto", "-", stdin=built("biped"))
-    assert "it will lie" in turned.err
-
-
-def test_without_legs_and_feet_the_path_is_by_height_and_nothing_is_floored(
-    call: Call, asset: Find, tmp_path: Path
-) -> None:
-    """The recorded person is 1.47 m tall, the character's nodes 1.20 m."""
-    text = asset("bvh/cmu_01_01.bvh").read_text()
-    for name in ("Hips", "HipJoint", "UpLeg", "Leg", "Foot", "ToeBase", "LowerBack"):
-        text = re.sub(rf"(ROOT|JOINT) (\w*){name}\b", r"\1 \2Unknown" + str(len(name)), text)
-    (tmp_path / "upper.bvh").write_text(text)
-    run = call("from-euler", tmp_path / "upper.bvh", "-", "--onto", asset("BitmojiRun.glb"))
-    run.product()
-    assert "legs, feet; the path is scaled by the sizes of both figures" in run.err
-    assert "for the floor" not in run.err
-    assert float(run.err.split("onto: path × ")[1].split()[0]) == pytest.approx(1.20 / 1.47, abs=0.01)
-
-
-def test_a_name_that_is_taken_gets_a_number(call: Call, fixture: Fixture, tmp_path: Path) -> None:
-    (tmp_path / "walk.bvh").write_bytes(SMALL)
-    (tmp_path / "names.csv").write_text("hip,hips\n")
-    onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
-    run = call("from-euler", *onto)
-    assert [clip.name for clip in reader.clips(opened(run.product()))] == ["walk", "wave", "jump", "walk 2"]
-    assert "warning: the character has a clip 'walk': this one is called 'walk 2'" in run.err
-    told = call("from-euler", *onto, "--name", "walk")
-    assert [clip.name for clip in reader.clips(opened(told.product()))] == ["walk", "wave", "jump", "walk"]
-    assert "warning: a second clip 'walk': #3 beside #0, which players and diff find first (--replace '#0'" in told.err
-
-
-def test_a_clip_gives_way(call: Call, fixture: Fixture, tmp_path: Path) -> None:
-    (tmp_path / "walk.bvh").write_bytes(SMALL)
-    (tmp_path / "names.csv").write_text("hip,hips\n")
-    onto = (tmp_path / "walk.bvh", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv")
-    by_name = call("from-euler", *onto, "--replace", "wave")
-    document = opened(by_name.product())
-    assert [clip.name for clip in reader.clips(document)] == ["walk", "wave", "jump"]
-    assert reader.clips(document)[1].end == pytest.approx(1 / 30)
-    assert "the character has a clip" not in by_name.err
-    assert call("from-euler", *onto, "--replace", "#1").out == by_name.out
-    assert call("from-euler", *onto, "--replace", "w*").code == 5
-    missing = call("from-euler", *onto, "--replace", "wavy")
-    assert (missing.code, "did you mean 'wave'?" in missing.err) == (5, True)
-    for same in ("wave", "#1"):
-        assert call("from-euler", *onto, "--replace", same, "--name", "wave").product() == by_name.out
-    other = call("from-euler", *onto, "--replace", "#1", "--name", "hello")
-    assert "--replace keeps the name of the clip, 'wave' (got --name 'hello')" in refusal(other, 2)
-    assert help_line(other) == "leave --name out"
-
-
-def test_what_a_bvh_does_not_hold_stays_when_the_clip_gives_way(call: Call, asset: Find, tmp_path: Path) -> None:
-    character = asset("BitmojiRun.glb")
-    call("to-euler", character, tmp_path / "run.bvh")
-    run = call("from-euler", tmp_path / "run.bvh", "-", "--onto", character, "--replace", "#0")
-    before, after = (reader.clips(opened(data))[0] for data in (character.read_bytes(), run.product()))
-    now = {(track.node, track.path) for track in after.tracks}
-    moved = {(t.node, t.path) for t in before.tracks if np.ptp(t.values, axis=0).max() > 1e-4 and t.path != "scale"}
-    assert moved <= now
-    assert ErrorMetric(reader.scene(opened(run.product()))).error(before, after).max_error < 1e-4
-    assert "tracks of 'lbr_run_normal_anm_default' that the motion has no node for stay" in run.err
-    other = call("from-euler", asset("bvh/cmu_01_01.bvh"), "-", "--onto", character, "--replace", "#0")
-    assert "that the motion has no node for go with it" in other.err
-
-
-def test_a_scale_that_a_bvh_does_not_hold_is_named_when_its_clip_gives_way(call: Call, tmp_path: Path) -> None:
-    content = json.loads(json.dumps(opened_fixture("biped").json))
-    content["nodes"].append({"name": "armature", "children": [0]})
-    armature = content["scenes"][0]["nodes"][0] = len(content["nodes"]) - 1
-    document = replace(opened_fixture("biped"), json=content)
-    walk = reader.clips(document)[0]
-    for largest, named in ((2.0, True), (1.0, False)):
-        scale = track("scale", [0, 1], [[1.0] * 3, [largest] * 3], node=armature)
-        character = tmp_path / "scaled.glb"
-        character.write_bytes(glb_of(writer.replace_clips(document, {0: Clip("walk", (*walk.tracks, scale))})))
-        call("to-euler", character, tmp_path / "walk.bvh", "--clip", "walk")
-        onto = ("--onto", character, "--replace", "walk", "--scale", ".01", "-q")
-        run = call("from-euler", tmp_path / "walk.bvh", "-", *onto)
-        run.product()
-        assert ("warning: the motion lacks the scale of node 22 'armature' in 'walk'" in run.err) == named
-
-
-def test_strangers_are_shown_how_to_pair(call: Call, asset: Find) -> None:
-    run = call("from-euler", asset("bvh/example.bvh"), "-", "--onto", asset("CesiumMan.glb"))
-    assert "no joint of the motion is one of the character" in refusal(run, 5)
-    assert help_line(run) == "pair them in an --alias file, in lines such as 'Hips,Skeleton_torso_joint_1'"
-
-
-def test_strangers_are_listed_where_all_is_to_be_said(call: Call, asset: Find) -> None:
-    to = ("from-euler", asset("bvh/example.bvh"), "-", "--onto", asset("CesiumMan.glb"))
-    run = call(*to, "-v")
-    assert (run.code, run.out) == (5, b"")
-    *lists, problem, help = run.err.splitlines()
-    assert "no joint of the motion is one of the character" in problem
-    assert help.startswith("help: pair them")
-    joints, others = (line.split(": ", 1) for line in lists[-2:])
-    assert joints[0] == "joints of the motion (18)"
-    assert joints[1].split(", ")[:3] == ["'Hips'", "'Chest'", "'Neck'"]
-    assert others[0] == "joints of the character (19)"
-    assert others[1].split(", ")[0] == "'Skeleton_torso_joint_1'"
-    assert len(others[1].split(", ")) == 19
-    assert "joints of the character" not in call(*to).err
-
-
-def test_too_many_strangers_fail(call: Call, asset: Find, fixture: Fixture) -> None:
-    source, character = asset("bvh/cmu_01_01.bvh"), fixture("biped")
-    run = call("from-euler", source, "-", "--onto", character, "--fail-unmatched", "9")
-    assert "10 joints could not be matched (limit 9)" in refusal(run, 6)
-    assert call("from-euler", source, "-", "--onto", character, "--fail-unmatched", "10").code == 0
-
-
-def test_aliases(call: Call, fixture: Fixture, tmp_path: Path) -> None:
-    (tmp_path / "names.csv").write_text("hip,hips\nknee,left_lower_leg\n")
-    run = call("from-euler", "-", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv", stdin=SMALL)
-    run.product()
-    assert "onto: 2 of 2 joints matched" in run.err
-    (tmp_path / "names.csv").write_text("hop,hips\n")
-    run = call("from-euler", "-", "-", "--onto", fixture("biped"), "--alias", tmp_path / "names.csv", stdin=SMALL)
-    assert "alias for 'hop'" in refusal(run, 5)
-    assert help_line(run) == "did you mean 'hip'?"
 
 
 def test_the_report_as_json(call: Call, tmp_path: Path) -> None:

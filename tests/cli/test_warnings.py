@@ -14,8 +14,8 @@ import pytest
 from cli.main import COMMANDS
 from tests.anim.skinning.odd_rigs import with_bad_sums
 from tests.cli.conftest import Call
+from tests.cli.curve_files import SMALL
 from tests.cli.running import ROOT, built
-from tests.cli.test_from_euler import SMALL
 from tests.cli.test_instancing import with_copies
 
 SUMS = "don't add up to 1"
