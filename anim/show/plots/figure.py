@@ -125,6 +125,18 @@ def format_number(number: float) -> str:
     return f"{float(f'{number:.3g}'):.12f}".rstrip("0").rstrip(".").replace("-", "−")
 
 
+def time_labels(times: Sequence[float]) -> list[str]:
+    """Return labels of ticks in seconds, the last with its unit, with as many decimals as keep them apart.
+
+    time_labels([100, 100.25, 100.5]) → ["100", "100.25", "100.5 s"]
+    """
+    step = min(np.diff(times), default=max(map(abs, times), default=1.0))
+    digits = next(n for n in range(13) if n == 12 or all(abs(round(t, n) - t) <= 1e-3 * step for t in times))
+    labels = [f"{round(t, digits) + 0.0:.{digits}f}".replace("-", "−") for t in times]
+    labels = [label.rstrip("0").rstrip(".") if "." in label else label for label in labels]
+    return [*labels[:-1], *(f"{label} s" for label in labels[-1:])]
+
+
 def edge_lines(points: Floats, edges: Ints) -> Floats:
     """Return both ends of every edge (E, 2) of points (P, 2), and NaN behind them (3 E, 2).
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.show.plots import polylines
-from anim.show.plots.figure import HAIR, SOFT, format_number
+from anim.show.plots.figure import HAIR, SOFT, time_labels
 from anim.show.plots.rotations import RotationCurve
 from anim.show.plots.track_selection import PlotTrack
 
@@ -37,9 +37,7 @@ def time_axis(axes: Axes, each: PlotTrack, *, labeled: bool) -> None:
         axes.tick_params(axis="x", labelbottom=False)
         return
     ticks = [t for t in axes.get_xticks() if low - 1e-9 <= t <= high + 1e-9]
-    axes.set_xticks(
-        ticks, [f"{format_number(t)} s" if i == len(ticks) - 1 else format_number(t) for i, t in enumerate(ticks)]
-    )
+    axes.set_xticks(ticks, time_labels(ticks))
     axes.tick_params(axis="x", which="major", length=4, width=0.6, color=SOFT)
     frames = (high - low) * each.fps if each.fps is not None else 0.0
     if each.fps is not None and 2 <= frames <= width / 3:

@@ -17,7 +17,20 @@ from anim.errors import RangeError, ShapeError
 from anim.maths import hermite
 from anim.measure.continuity.continuity import ContinuityClass, KeyJumps, at_keys
 from anim.model import Interpolation, Track
-from anim.show.plots.figure import COLORS, FAINT, INK, PAPER, SMALL, SOFT, TEXT, TITLE, Figure, format_number, style
+from anim.show.plots.figure import (
+    COLORS,
+    FAINT,
+    INK,
+    PAPER,
+    SMALL,
+    SOFT,
+    TEXT,
+    TITLE,
+    Figure,
+    format_number,
+    style,
+    time_labels,
+)
 from anim.show.plots.panel_axes import plain
 
 if TYPE_CHECKING:
@@ -202,8 +215,7 @@ def _rates(axes: Axes, curves: Sequence[_Curve], which: int) -> None:
 
 def _seconds(axes: Axes, times: Floats) -> None:
     ticks = times if len(times) <= 12 else np.linspace(times[0], times[-1], 6)
-    names = [f"{format_number(float(t))} s" if t == ticks[-1] else format_number(float(t)) for t in ticks]
-    axes.set_xticks(ticks.tolist(), names)
+    axes.set_xticks(ticks.tolist(), time_labels(ticks.tolist()))
     axes.set_xlim(float(times[0]), float(times[-1]))
     axes.grid(axis="x", color=FAINT, linewidth=0.8)
     axes.tick_params(axis="x", labelbottom=True)

@@ -94,17 +94,25 @@ def _cell(sheet: Figure, each: PlotTrack, x: float, y: float, width: float, slac
         if i:
             sheet.text(left, at - 0.07, caption, fontsize=SMALL, color=SOFT)
         else:
-            _title(sheet, each, left, y + 0.2, caption, many_clips=many_clips)
+            _title(sheet, each, (left, y + 0.2, width - LEFT), caption, many_clips=many_clips)
         panel_axes.time_axis(axes, each, labeled=i == len(kinds) - 1)
         at += tall + CAPTION
 
 
-def _title(sheet: Figure, each: PlotTrack, x: float, y: float, caption: str, *, many_clips: bool) -> None:
-    x += 0.14 + sheet.text(x, y, _tail(each.target, 36), fontsize=TITLE, weight="bold")
+def _title(
+    sheet: Figure, each: PlotTrack, place: tuple[float, float, float], caption: str, *, many_clips: bool
+) -> None:
+    """Write the target in bold, and what is drawn. place: x, y and width of both."""
+    x, y, width = place
     words = [_quantity(each) + caption, _keys(each)]
     if many_clips:
         words.insert(0, _tail(each.clip, 24))
-    sheet.text(x, y, "  ·  ".join(word for word in words if word), fontsize=SMALL, color=SOFT)
+    line = "  ·  ".join(word for word in words if word)
+    available = width - 0.14 - text_width(line, SMALL)
+    tails = [_tail(each.target, most) for most in range(36, 4, -1)]
+    name = next((tail for tail in tails if text_width(tail, TITLE, "bold") <= available), tails[-1])
+    x += 0.14 + sheet.text(x, y, name, fontsize=TITLE, weight="bold")
+    sheet.text(x, y, line, fontsize=SMALL, color=SOFT)
 
 
 def _quantity(each: PlotTrack) -> str:
@@ -121,7 +129,7 @@ def _keys(each: PlotTrack) -> str:
         other, more = str(each.other.interpolation).lower(), f"{len(each.other.times)}"
         how = how if how == other else f"{how} → {other}"
         count = count if count == more else f"{count} → {more}"
-    return f"{how}, {count} keys"
+    return f"{how}, {count} key{'s' * (count != '1')}"
 
 
 def _tail(name: str, most: int) -> str:

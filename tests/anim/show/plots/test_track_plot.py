@@ -15,7 +15,8 @@ from anim.gltf.document import Document
 from anim.model import Clip, Track
 from anim.operations.resample import resample
 from anim.operations.selection import Selection
-from anim.show.plots.track_plot import LIMIT, Names, track_plot
+from anim.show.plots.figure import SMALL, TITLE, style, text_width
+from anim.show.plots.track_plot import COLUMN, LIMIT, Names, track_plot
 from anim.show.plots.track_selection import TrackSelection, compare, select_tracks
 from tests import clips
 from tests.anim.show.reading import png_size, words
@@ -182,3 +183,25 @@ def test_real_files(asset: Callable[[str], Path], name: str) -> None:
 def test_fixtures_as_png(name: str) -> None:
     found = select_tracks(opened_fixture(name), ALL, limit=4)
     assert png_size(track_plot(found.shown, title=name, kind="png")) > (900, 300)
+
+
+def test_times_of_a_late_clip_are_kept_apart() -> None:
+    """The ticks from 100 s to 100.5 s were all labeled 100."""
+    late = document(clips.track("translation", [100, 100.5], BUMP[:2]))
+    said = drawn(select_tracks(late, ALL, limit=1))
+    assert {"100", "100.25", "100.5 s"} <= set(said)
+
+
+def test_names_in_wide_letters_leave_space_for_the_next_track() -> None:
+    two = [clips.track("translation", [0, 1], BUMP[:2], node=node) for node in (0, 1)]
+    said = drawn(select_tracks(document(*two, names=("とても長い名前" * 6, "b", "c")), ALL, limit=2))
+    name = next(each for each in said if each.startswith("…"))
+    words = "translation, m  ·  linear, 2 keys"
+    assert words in said
+    with style("svg"):
+        assert text_width(name, TITLE, "bold") + text_width(words, SMALL) < COLUMN
+
+
+def test_one_key_is_singular() -> None:
+    one = document(clips.track("translation", [1], [[1, 2, 3]]))
+    assert "translation, m  ·  linear, 1 key" in drawn(select_tracks(one, ALL, limit=1))
