@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from anim.arrays import Floats, Ints
 from anim.check.finding import Occurrence
-from anim.gltf.document import Document, Json, node_label
+from anim.check.track_table import TrackTable, track_table
+from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts
-from anim.model import Clip, Scene, Skeleton
+from anim.model import Clip, Scene, Skeleton, Track
+from anim.sampling.pose import rest_world
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,30 @@ class CheckedFile:
     def diagonal(self) -> float:
         """Diagonal of the model at rest in metres (of its nodes if it has no vertices)."""
         return diagonal(self.scene)
+
+    @cached_property
+    def rest_world(self) -> Floats:
+        """World matrices of all nodes at rest (N, 3, 4)."""
+        return rest_world(self.skeleton)
+
+    @cached_property
+    def joints(self) -> list[int]:
+        """Indices of the nodes that are joints of a skin, sorted."""
+        return sorted({joint for skin in json_array(self.json, "skins") for joint in skin["joints"]})
+
+    @cached_property
+    def scales(self) -> TrackTable:
+        """Keys of all scale tracks of the chosen clips."""
+        return self.tracks("scale")
+
+    def tracks(self, path: str, wanted: Callable[[Track], bool] = lambda track: True) -> TrackTable:
+        """Return the keys of tracks of a path in the chosen clips."""
+        return track_table(((report.index, clip) for report, clip in self.clips()), path, wanted)
+
+    def per_clip(self, table: TrackTable, counts: Ints) -> Iterator[Occurrence]:
+        """Yield an occurrence for each clip with counts of its tracks (T,) above 0."""
+        for clip, count in table.per_clip(counts):
+            yield self.in_clip(clip, count)
 
     def clips(self) -> Iterator[tuple[ClipReport, Clip]]:
         """Yield the chosen, readable clips with their reports."""

@@ -84,6 +84,8 @@ def test_faults_are_findings_with_names_and_advice(noop: bytes, call: Call) -> N
         "no-effect-tracks": "info",
         "redundant-keys": "info",
         "late-start": "info",
+        "one-instant": "info",
+        "loop-seam": "warning",
     }
     assert all(finding[key] for finding in findings for key in ("where", "problem", "advice"))
     assert next(f["where"] for f in findings if f["name"] == "wide-steps") == "clip 'half_turn'"

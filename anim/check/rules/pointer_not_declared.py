@@ -1,0 +1,31 @@
+"""GA501: KHR_animation_pointer that is not in extensionsUsed, or the reverse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence, Severity
+from anim.check.rule import Parameters, Rule
+from anim.gltf.document import json_array
+from anim.gltf.validation.channel_targets import EXTENSION
+
+
+def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield the file."""
+    clips = json_array(file.json, "animations")
+    uses = sum(channel["target"]["path"] == "pointer" for clip in clips for channel in clip["channels"])
+    if uses and EXTENSION not in file.json.get("extensionsUsed", ()):
+        problem = f"{uses} channels use {EXTENSION}, which is not in extensionsUsed"
+        yield Occurrence("extensionsUsed", "/extensionsUsed", uses, problem=problem)
+
+
+RULE = Rule(
+    "GA501",
+    "pointer-not-declared",
+    Severity.ERROR,
+    "Channels use KHR_animation_pointer, and extensionsUsed does not name it.",
+    "Loaders skip extensions that are not declared; validators report an error (donmccurdy/glTF-Transform#1448).",
+    find,
+    advice="add it to extensionsUsed where the file is made",
+)

@@ -1,0 +1,31 @@
+"""GA117: scales that change sign between keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence, Severity
+from anim.check.rule import Parameters, Rule, counted
+
+
+def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield the clips with the number of such steps."""
+    table = file.scales
+    flips = table.inner_steps()
+    flips[1:] &= (table.values[1:] * table.values[:-1] < 0).any(axis=1)
+    yield from file.per_clip(table, table.count(np.asarray(flips)))
+
+
+RULE = Rule(
+    "GA117",
+    "scale-through-zero",
+    Severity.WARNING,
+    "A scale changes its sign between two keys.",
+    "On the way it is zero, so that the mesh collapses and turns inside out.",
+    find,
+    counted("scale changes its sign between keys", "scales change their sign between keys"),
+    "use STEP keys there, or two meshes, where the file is made",
+)

@@ -1,0 +1,35 @@
+"""GA207: nodes of skinned meshes with a transform."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence, Severity
+from anim.check.rule import Parameters, Rule, counted
+from anim.gltf.document import json_array
+
+TOLERANCE = 1e-6
+
+
+def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield the nodes that have or inherit a transform."""
+    world = file.rest_world
+    for i, node in enumerate(json_array(file.json, "nodes")):
+        if "mesh" in node and "skin" in node and np.abs(world[i] - np.eye(4)[:3]).max() > TOLERANCE:
+            yield file.in_node(i)
+
+
+RULE = Rule(
+    "GA207",
+    "skinned-mesh-under-transform",
+    Severity.WARNING,
+    "The node of a skinned mesh has or inherits a transform.",
+    "glTF ignores it, as joints place the mesh. Players that apply it show the mesh in another place "
+    "(google/model-viewer#572); the Khronos validator warns.",
+    find,
+    counted("skinned mesh has a transform that is ignored", "skinned meshes have a transform that is ignored"),
+    "put the mesh's node at the root of the scene where the file is made",
+)

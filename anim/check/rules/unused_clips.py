@@ -1,0 +1,46 @@
+"""GA005: clips that animate nothing of any scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence, Severity
+from anim.check.rule import Parameters, Rule, counted
+from anim.gltf.document import json_array
+
+
+def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield the clips; none of files without scenes, whose nodes are all shown."""
+    scenes = json_array(file.json, "scenes")
+    if not scenes:
+        return
+    shown = _reachable(file, [root for scene in scenes for root in scene.get("nodes", ())])
+    for report, clip in file.clips():
+        targets = {track.node for track in clip.tracks}
+        if targets and None not in targets and not targets & shown:
+            yield file.in_clip(report.index)
+
+
+def _reachable(file: CheckedFile, roots: list[int]) -> set[int | None]:
+    nodes = json_array(file.json, "nodes")
+    found: set[int | None] = set()
+    stack = roots
+    while stack:
+        node = stack.pop()
+        if node not in found:
+            found.add(node)
+            stack = [*stack, *nodes[node].get("children", ())]
+    return found
+
+
+RULE = Rule(
+    "GA005",
+    "unused-clips",
+    Severity.WARNING,
+    "Clips animate nodes that are in no scene.",
+    "Players skip them, or animate another node of the same name (mrdoob/three.js#22204).",
+    find,
+    counted("clip animates nothing of any scene", "clips animate nothing of any scene"),
+    "add the nodes to a scene, or leave the clips out where the file is made",
+)

@@ -1,0 +1,32 @@
+"""GA118: morph weights outside 0 … 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence, Severity
+from anim.check.rule import Parameters, Rule, counted
+
+TOLERANCE = 1e-6
+
+
+def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield the clips with the number of such keys."""
+    for report, clip in file.clips():
+        weights = [track.values for track in clip.tracks if track.path == "weights"]
+        keys = sum(int(((values < -TOLERANCE) | (values > 1 + TOLERANCE)).any(axis=1).sum()) for values in weights)
+        if keys:
+            yield file.in_clip(report.index, keys)
+
+
+RULE = Rule(
+    "GA118",
+    "weights-out-of-range",
+    Severity.INFO,
+    "Keys have morph weights below 0 or above 1.",
+    "glTF allows them. gltfpack, Blender and Unity clamp them, so that the motion differs.",
+    find,
+    counted("key has a morph weight outside 0 … 1", "keys have morph weights outside 0 … 1"),
+    "scale the morph targets where the file is made, so that weights stay within 0 … 1",
+)

@@ -1,0 +1,64 @@
+"""Keys of many tracks of one path in one array, for rules that look at all tracks of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, Ints
+from anim.model import Clip, Track
+
+
+@dataclass(frozen=True, slots=True)
+class TrackTable:
+    """Keys (S, C) of T tracks with a node, one after the other. clips, nodes, starts, counts: (T,)."""
+
+    clips: Ints
+    nodes: Ints
+    starts: Ints
+    counts: Ints
+    values: Floats
+
+    def count(self, marked: Bools) -> Ints:
+        """Return the number of marked keys (S,) of each track (T,)."""
+        return np.asarray(np.add.reduceat(marked, self.starts, dtype=np.int64)) if len(self.starts) else self.starts
+
+    def range(self) -> tuple[Floats, Floats]:
+        """Return the smallest and the largest value (T, C) of each track."""
+        if not len(self.starts):
+            return self.values, self.values
+        return np.minimum.reduceat(self.values, self.starts), np.maximum.reduceat(self.values, self.starts)
+
+    def inner_steps(self) -> Bools:
+        """Return a mask (S,): False for the first key of a track, which has no step before it."""
+        mask = np.ones(len(self.values), np.bool_)
+        mask[self.starts] = False
+        return mask
+
+    def per_clip(self, counts: Ints) -> Iterator[tuple[int, int]]:
+        """Yield the index of each clip with counts (T,) of its tracks above 0, and their sum."""
+        for clip in dict.fromkeys(self.clips[counts > 0].tolist()):
+            yield clip, int(counts[self.clips == clip].sum())
+
+
+def track_table(
+    clips: Iterable[tuple[int, Clip]], path: str, wanted: Callable[[Track], bool] = lambda track: True
+) -> TrackTable:
+    """Return the wanted tracks of a path in clips with their indices. path: not "weights", whose width differs."""
+    found = [
+        (index, track)
+        for index, clip in clips
+        for track in clip.tracks
+        if track.path == path and track.node is not None and wanted(track)
+    ]
+    counts = np.array([len(track.values) for _, track in found], np.int64)
+    values = [track.values for _, track in found]
+    return TrackTable(
+        np.array([clip for clip, _ in found], np.int64),
+        np.array([track.node for _, track in found], np.int64),
+        np.cumsum(counts) - counts,
+        counts,
+        np.concatenate(values) if values else np.zeros((0, 4 if path == "rotation" else 3)),
+    )
