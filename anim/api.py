@@ -186,7 +186,7 @@ def bake(
 
     method: "lbs", "dqs", "cor", …, a name in `anim.SKINNING_METHODS`. fps: frames per second; or times, in seconds;
     without both a frame per key. space: "world" or "mesh". normals, tangents: bake those too.
-    rigid: include meshes without a skin. meshes: globs for names of meshes; all by default.
+    rigid: include meshes without a skin. meshes: globs for names of meshes; by default all, of all scenes.
     bake("walk.glb", "walk", method="dqs", fps=24).save("walk.usdc")
     """
     asset = as_asset(asset)

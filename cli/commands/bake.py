@@ -87,9 +87,9 @@ def command(
 ) -> None:
     """Bake skinning and morph targets to a vertex cache, also by methods that glTF players lack.
 
-    Vertices are in scene order: nodes depth-first, primitives as in the file, vertices as in their accessors. Skinned
-    meshes are in world space, and the transform of their own node is ignored. If there are several clips, OUT must
-    contain {clip}, which is replaced by the name of each; {mesh} in OUT writes a file per mesh.
+    Vertices are in scene order, those of all scenes: nodes depth-first, primitives as in the file, vertices as in their
+    accessors. Skinned meshes are in world space, and the transform of their own node is ignored. If there are several
+    clips, OUT must contain {clip}, which is replaced by the name of each; {mesh} in OUT writes a file per mesh.
 
     Skin weights are divided by their sum, as players do. A warning names methods that move a vertex farther from lbs
     than the model's size. For joints with non-uniform scale, tools define all methods except lbs differently: here each
@@ -118,6 +118,8 @@ def command(
         )
         numbers = Selection(clip or ()).chosen_clips(reader.names(document))
         nodes = meshes.nodes(scene, mesh)
+        chosen = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
+        scenes.warn_of_other_scenes(document, source.name, voice, chosen)
         groups = _groups(scene, nodes, output, rigid=rigid)
         jobs = _jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
         announce_compiling(voice)

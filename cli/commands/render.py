@@ -144,6 +144,7 @@ def command(
             announce_compiling(voice)
             scene = scenes.read_scene(seen, name, voice, nodes=lambda scene: meshes.visible_meshes(scene, mesh, hide))
             nodes = meshes.visible_meshes(scene, mesh, hide)
+            scenes.warn_of_other_scenes(seen, name, voice, nodes)
             found = clips.of_document(
                 seen,
                 numbers,

@@ -45,3 +45,15 @@ def _warn_of_copies(document: Document, name: str, voice: Reporter, chosen: Coll
             f"{name}: {node_label(document.json, copied[0])}{words} copies of a mesh by {INSTANCING}: "
             "one copy per node counts here, and others may move farther than is said"
         )
+
+
+def warn_of_other_scenes(document: Document, name: str, voice: Reporter, chosen: Collection[int] | None) -> None:
+    """Warn of meshes that aren't in the default scene: players don't show them. chosen: nodes, None for all."""
+    other = [i for i in reader.mesh_nodes_of_other_scenes(document) if chosen is None or i in chosen]
+    if other:
+        label = node_label(document.json, other[0])
+        subject = f"{label} and {len(other) - 1} more are" if len(other) > 1 else f"{label} is"
+        meshes = "their meshes are" if len(other) > 1 else "its mesh is"
+        voice.warn(
+            f"{name}: {subject} outside the default scene, which players show; {meshes} included (--mesh GLOB selects)"
+        )

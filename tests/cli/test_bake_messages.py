@@ -119,3 +119,21 @@ def test_meshes_that_are_left_out_are_counted(call: Call, asset: Find, tmp_path:
     assert "warning: skipped 3308 vertices of unskinned meshes (include with --rigid)" in run.err
     assert "left out" not in call("bake", asset("Knight.glb"), out, "--clip", "Idle", "--rigid").err
     assert "left out" not in call("bake", asset("Fox.glb"), out, "--clip", "Run").err
+
+
+def test_meshes_of_other_scenes_are_said(call: Call, tmp_path: Path) -> None:
+    """Players show the default scene; caches and pictures have the meshes of all, which was said nowhere."""
+    document = opened_fixture("tube")
+    nodes = document.json["nodes"]
+    skinned = next(i for i, node in enumerate(nodes) if "mesh" in node)
+    nodes.append({**nodes[skinned], "name": "spare"})
+    document.json["scenes"].append({"nodes": [len(nodes) - 1]})
+    data = glb_of(document)
+    expected = (
+        "node 'spare' is outside the default scene, which players show; its mesh is included (--mesh GLOB selects)"
+    )
+    bake = call("bake", "-", tmp_path / "a.npz", "--clip", "twist90", "--fps", "2", "-q", stdin=data)
+    assert bake.err.strip().endswith(expected)
+    render = call("render", "-", tmp_path / "a.png", "--clip", "twist90", "--frames", "1", "-q", stdin=data)
+    assert render.err.strip().endswith(expected)
+    assert expected not in call("render", "-", tmp_path / "a.png", "--frames", "1", "--hide", "spare", stdin=data).err

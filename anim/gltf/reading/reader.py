@@ -135,18 +135,26 @@ def depth_first(json: Json) -> Iterator[int]:
         stack.extend(reversed(nodes[node].get("children", ())))
 
 
-def is_default_scene_empty(document: Document) -> bool:
-    """Return whether no mesh is below a root of the default scene: `scene`, else the first; False without scenes."""
+def mesh_nodes_of_other_scenes(document: Document) -> list[int]:
+    """Return the nodes with a mesh outside the default scene: `scene`, else the first; [] without scenes."""
     nodes, scenes = json_array(document.json, "nodes"), json_array(document.json, "scenes")
     if not scenes:
-        return False
+        return []
+    shown: set[int] = set()
     stack = list(scenes[document.json.get("scene", 0)].get("nodes", ()))
     while stack:
-        node = nodes[stack.pop()]
-        if "mesh" in node:
-            return False
-        stack.extend(node.get("children", ()))
-    return True
+        node = stack.pop()
+        shown.add(node)
+        stack.extend(nodes[node].get("children", ()))
+    return [i for i, node in enumerate(nodes) if "mesh" in node and i not in shown]
+
+
+def is_default_scene_empty(document: Document) -> bool:
+    """Return whether no mesh is in the default scene; False without scenes."""
+    if not json_array(document.json, "scenes"):
+        return False
+    meshes = sum("mesh" in node for node in json_array(document.json, "nodes"))
+    return len(mesh_nodes_of_other_scenes(document)) == meshes
 
 
 def clip_label(name: str, number: int, what: str = "clip") -> str:
