@@ -129,9 +129,7 @@ def test_meshes_of_other_scenes_are_said(call: Call, tmp_path: Path) -> None:
     nodes.append({**nodes[skinned], "name": "spare"})
     document.json["scenes"].append({"nodes": [len(nodes) - 1]})
     data = glb_of(document)
-    expected = (
-        "node 'spare' is outside the default scene, which players show; its mesh is included (--mesh GLOB selects)"
-    )
+    expected = "'spare' is outside the default scene, which players show; its mesh is included (--mesh GLOB selects)"
     bake = call("bake", "-", tmp_path / "a.npz", "--clip", "twist90", "--fps", "2", "-q", stdin=data)
     assert bake.err.strip().endswith(expected)
     render = call("render", "-", tmp_path / "a.png", "--clip", "twist90", "--frames", "1", "-q", stdin=data)
