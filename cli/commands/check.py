@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path, PurePath
 from textwrap import fill
@@ -14,6 +15,7 @@ import typer
 from anim.check import baseline
 from anim.check.find import find_all
 from anim.check.finding import Finding, Severity
+from anim.check.fixing import fix_all
 from anim.check.registry import RULES
 from anim.check.rule import Rule
 from anim.check.rules.invalid import RULE as INVALID
@@ -26,9 +28,10 @@ from cli.io import documents, input_files
 from cli.options import common
 from cli.reports import check_ci, check_report
 from cli.reports.check_report import CheckReport
-from cli.text import Reporter
+from cli.text import Reporter, format_length
 from cli.workflows import check_config, checked_files
 from cli.workflows.check_config import CheckConfig
+from cli.workflows.edit_clips import DRY
 
 Target = StrEnum("Target", [(name, name) for name in TARGETS])  # type: ignore[misc]
 WIDTH = 100  # of --explain
@@ -92,6 +95,11 @@ def command(
         str | None,
         typer.Option("--config", metavar="FILE", help="Settings for all files, instead of the nearest gltf-anim.toml."),
     ] = None,
+    fix: Annotated[bool, typer.Option("--fix", help="Apply safe fixes, in place.")] = False,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-fixes", help="Apply all fixes, in place; each prints its largest error.")
+    ] = False,
+    dry_run: common.DryRun = False,
     list_rules: Annotated[bool, typer.Option("--list", help="List the rules.")] = False,
     explain: Annotated[
         str | None, typer.Option("--explain", metavar="RULE", help="Explain a rule: reason, parameters, fix.")
@@ -102,7 +110,10 @@ def command(
 
     Each finding has a rule with a code (GA101) and a name, the part of the file, and advice. --list shows all rules,
     --explain one of them. Exit codes: 0; 6 for a finding of the severity --fail-on or a worse one; 3 for unreadable
-    files, the others are checked all the same. Files are never changed.
+    files, the others are checked all the same.
+
+    --fix changes files in place: only what moves no vertex by more than 1e-6 of the model's size, measured on the
+    written file; --unsafe-fixes everything that has a fix. What is left is reported. A second run changes nothing.
 
     Settings are read from the nearest gltf-anim.toml, or [tool.gltf-anim] in pyproject.toml, from the file's folder
     upwards; options replace them:
@@ -127,6 +138,8 @@ def command(
         return errors.DONE
     if known is not None and write_known is not None:
         raise UsageError("--baseline and --write-baseline can't be combined")
+    if unsafe and known is not None:
+        raise UsageError("--unsafe-fixes and --baseline can't be combined")
     fixed = None if config is None else check_config.read_config(config)
     options = _Options(select or (), extend or (), ignore or (), str(target or ""), _parameters(param or ()))
     expected = None if known is None else _load_baseline(known)
@@ -138,7 +151,10 @@ def command(
         settings = fixed or check_config.nearest(_folder(path))
         files.append(name)
         limits[name] = fail_on or settings.fail_on or Severity.ERROR
-        findings, error = _check_file(path, options.selection(settings, path))
+        selection = options.selection(settings, path)
+        if fix or unsafe:
+            _fix_file(path, selection, voice, unsafe=unsafe, dry_run=dry_run)
+        findings, error = _check_file(path, selection)
         found += [(name, each) for each in findings]
         refused += [(name, error)] if error is not None else []
     if write_known is not None:
@@ -189,6 +205,24 @@ def _check_file(path: str, selection: RuleSelection) -> tuple[Sequence[Finding],
     except AnimError as error:
         fault = checked_files.fault_of(path, error)
         return [INVALID.finding([each], (), INVALID.severity) for each in fault_occurrences([fault])], fault
+
+
+def _fix_file(path: str, selection: RuleSelection, voice: Reporter, *, unsafe: bool, dry_run: bool) -> None:
+    """Fix a file in place; broken ones stay as they are, and are reported when they are checked."""
+    if path == documents.PIPE:
+        raise UsageError("stdin can't be fixed in place: name files")
+    with suppress(FormatError), checked_files.open_checked(path) as (source, file):
+        result = fix_all(file, selection, unsafe=unsafe)
+        for each in result.refused:
+            error = format_length(each.error_m)
+            voice.warn(f"{source.name}: {each.rule.code} {each.rule.name} is not fixed: a vertex would move by {error}")
+        if result.applied:
+            documents.write(result.document, path, source, dry_run=dry_run, voice=voice)
+            fixes = ", ".join(
+                f"{each.count} {each.rule.code} {each.rule.name} (error {format_length(each.error_m)})"
+                for each in result.applied
+            )
+            voice.info(f"{source.name}  fixed {fixes}{DRY if dry_run else ''}")
 
 
 def _report(

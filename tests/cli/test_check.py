@@ -13,6 +13,7 @@ from anim.check.finding import Severity
 from anim.check.registry import RULES
 from tests.cli.conftest import Call
 from tests.cli.running import built
+from tests.files import glb_of, opened
 
 LATE = ("GA105", "late-start")
 
@@ -243,3 +244,43 @@ def test_settings_in_the_help_are_toml(call: Call) -> None:
     settings = tomllib.loads(text[text.index("[check]") : text.index("--write-baseline")])
     assert settings["check"]["fail-on"] == "warning"
     assert settings["check"]["files"] == [{"match": "crowd/**", "ignore": ["GA2"]}]
+
+
+def test_safe_fixes_change_the_file_in_place_once(folder: Path, call: Call) -> None:
+    path = folder / "noop.glb"
+    before = path.read_bytes()
+    dry = call("check", "noop.glb", "--fix", "--dry-run")
+    assert path.read_bytes() == before
+    assert "(dry run: nothing written)" in dry.err
+    run = call("check", "noop.glb", "--fix", "--format", "json")
+    assert not {"GA101", "GA103", "GA104", "GA105"} & codes(run.json)
+    assert "fixed" in run.err
+    fixed = path.read_bytes()
+    assert fixed != before
+    (folder / "before.glb").write_bytes(before)
+    assert call("diff", "before.glb", "noop.glb", "--fail-above", "0.0001%").code == 0
+    again = call("check", "noop.glb", "--fix")
+    assert (path.read_bytes(), again.err) == (fixed, "")
+
+
+def test_unsafe_fixes_need_their_option(folder: Path, call: Call) -> None:
+    rename(folder / "noop.glb", ["", "walk", "walk"])
+    assert codes(call("check", "noop.glb", "--fix", "--select", "GA0", "--format", "json").json) == {"GA001", "GA002"}
+    run = call("check", "noop.glb", "--unsafe-fixes", "--select", "GA0", "--format", "json")
+    assert codes(run.json) == set()
+    clips = call("inspect", "noop.glb", "--format", "json").json["files"][0]["clips"]
+    assert [clip["name"] for clip in clips][:3] == ["animation_0", "walk", "walk_2"]
+
+
+def rename(path: Path, names: list[str]) -> None:
+    document = opened(path.read_bytes())
+    for animation, name in zip(document.json["animations"], names, strict=False):
+        animation["name"] = name
+    path.write_bytes(glb_of(document))
+
+
+def test_broken_files_and_stdin_are_not_fixed(folder: Path, call: Call) -> None:
+    (folder / "bad.glb").write_bytes(b"no glTF")
+    assert call("check", "bad.glb", "--fix").code == 3
+    assert (folder / "bad.glb").read_bytes() == b"no glTF"
+    assert call("check", "-", "--fix", stdin=built("noop")).code == 2

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import free_name, rename_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule
-from anim.gltf.document import json_array
+from anim.check.rule import Fix, Parameters, Rule
+from anim.gltf.document import Document, json_array
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -26,6 +27,18 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
             )
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with a number behind all names but the first: "walk", "walk_2"."""
+    names, seen = {}, set()
+    taken = {clip.get("name", "") for clip in file.json["animations"]}
+    for i, clip in enumerate(file.json["animations"]):
+        name = clip.get("name", "")
+        if name in seen:
+            names[i] = free_name(name, taken)
+        seen.add(name)
+    return rename_clips(file.document, {i: name for i, name in names.items() if name})
+
+
 RULE = Rule(
     "GA002",
     "duplicate-clip-names",
@@ -33,4 +46,5 @@ RULE = Rule(
     "Several clips have the same name.",
     "Players choose clips by name: the second one can't be chosen, or replaces the first.",
     find,
+    fix=Fix("add a number to all names but the first", fix, is_safe=False),
 )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule
-from anim.gltf.document import json_array
+from anim.check.rule import Fix, Parameters, Rule
+from anim.gltf.document import Document, json_array
 from anim.gltf.validation.channel_targets import EXTENSION
 
 
@@ -20,6 +21,12 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         yield Occurrence("extensionsUsed", "/extensionsUsed", uses, problem=problem)
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with the extension in extensionsUsed."""
+    used = [*file.json.get("extensionsUsed", ()), EXTENSION]
+    return replace(file.document, json={**file.json, "extensionsUsed": used})
+
+
 RULE = Rule(
     "GA501",
     "pointer-not-declared",
@@ -28,4 +35,5 @@ RULE = Rule(
     "Loaders skip extensions that are not declared; validators report an error (donmccurdy/glTF-Transform#1448).",
     find,
     advice="add it to extensionsUsed where the file is made",
+    fix=Fix("add it to extensionsUsed", fix, is_safe=True),
 )

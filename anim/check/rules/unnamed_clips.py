@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import free_name, rename_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -14,6 +16,13 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for clip in file.facts.clips:
         if not clip.name:
             yield file.in_clip(clip.index)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with names: "animation_0", by index."""
+    taken = {clip.get("name", "") for clip in file.json["animations"]}
+    names = {each.number: free_name(f"animation_{each.number}", taken) for each in found}
+    return rename_clips(file.document, names)
 
 
 RULE = Rule(
@@ -25,4 +34,5 @@ RULE = Rule(
     find,
     counted("clip has no name", "clips have no name"),
     "name them where the file is made",
+    fix=Fix("name them by their index: animation_0", fix, is_safe=False),
 )

@@ -12,6 +12,8 @@ import pytest
 from anim.check.checked_file import CheckedFile
 from anim.check.find import find_all, find_grouped
 from anim.check.finding import Finding
+from anim.check.fixing import fix_all
+from anim.check.registry import RULES
 from anim.check.selection import RuleSelection
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -213,3 +215,14 @@ def test_clips_are_summed_up_where_a_rule_can() -> None:
     assert len(grouped) == 1
     assert len(single) > 1
     assert grouped[0].where.startswith("clips '")
+
+
+@pytest.mark.parametrize("code", [rule.code for rule in RULES if rule.fix and rule.code in WRONG])
+def test_a_fixed_file_is_clean_and_moves_no_vertex(code: str) -> None:
+    selection = RuleSelection(select=(code,))
+    result = fix_all(checked(WRONG[code][0]), selection, unsafe=True)
+    assert [each.rule.code for each in result.applied] == [code]
+    assert result.applied[0].error_m < 1e-9
+    fixed = checked(result.document)
+    assert find_all(fixed, selection) == ()
+    assert fix_all(fixed, selection, unsafe=True).document is fixed.document
