@@ -1,4 +1,4 @@
-"""glTF 2.0 animation as immutable values and pure functions: the library under the `gltf-anim` command.
+"""glTF 2.0 animation as immutable values and pure functions: the library of the command `gltf-anim`.
 
     import anim
     from anim import ops

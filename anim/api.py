@@ -87,7 +87,7 @@ class BakedCache(VertexCache):
         depth: str = "float",
         rest_mesh: str = ".ply",
     ) -> None:
-        """Write the cache in the format of the file extension: .npz, .usdc, .glb, .pc2, … (`anim.CACHE_FORMATS`).
+        """Write the cache in the format of the file extension, one of `anim.CACHE_FORMATS`.
 
         Options as of `gltf-anim bake`. Raises UnsupportedError for another extension or a missing package, RangeError
         for an option that the format doesn't support, OutputError if the file can't be written.
@@ -113,7 +113,7 @@ def optimize(
     workers: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> OptimizeResult:
-    """Return the asset with its animations in fewer bytes and no vertex displaced by more than `max_error` at any time.
+    """Return the asset with smaller animations and no vertex displaced by more than `max_error`.
 
     max_error: "0.5mm", "0.01%", or metres; 0 is lossless. clips: globs, all by default; an empty list is refused.
     max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.

@@ -69,7 +69,7 @@ def kind(value: object) -> str:
 
 
 def meters(value: str | float, name: str, scale: Callable[[], float], *, at_least: float | None = None) -> float:
-    """Return a length in metres from a number, or from text with a unit; `scale` is the length of 100 %, in metres.
+    """Return metres from a number, or from text with a unit; `scale` is the length of 100 %, in metres.
 
     Raises RangeError below `at_least`, or if that is None, for 0 and less.
     """

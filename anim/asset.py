@@ -1,4 +1,4 @@
-"""Asset: an immutable glTF file in memory, with views of its contents; `map_clips` and `add_clips` return copies."""
+"""Asset: an immutable glTF file in memory, with views of its contents; its methods return copies."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from anim.operations.selection import not_found
 
 
 class Clips:
-    """The clips of an asset, by index or by name: `clips[0]`, `clips["walk"]`, `clips["#0"]`; `list(clips)`."""
+    """The clips of an asset, by index or by name: `clips[0]`, `clips["walk"]`, `clips["#0"]`."""
 
     def __init__(self, clips: Sequence[Clip]) -> None:
         self._clips = tuple(clips)

@@ -1,4 +1,4 @@
-"""Operations: Clip → Clip, one verb each. Everything else of a clip is kept; the given clip is not changed.
+"""Operations: Clip → Clip, one verb each. The given clip is not changed.
 
     from anim import ops
     asset.map_clips(lambda clip: ops.resample(clip, fps=30))
@@ -55,7 +55,7 @@ def select_tracks(
     nodes: str | Sequence[str] | None = None,
     paths: str | Sequence[str] | None = None,
 ) -> frozenset[int]:
-    """Return the indices of the tracks of some nodes, by globs, and of some paths: "translation", "rotation", ….
+    """Return the indices of the tracks of some nodes (globs) and paths: "translation", "rotation", ….
 
     None selects all. Raises NotFoundError for a glob that matches no node, RangeError for an unknown path or an empty
     list.

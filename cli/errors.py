@@ -48,7 +48,7 @@ CODES[CheckError] = CHECK
 
 
 def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
-    """Run a job and return the exit code; errors are one line on stderr, tracebacks are for internal errors only.
+    """Run a job and return the exit code; errors are a line on stderr, tracebacks for internal ones only.
 
     args: of the command line, for the hint on a file name that looks like an option.
     """

@@ -9,7 +9,7 @@ Cell = str | int | float | bool | None
 
 
 def text(header: Sequence[str], rows: Sequence[Sequence[Cell]], *, left: int = 1, indent: str = "  ") -> str:
-    """Return rows under a header, columns aligned: the first `left` ones to the left, numbers to the right.
+    """Return rows under a header, in columns: the first `left` ones to the left, numbers to the right.
 
     A column in which every cell is empty is left out.
     """
@@ -36,7 +36,7 @@ def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> st
 
 
 def escape_control(words: str) -> str:
-    """Return text with control characters escaped: line breaks and terminal codes of a name become \\n, \\x1b."""
+    """Return text with line breaks, terminal codes and other control characters escaped: \\n, \\x1b."""
     if words.isprintable():
         return words
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)

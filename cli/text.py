@@ -28,7 +28,7 @@ class Reporter:
                 sys.stderr.write(line + "\n")
 
     def warn(self, words: str) -> None:
-        """Write "warning: words" to stderr, even when quiet, once: for facts that change the meaning of a figure."""
+        """Write "warning: words" to stderr once, even when quiet: facts that change the meaning of a figure."""
         if words not in self.warnings:
             self.warnings.append(words)
             Reporter().info(f"warning: {words}")

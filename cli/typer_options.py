@@ -1,4 +1,4 @@
-"""Options for typer: parsers and metavars by type, the project's error messages, options named in library errors."""
+"""Options for typer: parsers and metavars by type, error messages, options named in library errors."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Command(Parsing, TyperCommand):
 
 
 def name_options(error: AnimError, options: Mapping[str, str]) -> None:
-    """Replace every `parameter` in an error by the option for it, and remove the quotes where there is none.
+    """Replace every `parameter` in an error by the option for it; without one, remove the quotes.
 
     "choose `fps`", {"fps": "--fps"} → "choose --fps"
     """

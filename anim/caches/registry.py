@@ -138,7 +138,7 @@ def _of(ending: str) -> CacheFormat:
 
 
 def sniff_format(head: bytes, size: int) -> str:
-    """Return the file extension of a format by a file's first bytes (`SIGNATURE_BYTES`, if possible) and its size.
+    """Return a format's file extension by a file's size and first bytes (`SIGNATURE_BYTES` if possible).
 
     Raises FormatError for bytes that no cache format starts with.
     """

@@ -26,7 +26,7 @@ class CompanionFiles:
 
 
 def read_file(path: Path, ending: str = ".glb") -> Bytes:
-    """Return the bytes of a file, read-only. ending: expected extension, for the hint if `path` is a folder.
+    """Return the bytes of a file, read-only. ending: expected extension, for the hint about a folder.
 
     A copy instead of a memory map: the system kills a process whose mapped file is rewritten in place by another.
     """

@@ -11,7 +11,7 @@ from anim.errors import not_written
 
 
 def write_stream(file: Any, pieces: Iterable[bytes | memoryview], name: str) -> None:
-    """Write all bytes to a binary file, buffered or not. name: for messages. Raises OutputError if a write fails.
+    """Write all bytes to a binary file, buffered or not. Raises OutputError, with `name`, if that fails.
 
     The system may write only a part of the bytes per call: on a disk that is nearly full, or above 2 GiB into a pipe.
     A non-blocking pipe, as some parent processes pass on, may accept nothing until its reader has read.

@@ -1,4 +1,4 @@
-"""Coordinates of cubic Bézier curves from 0 to 1, and their parameter by time: CSS easings, weighted tangents."""
+"""Coordinates and parameter of cubic Bézier curves from 0 to 1: CSS easings, weighted tangents."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def slope(s: Floats, p1: Floats | float, p2: Floats | float) -> Floats:
 
 
 def parameter(time: Floats, x1: Floats | float, x2: Floats | float) -> Floats:
-    """Return s with evaluate(s, x1, x2) = time, all of them 0 … 1 and of any shape: then time never decreases.
+    """Return s with evaluate(s, x1, x2) = time, all of them 0 … 1 and of any shape.
 
     Newton's method with bisection as a safeguard.
     """

@@ -1,4 +1,4 @@
-"""Rigid motions as dual quaternions (..., 8): the rotation x, y, z, w, then the dual part x, y, z, w, float64."""
+"""Rigid motions as dual quaternions (..., 8): rotation x, y, z, w, then dual part x, y, z, w, float64."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def from_rigid(rotation: Floats, translation: Floats) -> Floats:
 
 
 def apply(dual: Floats, points: Floats) -> Floats:
-    """Return points (..., 3) transformed by dual quaternions (..., 8), which are normalized first; none may be 0.
+    """Return points (..., 3) transformed by dual quaternions (..., 8), normalized first; none may be 0.
 
     apply([0, 0, 0, 1, 1, 0, 0, 0], [5, 5, 5]) → [7, 5, 5]
     """

@@ -94,7 +94,7 @@ def unwrap(
 
 
 def gimbal_distance(q: Floats, *, order: str) -> Floats:
-    """Return the angle (...) in radians, 0 … π/2, of unit quaternions (..., 4) from the lock of an intrinsic order.
+    """Return the angle (...) rad, 0 … π/2, of unit quaternions (..., 4) from an intrinsic order's lock.
 
     The extrinsic order with the axes reversed has the same distance.
     gimbal_distance([0, 0, 0, 1], order="XYZ") → π/2
@@ -122,7 +122,7 @@ def wrap_angles(angles: Floats) -> Floats:
 
 
 def _axes(order: str, frame: AxesConvention) -> tuple[int, int, int, float]:
-    """First, second and remaining axis of the extrinsic sequence, and 1 if right-handed, −1 if left-handed."""
+    """First, second and remaining axis of the extrinsic sequence; 1 if right-handed, −1 if left-handed."""
     listed = check_order(order) if frame == AxesConvention.EXTRINSIC else check_order(order)[::-1]
     i, j, k = ("XYZ".index(axis) for axis in listed)
     if i == k:
@@ -131,7 +131,7 @@ def _axes(order: str, frame: AxesConvention) -> tuple[int, int, int, float]:
 
 
 def _parts(q: Floats, order: str, frame: AxesConvention) -> tuple[Floats, Floats, Floats, Floats]:
-    """Complex a + ib and c + id: lengths give the middle angle, directions the half sum and half difference."""
+    """Complex a + ib and c + id: lengths give the middle angle, directions half sum and half difference."""
     i, j, k, sign = _axes(order, frame)
     x, y, z, w = q[..., i], q[..., j], q[..., k] * sign, q[..., 3]
     if is_proper(order):

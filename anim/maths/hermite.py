@@ -10,7 +10,7 @@ from anim.arrays import Floats
 
 
 def evaluate(u: Floats, p0: Floats, m0: Floats, p1: Floats, m1: Floats) -> Floats:
-    """Return the value at u of the cubic from p0 (slope m0) to p1 (slope m1); p0 and p1 exactly at u = 0 and 1.
+    """Return the value at u of the cubic from p0 (slope m0) to p1 (slope m1); exact at u = 0 and 1.
 
     evaluate(0.5, 0, 0, 1, 0) → 0.5
     Source: glTF 2.0 specification, appendix C.5.
@@ -20,7 +20,7 @@ def evaluate(u: Floats, p0: Floats, m0: Floats, p1: Floats, m1: Floats) -> Float
 
 
 def first_derivative(u: Floats, p0: Floats, m0: Floats, p1: Floats, m1: Floats) -> Floats:
-    """Return the slope per u at u of the same cubic; m0 and m1 exactly at 0 and 1. Divide by h for per second.
+    """Return the slope per u of the same cubic; m0 and m1 exactly at 0 and 1. Divide by h for per second.
 
     first_derivative(0.5, 0, 0, 1, 0) → 1.5
     """

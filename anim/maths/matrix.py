@@ -12,7 +12,7 @@ ORTHOGONALITY_TOLERANCE = 1e-9  # cosine between axes that counts as 0
 
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
-    """Return T·R·S as (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4) and scale (..., 3)."""
+    """Return T·R·S (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4), scale (..., 3)."""
     x, y, z, w = np.moveaxis(rotation, -1, 0)
     sx, sy, sz = np.ascontiguousarray(np.moveaxis(scale, -1, 0))
     x2, y2, z2 = x + x, y + y, z + z
@@ -59,7 +59,7 @@ def inverse(matrix: Floats) -> Floats:
 
 
 def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return translation (..., 3), unit quaternion (..., 4), scale (..., 3) and shear (...) of matrices (..., 3, 4).
+    """Return translation (..., 3), quaternion (..., 4), scale (..., 3), shear (...) of (..., 3, 4).
 
     shear: largest error of an axis of the recomposed matrix, as a fraction of the axis length. Where it is 0 the parts
     recompose the matrix; elsewhere they are the nearest rotation with the axes' lengths. Directions of axes shorter

@@ -38,7 +38,7 @@ def conjugate(q: Floats) -> Floats:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Return the scalar product (...) of quaternions (..., 4): the cosine of half the angle between, up to sign."""
+    """Return the dot product (...) of quaternions (..., 4): the cosine of half the angle, up to sign."""
     return _sum(a * b)
 
 
@@ -55,7 +55,7 @@ def normalize(q: Floats) -> Floats:
 
 
 def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
-    """Return the spherical linear interpolation (..., 4) from a to b along the shorter arc at constant speed.
+    """Return the spherical linear interpolation (..., 4) from a to b along the shorter arc.
 
     u: (...), 0 gives a and 1 gives b or −b, exactly; outside 0 … 1 the rotation continues along the same arc.
     The sign of b changes where dot(a, b) < 0, so results are in a's hemisphere. At dot(a, b) = 0 b keeps its sign.
@@ -72,7 +72,7 @@ def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
 
 
 def nlerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
-    """Return the normalized linear interpolation (..., 4) from a to b: slerp's arc, but not at constant speed.
+    """Return the normalized linear interpolation (..., 4) from a to b: slerp's arc, not at constant speed.
 
     u: (...) in 0 … 1. It deviates from slerp by 0.033°, 0.27°, 0.92° for 30°, 60°, 90° between a and b.
     """
@@ -81,7 +81,7 @@ def nlerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
 
 
 def rotation_vector(q: Floats) -> Floats:
-    """Return axis · angle (..., 3) in radians, the angle in 0 … π: the logarithm of a rotation (twice that of q).
+    """Return axis · angle (..., 3) rad, the angle in 0 … π: a rotation's logarithm (twice that of q).
 
     Independent of the length of q, and of its sign except at 180°, where the sign selects the axis.
     rotation_vector([0, 0, √½, √½]) → [0, 0, π/2]
@@ -95,7 +95,7 @@ def rotation_vector(q: Floats) -> Floats:
 
 
 def from_rotation_vector(vector: Floats) -> Floats:
-    """Return unit quaternions (..., 4) of rotations by |vector| radians about `vector` (..., 3): the exponential.
+    """Return unit quaternions (..., 4) of rotations by |vector| rad about `vector` (..., 3).
 
     from_rotation_vector([0, 0, π]) → [0, 0, 1, 0]
     """
@@ -104,7 +104,7 @@ def from_rotation_vector(vector: Floats) -> Floats:
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
-    """Return the angle (...) in radians, 0 … π, between rotations a and b; unlike acos(dot), accurate near 0.
+    """Return the angle (...) rad, 0 … π, between rotations a and b; unlike acos(dot), accurate near 0.
 
     angle_between([0, 0, 0, 1], [0, 0, 0, −1]) → 0
     """
@@ -145,7 +145,7 @@ def to_matrix(q: Floats) -> Floats:
 
 
 def from_matrix(matrix: Floats) -> Floats:
-    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3); the largest component is positive.
+    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3), the largest component positive.
 
     The matrices must be rotations: no scale, no reflection. Small errors (1e-6) are averaged out.
     Source: Shepperd 1978; the table below is 4 q qᵀ; its row with the largest diagonal is well-conditioned.

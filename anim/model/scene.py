@@ -34,7 +34,7 @@ class Skin:
 
 @dataclass(frozen=True, slots=True)
 class PrimitiveRange:
-    """Numbers of vertices and faces of one primitive of a mesh. material: its index in the file, −1 for none."""
+    """Numbers of vertices and faces of one primitive. material: its index in the file, −1 for none."""
 
     vertices: int
     faces: int

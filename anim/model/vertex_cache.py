@@ -1,4 +1,4 @@
-"""VertexCache: vertex positions per frame, streamed in chunks so that memory does not limit the length."""
+"""VertexCache: vertex positions per frame, streamed in chunks of frames."""
 
 from __future__ import annotations
 

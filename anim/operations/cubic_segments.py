@@ -151,7 +151,7 @@ def _separate(segments: CubicSegments, boundaries: _Boundaries) -> None:
 
 
 def _bend(segments: CubicSegments, i: int, ends: Floats, value: Floats) -> None:
-    """Give one end of a segment another value, and slopes with which it is monotone (Fritsch and Carlson, 1980)."""
+    """Give one end of a segment another value, and monotone slopes (Fritsch and Carlson, 1980)."""
     ends[i] = value
     limit = 3.0 * np.abs(segments.value1[i] - segments.value0[i])
     for slopes in (segments.slope0, segments.slope1):

@@ -76,7 +76,7 @@ class EasedTrack:
         return segment.evaluate(self._track, left, np.where(self._inside[left], evaluate(self._cubics, u), u))
 
     def rates(self, times: Floats, before: bool) -> Floats:
-        """Return the one-sided derivative per second (F, C), of rotations the angular velocity (F, 3), at `times`."""
+        """Return the one-sided derivative per second (F, C), of rotations the angular velocity (F, 3)."""
         left, u = self._place(times, before=before)
         inside = self._inside[left]
         share = np.where(inside, evaluate(self._cubics, u), u)
@@ -120,7 +120,7 @@ def _vector_segments(track: Track, left: Ints, cubics: Sequence[CubicSegment]) -
 
 
 def _rotation_segments(track: Track, left: Ints, easing: Easing, tolerance: float) -> list[CubicSegments]:
-    """The segments left → left + 1 (S,) of a rotation track, each eased along its own arc; fits are shared by angle."""
+    """The segments left → left + 1 (S,) of a rotation track, each eased along its arc; one fit per angle."""
     q = quaternion.normalize(track.values)
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(q[left]), q[left + 1]))
     angle = np.sqrt((turn * turn).sum(axis=1))

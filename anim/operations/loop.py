@@ -56,7 +56,7 @@ def _is_closed(track: Track) -> bool:
 
 
 def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> Clip:
-    """Return the clip with its last `blend` seconds corrected so that it ends as it starts, in value and speed.
+    """Return the clip with its last `blend` seconds corrected to end as it starts, in value and speed.
 
     The correction is added to the motion: a cubic from 0 to the loop gap in value and speed; for rotations a rotation
     vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks end with their first value.
@@ -88,7 +88,7 @@ def _append_key(track: Track, clip: Clip, end: float, *, travels: bool) -> Track
 
 
 def _continue_travel(track: Track, clip: Clip, end: float) -> Floats:
-    """Return the value (1, C) at `end`, after the last key: the added frame is between the end's and the start's."""
+    """Return the value (1, C) at `end`, after the last key, between those of the end and the start."""
     before = rates(track, np.array([clip.end]), before=True)[0]
     after = rates(track, np.array([clip.start]), before=False)[0]
     return _extrapolate(track, track.values[-1], (before + after) / 2, end - clip.end)[None]
@@ -211,7 +211,7 @@ def _correct_spline(track: Track, times: Floats, correction: _Correction) -> Tra
 
 
 def _join_splines(first: Track, second: Track, index: int) -> Track:
-    """Return `first` followed by the keys of `second` after `index`, where `first` ends; signs follow from `first`."""
+    """Return `first` and then the keys of `second` after `index`, with signs that follow from `first`."""
     assert first.in_tangents is not None
     assert first.out_tangents is not None
     assert second.in_tangents is not None

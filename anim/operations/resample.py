@@ -78,7 +78,7 @@ def _is_constant(track: Track) -> bool:
 
 
 def _sample_tracks(tracks: list[Track], times: Floats) -> list[Floats]:
-    """Values (F, C) of each track at `times`, rotations sign-continuous; tracks of one time axis form a batch."""
+    """Values (F, C) of each track at `times`, rotations sign-continuous; a batch per time axis."""
     found = [np.zeros(0)] * len(tracks)
     for batch in batches(tracks):
         values = batch.sample(times)

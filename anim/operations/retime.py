@@ -1,4 +1,4 @@
-"""Retiming of clips: scale, shift, reverse, ping-pong; values stay and tangents follow by the chain rule."""
+"""Retiming of clips: scale, shift, reverse, ping-pong; tangents follow by the chain rule."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def reverse_track(track: Track, start: float, end: float) -> Track:
 
 
 def ping_pong_track(track: Track, start: float, end: float) -> Track:
-    """Return the track followed by itself reversed, from `end` to twice as far from `start` (s, of the clip)."""
+    """Return the track followed by itself reversed, from `end` to twice as far from `start` (s)."""
     if len(track.times) == 1:
         return track
     back = reverse_track(track, end, end)

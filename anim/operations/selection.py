@@ -34,7 +34,7 @@ class Selection:
         return match_names(self.nodes, names, "node")
 
     def chosen_tracks(self, clip: Clip, skeleton: Skeleton) -> frozenset[int]:
-        """Return the indices of the selected tracks of `clip`; pointers only without a selection of nodes and paths."""
+        """Return the indices of the selected tracks of `clip`; pointers only if no node or path is selected."""
         check_type(clip, Clip, "clip")
         check_type(skeleton, Skeleton, "skeleton")
         nodes = set(self.chosen_nodes(skeleton)) if self.nodes else None
@@ -62,7 +62,7 @@ def track_indices(clip: Clip, tracks: Collection[int] | None) -> frozenset[int]:
 
 
 def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
-    """Return the indices of the names that match any of the globs; all without globs. what: "clip", for messages.
+    """Return the indices of the names that match any of the globs; all without globs.
 
     "#3" is index 3, with any name. A glob that is a name itself, "Run[1]", is that name only.
     Raises NotFoundError, with similar names, for a glob that matches none.

@@ -42,7 +42,7 @@ def warp(
     interpolation: str = "cubicspline",
     tracks: frozenset[int] | None = None,
 ) -> Clip:
-    """Return the clip with its time eased over a range: the pose at start + u·d is the old one at start + e(u)·d.
+    """Return the clip with its time eased over a range: the pose at start + u·d is from start + e(u)·d.
 
     easing: one of EASINGS, or its name as text: "sine-in-out".
     start, end: seconds, by default the clip's own; outside nothing changes. An easing that overshoots reaches the
@@ -121,7 +121,7 @@ class TimeMap:
 
 
 def _build_map(track: Track, easing: Easing, start: float, end: float, allowed: float) -> TimeMap:
-    """The map for one track: a non-cubic easing is approximated so that its error is at most half of `allowed`."""
+    """The map for one track; the fit of a non-cubic easing takes at most half of `allowed`."""
     if track.interpolation is Interpolation.STEP:
         return TimeMap(fit_segments(easing, tolerance=TOLERANCE), easing.value, start, end)
     near = allowed / 2 / max(segment.max_rate_per_second(track) * (end - start), allowed)

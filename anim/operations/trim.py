@@ -27,7 +27,7 @@ def trim(
     rebase: bool = False,
     tracks: frozenset[int] | None = None,
 ) -> Clip:
-    """Return the clip from `start` to `end` seconds; keys between are unchanged, keys at the ends are exact.
+    """Return the clip from `start` to `end` s; keys between are unchanged, keys at the ends exact.
 
     New end keys have the track's value and, under CUBICSPLINE, its tangent; a cut segment of a rotation spline gets
     more keys if its normalization needs them. A constant track without a key in between becomes one key; if all do, the
@@ -100,7 +100,7 @@ def _constant_keys(track: Track, start: float, end: float) -> Track:
 
 
 def cut_spline(track: Track, start: float, end: float) -> Track:
-    """Return the part of a CUBICSPLINE track from `start` to `end`: keys between are unchanged, the ends are exact."""
+    """Return the part of a CUBICSPLINE track from `start` to `end`: keys between unchanged, ends exact."""
     inner = (track.times > start) & (track.times < end)
     times = np.concatenate(([start], track.times[inner], [end]))
     if track.kind is ValueKind.ROTATION:
@@ -118,7 +118,7 @@ def cut_spline(track: Track, start: float, end: float) -> Track:
 
 
 def _insert_cut_times(track: Track, times: Floats) -> Floats:
-    """The times with more in the cut segments at both ends, in which a rotation's cubic is normalized anew."""
+    """The times, with more in the cut end segments, as a rotation's cubic is normalized anew."""
     motion = TrackFunction(
         lambda at, before: sample(track, at), rotation=True, rates=lambda at, before: rates(track, at, before=before)
     )
@@ -130,7 +130,7 @@ def _insert_cut_times(track: Track, times: Floats) -> Floats:
 
 
 def _cut_signs(values: Floats, exact: Bools) -> Floats:
-    """Signs (K, 1) for quaternion keys, with which those of cut segments are in the hemisphere of their neighbors.
+    """Signs (K, 1) of quaternion keys for which those of cut segments continue their neighbors.
 
     Original keys (`exact`) keep theirs: a spline between q and −q takes the long arc, and would change with its signs.
     """

@@ -1,4 +1,4 @@
-"""Tracks in one array, so that the cost per numpy call occurs once: stacked per time axis, or concatenated."""
+"""Tracks in one array, stacked per time axis or concatenated: the cost per numpy call occurs once."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class ConcatenatedTracks(TrackGroup):
         return interpolate(self._located(at), self.values, self.tangents, self.interpolation, self.kind)
 
     def _located(self, at: Floats) -> KeyInterval:
-        """Key intervals of the times, as by `sampling.track.find_interval`, by counting keys at or before each time."""
+        """Key intervals of the times, as by `find_interval`, by counting keys at or before each time."""
         before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
         last = self.counts[:, None] - 1
         in_track = np.clip(np.add.reduceat(before, self.starts, axis=0, dtype=np.int64) - 1, 0, last)

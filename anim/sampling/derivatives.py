@@ -11,7 +11,7 @@ from anim.sampling import segment as piece
 
 
 def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return in and out tangents (F, C) per second for keys at `times` (F,) with sampled values (F, C) of the track.
+    """Return in and out tangents (F, C) per second for keys at `times` (F,) with sampled values (F, C).
 
     values: rotations can have any signs; their tangents get the same.
     """

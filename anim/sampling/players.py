@@ -103,7 +103,7 @@ def _babylon_slerp(a: Floats, b: Floats, u: Floats) -> Floats:
 
 
 def _slerp_stored(a: Floats, b: Floats, u: Floats, short: float, finish: Callable[[Floats], Floats]) -> Floats:
-    """Shoemake's formula on keys of any length; from the dot product `short` on the chord; equal keys as stored."""
+    """Shoemake's formula on keys as stored, of any length; from the dot product `short` on the chord."""
     b = _align_sign(a, b)
     dot = (a * b).sum(axis=-1, keepdims=True)
     is_short = dot >= short
@@ -138,7 +138,7 @@ def _babylon_arc(a: Floats, b: Floats) -> tuple[Floats, Bools]:
 
 
 def _stored_arc(a: Floats, b: Floats, short: float) -> tuple[Floats, Bools]:
-    """Slerp angle of keys of any length, 0 from the dot product `short` on, and a mask of distinct keys that near."""
+    """Slerp angle of keys of any length, 0 from the dot product `short` on, and a mask of these."""
     dot = (a * b).sum(axis=0)
     equal = (a == b).all(axis=0)
     is_line = (dot >= short) | equal

@@ -22,7 +22,7 @@ Sampler: TypeAlias = Callable[[Batch, Floats, KeyInterval], Floats]
 
 
 def sample_pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
-    """Return the local transforms of all nodes at times `at` (F,) in seconds; untracked properties equal the rest pose.
+    """Return the local transforms of all nodes at times `at` (F,) s; without a track those at rest.
 
     Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.
     """
@@ -121,7 +121,7 @@ def sample_clips(
     step_times: Floats | None = None,
     groups: Sequence[ConcatenatedTracks] | None = None,
 ) -> tuple[Pose, list[dict[int, Floats]]]:
-    """Return the poses of clips at times of their own (clips, T) in seconds, as one pose of clips × T frames.
+    """Return the poses of clips at times (clips, T) s of their own, as one pose of clips × T frames.
 
     Second, the morph weights (T, M) of each clip by node. step_times: for STEP tracks, by default the same.
     groups: the concatenated tracks of all clips, if the caller has them.

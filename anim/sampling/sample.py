@@ -40,7 +40,7 @@ class PoseTable:
 
 
 def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") -> PoseTable:
-    """Return the transforms of all nodes at times `at` (F,) in seconds; outside the clip those of its nearest end.
+    """Return the transforms of all nodes at times `at` (F,) s; outside the clip those of its nearest end.
 
     space: "local", in the parent's space, or "world". Raises RangeError for another.
     Raises NotFoundError for a track of a node that the skeleton lacks, ShapeError or RangeError for bad times.

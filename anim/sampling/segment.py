@@ -27,7 +27,7 @@ def evaluate(track: Track, left: Ints, share: Floats) -> Floats:
 
 
 def derivative(track: Track, left: Ints, share: Floats) -> Floats:
-    """Return the derivative per u (F, C); of rotations the angular velocity (F, 3) in rad about the node's own axes."""
+    """Return the derivative per u (F, C); of rotations the angular velocity (F, 3) rad about own axes."""
     rotation = track.kind is ValueKind.ROTATION
     if track.interpolation is Interpolation.STEP:
         return np.zeros((len(left), 3 if rotation else track.values.shape[1]))
@@ -46,7 +46,7 @@ def derivative(track: Track, left: Ints, share: Floats) -> Floats:
 
 
 def max_rate(track: Track, pieces: Ints) -> float:
-    """Return the greatest derivative per u in the segments `pieces`: vector length, or angular speed in rad."""
+    """Return the greatest derivative per u in the segments `pieces`: length, or angular speed in rad."""
     left = np.repeat(pieces, len(_FRACTIONS))
     found = derivative(track, left, np.tile(_FRACTIONS, len(pieces)))
     return float(np.sqrt((found * found).sum(axis=1)).max(initial=0.0))

@@ -74,12 +74,12 @@ def jump_time_after(seconds: float) -> float:
 
 
 def min_interval(end: float, least: float) -> float:
-    """Return the shortest time between keys up to `end` (s): `least`, or two float32 steps if that is more."""
+    """Return the shortest time between keys up to `end` s: `least`, or two float32 steps if more."""
     return max(least, 2 * float(np.spacing(np.float32(end))))
 
 
 def separate_float32(seconds: Floats) -> Floats:
-    """Return times that strictly increase as float32; equal ones are moved apart by the fewest float32 steps.
+    """Return times that strictly increase as float32; equal ones are moved by the fewest float32 steps.
 
     Keys of a jump coincide if they are moved to later times. The first and the last time stay. Times for which
     MAX_MOVED_STEPS are not enough are returned unchanged.

@@ -30,7 +30,7 @@ class KeyInterval:
 
 
 def find_interval(times: Floats, at: Floats) -> KeyInterval:
-    """Return the key intervals of times `at` (F,) among the keys `times` (K,); outside they are clamped to the ends."""
+    """Return the key intervals of times `at` (F,) among keys `times` (K,), clamped to the ends."""
     last = len(times) - 1
     left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, last)
     right = np.minimum(left + 1, last)
@@ -61,7 +61,7 @@ def interpolate(
     interpolation: Interpolation,
     kind: ValueKind,
 ) -> Floats:
-    """Return the values (..., C) in key intervals (...) of keys `values` (K, C); of G tracks on one axis (..., G, C).
+    """Return values (..., C) in key intervals (...) of keys `values` (K, C); of G tracks (..., G, C).
 
     tangents: in and out, shaped as the values, per second, for CUBICSPLINE. Rotations are normalized.
     """

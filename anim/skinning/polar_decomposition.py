@@ -1,4 +1,4 @@
-"""Polar decomposition of skinning matrices into rigid motion and stretch, for methods that only rotate."""
+"""Polar decomposition of skinning matrices: rigid motion for methods that only rotate, and stretch."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ CHUNK_FRAMES = 256  # frames
 
 
 class UnevenScale:
-    """Search for the joints of a baker's meshes that scale unevenly or shear, prepared once for many clips."""
+    """Search for joints of a baker's meshes that scale unevenly or shear, prepared for many clips."""
 
     def __init__(self, made: Baker) -> None:
         self._skeleton = made.scene.skeleton

@@ -177,7 +177,7 @@ def _names(one: _Side, other: _Side) -> tuple[int, bool]:
 
 
 def _ambiguous(one: File, other: File, chosen: Sequence[int] | None) -> Iterator[str]:
-    """Yield notes on clip names that occur more often in one file than in the other. chosen: clip indices of A."""
+    """Yield notes on clip names with another count in the other file. chosen: clip indices of A."""
     looked_at = set(one.clips if chosen is None else (one.clips[i] for i in chosen))
     for name in ambiguous_names(one.clips, other.clips):
         if name in looked_at:
@@ -223,7 +223,7 @@ def _left_out(drawn: int, apart: int, count: int) -> str:
 
 
 def _check(found: DiffReport, limit: float) -> None:
-    """Raise CheckError if a clip's error exceeds `limit`, in m, if a clip is missing, or if nothing was compared."""
+    """Raise CheckError if an error exceeds `limit` m, a clip is missing, or nothing was compared."""
     if found.diff.missing_clips:
         number = found.diff.missing_clips[0]
         raise CheckError(f"{found.new.name}: {reader.clip_label(found.old.clips[number], number)} is missing")

@@ -85,7 +85,7 @@ def command(
 
 
 class _Closing:
-    """Closes clips one by one. blend: s, None to add a missing frame only. path: of the input, for messages.
+    """Closes clips one by one. blend: s, None to add a missing frame only. path: of the input.
 
     Clips that can't be closed are collected, so that one error names all of them before anything is written.
     """

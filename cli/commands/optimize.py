@@ -251,7 +251,7 @@ def _report_result(about: optimize_report.OptimizeReport, voice: Reporter, *, dr
 
 
 def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
-    """Raise before any work for outputs that can't be written or would replace another file of the command."""
+    """Raise before any work for outputs that can't be written or are another file of the command."""
     if curve_file is not None:
         documents.check_file(curve_file)
         if PurePath(curve_file).suffix.lower() not in (".csv", *PICTURES):

@@ -184,7 +184,7 @@ def _ending(output: str) -> str:
 
 @contextmanager
 def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, Resolve | None]]:
-    """Give a glTF document or a vertex cache, its name for messages, and the resolver of its companion files.
+    """Give a glTF document or a vertex cache, its name, and the resolver of its companion files.
 
     The type follows from the file extension, for a pipe from the first bytes.
 
@@ -214,7 +214,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) -> FrameSelection:
-    """The frame rate at which the longest clip has the chosen frame count: in a film all clips share one rate."""
+    """The one frame rate of a film, at which the longest clip has the chosen frame count."""
     clips = reader.clips(document)
     spans = [when.span(clips[i].start, clips[i].end) for i in numbers]
     longest = max(last - first for first, last in spans)

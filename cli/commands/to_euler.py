@@ -172,8 +172,10 @@ def _motion(
     limit: float | None,
     scale: float,
 ) -> tuple[EulerMotion, str, int, float]:
-    """The motion to write, notes on lost data, the number of joints with another rest pose in the file, and the largest
-    error between keys in radians."""
+    """The motion to write, and facts about it.
+
+    Notes on lost data, number of joints with another rest pose, largest error between keys in radians.
+    """
     nodes = reader.skeleton(document)
     bound = bind_pose(nodes, reader.skins(document))
     skeleton = bound.skeleton

@@ -129,7 +129,7 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
 
 
 def _ending(inputs: cache_folders.CacheFolder) -> str:
-    """File extension of the input's format: by name, else by the first bytes of the file or of its first frame."""
+    """File extension of the input's format: by name, else by its first bytes or those of its first frame."""
     own = suffix(inputs.main)
     if own in CACHE_FORMATS:
         return own

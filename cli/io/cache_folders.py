@@ -23,7 +23,7 @@ from cli.io import documents
 
 
 def inputs(path: str, stack: ExitStack) -> CacheFolder:
-    """Return the folder of the file at `path`; "-" for stdin, stored in a temporary file until `stack` closes.
+    """Return the folder of the file at `path`; "-": stdin, in a temporary file until `stack` closes.
 
     Raises UsageError if stdin is a terminal; FormatError if a requested file can't be opened.
     """

@@ -48,7 +48,7 @@ def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read
 
 @contextmanager
 def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
-    """Give the bytes at `path`, "-" for stdin, and their name for messages; errors raised inside name the input.
+    """Give the bytes at `path`, "-" for stdin, and their name; errors raised inside name the input.
 
     ending: expected file extension, for the hint if `path` is a folder.
     """
@@ -136,7 +136,7 @@ def commit_text_after(text: str, path: str) -> Iterator[None]:
 
 
 def check_output(path: str) -> None:
-    """Raise UsageError, before any work, if glTF can't be written to `path` or its extension is another format's.
+    """Raise UsageError if glTF can't be written to `path` or its extension is another format's.
 
     A name without extension is a GLB; devices and named pipes (/dev/null) can have any name.
     """

@@ -52,7 +52,7 @@ def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:
 
 
 def rows(files: Sequence[Inspected], smooth: Sequence[Smoothness]) -> tuple[list[str], list[list[Cell]]]:
-    """Return header and rows of one table: a row per track of every clip of every file, with its keys by smoothness."""
+    """Return header and rows of one table: a row per track of every clip, with its keys by smoothness."""
     header = ["file", "clip", *cells(None)]
     lines: list[list[Cell]] = [
         [inspected.name, clip_name(clip.name, clip.index), *cells(track).values()]

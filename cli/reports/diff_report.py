@@ -103,7 +103,7 @@ def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
 
 
 def worst(found: DiffReport) -> str:
-    """Return the largest distance and its position: "4.3 mm (0.21 %) in 'Run' at 'tail3', vertex 134, 0.458 s"."""
+    """Return the largest distance and its position: "4.3 mm (0.21 %) in 'Run' at 'tail3', 0.458 s"."""
     each = found.diff.clips[0]
     error = each.error
     if not error.max_error:

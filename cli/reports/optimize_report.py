@@ -212,7 +212,7 @@ def _error_words(verdict: Verification, about: OptimizeReport) -> str:
 
 
 def _earlier(about: OptimizeReport) -> list[str]:
-    """Note on an input that was optimized before: errors add up, since its original motion is not in the file."""
+    """Note on an input that was optimized before: errors add up, as the file lacks the original motion."""
     if not about.optimized_before:
         return []
     return ["the input was optimized before; errors are measured from it, not from its source"]

@@ -28,7 +28,7 @@ from cli.text import Reporter
 
 @dataclass(frozen=True, slots=True)
 class CharacterOptions:
-    """Options of --onto: pairs of names, scaling of hip heights, time of the rest pose, limit on unmatched joints.
+    """Options of --onto: pairs of names, hip heights, time of the rest pose, limit on unmatched joints.
 
     replaced: index of the clip that the new one replaces; None to add it.
     """

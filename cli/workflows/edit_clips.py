@@ -111,7 +111,7 @@ def edit_clips(
 
 
 def check_clips(path: str, selection: Selection, voice: text.Reporter) -> None:
-    """Raise NotFoundError for a selected clip that a file lacks; without such a selection the file is not read."""
+    """Raise NotFoundError for a selected clip that a file lacks, which is only then read."""
     if selection.clips:
         with documents.source(path, voice) as source:
             selection.chosen_clips(reader.names(source.document))
@@ -162,7 +162,7 @@ def _worst(measured: list[Proof]) -> Proof | None:
 
 
 def _warn_of_lengths(edited: EditResult, voice: text.Reporter) -> None:
-    """Warn of rotations that are not unit length in changed tracks: the error holds for players that normalize them."""
+    """Warn of rotations off unit length in changed tracks: the error holds for players that normalize."""
     off: list[tuple[str, int]] = []
     keys = 0
     for i, before in edited.before.items():
@@ -211,7 +211,7 @@ def note_images(document: Document, source: Source, output: str, voice: text.Rep
 
 
 def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
-    """Return the duration of every clip that changed it: "'walk' 1 s → 4 s"; of many clips the sum; else "".
+    """Return the duration of every clip that changed it: "'walk' 1 s → 4 s"; of many the sum; else "".
 
     before, after: clips of a file by index. Of a clip that starts after 0 s the time span is given: "0.5–1.5 s".
     """

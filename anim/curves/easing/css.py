@@ -18,7 +18,7 @@ HANDLE_TOLERANCE = 1e-12  # distance of handles from 1/3 and 2/3 below which the
 
 
 def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") -> Easing:
-    """Return the easing along the Bézier (0, 0), (x1, y1), (x2, y2), (1, 1), with x as time and y as progress.
+    """Return the easing along the Bézier (0, 0), (x1, y1), (x2, y2), (1, 1): progress y over time x.
 
     x1 and x2 are in 0 … 1, y1 and y2 are any finite numbers; RangeError otherwise. Handles at thirds of the time give
     an exact cubic, handles on the diagonal a line. The slope is ±inf at a vertical handle.
@@ -45,7 +45,7 @@ def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") 
 
 
 def steps(count: int, jump: str = "jump-end", *, name: str = "") -> Easing:
-    """Return the easing of `count` constant levels of equal duration with jumps between them; its exact form is STEP.
+    """Return the easing of `count` constant levels of equal duration; its exact form is STEP.
 
     jump: position of the first and last jump: "jump-start" jumps at u = 0, "jump-end" at u = 1, "jump-both" at both,
     "jump-none" at neither (count ≥ 2). At a jump the value is the one after it: value(0) > 0 for the first and third.

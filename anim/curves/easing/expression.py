@@ -30,7 +30,7 @@ class Factory(Generic[T]):
 
 
 def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T]], *, kind: str, listing: str) -> T:
-    """Return what `text` names: an entry of `ready`, or one made by `makers` with the arguments in parentheses.
+    """Return the entry of `ready` that `text` names, or one made by `makers` from its arguments.
 
     kind: type of the entries for messages, such as "easing". listing: the table of names, for the help.
     Case and spaces around names and arguments are ignored.
@@ -59,7 +59,7 @@ def parse_call(text: str, ready: Mapping[str, T], makers: Mapping[str, Factory[T
 
 
 def numbers(arguments: tuple[str, ...], count: int) -> tuple[float, ...]:
-    """Return the arguments as `count` floats; fractions such as 1/3 are valid. Raises RangeError otherwise."""
+    """Return the arguments as `count` floats, also from fractions as 1/3. Raises RangeError otherwise."""
     if len(arguments) != count:
         raise RangeError(f"number of arguments is {len(arguments)} (expected {count})")
     return tuple(number(argument) for argument in arguments)
@@ -75,7 +75,7 @@ def number(text: str) -> float:
 
 
 def _suggestion(name: str, known: list[str]) -> str:
-    """Return "did you mean ...?": names of the same words in any order and style (easeInOutQuad), or near spellings."""
+    """Return "did you mean ...?": names of the same words in any order (easeInOutQuad), or near spellings."""
     words = {word.lower() for word in WORD.findall(name)}
     same = [k for k in known if words in (set(k.split("-")), set(k.split("-")) | {"ease"})]
     family = [k for k in known if k.startswith(f"{name.lower()}-")]

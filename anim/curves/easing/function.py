@@ -1,4 +1,4 @@
-"""Easing: progress of a motion as a function of the time fraction u, and its exact cubics if there are any."""
+"""Easing: progress of a motion as a function of the time fraction u, and its exact cubics if any."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OVERSHOOT_TOLERANCE = 1e-9  # smaller overshoots are rounding
 
 @dataclass(frozen=True, slots=True)
 class CubicSegment:
-    """Cubic segment of an easing, from u = `start` to `end`: end values, and end slopes per u of the whole easing.
+    """Cubic segment of an easing from u = `start` to `end`: end values, and slopes per u of the easing.
 
     On a segment of duration t_d from v0 to v1 the key values are v0 + value · (v1 − v0) and the CUBICSPLINE tangents
     slope · (v1 − v0) / t_d. If value1 of a segment is not value0 of the next one, the easing jumps.
@@ -73,7 +73,7 @@ def format_call(name: str, *arguments: float) -> str:
 
 
 def evaluate(pieces: tuple[CubicSegment, ...], u: Floats) -> Floats:
-    """Return the values at u (any shape, in 0 … 1) of cubics that cover 0 … 1; at a jump the value after it.
+    """Return the values at u (any shape, 0 … 1) of cubics that cover 0 … 1; at a jump the value after it.
 
     evaluate((CubicSegment(0, 1, 0, 1, 0, 0),), 0.5) → 0.5
     """
@@ -97,7 +97,7 @@ def ease_out_from(ease: Easing, name: str) -> Easing:
 
 
 def ease_in_out_from(ease: Easing, name: str) -> Easing:
-    """Return the in-out form of an in form: scaled by ½ up to u = ½, then point-mirrored. ½ is a breakpoint."""
+    """Return the in-out form of an in form: scaled by ½ up to the breakpoint u = ½, then point-mirrored."""
 
     def value(u: Floats) -> Floats:
         half = ease.value(np.where(u < 0.5, 2 * u, 2 - 2 * u)) / 2

@@ -33,7 +33,7 @@ def penner() -> list[Easing]:
 
 
 def back_in(overshoot: float, *, name: str = "") -> Easing:
-    """Return the easing with an initial undershoot: (s+1)u³ − su² for s = `overshoot` ≥ 0; 10 % for 1.70158.
+    """Return the easing with an undershoot: (s+1)u³ − su² for s = `overshoot` ≥ 0; 10 % for 1.70158.
 
     Raises RangeError for an overshoot that is negative or not finite.
     """
@@ -113,7 +113,7 @@ def _elastic(period: float) -> Easing:
 
 
 def _bounce_out() -> Easing:
-    """Return a fall and three rebounds: parabolas (11/4)² (u − c)² + floor with value 1 at 4/11, 8/11, 10/11 and 1."""
+    """Return a fall and three rebounds: parabolas (11/4)² (u − c)² + floor, 1 at 4/11, 8/11, 10/11 and 1."""
     breaks = np.array([4, 8, 10]) / 11
     centers = np.array([0, 6, 9, 10.5]) / 11
     floors = np.array([0, 0.75, 0.9375, 0.984375])

@@ -13,7 +13,7 @@ ZERO, ONE = np.zeros(()), np.ones(())
 
 
 def hermite(slope0: float, slope1: float, *, name: str = "") -> Easing:
-    """Return the cubic easing with start slope `slope0` and end slope `slope1`, relative to constant speed.
+    """Return the cubic easing with slopes `slope0` and `slope1` at its ends, relative to constant speed.
 
     Any finite slopes: negative ones undershoot, large ones overshoot. Raises RangeError for others.
     hermite(0, 0) → smoothstep, hermite(1, 1) → linear, hermite(0, 3) → cubic-in
@@ -44,7 +44,7 @@ def smoothstep() -> Easing:
 
 
 def smootherstep() -> Easing:
-    """Return 10u³ − 15u⁴ + 6u⁵: zero speed and acceleration at both ends, the minimum of integrated squared jerk.
+    """Return 10u³ − 15u⁴ + 6u⁵: zero speed and acceleration at both ends, least integrated squared jerk.
 
     Source: Flash & Hogan 1985 (minimum jerk); Perlin 2002 (the same polynomial, for noise).
     """

@@ -14,7 +14,7 @@ CRITICAL_SETTLING = 9.233413476451586  # the root of (1 + x) e^−x = SETTLING_T
 
 
 def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
-    """Return the motion of a mass of 1 kg on a spring until it has settled, as an easing: starts at rest, ends at 1.
+    """Return the motion of a mass of 1 kg on a spring, from rest until it has settled at 1, as an easing.
 
     stiffness: k in N/m, > 0. damping: c in N·s/m, > 0. Only the ratio ζ = c / (2 √k) determines the shape, since u = 1
     is the settling time: ζ < 1 oscillates, ζ ≥ 1 does not. A factor within 0.1 % of 1 makes the end exactly 1.
@@ -31,7 +31,7 @@ def spring(stiffness: float, damping: float, *, name: str = "") -> Easing:
 
 
 def settle_time(stiffness: float, damping: float) -> float:
-    """Return the settling time in seconds, after which the error stays below 0.1 %. Raises RangeError as spring.
+    """Return the time in seconds until the error stays below 0.1 %. Raises RangeError as `spring`.
 
     It is defined on the envelope of the oscillation, so that it is a continuous function of the damping.
     """
@@ -51,7 +51,7 @@ def settle_time(stiffness: float, damping: float) -> float:
 
 
 def _settle_overdamped(stiffness: float, damping: float) -> float:
-    """Return the settling time of an over-damped spring by bisection: its distance decreases monotonically."""
+    """Return the settling time of an over-damped spring by bisection: its distance only decreases."""
     low, high = 0.0, 2 * CRITICAL_SETTLING * damping / stiffness
     for _ in range(60):
         middle = (low + high) / 2
@@ -80,7 +80,7 @@ def _speed(t: Floats, stiffness: float, damping: float) -> Floats:
 
 
 def _oscillation(t: Floats, stiffness: float, damping: float) -> Floats:
-    """Return e^(−ct/2) sin(ωt) / ω, ω² = k − c²/4, and its limits where ω is 0 (t e^(−ct/2)) or imaginary (sinh)."""
+    """Return e^(−ct/2) sin(ωt) / ω, ω² = k − c²/4, and its limits for ω = 0 or imaginary ω (sinh)."""
     decay, gap = damping / 2, damping * damping / 4 - stiffness
     if gap <= 0:
         return np.asarray(np.exp(-decay * t) * t * np.sinc(np.sqrt(-gap) * t / np.pi))

@@ -80,7 +80,7 @@ def parse(text: str) -> Easing:
 
 
 def sparkline(easing: Easing, width: int = 24) -> str:
-    """Return the curve as one line of `width` bars, scaled to its lowest and highest value, overshoots included.
+    """Return the curve as one line of `width` bars, scaled to its lowest and highest value.
 
     Raises RangeError for a width below 2.
     sparkline(EASINGS["linear"], 8) → ▁▂▃▄▅▆▇█

@@ -1,4 +1,4 @@
-"""Adaptive keys: segments are split until interpolation between their ends follows a motion within a tolerance."""
+"""Adaptive keys: segments are split until interpolation follows a motion within a tolerance."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tu
 
 
 def cubic_keys(track: Track, motion: TrackFunction, knots: Floats, *, tolerance: float) -> Track:
-    """Return `track` with CUBICSPLINE keys that approximate `motion` within `tolerance`, as `linear_keys` does."""
+    """Return `track` with CUBICSPLINE keys that approximate `motion` within `tolerance`."""
     assert motion.rates is not None
 
     def count(a: Floats, b: Floats) -> Ints:
@@ -98,7 +98,7 @@ def cubic_keys(track: Track, motion: TrackFunction, knots: Floats, *, tolerance:
 
 
 def _limit_slopes(segments: Ints, times: Floats, values: Floats, before: Floats, after: Floats) -> None:
-    """Limit the end slopes of segments that are too short to be split, in place, so that they don't overshoot.
+    """Limit end slopes of segments too short to be split, in place, so that they don't overshoot.
 
     Where the motion rises vertically, its slopes are far too large for a segment of a float32 step. Source: Fritsch and
     Carlson, 1980.
@@ -157,7 +157,7 @@ def sample_times(a: Floats, b: Floats, inner: int) -> Floats:
 
 
 def rotation_segment_count(values: Floats, tolerance: float) -> Ints:
-    """Return the slerp segments (B,) that rotations need; values (B, S, N, 4): N joints at times of `sample_times`.
+    """Return the number (B,) of slerp segments for rotations (B, S, N, 4): N joints at `sample_times`.
 
     By the angle of a segment if it is too large for one, since its error is meaningless then, else by its error.
     """
@@ -178,7 +178,7 @@ def vector_segment_count(values: Floats, tolerance: float) -> Ints:
 
 
 def segment_count(error: Floats, tolerance: float) -> Ints:
-    """Return the linear segments (B,) to split segments with these errors (B,) into, up to MAX_SUBDIVISIONS.
+    """Return the number (B,) of parts to split segments with errors (B,) into, up to MAX_SUBDIVISIONS.
 
     Source: the chord error of a segment of length h is about h² · α / 8, so an error e needs √(e / tolerance) segments.
     """

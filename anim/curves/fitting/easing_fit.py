@@ -14,7 +14,7 @@ from anim.curves.fitting.subdivision import subdivide
 
 @lru_cache(maxsize=256)
 def fit_segments(easing: Easing, *, tolerance: float) -> tuple[CubicSegment, ...]:
-    """Return an easing as cubics: the exact ones if there are any, else the fewest within `tolerance` (of the range).
+    """Return an easing as cubics: the exact ones, else the fewest within `tolerance` (of the range).
 
     fit_segments(EASINGS["bounce-out"], tolerance=1e-3) → its four parabolas
     Raises RangeError as fit_cubic does.
@@ -42,7 +42,7 @@ def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], toleran
 
 
 def fit_linear(f: Function, breakpoints: tuple[float, ...], tolerance: float) -> Floats:
-    """Return the fewest knots u (K,), 0 and 1 included, of linear segments that approximate f within `tolerance`.
+    """Return the fewest knots u (K,), with 0 and 1, of lines that approximate f within `tolerance`.
 
     f must be continuous. The result contains all breakpoints. Raises RangeError for a tolerance below 1e-7.
     For an eased slerp by θ give tolerance / θ: its angle is f · θ.

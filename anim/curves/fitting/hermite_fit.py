@@ -21,7 +21,7 @@ MAX_SLOPE = 1e4  # steeper slopes are replaced by a least squares fit
 
 @dataclass(frozen=True, slots=True)
 class FitTarget:
-    """Path from u (...) to points (..., D), with unit tangent `direction` (..., D) and speed `rate` (...) per u.
+    """Path from u (...) to points (..., D): unit tangent `direction` (..., D), speed `rate` (...) per u.
 
     distance: the error (...) of a point (..., D) against the true one (..., D).
     breakpoints: u with different rates on both sides.

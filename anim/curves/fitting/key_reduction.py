@@ -55,7 +55,7 @@ def greedy_segments(tracks: int, count: int, fits: SegmentTest) -> Bools:
 
 
 def greedy_indices(count: int, fits: Callable[[int, int], bool]) -> Ints:
-    """Return the indices of the keys that remain of one track; fits: as for `greedy_segments`, start and end key."""
+    """Return the indices of the remaining keys of one track; fits: as for `greedy_segments`."""
     keep = greedy_segments(1, count, lambda _, start, end: np.array([fits(int(start[0]), int(end[0]))]))
     return np.flatnonzero(keep[0])
 

@@ -20,7 +20,7 @@ MAX_FITS = 4  # attempts with smaller tolerances
 
 @dataclass(frozen=True, slots=True)
 class RotationFit:
-    """Cubics for rotations of up to one angle: key u (P + 1,), start and end rates e′ (P,) of segments, and error.
+    """Cubics for rotations of up to one angle: key u (P + 1,), rates e′ (P,) at segment ends, and error.
 
     Tangents per u are ½ q ⊗ (rate · rotation vector). error: greatest angle in radians from the eased rotation, for
     any rotation angle that shares the fit.
@@ -33,7 +33,7 @@ class RotationFit:
 
 
 def fit_rotation(easing: Easing, angle: float, tolerance: float) -> RotationFit:
-    """Return the fewest cubics for a rotation by `angle` radians; angles are rounded up to multiples of π/32.
+    """Return the fewest cubics for a rotation by `angle` radians, rounded up to a multiple of π/32.
 
     tolerance: the greatest angle from the eased slerp, radians, 1e-7 or more. No segment rotates by more than 120°.
     90° with smoothstep at 0.1° → 4 keys

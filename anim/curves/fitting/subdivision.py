@@ -1,4 +1,4 @@
-"""Subdivision into the fewest segments within a tolerance: greedy from left to right, then errors are equalized."""
+"""Subdivision into the fewest segments within a tolerance: greedy, then with equalized errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_EQUALIZED_SEGMENTS = 64  # with more segments a short last one doesn't matte
 
 
 def subdivide(errors: Errors, edges: tuple[float, ...], tolerance: float) -> tuple[float, ...]:
-    """Return the ends of the fewest segments with errors within `tolerance`: `edges` and ends between them.
+    """Return the ends of the fewest segments with errors within `tolerance`, `edges` included.
 
     errors: the error of each segment from a to b (B,). edges: increasing, each one an end of segments.
     The number is minimal if errors don't grow when a segment is shortened; then the errors are equalized.
@@ -38,7 +38,7 @@ def subdivide(errors: Errors, edges: tuple[float, ...], tolerance: float) -> tup
 
 
 def _equalize_errors(errors: Errors, start: float, end: float, tolerance: float) -> list[float]:
-    """Return the ends of the fewest segments from start to end, at nearly the least tolerance for their number."""
+    """Return the ends of the fewest segments, at nearly the least tolerance for their number."""
     best = _subdivide_greedily(errors, start, end, tolerance, limit=None)
     assert best is not None
     count = len(best)

@@ -12,7 +12,7 @@ from anim.curves.tangents.rule import SplineKeys, extend_loop
 
 
 def natural(times: Floats, values: Floats) -> SplineKeys:
-    """Return the C2 curve through the keys with zero end acceleration: the least integrated squared acceleration."""
+    """Return the C2 curve with zero end acceleration: the least integrated squared acceleration."""
     return _cubic(times, values, ends="natural")
 
 
@@ -73,7 +73,7 @@ def _cubic(times: Floats, values: Floats, *, ends: str) -> SplineKeys:
 
 
 def _fit_bspline(knots: Floats, lines_t: Floats, lines_v: Floats, times: Floats, values: Floats) -> SplineKeys:
-    """Return the B-spline on `knots`, with control points on the lines through lines_t, lines_v, sampled at `times`."""
+    """Return the B-spline on `knots`, control points on the lines through lines_t, lines_v, at `times`."""
     from scipy.interpolate import BSpline
 
     centers = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3

@@ -1,4 +1,4 @@
-"""Tangents from a key's neighbors: h_k and d_k are the duration and the mean speed from key k to k + 1.
+"""Tangents from a key's neighbors: h_k is the duration, d_k the mean speed from key k to k + 1.
 
 Monotone and Akima come from scipy.
 """
@@ -15,7 +15,7 @@ MIN_KNOT_RATIO = 1e-9  # of the longest interval: separates repeated points in t
 
 
 def bessel(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return the slopes of the parabolas through three keys; the end slopes are of the first and last three keys.
+    """Return the slopes of parabolas through three keys; at the ends of the first and last three.
 
     (h_k d_{k−1} + h_{k−1} d_k) / (h_{k−1} + h_k). Exact for parabolas, whatever the spacing.
     """
@@ -53,7 +53,7 @@ def centripetal(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def monotone(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return slopes of a curve that stays in the range of neighboring keys: weights in 0 … 1, no feet below the floor.
+    """Return slopes of a curve that stays in the range of neighboring keys, so no feet below the floor.
 
     Source: Fritsch & Butland 1984, by scipy's PchipInterpolator.
     """
@@ -65,7 +65,7 @@ def monotone(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def akima(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return slopes weighted towards the side with less change, robust to outlier keys (Akima 1970, scipy)."""
+    """Return slopes weighted towards the side of less change, robust to outlier keys (Akima 1970, scipy)."""
     from scipy.interpolate import Akima1DInterpolator
 
     if len(times) == 2:
@@ -75,7 +75,7 @@ def akima(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def cardinal(tension: float) -> TangentRule:
-    """Return the rule of Catmull-Rom slopes times 1 − tension: 0 is catmull-rom, 1 is flat, below 0 steeper.
+    """Return the rule of Catmull-Rom slopes times 1 − tension: 0 is catmull-rom, 1 flat, below 0 steeper.
 
     Raises RangeError for a tension outside −1 … 1.
     """
@@ -89,7 +89,7 @@ def cardinal(tension: float) -> TangentRule:
 
 
 def tcb(tension: float, continuity: float, bias: float) -> TangentRule:
-    """Return the rule with tension (1: slope 0), continuity (0: C1) and bias (±1: overshoot after or before).
+    """Return the rule with tension (1: slope 0), continuity (0: C1), bias (±1: overshoot after, before).
 
     Each in −1 … 1, RangeError otherwise; (0, 0, 0) is catmull-rom. The end slopes are catmull-rom's times 1 − tension.
     Source: Kochanek & Bartels 1984, with their correction for uneven spacing.

@@ -47,7 +47,7 @@ class TangentRule:
 
 
 def local_rule(name: str, slopes: Slopes) -> TangentRule:
-    """Return a rule of at most two neighbors on each side; in a loop the ends' neighbors are those of the other end."""
+    """Return a rule of at most two neighbors on each side; in a loop those of the other end."""
 
     def open_keys(times: Floats, values: Floats) -> SplineKeys:
         return SplineKeys(values, *slopes(times, values))
@@ -60,7 +60,7 @@ def local_rule(name: str, slopes: Slopes) -> TangentRule:
 
 
 def extend_loop(times: Floats, values: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return times (K + 2·count,) and values (K + 2·count, C) with `count` more keys of the loop before and after.
+    """Return times (K + 2·count,) and values (K + 2·count, C) with `count` keys of the loop on each side.
 
     The last key is the first one of the next cycle; the difference of their values is the displacement per cycle.
     extend_loop([0, 1, 3], [[0], [5], [0]], 1) → [−2, 0, 1, 3, 4], [[5], [0], [5], [0], [5]]

@@ -50,7 +50,7 @@ def parse(text: str) -> TangentRule:
 
 
 def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
-    """Return CUBICSPLINE keys for times (K,) s and values (K, C): the values and the rule's tangents per second.
+    """Return CUBICSPLINE keys for times (K,) s: values (K, C) and the rule's tangents per second.
 
     cyclic: the last key is the first one of the next cycle, so speed is continuous there (for C2 rules acceleration
     too: natural becomes periodic). The difference of last and first value is the displacement per cycle.
@@ -65,7 +65,7 @@ def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cy
 def apply_rotation_tangents(
     times: ArrayLike, rotations: ArrayLike, rule: TangentRule, *, cyclic: bool = False
 ) -> SplineKeys:
-    """Return CUBICSPLINE keys for times (K,) s and quaternions (K, 4): signs aligned, the rule's tangents per second.
+    """Return CUBICSPLINE keys for times (K,) s: quaternions (K, 4), signs aligned, and their tangents.
 
     Local rules work on the rotations from key to key, unrolled into a curve of rotation vectors in body axes: its
     slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when the
@@ -108,7 +108,7 @@ def _keys(times: Floats, values: Floats, rule: TangentRule, cyclic: bool) -> Spl
 
 
 def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
-    """Return the rule's keys of quaternion components, normalized. A loop that ends at −q is closed by two cycles."""
+    """Return the rule's keys of quaternion components; a loop that ends at −q is closed by two cycles."""
     if cyclic:
         check_closed(q)
     count = len(q)

@@ -65,7 +65,7 @@ def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
 
 
 def _stack_angles(motion: EulerMotion, clip: Clip) -> Iterator[tuple[Floats, list[int], Floats]]:
-    """Yield tracks of one time axis: times (K,), node indices, rotations (K, G, 4) of angles, sized for CPU caches."""
+    """Yield tracks of one time axis: times (K,), nodes, rotations (K, G, 4), sized for CPU caches."""
     groups: dict[tuple[TimeAxis, bool], list[tuple[int, Track]]] = {}
     for track in clip.tracks:
         if track.path == "rotation" and track.node is not None and motion.nodes[track.node].order in ORDERS:

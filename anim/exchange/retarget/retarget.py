@@ -161,7 +161,7 @@ def _segment_count(
     size: float,
     tolerance: float,
 ) -> Ints:
-    """The segments (B,) from a to b (B,) that the joints need: paths, and scales × size, within tolerance × size.
+    """The number (B,) of segments from a to b (B,): paths, and scales × size, within tolerance × size.
 
     units: metres per unit of each node's parent space.
     """

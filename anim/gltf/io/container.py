@@ -63,7 +63,7 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
 
 
 def check_edits(document: Document) -> Document:
-    """Return a document whose JSON may have been edited in place, with the buffers that were appended to it.
+    """Return a document with the buffers that were appended to its JSON by edits in place.
 
     Raises FormatError for invalid JSON, as on reading, and for removed buffers.
     """

@@ -44,7 +44,7 @@ class Source:
         return self.data if document is self.document and not document.expanded else None
 
     def is_edited(self) -> bool:
-        """Return True if the JSON of the document was changed in place, a dict or list of it, since it was read."""
+        """Return True if a dict or list of the document's JSON was changed in place since it was read."""
         return json_text.dump(container.read(self.data).json) != json_text.dump(self.document.json)
 
     def is_at(self, path: str) -> bool:

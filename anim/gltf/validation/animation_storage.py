@@ -1,4 +1,4 @@
-"""Storage of animations against the specification: samplers without a channel, missing bounds, strided views."""
+"""Storage of animations against the specification: unused samplers, missing bounds, strided views."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def unbounded(json: Json, animation: Json) -> set[int]:
 
 
 def strided(json: Json, animation: Json) -> set[int]:
-    """Return the indices of a clip's accessors in buffer views with byteStride, which is for vertex attributes."""
+    """Return the indices of a clip's accessors in buffer views with byteStride (for vertex attributes)."""
     named = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
     return {n for n in named if has_stride(json, n)}
 

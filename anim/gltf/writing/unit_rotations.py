@@ -57,7 +57,7 @@ def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | 
 
 
 def _non_unit_tracks(clip: Clip, chosen: Iterable[int]) -> list[int]:
-    """The chosen tracks of a clip with rotations off unit length; all in one array, since tracks are many and short."""
+    """The chosen tracks of a clip with rotations off unit length, in one array: tracks are many and short."""
     rotations = [n for n in chosen if clip.tracks[n].path == "rotation"]
     if not rotations:
         return []

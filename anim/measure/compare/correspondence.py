@@ -53,7 +53,7 @@ class Correspondence:
 
 
 def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
-    """Return the correspondence of two scenes' nodes, and the joints of the first one's `surfaces` in the second.
+    """Return the correspondence of two scenes' nodes, and joints of the first's `surfaces` in the second.
 
     Surfaces of a node that the second scene lacks are moved by its nearest ancestor there, with the offset at rest: if
     the first scene's clip moves the node, that is an error.
@@ -111,13 +111,13 @@ class _SceneMatcher:
         self._local = local_by_node(scene.skeleton, rest_pose)[:, 0]
 
     def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
-        """The instance of the other scene with the same vertices: on the same node, of the same name, in order."""
+        """The instance of the other scene with the same vertices: same node, same name, same order."""
         skinned = instance.skin is not None
         choices = [each for each in self._choices(number, instance) if (each.skin is not None) is skinned]
         return next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
 
     def opposite(self, number: int, instance: MeshInstance) -> MeshInstance | None:
-        """A skinned instance's partner without skin, or the reverse: of the same vertices, or on the node by name."""
+        """A skinned instance's partner without skin, or the reverse: by vertices, or by the node's name."""
         is_skinned = instance.skin is not None
         choices = [each for each in self._choices(number, instance) if (each.skin is not None) is not is_skinned]
         found = next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
@@ -128,7 +128,7 @@ class _SceneMatcher:
         return found
 
     def is_reduced(self, number: int, instance: MeshInstance) -> bool:
-        """Return whether an instance lost primitives that are in no other mesh either: other tools split meshes."""
+        """Return whether an instance lost primitives that are in no other mesh (other tools split meshes)."""
         lost = [is_reduced(instance.mesh, each.mesh) for each in self._choices(number, instance)]
         faces = [sum(len(each.mesh.faces) for each in scene.instances) for scene in (self._scene, self._other)]
         return bool(lost) and all(lost) and faces[1] < faces[0]
@@ -251,7 +251,7 @@ def _agree(old: Mesh, new: Mesh) -> bool:
 
 
 def _space(a: Floats, b: Floats) -> Floats:
-    """b_from_a (3, 4): translation and uniform scale that take points a (V, 3) nearest to b (least squares)."""
+    """b_from_a (3, 4): translation and uniform scale from points a (V, 3) to b, by least squares."""
     if np.array_equal(a, b):
         return NOWHERE
     middle_a, middle_b = a.mean(axis=0), b.mean(axis=0)
@@ -261,7 +261,7 @@ def _space(a: Floats, b: Floats) -> Floats:
 
 
 def _space_of_boxes(a: Floats, b: Floats) -> Floats | None:
-    """b_from_a (3, 4) from the boxes around points a and b, in any order and number; None for other proportions."""
+    """b_from_a (3, 4) from the boxes around points a and b, in any order; None for other proportions."""
     sizes = [np.ptp(each, axis=0) for each in (a, b)]
     middles = [(each.max(axis=0) + each.min(axis=0)) / 2 for each in (a, b)]
     limit = SAME_SPACE_TOLERANCE * float(np.linalg.norm(sizes[1]))

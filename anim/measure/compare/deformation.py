@@ -46,7 +46,7 @@ def same_targets(old: Mesh, new: Mesh, new_from_old: Floats) -> bool:
 
 
 def is_reduced(old: Mesh, new: Mesh) -> bool:
-    """Return whether the second mesh lost primitives, with their vertices and faces: merged primitives keep them."""
+    """Return whether the second mesh lost primitives with their vertices and faces; merged ones keep them."""
     if len(new.primitives) >= len(old.primitives) or len(new.positions) >= len(old.positions):
         return False
     return len(old.faces) - len(new.faces) >= min(each.faces for each in old.primitives)

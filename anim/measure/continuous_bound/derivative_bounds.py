@@ -15,7 +15,7 @@ from anim.arrays import Floats
 
 
 def derivative_bound(first: Floats, apart: Floats) -> Floats:
-    """Return the majorant (3, 2, ...) of a motion bounded by `first` (3, ...), with differences up to `apart`."""
+    """Return the majorant (3, 2, ...) of a motion bounded by `first` (3, ...), differences up to `apart`."""
     return np.stack((first, first + apart), axis=1)
 
 

@@ -17,7 +17,7 @@ from anim.sampling.batch import Batch
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """Value, slope per s and second derivative per s² of U vectors at both ends of G intervals, (2, C, G, U).
+    """Values, slopes, second derivatives (per s, s²) of U vectors at ends of G intervals, (2, C, G, U).
 
     Within an interval the third derivative is constant: a line or a cubic.
     """
@@ -42,7 +42,7 @@ def endpoints(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], w
 
 
 def of_batch(batch: Batch, where: Intervals) -> tuple[Floats, Floats, Floats]:
-    """Return values, slopes and second derivatives (2, C, G, U) of a batch's U tracks; rotations not normalized."""
+    """Return values and two derivatives (2, C, G, U) of a batch's U tracks; rotations not normalized."""
     at = where.on(batch.time_axis)
     start, end = (np.moveaxis(batch.values[k], -1, 0) for k in (at.left, at.right))  # (C, G, U)
     if batch.interpolation is Interpolation.STEP:

@@ -12,7 +12,7 @@ from anim.model import Clip, Interpolation
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """Spacing of the first samples. parts: minimum number per interval between keys. step: s, maximum distance.
+    """Spacing of the first samples. parts: least number between keys. step: s, largest distance.
 
     longest: s, as for `Prover.certified`.
     """
@@ -28,7 +28,7 @@ FINE = Spacing(16, 1 / 480, 0.0)  # for intervals in which the first samples pro
 
 
 def largest_error(prover: Prover, before: Clip, after: Clip, *, floor: float = 0.0) -> Proof:
-    """Return the largest error of `after`, interpolated as the specification says, and an upper bound of it.
+    """Return the largest error of `after`, interpolated as specified by glTF, and an upper bound of it.
 
     Samples are at all keys, at the last moment before each jump, and between keys wherever a vertex could have a larger
     error than the samples so far. `is_closed` tells if the largest error was found.

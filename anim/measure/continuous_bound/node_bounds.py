@@ -114,7 +114,7 @@ def _held(version: ClipVersion, path: str) -> Floats:
 
 
 def _late(version: ClipVersion, where: Intervals) -> set[int]:
-    """Nodes with a constant rotation that starts after the first interval: some players normalize only from then on."""
+    """Nodes with a constant rotation after the first interval: some players normalize only from then on."""
     late = [batch for batch in _of_path(version.still, "rotation") if batch.times[-1] > where.edges[1]]
     return _nodes(late)
 
@@ -122,7 +122,7 @@ def _late(version: ClipVersion, where: Intervals) -> set[int]:
 def _groups(
     first: ClipVersion, second: ClipVersion, path: str, where: Intervals, uneven: Collection[int] = ()
 ) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Intervals]]:
-    """Nodes that move in either version, with their tracks and all intervals; then those of `uneven` that do not.
+    """Nodes that move in either version, with tracks and all intervals; then the others of `uneven`.
 
     The latter with one interval, since all are equal.
     """

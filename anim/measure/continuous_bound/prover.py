@@ -37,7 +37,7 @@ class Proof:
 
 @dataclass(frozen=True, slots=True)
 class ProofTarget:
-    """Target of a proof. found: m, the largest distance so far. room: m, maximum excess of the bound over it."""
+    """Target of a proof. found: m, largest distance so far. room: m, largest excess of the bound over it."""
 
     found: float
     slack: float

@@ -47,7 +47,7 @@ class RefinedMaximum:
 
 
 def subdivide(player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints) -> Subintervals:
-    """Return intervals between neighbors among `times` (F,) in s, each divided into some of `parts` (F − 1,).
+    """Return the intervals between neighbors of `times` (F,) s, divided into `parts` (F − 1,).
 
     rise: (C, F − 1) m of groups in whole intervals. asked: (C, F − 1), mask of the intervals to refine for each group.
     """
@@ -104,7 +104,7 @@ def _chunks(asked: Sequence[Subintervals], length: int) -> Iterator[list[Subinte
 
 
 def _searched(field: DisplacementField, more: Floats, target: float, most: int) -> tuple[float, float, int, int]:
-    """The bound of all groups, the longest vector, its frame, and the number of evaluated ones, of `most` at most."""
+    """The bound of all groups, the longest vector, its frame, and the number (≤ `most`) of evaluated ones."""
     tops = field.limits + more
     found, frame, looked = 0.0, 0, 0
     for group in np.flatnonzero((tops > target).any(axis=1)).tolist():

@@ -23,7 +23,7 @@ from anim.measure.continuous_bound.rotation_endpoints import RotationEndpoints
 
 
 def rotation_bounds(first: RotationEndpoints, second: RotationEndpoints, lengths: Floats) -> tuple[Floats, Floats]:
-    """Return the majorant (3, 2, G, U) of matrices from quaternions, and upper bounds of their jumps (G, U).
+    """Return the majorant (3, 2, G, U) of matrices from quaternions, and bounds of their jumps (G, U).
 
     Valid for each of the players. A matrix is q·x·q* + (1 − |q|²)·x of a vector x, for any quaternion q: a product
     of q with itself, and a remainder if q is not of unit length. If the quaternion is normalized in an interval but not

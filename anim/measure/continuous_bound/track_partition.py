@@ -14,7 +14,7 @@ from anim.sampling.batch import Batch, batches
 
 @dataclass(frozen=True, slots=True)
 class ClipVersion:
-    """One version: nodes at rest, tracks of nodes that move in either version, and constant tracks with one key each.
+    """One version: nodes at rest, tracks of nodes that move in either, constant tracks with one key each.
 
     All stacked.
     """

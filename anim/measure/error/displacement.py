@@ -28,11 +28,11 @@ class DisplacementField(Protocol):
         ...
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
-        """Return the joint of the surface that moves a vertex of a group most in a frame; vertex −1: any of them."""
+        """Return the joint of the surface that moves a vertex (−1: any) of a group most in a frame."""
         ...
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return the rates of change of the vectors from each frame to the next. step: (F − 1,) s between frames."""
+        """Return the rates of change of the vectors between frames. step: (F − 1,) s from each to the next."""
         ...
 
 
@@ -68,7 +68,7 @@ class SkinnedDisplacement:
         return self._groups.fraction * largest_over(self._groups.corners, self._moved)
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return the rates of change of the vectors from each frame to the next. step: (F − 1,) s between frames."""
+        """Return the rates of change of the vectors between frames. step: (F − 1,) s from each to the next."""
         return SkinnedDisplacement(self._groups, np.diff(self._moved, axis=1) / step[:, None, None])
 
     def vectors(self, group: int, frames: Ints) -> Floats:
@@ -78,7 +78,7 @@ class SkinnedDisplacement:
         return np.asarray(flat.reshape(-1, 3, len(frames)))
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
-        """Return the joint of the surface that moves a vertex of a group most in a frame; vertex −1: any of them."""
+        """Return the joint of the surface that moves a vertex (−1: any) of a group most in a frame."""
         reach = self._groups.reach[group]
         if vertex < 0:
             return int(reach[self._bounds[reach, frame].argmax()])
@@ -110,7 +110,7 @@ class MorphedDisplacement:
         self._kept: dict[int, Floats] = {}
 
     def rate(self, step: Floats) -> DisplacementField:
-        """Return the rates of change of the vectors from each frame to the next. step: (F − 1,) s between frames."""
+        """Return the rates of change of the vectors between frames. step: (F − 1,) s from each to the next."""
         return DisplacementRate(self, step, _by_group(self._rates(step), self._reach))
 
     def vectors(self, group: int, frames: Ints) -> Floats:
@@ -164,7 +164,7 @@ class DisplacementRate:
 
 @dataclass(frozen=True, slots=True)
 class MaxDisplacement:
-    """The longest vector of a field. vertex: its index within the group, −1 if only the bound was evaluated.
+    """The longest vector of a field. vertex: index in the group, −1 if only the bound was evaluated.
 
     limits: (G, F), the field's own; where vertices were evaluated, at most the longest of them.
     """
@@ -220,7 +220,7 @@ def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:
 
 
 def largest_over(points: Floats, moved: Floats) -> Floats:
-    """Return the largest displacement (J, F) of any of the points (J, P, 3) by differences of matrices (J, F, 3, 4)."""
+    """Return the largest displacement (J, F) of points (J, P, 3) by matrix differences (J, F, 3, 4)."""
     displaced = moved[..., :3] @ np.swapaxes(points, -1, -2)[:, None]  # (J, F, 3, P)
     displaced += moved[..., 3, None]
     displaced *= displaced

@@ -16,7 +16,7 @@ JOINTS = 4  # number of worst joints with a curve of their own
 
 @dataclass(frozen=True, slots=True)
 class JointErrorCurve:
-    """Error of one joint: the largest displacement (F,) in m of a vertex with its largest weight on the joint."""
+    """Error of one joint: the largest displacement (F,) m of a vertex with its largest weight on it."""
 
     joint: str
     error: Floats
@@ -24,7 +24,7 @@ class JointErrorCurve:
 
 @dataclass(frozen=True, slots=True)
 class ErrorCurve:
-    """Error of one clip. times: (F,) s. error: (F,) m, the largest displacement of any vertex. joints: worst first."""
+    """Error of one clip. times: (F,) s. error: (F,) m, the largest of any vertex. joints: worst first."""
 
     name: str
     times: Floats

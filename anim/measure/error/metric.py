@@ -1,4 +1,4 @@
-"""Error metric: the distance between two versions of a clip, in metres on the surface, with position and time.
+"""Error metric: the distance between two versions of a clip on the surface, with position and time.
 
 Reported errors are upper bounds at the sampled times. Times are processed in blocks, so that memory does not depend on
 the length of a clip.
@@ -200,7 +200,7 @@ def key_and_mid_times(*clips: Clip) -> Floats:
 
 
 def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
-    """Return key and mid times, a grid of `fps` frames per second, and the last moment before each STEP key.
+    """Return key and mid times, a grid of `fps` frames per second, and the moments before STEP keys.
 
     In seconds, increasing. The grid includes 0 s, and starts with the last frame before the first key, which is equal
     to all earlier ones. Frames that differ from a key by rounding are that key.
@@ -215,7 +215,7 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
 
 
 def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
-    """Return every key time of the clips, the last moment before each STEP key, and divisions of all intervals.
+    """Return the clips' key times, the moments before STEP keys, and divisions of all intervals.
 
     In seconds, increasing. Each interval between neighboring keys is divided into equal parts. parts: minimum number of
     parts of an interval, ≥ 1. step: s, maximum duration of a part; > 0.

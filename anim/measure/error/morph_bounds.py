@@ -19,7 +19,7 @@ SIDES = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Both versions over time: differences of matrices `moved` = A − B and `after` = A (J, F, 3, 4), weights (F, M)."""
+    """Both versions over time: matrices `moved` = A − B and `after` = A (J, F, 3, 4), weights (F, M)."""
 
     moved: Floats
     after: Floats

@@ -20,7 +20,7 @@ def probe_size(places: Floats) -> float:
 
 
 def shell_points(skeleton: Skeleton, nodes: Ints, radius: float) -> Floats:
-    """Return the points (S, 6, 3), in the space of each of the `nodes`, `radius` m from it in the rest pose."""
+    """Return points (S, 6, 3) in the space of each of the `nodes`, `radius` m from it in the rest pose."""
     axes = rest_world(skeleton)[nodes, :, :3]
     scale = np.sqrt((axes * axes).sum(axis=1))  # (S, 3)
     return np.asarray(ENDS * (radius / np.where(scale > 0, scale, 1))[:, None])

@@ -1,4 +1,4 @@
-"""One surface in two versions: bounds of the displacement of its vertices, and displacements per vertex.
+"""One surface in two versions: displacement of its vertices, and bounds of it.
 
 A displacement |D·p| is convex in p, so that over a box it is largest at a corner, and for a blend of joints at most the
 largest joint's. That bounds every time cheaply. Without morphing the displacement is linear in the joints' matrices, so
@@ -50,7 +50,7 @@ class Binding:
 
 
 class PointGroups(Protocol):
-    """Points that move together: those of a mesh, or shells. name: of the mesh, empty if each group has its own."""
+    """Points that move together: those of a mesh, or shells."""
 
     @property
     def groups(self) -> Sequence[Ints]:
@@ -84,7 +84,7 @@ class PointGroups(Protocol):
 
 
 class SkinnedGroups:
-    """A surface with vertices grouped by the joint with the largest weight, and boxes around joints' vertices.
+    """A surface with vertices grouped by their main joint, and boxes around joints' vertices.
 
     new: joints of the surface in the second version, if they differ. used: indices of the joints with influence.
     reach: of each group the joints with influence, as indices into `used`. share: the largest sum of skin weights of a

@@ -1,4 +1,4 @@
-"""Points on which an error is measured: vertices with their joints, as one matrix from node to point motion.
+"""Points on which an error is measured, as one matrix from the motion of nodes to that of points.
 
 A skinned vertex is at Σ w·M·b·p: linear in the joints' world matrices M. With one row per vertex and four columns
 per node (x, y, z and 1 of w·b·p), the displacements of all vertices at all times are a single matrix product.
@@ -95,7 +95,7 @@ class PointRows:
 
 
 def stack_points(world: Floats, nodes: Ints) -> Floats:
-    """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, then all y, then all z."""
+    """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, all y, all z."""
     chosen = world[nodes]
     return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), -1)
 
@@ -103,7 +103,7 @@ def stack_points(world: Floats, nodes: Ints) -> Floats:
 def sample_points(
     scene: Scene, shells: Set[int], radius: float, extra: Set[tuple[int, int]] = frozenset()
 ) -> PointMatrix:
-    """Return the outermost vertices of the scene, and six points at `radius` metres around each node in `shells`.
+    """Return the outermost vertices of the scene, and six points `radius` m around each node in `shells`.
 
     Of vertices: for each joint and each of 14 directions of its space, the farthest of those with their largest weight
     on it, and of all with a noticeable weight. extra: further vertices, (index of the surface, index of the vertex).
@@ -117,7 +117,7 @@ def sample_points(
 
 
 def all_points(scene: Scene, radius: float) -> PointMatrix:
-    """Return all vertices of the scene, surface after surface; without vertices, six points around every node."""
+    """Return all vertices of the scene by surface; without vertices, six points around every node."""
     if has_vertices(scene):
         return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in surfaces(scene)])
     return _joined(_shells(scene, frozenset(range(len(scene.skeleton))), radius))

@@ -10,7 +10,7 @@ from anim.sampling.track import sample
 
 
 def pointer_error(before: Clip, after: Clip, times: Floats) -> tuple[float, str]:
-    """Return the largest error of such tracks as a fraction of the old track's range, and the track's pointer.
+    """Return the largest error of such tracks as a fraction of the old range, and the track's pointer.
 
     Tracks of only one of the clips don't count. times: (F,) s.
     """

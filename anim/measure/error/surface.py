@@ -1,4 +1,4 @@
-"""Surfaces on which an error is measured: the vertices of a scene, or small cubes on its nodes without any."""
+"""Surfaces on which an error is measured: vertices, or small cubes on the nodes of scenes without any."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def has_vertices(scene: Scene) -> bool:
 
 
 def is_measured_at(scene: Scene) -> str:
-    """Return the word for the points on which errors are measured: "surface", or "nodes" without any vertex."""
+    """Return the word for the points of error measures: "surface", or "nodes" without any vertex."""
     return "surface" if has_vertices(scene) else "nodes"
 
 
@@ -81,7 +81,7 @@ def morph_points(surface: Surface, weights: Floats) -> Floats:
 
 
 def skin_points(surface: Surface, points: Floats, bound: Floats) -> Floats:
-    """Return points (V, 3) of mesh space in world space, blended linearly by the joints' matrices (J, 3, 4)."""
+    """Return points (V, 3) of mesh space in world space, blended linearly by matrices (J, 3, 4)."""
     moved = np.zeros_like(points)
     for i in range(surface.joints.shape[1]):
         chosen = bound[surface.joints[:, i]]

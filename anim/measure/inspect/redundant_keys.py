@@ -15,7 +15,7 @@ TIME_BYTES = 4  # bytes of a key's time
 
 
 def redundant_keys(tracks: Sequence[Track], given: Mapping[int, Bools]) -> dict[int, Bools]:
-    """Return masks (K,) of the keys whose removal makes the file smaller, by index of the tracks that have any.
+    """Return masks (K,) of keys to remove for a smaller file, by index of the tracks that have any.
 
     given: masks (K,) of the keys that are interpolated by their neighbors, by index of the track; constant tracks are
     absent and need no time axis. A key that no track on its time axis needs is removed; other keys only if a separate

@@ -92,7 +92,7 @@ def _unit_error(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[in
 
 
 def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tuple[TrackStats, dict[int, Bools]]:
-    """The statistics, with redundant keys of constant tracks only, and masks of those of others that have any."""
+    """The statistics, with redundant keys of constant tracks only, and masks of the others' keys."""
     count = sum(len(group.tracks) for group in groups)
     result = TrackStats(*(np.zeros(count, kind) for kind in (bool, bool, int, int, int, int, float)))
     tracks: dict[int, Track] = {}

@@ -1,4 +1,4 @@
-"""Playback of stored keys: slerp, nlerp, linear interpolation and world matrices, rotations unit or not."""
+"""Playback of stored keys: slerp, nlerp, linear interpolation, world matrices; rotations unit or not."""
 
 from __future__ import annotations
 

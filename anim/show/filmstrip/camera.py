@@ -80,7 +80,7 @@ def _axes(azimuth: float, elevation: float) -> Floats:
 
 
 def _fit(across: Floats, back: Floats, slope: float) -> tuple[float, float]:
-    """Eye position, sideways and backward, of the tightest field of view, two planes through the eye, on all points."""
+    """Eye position, sideways and backward, of the tightest field of view on all points."""
     most = float((across + slope * back).max())
     least = float((-across + slope * back).max())
     return (most - least) / 2, (most + least) / (2 * slope)

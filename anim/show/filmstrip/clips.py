@@ -34,7 +34,7 @@ MAX_STICK_RATIO = 1.5  # relative to the median width, so that links to distant 
 
 @dataclass(frozen=True, slots=True)
 class FrameSelection:
-    """Selection of frames: at given times, or `count` evenly spaced, or `fps` per second, from `begin` to `end` s.
+    """Selection of frames: given times, `count` even ones, or `fps` per second, from `begin` to `end` s.
 
     begin, end: None for the clip's own.
     """
@@ -52,7 +52,7 @@ class FrameSelection:
                 raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
 
     def span(self, start: float, end: float) -> tuple[float, float]:
-        """Return the first and the last time in s of a motion from `start` to `end`. Raises RangeError for none."""
+        """Return the first and last time in s of a motion from `start` to `end`. Raises RangeError for none."""
         first = start if self.begin is None else max(self.begin, start)
         last = end if self.end is None else min(self.end, end)
         if first > last:
@@ -62,7 +62,7 @@ class FrameSelection:
         return first, last
 
     def times(self, start: float, end: float) -> Floats:
-        """Return times (F,) s of a motion from `start` to `end`; of those in `at` the ones within it, maybe none.
+        """Return times (F,) s of a motion from `start` to `end`; of those in `at` only those within.
 
         Raises RangeError if the selection is empty otherwise, or exceeds the greatest number of frames.
         """

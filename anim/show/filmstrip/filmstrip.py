@@ -36,7 +36,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """Row of a filmstrip. times: (F,) s. positions: (F, V, 3) m, Y up. faces: (T, 3). colors: (T, 3) linear.
+    """Row of a filmstrip. times: (F,) s. positions: (F, V, 3) m, Y up. faces, linear colors: (T, 3).
 
     distances: (F, V) m, shown as a heat map instead of the colors, or None. label: of the row, "dqs".
     heading: above all rows of one clip, "Walk". way: root path for a camera that follows the figure.
@@ -67,7 +67,7 @@ class Extent:
 
 @dataclass(frozen=True, slots=True)
 class ViewOptions:
-    """Options of the view. height: pixels of a frame. azimuth, elevation: degrees of the camera around the motion.
+    """Options of the view. height: pixels of a frame. azimuth, elevation: degrees of the camera.
 
     checker: squares fixed to the rest pose on the surface. wire: the edges of its triangles.
     """
@@ -154,7 +154,7 @@ def _draw_row(
 
 
 def _render_moment(row: Strip, frame: int) -> list[str]:
-    """Captions of a frame: time and, if the camera follows the figure, traveled distance: "0.50 s", "1.2 m"."""
+    """Captions of a frame: time and, if the camera follows the figure, distance: "0.50 s", "1.2 m"."""
     time = f"{row.times[frame]:.2f} s"
     if row.root_path is None:
         return [time]
@@ -164,7 +164,7 @@ def _render_moment(row: Strip, frame: int) -> list[str]:
 def animate_frames(
     rows: Sequence[Strip], extent: Extent, *, title: str = "", look: ViewOptions = ViewOptions()
 ) -> Iterator[Image]:
-    """Yield the frames (H, W, 3) of a looped film, with rows side by side; shorter ones repeat their last frame.
+    """Yield the frames (H, W, 3) of a looped film, rows side by side; short ones repeat the last frame.
 
     Raises RangeError for more than MAX_PIXELS.
     """
@@ -194,7 +194,7 @@ def animate_frames(
 
 
 def film_times(rows: Sequence[Strip]) -> Floats:
-    """Return the times (F,) s of a film of the rows: of the longest one; for loops without the duplicate last frame.
+    """Return the times (F,) s of a film of the rows: of the longest one, for loops without the last frame.
 
     At least one row.
     """

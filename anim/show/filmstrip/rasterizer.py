@@ -46,7 +46,7 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
 
 
 def _planes(corners: Floats) -> tuple[Floats, Floats, Ints]:
-    """Coefficients of x, y and 1 for barycentric weights (T, 3, 3) and nearness (T, 3) of non-degenerate triangles."""
+    """Coefficients of x, y and 1 for barycentric weights (T, 3, 3) and nearness (T, 3) of triangles."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     chosen: Ints = np.flatnonzero((np.abs(area) > MIN_AREA_PX2) & np.isfinite(corners).all(axis=(1, 2)))

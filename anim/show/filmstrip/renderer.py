@@ -36,7 +36,7 @@ GAMMA = 2.2
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """View shared by all frames. ground: its height in m. middle: (2,) x and z of the motion, m; reach: its radius, m.
+    """View of all frames. ground: its height, m. middle: (2,) x and z of the motion, m; reach: its radius.
 
     background: (H, W, 3) linear, with the grid for the initial camera position.
     """
@@ -86,7 +86,7 @@ def render_frame(
     *,
     tinted: bool = True,
 ) -> Floats:
-    """Return the picture (H, W, 3) in linear light. positions (V, 3) m, faces (T, 3), colors (T, 3) of the faces.
+    """Return the picture (H, W, 3) in linear light. positions: (V, 3) m. faces: (T, 3). colors: (T, 3).
 
     marks: drawn on the surface, in order. surface: materials; their alpha always applies, their colors multiply the
     others if `tinted`.
@@ -110,7 +110,7 @@ def _paint(
     *,
     tinted: bool,
 ) -> None:
-    """Draw triangles into some rows (H, W, 3) of a picture. painted: (T + 1, 3), colors of triangles and of none."""
+    """Draw triangles into rows (H, W, 3) of a picture. painted: (T + 1, 3), colors of triangles and none."""
     height, width = band.shape[:2]
     alpha_test = None if surface is None else surface.alpha_test(corners)
     seen = visible_faces(corners, width=width * SAMPLES, height=height * SAMPLES, alpha_test=alpha_test)

@@ -1,4 +1,4 @@
-"""Materials of a mesh for drawing: base color textures, vertex colors and alpha at samples of a picture."""
+"""Materials of a mesh for drawing: base color textures, vertex colors, alpha at samples of a picture."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Coating:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Materials on the faces (T, 3) of a mesh. coating: (T,) index of each face's coating among `coatings`.
+    """Materials on the faces (T, 3) of a mesh. coating: (T,) index of each face's among `coatings`.
 
     texcoords: (V, 2). colors: (V, 4) linear RGBA of vertices, or None if all are white.
     """
@@ -45,7 +45,7 @@ class Surface:
     colors: AnyArray | None
 
     def tint(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
-        """Return the linear RGB (S, 3) that multiplies the base color, at samples (S, 2) in pixels of faces (S,).
+        """Return the linear RGB factor (S, 3) of the base color at samples (S, 2) in pixels of faces (S,).
 
         corners: (T, 3, 3) of all faces on the screen: x, y and nearness.
         """

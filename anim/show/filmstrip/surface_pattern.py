@@ -45,7 +45,7 @@ class Checker:
 
 
 def edges(corners: Floats, samples: Floats, faces: Ints) -> Floats:
-    """Return the brightness (S,) at samples (S, 2) in pixels, dark near the edges of faces with the given corners.
+    """Return the brightness (S,) at samples (S, 2) in pixels, dark near edges of faces.
 
     Dense edges are fainter, so that the surface stays visible.
     """
@@ -64,7 +64,7 @@ def barycentric(corners: Floats, samples: Floats) -> Floats:
 
 
 def _heights(corners: Floats) -> Floats:
-    """Heights (S, 3) in pixels over the edge opposite each corner; times the weight they are distances to the edge."""
+    """Heights (S, 3) in pixels over the edge opposite each corner; times the weight its distance."""
     flat = corners[..., :2]
     area = np.abs(_cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]))
     opposite = np.linalg.norm(flat[:, [2, 0, 1]] - flat[:, [1, 2, 0]], axis=2)

@@ -83,7 +83,7 @@ def decode_image(data: Bytes) -> Texels:
 
 
 def _as_bytes(image: Image.Image) -> Image.Image:
-    """The image with 8 bits per channel: Pillow's conversion clips gray levels of 16 bits instead of scaling them."""
+    """The image with 8 bits per channel; Pillow's conversion clips gray levels of 16 bits."""
     from PIL import Image
 
     if not image.mode.startswith("I"):

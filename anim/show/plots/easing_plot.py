@@ -161,7 +161,7 @@ class _Cell:
         return f"at most {format_number(most)}×" if most < 1e3 else "vertical in places"
 
     def _tempo(self, axes: Axes, values: tuple[float, float]) -> None:
-        """Draw dots on a line with marks at 0 and 1; values: the least and the greatest of all easings on the sheet."""
+        """Draw dots on a line with marks at 0 and 1; values: the least and greatest of all easings."""
         places = self.easing.value(np.linspace(0, 1, DOTS + 1))
         axes.grid(visible=False)
         axes.spines["bottom"].set_visible(False)

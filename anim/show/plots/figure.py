@@ -148,7 +148,7 @@ def edge_lines(points: Floats, edges: Ints) -> Floats:
 
 
 def separate_labels(places: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Return positions moved apart by the least amount to distances of at least `gap`, within low … high if they fit.
+    """Return positions moved apart to distances of at least `gap`, within low … high if they fit.
 
     separate_labels([1, 1, 5], 2, 0, 9) → [0, 2, 5]
     """

@@ -183,7 +183,7 @@ def _color(each: PlotTrack, component: int) -> str:
 
 
 def _origin(each: PlotTrack, curve: RotationCurve) -> Floats:
-    """Origin (C,) of the drawn values: 0, or the first key if curves are too far apart to show their motion."""
+    """Origin (C,) of the drawn values: 0, or the first key if curves are too far apart."""
     values = curve.keys
     width = float(np.ptp(values, axis=0).max())
     far = values.shape[1] <= MAX_COLORED and float(values.max() - values.min()) > MAX_RANGE_RATIO * width > 0

@@ -82,7 +82,7 @@ def difference_line(track: Track, other: Track) -> Polyline:
 
 
 def handles(track: Track) -> tuple[Floats, Floats]:
-    """Return the Bézier handles of a CUBICSPLINE track: times (H, 2) and values (H, 2, C), from key to handle."""
+    """Return the Bézier handles of a CUBICSPLINE track, from the key: times (H, 2), values (H, 2, C)."""
     if track.in_tangents is None or track.out_tangents is None:
         return np.zeros((0, 2)), np.zeros((0, 2, track.values.shape[1]))
     third = np.diff(track.times) / 3

@@ -26,7 +26,7 @@ UNITS = ((1e6, "MB"), (1e3, "kB"), (1, "B"))
 def rate_distortion_plot(
     sizes: Sequence[RatePoint], diagonal: float, *, title: str, kind: str, source: int | None = None
 ) -> bytes:
-    """Return a plot of error bounds, % of the diagonal, over animation bytes as the bytes of a PNG or SVG file.
+    """Return a plot of error bounds, % of the diagonal, over animation bytes as a PNG or SVG file.
 
     Both axes are logarithmic. Vertical lines mark the source, the lossless size (a bound of 0), and the smallest size
     of any bound.

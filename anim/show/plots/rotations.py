@@ -23,7 +23,7 @@ MAX_REFINEMENTS = 6  # halvings of the time between two points
 
 @dataclass(frozen=True, slots=True)
 class RotationCurve:
-    """Drawn curve of a track. line: its values over time. keys: (K, C). risers: the jumps of a STEP track, or None."""
+    """Drawn curve of a track. line: values over time. keys: (K, C). risers: jumps of STEP, or None."""
 
     line: Polyline
     keys: Floats

@@ -1,4 +1,4 @@
-"""Plot of a report of a simulation: every integrator on its system, or energy, step error and poses of the run."""
+"""Plot of a simulation's report: every integrator on its system, or energy, step error and poses."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MAX_PATHS = 60  # points with a path; more only fill the picture
 
 
 def simulation_plot(report: SimulationReport, *, kind: str) -> bytes:
-    """Return the picture of a report as the bytes of a PNG or SVG file; its title is computed from the run.
+    """Return the picture of a report as a PNG or SVG file; its title is computed from the run.
 
     Raises UnsupportedError where matplotlib is not installed.
     """

@@ -1,4 +1,4 @@
-"""Plot of one system by every integrator: energy over time, gain per step against ω·h, and the motion itself."""
+"""Plot of one system by every integrator: energy over time, gain per step against ω·h, and motion."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float) -> None
 
 
 def _keeps_energy(run: IntegratorRun) -> bool:
-    """True for a run of a symplectic integrator that doesn't diverge: its energy oscillates about the start's."""
+    """True for a stable run of a symplectic integrator: its energy oscillates about the start's."""
     return run.diverged_at is None and run.name in INTEGRATORS and INTEGRATORS[run.name].limit == VERLET_LIMIT
 
 
@@ -195,7 +195,7 @@ def _span(runs: Sequence[IntegratorRun], drawn: Sequence[Floats]) -> tuple[Float
 
 
 def motion_points(run: IntegratorRun, springs: Ints, omega: float) -> Floats:
-    """Points (n, P, 2) to draw: x and y, or in phase space position and velocity / ω of the one moving point."""
+    """Points (n, P, 2) to draw: x and y, or position and velocity / ω of the one moving point."""
     if len(springs) > 1:
         spread = np.ptp(run.positions[0], axis=0)  # seen from the side that shows more of the start
         return np.asarray(run.positions[..., [0 if spread[0] >= spread[2] else 2, 1]])

@@ -1,4 +1,4 @@
-"""Plot of curves through given values by several tangent rules: overshoot, velocity, acceleration, continuity."""
+"""Plot of curves by several tangent rules: overshoot, velocity, acceleration, continuity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plot of tracks over time: values with keys and tangents, speed, rotation angle, and a second file for comparison."""
+"""Plot of tracks over time: values with keys and tangents, speed, rotation angle, a second file."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _height(each: PlotTrack) -> float:
 
 
 def _cell(sheet: Figure, each: PlotTrack, x: float, y: float, width: float, slack: float, *, many_clips: bool) -> None:
-    """Draw one track. slack: inches added to the first panel, to match the height of a neighbor in the row."""
+    """Draw one track. slack: inches added to the first panel, for the height of its neighbor."""
     left = x + LEFT
     names = max(text_width(label, panels.LABEL) for label in panels.labels(each))
     across = width - LEFT - min(max(RIGHT, names + 0.2), MOST_RIGHT)

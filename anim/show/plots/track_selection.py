@@ -82,7 +82,7 @@ def select_tracks(document: Document, selection: Selection, *, limit: int, view:
 
 
 def compare(chosen: TrackSelection, other: Document) -> tuple[TrackSelection, int]:
-    """Return the tracks with their matches in another file, by clip, node and path, and the number without a match.
+    """Return the tracks with their matches in another file, and the number without a match.
 
     Raises NotFoundError if there is no match.
     """
