@@ -7,6 +7,7 @@ implicit Euler with one Newton step: Baraff, Witkin, Large Steps in Cloth Simula
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
@@ -15,6 +16,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
+
+RADIUS_TOLERANCE = 1e-12
+MAX_OMEGA_H = 10.0  # up to which limits with damping are searched
 
 State: TypeAlias = tuple[Floats, Floats]
 Scalar: TypeAlias = Floats | float  # or (P, 1), another for each point
@@ -136,3 +140,46 @@ def find_integrator(name: str) -> Integrator:
     if name not in INTEGRATORS:
         raise RangeError(f"unknown integrator '{name}' (expected {', '.join(INTEGRATORS)})")
     return INTEGRATORS[name]
+
+
+@dataclass(frozen=True, slots=True)
+class DampedOscillator:
+    """System x″ = −omega² x − 2 ratio omega x′ of points (P, 3); omega: rad/s."""
+
+    omega: float
+    ratio: float
+
+    def acceleration(self, time: Scalar, x: Floats, v: Floats) -> Floats:
+        """Return the accelerations (P, 3)."""
+        return np.asarray(-self.omega * (self.omega * x + 2 * self.ratio * v))
+
+    def solve_implicit(self, time: Scalar, x: Floats, v: Floats, step: Scalar) -> Floats:
+        """Return the change of velocity over an implicit Euler step, exactly."""
+        under = 1 + step * 2 * self.ratio * self.omega + np.square(step * self.omega)
+        return np.asarray(step * (self.acceleration(0.0, x, v) - step * self.omega**2 * v) / under)
+
+
+def damped_limit(name: str, ratio: float) -> float:
+    """Return the largest stable ωh of an oscillator with a damping ratio, to 0.1 %.
+
+    Methods that take damping explicitly have a lower limit with it: verlet at a ratio of 0.5 has 1.24, not 2.
+    """
+    method = find_integrator(name)
+    if ratio == 0 or math.isinf(method.limit):
+        return method.limit
+    low = high = 0.0
+    for high in np.geomspace(1e-3, MAX_OMEGA_H, 200).tolist():
+        if _spectral_radius(method, ratio, high) > 1 + RADIUS_TOLERANCE:
+            break
+        low = high
+    while high - low > 1e-4 * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if _spectral_radius(method, ratio, middle) <= 1 + RADIUS_TOLERANCE else (low, middle)
+    return low
+
+
+def _spectral_radius(method: Integrator, ratio: float, omega_h: float) -> float:
+    """Largest factor by which a step of 1 s multiplies a state."""
+    x, v = np.array([[1.0, 0, 0], [0.0, 0, 0]]), np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    new_x, new_v = method.step(DampedOscillator(omega_h, ratio), 0.0, x, v, 1.0)
+    return float(np.abs(np.linalg.eigvals(np.array([new_x[:, 0], new_v[:, 0]]))).max())

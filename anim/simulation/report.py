@@ -76,7 +76,7 @@ class SimulationReport:
         return result
 
 
-def advise_step(omega_h: float, limit: float, step: float, integrator: str) -> str:
+def advise_step(omega_h: float, limit: float, step: float, integrator: str, rk4_limit: float = 2 * math.sqrt(2)) -> str:
     """Return advice for a step beyond the stability limit: "ω·h = 2.4, verlet's limit is 2: --step 1/282 or …"."""
     if omega_h <= limit:
         return ""
@@ -86,7 +86,7 @@ def advise_step(omega_h: float, limit: float, step: float, integrator: str) -> s
     if not limit:
         return f"{words}: --integrator verlet"
     per_second = math.ceil(omega_h / (step * limit * SAFE_STEP_FRACTION))
-    other = " or --integrator rk4" if integrator != "rk4" and omega_h < 2 * math.sqrt(2) else ""
+    other = " or --integrator rk4" if integrator != "rk4" and omega_h < rk4_limit else ""
     return f"{words}: --step 1/{per_second}{other}"
 
 

@@ -23,7 +23,7 @@ from tests.cli.running import ROOT
 from tests.khronos import errors, needs_validator, validate
 
 # Options with the same name and another meaning: VRM's, a ball's or a body's, of a fabric or of the air.
-OWN_MEANING = {"sphere", "gravity", "stiffness", "drag", "density", "max_error"}
+OWN_MEANING = {"sphere", "gravity", "stiffness", "drag", "density", "max_error", "integrator"}
 
 
 @pytest.mark.parametrize("args", [(), ("--help",)])

@@ -146,6 +146,8 @@ def _nodes(data: bytes) -> list[dict[str, str]]:
         (("--fps", "0"), 2, "fps is 0", ""),
         (("--max-error", "0"), 2, "--max-error is '0'", ""),
         (("--report", "x.txt"), 2, "--report x.txt", ""),
+        (("--integrator", "rk4"), 2, "--integrator is for springs with a frequency", "choose --frequency"),
+        (("--integrator", "euler"), 2, "'euler' is none of explicit-euler", ""),
     ],
 )
 def test_refusals_are_one_line(
@@ -157,6 +159,31 @@ def test_refusals_are_one_line(
     assert words in first
     assert len(rest) <= 1
     assert help in "".join(rest)
+
+
+@pytest.mark.parametrize("ending", ["json", "png", "svg"])
+def test_masses_on_springs_that_diverge_end_with_a_report_and_runnable_advice(
+    ending: str, fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    out, report = tmp_path / "out.glb", tmp_path / f"report.{ending}"
+    args = ("--chain", "hair1", "--frequency", "22", "--integrator", "verlet")
+    run = call(*COMMAND, fixture("ponytail"), out, *args, "--report", report)
+    assert (run.code, out.exists(), report.exists()) == (6, False, True)
+    assert "help: ω·h = 2.3, verlet's limit is 1.24: --step 1/125 or --integrator rk4" in run.err
+    if ending == "json":
+        found = json.loads(report.read_text())
+        assert found["first_bad_step"] > 0
+        assert found["omega_h_limit"] == pytest.approx(1.236, abs=1e-3)  # with its damping ratio of 0.5
+        assert found["advice"] in run.err
+    for mended in (("--step", "1/125"), ("--integrator", "rk4")):
+        call(*COMMAND, fixture("ponytail"), out, *args, *mended).product()
+
+
+def test_the_picture_of_a_report_is_computed_from_the_run(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    report = tmp_path / "report.svg"
+    call(*COMMAND, fixture("ponytail"), tmp_path / "out.glb", "--report", report).product()
+    drawn = report.read_text()
+    assert "Step 1/60 s, ω·h = 0.33: explicit-euler (2.20 s) diverges" in drawn
 
 
 def test_a_file_without_springs_is_told_about_chains(fixture: Fixture, call: Call) -> None:

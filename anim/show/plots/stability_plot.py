@@ -41,6 +41,7 @@ COLORS = {
 SHOWN = ("explicit-euler", "verlet", "implicit-euler", "xpbd")  # drawn as poses: gains, keeps, loses energy
 THICK, THIN = 2.0, 1.2
 NUM_POSES = 9
+MAX_SHOWN_GROWTH = 4  # of energy, beyond which a run leaves the picture
 MANY_SPRINGS = 200  # drawn as thin lines without points
 VERLET_LIMIT = 2.0  # ω·h
 MAX_OMEGA_H, MIN_GAIN, MAX_GAIN = 3.4, 0.5, 1.6
@@ -188,10 +189,14 @@ def _draw_gain(sheet: Figure, omega_h: float) -> None:
 
 def _span(runs: Sequence[IntegratorRun], drawn: Sequence[Floats]) -> tuple[Floats, float]:
     """Center and half size of the motion's pictures, from the start and what stays near it."""
-    near = [each[:1] if run.diverged_at is not None else each for run, each in zip(runs, drawn, strict=True)]
+    near = [each if _stays_near(run) else each[:1] for run, each in zip(runs, drawn, strict=True)]
     points = np.concatenate([each.reshape(-1, 2) for each in near])
     low, high = points.min(axis=0), points.max(axis=0)
     return (low + high) / 2, 0.6 * float((high - low).max()) or 1.0
+
+
+def _stays_near(run: IntegratorRun) -> bool:
+    return run.diverged_at is None and bool(run.energies.max() < MAX_SHOWN_GROWTH * run.energies[0])
 
 
 def motion_points(run: IntegratorRun, springs: Ints, omega: float) -> Floats:

@@ -15,7 +15,7 @@ from anim.simulation.spring_bones.collisions import TINY, Collisions, cofactors,
 from anim.simulation.spring_bones.driver import DriverChunk
 from anim.simulation.spring_bones.hierarchy import tail_at_rest
 from anim.simulation.spring_bones.plan import Plan, PlannedJoint
-from anim.simulation.spring_bones.spring_models import make_model
+from anim.simulation.spring_bones.spring_models import MassSpringModel, make_model
 
 ROUNDING = 1e-12  # of a length, between two ways to compute it
 OPPOSITE = float(np.finfo(np.float64).eps)  # 1 + cosine below which two directions are opposite, as in players
@@ -43,6 +43,7 @@ class Batch:
         colliders: Sequence[Collider],
         plan: Plan,
         step: float,
+        integrator: str = "",
     ) -> None:
         self._skeleton = skeleton
         self._joints = [each.joint for each in planned]
@@ -54,7 +55,7 @@ class Batch:
         self._centers = _center_rows(planned, plan)
         self._own = np.array([i for i, each in enumerate(planned) if each.chain.center == each.joint.node], np.int64)
         parameters = [joint.parameters for joint in self._joints]
-        self._model = make_model(parameters, step)
+        self._model = make_model(parameters, step, integrator)
         chosen = [each.chain.colliders for each in planned]
         hit_radius = np.array([each.hit_radius for each in parameters])
         collider_rows = plan.rows[np.array([-1 if each.node is None else each.node for each in colliders], np.int64)]
@@ -110,6 +111,10 @@ class Batch:
         self._rotation = self._rotations(columns, tail - head)
         self._place(world, linear, head, frame)
         return np.asarray(self._rotation)
+
+    def figures(self) -> tuple[Floats, Floats] | None:
+        """Return elongation and energy (m,) after the last step; None for models that keep lengths."""
+        return (self._model.elongation, self._model.energy) if isinstance(self._model, MassSpringModel) else None
 
     def transform(self, world: Floats, before: Floats | None, after: Floats | None) -> None:
         """Move the state by matrices (m, 3, 4), as the driver jumps."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from anim.arrays import Bools, Floats
@@ -124,3 +126,24 @@ def tail_at_rest(skeleton: Skeleton, joint: SpringJoint) -> Floats:
         point = matrix.apply(local, point[None])[0]
         node = int(skeleton.parents[node])
     return point
+
+
+def scale_bones(skeleton: Skeleton, bones: SpringBones) -> SpringBones:
+    """Return the chains with stiffness, gravity and radii times the world scale of their nodes at rest.
+
+    A scaled model then moves by the same angles as the model without scale; of unequal scales the largest counts.
+    """
+    scales = np.linalg.norm(rest_world(skeleton)[:, :, :3], axis=1).max(axis=1).tolist()
+
+    def scaled(joint: SpringJoint) -> SpringJoint:
+        own, factor = joint.parameters, scales[joint.node]
+        x, y, z = own.gravity
+        gravity = (factor * x, factor * y, factor * z)
+        changed = replace(own, stiffness=factor * own.stiffness, hit_radius=factor * own.hit_radius, gravity=gravity)
+        return replace(joint, parameters=changed)
+
+    chains = tuple(replace(chain, joints=tuple(map(scaled, chain.joints))) for chain in bones.chains)
+    colliders = (
+        each if each.node is None else replace(each, radius=scales[each.node] * each.radius) for each in bones.colliders
+    )
+    return replace(bones, chains=chains, colliders=tuple(colliders))

@@ -52,7 +52,9 @@ def run_loop(solver: SpringSolver, steps: Steps) -> LoopedMotion:
     num_blended = 1 if settled else max(int(min(BLEND_S, duration / 2) / steps.step_s), 1)
     rotations = _close(np.concatenate((motion.rotations, end.rotations)), num_blended)
     tails = np.concatenate((motion.tails, end.tails))
-    return LoopedMotion(SpringMotion(rotations, tails), rounds, settled, seam)
+    elongation = np.concatenate((motion.elongation, end.elongation))
+    energies = np.concatenate((motion.energies, end.energies))
+    return LoopedMotion(SpringMotion(rotations, tails, elongation, energies), rounds, settled, seam)
 
 
 def _close(rotations: Floats, num_blended: int) -> Floats:

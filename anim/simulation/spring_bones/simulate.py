@@ -11,9 +11,10 @@ from anim.errors import RangeError, check_number
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling.times import distinct_float32, frame_times
+from anim.simulation.integrators import find_integrator
 from anim.simulation.spring_bones.chain_globs import drop_inert_joints
 from anim.simulation.spring_bones.chains import SpringBones
-from anim.simulation.spring_bones.hierarchy import check_hierarchy, scaled_colliders
+from anim.simulation.spring_bones.hierarchy import check_hierarchy, scale_bones, scaled_colliders
 from anim.simulation.spring_bones.loop import LoopedMotion, run_loop
 from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
 from anim.simulation.steps import Steps
@@ -29,6 +30,8 @@ class SpringOptions:
 
     duration: None for the length of the clip. step: of the simulation. warm_up: simulated before 0 s at the pose of
     0 s. loop: close the loop of `duration`; the step is then the nearest that divides it. fps: of the keys.
+    integrator: of joints with a frequency, as masses on springs; "" for their exact solution.
+    scale_aware: stiffness, gravity and radii are those of a model without scale.
     """
 
     duration: float | None = None
@@ -36,6 +39,8 @@ class SpringOptions:
     warm_up: float = 0.0
     loop: bool = False
     fps: float = 60.0
+    integrator: str = ""
+    scale_aware: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +50,8 @@ class SpringResult:
     joints: nodes of the joints, in the order of the chains. replaced: those that had a rotation track before.
     step: in seconds, as simulated. num_steps: from 0 s on, in one round of a loop. loop: of the loop, None for none.
     tails: (S, J, 3) m, of the joints at every step, in world space. max_rotation: rad, largest rotation of a joint from
-    its rest. max_speed: m/s, of a tail. notes: lines for the user.
+    its rest. max_speed: m/s, of a tail. notes: lines for the user. elongation: (S, J) of bones,
+    relative. energies: (S,) J, of masses of 1 kg relative to their goals.
     """
 
     clip: Clip
@@ -59,6 +65,8 @@ class SpringResult:
     max_speed: float
     loop: LoopedMotion | None = None
     notes: tuple[str, ...] = ()
+    elongation: Floats | None = None
+    energies: Floats | None = None
 
 
 def simulate_springs(
@@ -75,6 +83,9 @@ def simulate_springs(
     check_hierarchy(skeleton, bones)
     chains, notes = drop_inert_joints(skeleton, bones.chains)
     bones = replace(bones, chains=chains)
+    _check_integrator(bones, options.integrator)
+    if options.scale_aware:
+        bones = scale_bones(skeleton, bones)
     duration = clip.end - clip.start if options.duration is None else options.duration
     steps, looped, motion = _run(skeleton, _from_zero(clip), bones, options, duration)
     frames = frame_times(0.0, duration, fps=options.fps)
@@ -96,8 +107,18 @@ def simulate_springs(
         float(deflection.max(initial=0.0)),
         float(speeds.max(initial=0.0)),
         looped,
-        (*bones.notes, *notes, *scaled_colliders(skeleton, bones)),
+        (*bones.notes, *notes, *(() if options.scale_aware else scaled_colliders(skeleton, bones))),
+        motion.elongation,
+        motion.energies.sum(axis=1),
     )
+
+
+def _check_integrator(bones: SpringBones, integrator: str) -> None:
+    if not integrator:
+        return
+    find_integrator(integrator)
+    if any(joint.parameters.frequency is None for chain in bones.chains for joint in chain.joints):
+        raise RangeError("`integrator` is for springs with a frequency", help="choose `frequency` and `damping_ratio`")
 
 
 def _from_zero(clip: Clip) -> Clip:
@@ -131,7 +152,7 @@ def _run(
     if options.loop:
         num_steps = max(round(duration / options.step), MIN_LOOP_STEPS)
         steps = Steps(duration / num_steps, duration, options.warm_up)
-    solver = SpringSolver(skeleton, clip, bones, step=steps.step_s)
+    solver = SpringSolver(skeleton, clip, bones, step=steps.step_s, integrator=options.integrator)
     solver.start(0.0)
     if steps.num_warm_up_steps:
         solver.run(np.zeros(steps.num_warm_up_steps))

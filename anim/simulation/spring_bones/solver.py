@@ -23,23 +23,31 @@ CHUNK_STEPS = 256  # driver steps evaluated together; more needs more memory and
 class SpringMotion:
     """Motion of J joints, in the order of the chains, at S steps.
 
-    rotations: (S, J, 4) local. tails: (S, J, 3) in world space, in metres.
+    rotations: (S, J, 4) local. tails: (S, J, 3) in world space, in metres. elongation: (S, J) relative, and
+    energies: (S, J) J of 1 kg, both 0 for joints whose bones keep their lengths.
     """
 
     rotations: Floats
     tails: Floats
+    elongation: Floats
+    energies: Floats
 
 
 class SpringSolver:
     """Simulation of checked chains, driven by a clip.
 
-    step: seconds, > 0. Every call of `run` continues from the state that the last one left.
+    step: seconds, > 0. integrator: of joints with a frequency, as masses on springs; "" solves them exactly.
+    Every call of `run` continues from the state that the last one left.
     """
 
-    def __init__(self, skeleton: Skeleton, clip: Clip, bones: SpringBones, *, step: float) -> None:
+    def __init__(
+        self, skeleton: Skeleton, clip: Clip, bones: SpringBones, *, step: float, integrator: str = ""
+    ) -> None:
         self._plan = make_plan(skeleton, bones)
         self._driver = Driver(skeleton, clip, frozenset(bones.nodes), self._plan.driven)
-        self._levels = [_LevelSolver(skeleton, bones, level, self._plan, step) for level in self._plan.levels]
+        self._levels = [
+            _LevelSolver(skeleton, bones, level, self._plan, step, integrator) for level in self._plan.levels
+        ]
         self._num_joints = len(bones.nodes)
         self._bases = _base_rows(skeleton, bones, self._plan)
         self._centers = _driven_centers(bones, self._plan)
@@ -58,7 +66,8 @@ class SpringSolver:
 
         Raises UnstableError at the first value that is not finite.
         """
-        motion = SpringMotion(np.empty((len(times), self._num_joints, 4)), np.empty((len(times), self._num_joints, 3)))
+        size = (len(times), self._num_joints)
+        motion = SpringMotion(np.empty((*size, 4)), np.empty((*size, 3)), np.zeros(size), np.zeros(size))
         driven = len(self._plan.driven)
         for first in range(0, len(times), CHUNK_STEPS):
             part = times[first : first + CHUNK_STEPS]
@@ -97,8 +106,10 @@ class SpringSolver:
 class _LevelSolver:
     """Batches and followers of one level."""
 
-    def __init__(self, skeleton: Skeleton, bones: SpringBones, level: Level, plan: Plan, step: float) -> None:
-        self._batches = [Batch(skeleton, batch, bones.colliders, plan, step) for batch in level.batches]
+    def __init__(
+        self, skeleton: Skeleton, bones: SpringBones, level: Level, plan: Plan, step: float, integrator: str
+    ) -> None:
+        self._batches = [Batch(skeleton, batch, bones.colliders, plan, step, integrator) for batch in level.batches]
         self._followers = np.array(level.followers, np.int64)
         self._rows = plan.rows[self._followers]
         self._parents = plan.rows[skeleton.parents[self._followers]]
@@ -118,6 +129,9 @@ class _LevelSolver:
         for batch in self._batches:
             motion.rotations[at, batch.indices] = batch.advance(world, frame)
             motion.tails[at, batch.indices] = batch.tails
+            found = batch.figures()
+            if found is not None:
+                motion.elongation[at, batch.indices], motion.energies[at, batch.indices] = found
 
     def transform(self, moved: Floats, before: Floats, after: Floats) -> None:
         for batch in self._batches:
@@ -152,4 +166,4 @@ def _check_finite(motion: SpringMotion, times: Floats, first: int, end: int) -> 
         raise UnstableError(
             f"the springs diverge at {times[first + int(wrong.argmax())]:.4g} s: numbers are too large",
             help="smaller `stiffness` and `gravity`, or `frequency` and `damping_ratio`, which are always stable",
-        )
+        ).with_report(first + int(wrong.argmax()))

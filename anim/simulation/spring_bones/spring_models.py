@@ -6,14 +6,18 @@ Each model holds the state of one batch, in world space or in the space of the c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import matrix
+from anim.simulation.integrators import Scalar, find_integrator
 from anim.simulation.spring_bones.chains import SpringParameters
 from anim.simulation.spring_bones.collisions import TINY, norms
+
+MAX_DEVIATION_PER_LENGTH = 1e3  # deviation of a mass in lengths of its bone, beyond which it has diverged
 
 
 class SpringModel(Protocol):
@@ -121,6 +125,73 @@ class OscillatorModel:
         self._velocity = _rotate_back(after, _rotate(world, _rotate(before, self._velocity)))
 
 
+class MassSpringModel(OscillatorModel):
+    """The same oscillator as a mass on a spring to its goal, advanced by an integrator; bones may stretch.
+
+    The joint points at the mass. elongation: (m,) of the bones, relative; energy: (m,) J of 1 kg, relative to its goal.
+    A step beyond the integrator's limit diverges: positions become NaN.
+    """
+
+    def __init__(self, parameters: Sequence[SpringParameters], step: float, integrator: str) -> None:
+        super().__init__(parameters, step)
+        self._method = find_integrator(integrator)
+        frequency = np.array([[2 * np.pi * (each.frequency or 0.0)] for each in parameters])
+        ratio = np.array([[each.damping_ratio] for each in parameters])
+        self._system = _Oscillators(frequency * frequency, 2 * ratio * frequency)
+        self._free = np.zeros((len(parameters), 3))
+        self._relative = (self._free, self._free)
+        self.elongation = np.zeros(len(parameters))
+        self.energy = np.zeros(len(parameters))
+
+    def start(self, head: Floats, goal: Floats, center: Floats | None) -> None:
+        """Set all tails to their goals, without velocity: that of Verlet is half a step early."""
+        super().start(head, goal, center)
+        _, self._velocity = self._method.start(self._system, 0.0, -self._sag, self._velocity, self._step)
+
+    def predict(self, head: Floats, goal: Floats, center: Floats | None) -> Floats:
+        """Return the tails (m, 3) at the end of the step, before their length and collisions are considered."""
+        before = from_center(center, self._goal)
+        rate = (goal - before) / self._step
+        error = from_center(center, self._tail) - before - self._sag
+        velocity = _rotate(center, self._velocity) - rate
+        error, velocity = self._method.step(self._system, 0.0, error, velocity, self._step)
+        self._free_velocity = velocity + rate
+        self._goal = to_center(center, goal)
+        self._relative = error, velocity
+        gone = norms(error) > MAX_DEVIATION_PER_LENGTH * norms(goal - head)
+        self._free = np.where(gone, np.nan, goal + self._sag + error)
+        return self._free
+
+    def accept(self, head: Floats, free: Floats, tail: Floats, center: Floats | None) -> None:
+        """Take the tails at the end of the step. free: before collisions; without one, the stretched tail counts."""
+        self.elongation = (norms(self._free - head) / np.maximum(norms(tail - head), TINY))[:, 0] - 1
+        error, velocity = self._relative
+        elastic = (self._system.square * error * error).sum(axis=-1)
+        self.energy = (elastic + (velocity * velocity).sum(axis=-1)) / 2
+        pushed = tail - free
+        hit = pushed.any(axis=-1, keepdims=True)
+        velocity = self._free_velocity
+        against = hit & ((velocity * pushed).sum(axis=-1, keepdims=True) < 0)
+        velocity = velocity - np.where(against, _along(velocity, pushed), 0.0)
+        self._velocity = _rotate_back(center, velocity)
+        self._tail, self._head = to_center(center, np.where(hit, tail, self._free)), to_center(center, head)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Oscillators:
+    """System e″ = −square · e − rate · e′ of m independent points. square, rate: (m, 1)."""
+
+    square: Floats
+    rate: Floats
+
+    def acceleration(self, time: Scalar, x: Floats, v: Floats) -> Floats:
+        return -self.square * x - self.rate * v
+
+    def solve_implicit(self, time: Scalar, x: Floats, v: Floats, step: Scalar) -> Floats:
+        force = self.acceleration(time, x, v) - step * self.square * v
+        return np.asarray(step * force / (1 + step * self.rate + step * step * self.square))
+
+
 def apply_each(matrices: Floats, points: Floats) -> Floats:
     """Return points (m, 3), each transformed by its own matrix (m, 3, 4)."""
     return np.asarray(np.matmul(matrices[..., :3], points[..., None])[..., 0] + matrices[..., 3])
@@ -175,6 +246,11 @@ SPRING_MODELS: dict[str, Callable[[Sequence[SpringParameters], float], SpringMod
 }
 
 
-def make_model(parameters: Sequence[SpringParameters], step: float) -> SpringModel:
-    """Return the model of joints that all state a frequency, or none of which does."""
+def make_model(parameters: Sequence[SpringParameters], step: float, integrator: str = "") -> SpringModel:
+    """Return the model of joints that all state a frequency, or none of which does.
+
+    integrator: of masses on springs, in place of the exact solution; "" for that.
+    """
+    if integrator and parameters[0].frequency is not None:
+        return MassSpringModel(parameters, step, integrator)
     return SPRING_MODELS["verlet" if parameters[0].frequency is None else "oscillator"](parameters, step)

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from anim.arrays import Floats
+from anim.errors import UnstableError
 from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -27,7 +28,7 @@ from anim.simulation.spring_bones.json_reader import read_spring_file
 from anim.simulation.spring_bones.penetration import deepest_penetration
 from anim.simulation.spring_bones.read import read_spring_bones
 from anim.simulation.spring_bones.reduction import reduce_keys
-from anim.simulation.spring_bones.report import make_report, step_error
+from anim.simulation.spring_bones.report import make_report, report_divergence, step_error
 from anim.simulation.spring_bones.simulate import SpringOptions, SpringResult, simulate_springs
 from cli import text, units
 from cli.errors import UsageError
@@ -74,11 +75,22 @@ def command(
     ] = None,
     damping_ratio: Annotated[
         float | None,
-        typer.Option("--damping-ratio", metavar="N", help="Its damping: 0 for none, 1 without overshoot."),
+        typer.Option("--damping-ratio", metavar="N", help="Its damping: 0 for none, 1 is critical."),
     ] = None,
     center: Annotated[
         str | None, typer.Option("--center", metavar="NODE", help="Node in whose space inertia is evaluated.")
     ] = None,
+    integrator: Annotated[
+        simulation.Integrator | None,
+        typer.Option(
+            "--integrator",
+            help="Masses on springs by this method; without it oscillators are exact.",
+            show_default=False,
+        ),
+    ] = None,
+    scale_aware: Annotated[
+        bool, typer.Option("--scale-aware", help="Scale stiffness, gravity and radii by the nodes' world scale.")
+    ] = False,
     clip: simulation.Clip = None,
     step: simulation.Step = SIMULATIONS["springs"].step,
     fps: simulation.Fps = simulation.DEFAULT_FPS,
@@ -98,15 +110,28 @@ def command(
     options replace those of all chains. Rotation tracks of the joints are replaced, others stay.
 
     VRM's drag is per step, so players show the motion of 1/60 s: another --step is another motion. With --frequency
-    each joint is a damped oscillator instead, solved exactly, and stable at every step. --loop runs the clip until the
-    motion repeats within 0.1 mm, or else blends the last 0.2 s; its step is the nearest that divides the clip.
+    each joint is a damped oscillator instead, solved exactly, and stable at every step. Its damping is relative to the
+    parent: a joint arrives with the parent's speed, so where that stops at once even --damping-ratio 1 passes the rest
+    pose once, by speed / (e · angular frequency). With --integrator it is a mass on a spring: bones stretch, and a step
+    that is too long diverges; --report springs.png draws every integrator.
+
+    --loop runs the clip until the motion repeats within 0.1 mm, or else blends the last 0.2 s; its step is the nearest
+    that divides the clip. --scale-aware moves a scaled model by the angles of the model without scale.
     """
     if frequency is not None and (stiffness is not None or drag is not None):
         raise UsageError("--frequency replaces --stiffness and --drag (expected one or the other)")
     if damping_ratio is not None and frequency is None and not chain:
         raise UsageError("--damping-ratio needs --frequency")
     voice = Reporter(quiet, verbose)
-    options = SpringOptions(duration, parse_seconds(step, "--step"), warm_up, loop, fps)
+    options = SpringOptions(
+        duration,
+        parse_seconds(step, "--step"),
+        warm_up,
+        loop,
+        fps,
+        "" if integrator is None else integrator.value,
+        scale_aware,
+    )
     given = {"stiffness": stiffness, "drag": drag, "frequency": frequency, "damping_ratio": damping_ratio}
     changes: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     if gravity is not None:
@@ -122,7 +147,10 @@ def command(
         is_vrm = stiffness is not None or drag is not None
         own = SpringParameters(frequency=None if is_vrm else DEFAULT_FREQUENCY_HZ)
         bones = _chains(document, scene.skeleton, chain or [], springs, center, own).with_parameters(**changes)
-        result = simulate_springs(scene.skeleton, driver, bones, options)
+        try:
+            result = simulate_springs(scene.skeleton, driver, bones, options)
+        except UnstableError as gone:
+            raise report_divergence(scene.skeleton, bones, options, gone) from None
         for note in _notes(result, scene.skeleton, options):
             voice.info(f"note: {note}")
         prover = Prover(ErrorMetric(scene)) if max_error is not None or report is not None else None
@@ -134,7 +162,7 @@ def command(
         if prover is not None and max_error is not None:
             bound = units.parse_length(max_error, "--max-error", lambda: prover.ruler.diagonal)
             result, reduced = _reduce(result, prover, bound)
-        found = make_report(bones, options, result, error, depth)
+        found = make_report(scene.skeleton, bones, options, result, error, depth)
         return _written(document, result.clip, number), found, _summary(found, result) + reduced
 
     simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from anim.errors import RangeError
-from anim.simulation.integrators import INTEGRATORS, integrate
+from anim.simulation.integrators import INTEGRATORS, damped_limit, integrate
 
 Array = NDArray[np.float64]
 OMEGA = 2 * np.pi
@@ -126,3 +126,12 @@ def test_integration_stops_before_values_that_are_not_finite() -> None:
 def test_an_unknown_integrator_is_refused() -> None:
     with pytest.raises(RangeError, match="unknown integrator 'euler'"):
         list(integrate(Oscillator(1.0), "euler", np.zeros((1, 3)), np.zeros((1, 3)), 0.1, 1))
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.5, 1.0])
+def test_limits_with_damping_are_those_of_the_step_matrix(ratio: float) -> None:
+    """λ² − (2 − 2ζw − w²) λ + 1 − 2ζw leaves the unit circle at −1: w² + 4ζw = 4; explicit Euler at w = 2ζ."""
+    assert damped_limit("verlet", ratio) == pytest.approx(2 * np.sqrt(ratio**2 + 1) - 2 * ratio, rel=1e-3)
+    assert damped_limit("explicit-euler", ratio) == pytest.approx(2 * ratio, rel=1e-3)
+    assert damped_limit("implicit-euler", ratio) == np.inf
+    assert damped_limit("verlet", 0.0) == 2.0

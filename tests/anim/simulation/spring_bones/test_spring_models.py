@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
+from anim.errors import UnstableError
 from anim.model import Clip, Skeleton
+from anim.simulation.integrators import INTEGRATORS, Scalar
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
 from tests.clips import about, skeleton, track
@@ -16,13 +18,28 @@ SMALL = 1e-5  # m, of a kick: the sphere is flat over it
 TAIL = 2
 
 
+class Linear:
+    """The oscillator x″ = −ω² x − 2 ζ ω x′, written once more."""
+
+    def __init__(self, omega: float, ratio: float) -> None:
+        self.omega, self.ratio = omega, ratio
+
+    def acceleration(self, time: Scalar, x: Floats, v: Floats) -> Floats:
+        return -self.omega * (self.omega * x + 2 * self.ratio * v)
+
+    def solve_implicit(self, time: Scalar, x: Floats, v: Floats, step: Scalar) -> Floats:
+        """Solve (v₊ − v) / h = a(x + h v₊, v₊) for v₊ − v."""
+        new = (v - step * self.omega**2 * x) / (1 + 2 * self.ratio * self.omega * step + (self.omega * step) ** 2)
+        return np.asarray(new - v)
+
+
 def pendulum() -> Skeleton:
     return skeleton([-1, 0, 1], translation=[[0, 0, 0], [0, 0, 0], [0, -LENGTH, 0]])
 
 
-def swung(parameters: SpringParameters, driver: Clip, times: Floats, step: float) -> SpringMotion:
+def swung(parameters: SpringParameters, driver: Clip, times: Floats, step: float, integrator: str = "") -> SpringMotion:
     bones = SpringBones((SpringChain("", (SpringJoint(1, TAIL, parameters),)),))
-    solver = SpringSolver(pendulum(), driver, bones, step=step)
+    solver = SpringSolver(pendulum(), driver, bones, step=step, integrator=integrator)
     solver.start(0.0)
     return solver.run(times)
 
@@ -60,6 +77,33 @@ def test_the_undamped_oscillator_neither_gains_nor_loses() -> None:
     motion = swung(SpringParameters(frequency=3.0, damping_ratio=0.0), driver, times, 1 / 60)
     swing = np.abs(motion.tails[:, 0, 0] - SMALL)
     assert swing[:600].max() == pytest.approx(swing[-600:].max(), rel=1e-3)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.3])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_mass_on_a_spring_moves_as_the_integrator_says(integrator: str, ratio: float) -> None:
+    """After a kick the deviation is that of the lesson's oscillator, by the same integrator from the same state."""
+    step, frequency = 1 / 60, 3.0
+    driver, times = kicked(step, 60)
+    parameters = SpringParameters(frequency=frequency, damping_ratio=ratio)
+    motion = swung(parameters, driver, times, step, integrator)
+    method, system = INTEGRATORS[integrator], Linear(2 * np.pi * frequency, ratio)
+    state = (np.zeros((1, 3)), np.array([[-SMALL / step, 0, 0]]))
+    expected = []
+    for k in range(len(times)):
+        state = method.step(system, k * step, *state, step)
+        expected.append(state[0][0, 0])
+        if k == 0:  # the goal stops
+            state = (state[0], state[1] + [[SMALL / step, 0, 0]])
+    assert motion.tails[:, 0, 0] - SMALL == pytest.approx(np.array(expected), abs=1e-3 * SMALL)
+
+
+def test_a_step_beyond_the_limit_diverges() -> None:
+    driver, times = kicked(1 / 60, 600)
+    parameters = SpringParameters(frequency=25.0, damping_ratio=0.0)  # ωh = 2.6
+    with pytest.raises(UnstableError, match="diverge at"):
+        swung(parameters, driver, times, 1 / 60, "verlet")
+    assert np.isfinite(swung(parameters, driver, times, 1 / 60, "rk4").tails).all()
 
 
 @pytest.mark.parametrize("step", [1 / 60, 1.0, 100.0])
