@@ -148,6 +148,8 @@ def _change(run: IntegratorRun) -> str:
     if _keeps_energy(run):
         change = 100 * (run.energies / run.energies[0] - 1)
         words = f"within {change.min():+.2g} … {change.max():+.2g} %"
+    elif run.energy_change > 10:
+        words = f"×{format_number(1 + run.energy_change)} after {run.times[-1]:.2g} s"
     else:
         words = f"{100 * run.energy_change:+.3g} % after {run.times[-1]:.2g} s"
     return words.replace("-", "−")
