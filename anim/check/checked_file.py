@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from anim.arrays import Floats, Ints
@@ -23,11 +23,14 @@ class CheckedFile:
     """A file to check. contents: its readable parts. facts: their report; rules look at its clips only.
 
     missing: label, JSON pointer and problem of each file that it names and that isn't there.
+    budget: limits by name (see `budget`). source: the file that its error is measured against, if there is a limit.
     """
 
     contents: FileContents
     facts: Facts
     missing: Sequence[tuple[str, str, str]] = ()
+    budget: Mapping[str, float] = field(default_factory=dict)
+    source: CheckedFile | None = None
 
     @property
     def document(self) -> Document:

@@ -4,37 +4,27 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from enum import StrEnum
-from pathlib import Path, PurePath
-from textwrap import fill
 from typing import Annotated
 
 import typer
 
 from anim.check import baseline
-from anim.check.find import find_all
-from anim.check.finding import Finding, Severity
-from anim.check.fixing import fix_all
-from anim.check.registry import RULES
-from anim.check.rule import Rule
+from anim.check.finding import Severity
 from anim.check.rules.invalid import RULE as INVALID
-from anim.check.rules.invalid import fault_occurrences
-from anim.check.selection import TARGETS, RuleSelection, rule_of
+from anim.check.selection import TARGETS, rule_of
 from anim.errors import AnimError, FormatError
-from cli import errors, tables
+from cli import errors
 from cli.errors import CheckError, UsageError
 from cli.io import documents, input_files
 from cli.options import common
-from cli.reports import check_ci, check_report
+from cli.reports import check_ci, check_report, rule_list
 from cli.reports.check_report import CheckReport
-from cli.text import Reporter, format_length
-from cli.workflows import check_config, checked_files
-from cli.workflows.check_config import CheckConfig
-from cli.workflows.edit_clips import DRY
+from cli.text import Reporter
+from cli.workflows import check_config
+from cli.workflows.check_files import FileChecker, RuleOptions
 
 Target = StrEnum("Target", [(name, name) for name in TARGETS])  # type: ignore[misc]
-WIDTH = 100  # of --explain
 MAX_NAMED_FILES = 3  # in the line about unreadable files
 
 
@@ -100,6 +90,9 @@ def command(
         bool, typer.Option("--unsafe-fixes", help="Apply all fixes, in place; each prints its largest error.")
     ] = False,
     dry_run: common.DryRun = False,
+    budget_report: Annotated[
+        bool, typer.Option("--budget-report", help="Only list the values of budgets with their limits.")
+    ] = False,
     list_rules: Annotated[bool, typer.Option("--list", help="List the rules.")] = False,
     explain: Annotated[
         str | None, typer.Option("--explain", metavar="RULE", help="Explain a rule: reason, parameters, fix.")
@@ -126,103 +119,48 @@ def command(
         [[check.files]]
         match = "crowd/**"
         ignore = ["GA2"]
+        [[budget]]
+        match = "crowd/**"
+        bytes = 500_000
+        error = "0.5mm"
+        against = "source/{path}"
 
     --write-baseline keeps the findings of today, by rule, file and part; with --baseline only new ones count.
+    Budgets limit bytes, animation_bytes, keys, keys_per_second, seconds, clips, joints, targets, and the error against
+    a source; --budget-report shows the values beside the limits.
     --format github prints annotations, sarif is for code scanning, junit for test reports, md for job summaries.
     """
     if explain is not None:
-        documents.write_text(_explanation(rule_of(explain)))
+        documents.write_text(rule_list.explain(rule_of(explain)))
         return errors.DONE
     if list_rules:
-        documents.write_text(_rule_table())
+        documents.write_text(rule_list.rule_table())
         return errors.DONE
     if known is not None and write_known is not None:
         raise UsageError("--baseline and --write-baseline can't be combined")
-    if unsafe and known is not None:
-        raise UsageError("--unsafe-fixes and --baseline can't be combined")
-    fixed = None if config is None else check_config.read_config(config)
-    options = _Options(select or (), extend or (), ignore or (), str(target or ""), _parameters(param or ()))
     expected = None if known is None else _load_baseline(known)
     voice = Reporter(quiet)
-    files, found, refused = [], [], []
-    limits: dict[str, Severity] = {}
+    rules = [[word for each in option or () for word in each.split(",")] for option in (select, extend, ignore)]
+    checker = FileChecker(
+        RuleOptions(rules[0], rules[1], rules[2], str(target or ""), _parameters(param or ())),
+        voice,
+        None if config is None else check_config.read_config(config),
+        fail_on,
+        unsafe if fix or unsafe else None,
+        dry_run,
+    )
     for path in input_files.expand(inputs or [documents.PIPE]):
-        name = PurePath(documents.called(path)).as_posix()
-        settings = fixed or check_config.nearest(_folder(path))
-        files.append(name)
-        limits[name] = fail_on or settings.fail_on or Severity.ERROR
-        selection = options.selection(settings, path)
-        if fix or unsafe:
-            _fix_file(path, selection, voice, unsafe=unsafe, dry_run=dry_run)
-        findings, error = _check_file(path, selection)
-        found += [(name, each) for each in findings]
-        refused += [(name, error)] if error is not None else []
+        checker.check(path)
+    checker.warn_of_unused_budgets()
+    if budget_report:
+        documents.write_text(check_report.budget_table(checker.headroom))
+        return _worst(checker.refused, len(checker.files))
     if write_known is not None:
-        documents.write_text(baseline.dump(found), write_known)
-        voice.info(f"{write_known}  {len(found)} findings")
-        return _worst(refused, len(files))
-    return _report(CheckReport(files, found, refused), expected, limits, format, quiet=quiet)
-
-
-class _Options:
-    """Rules and parameters of the command line, which replace or extend those of a configuration."""
-
-    def __init__(
-        self,
-        select: Sequence[str],
-        extend: Sequence[str],
-        ignore: Sequence[str],
-        target: str,
-        parameters: Mapping[str, str],
-    ) -> None:
-        split = [[word for each in words for word in each.split(",")] for words in (select, extend, ignore)]
-        self.select, self.extend, self.ignore = split
-        self.target, self.parameters = target, parameters
-        self._checked: set[str] = set()
-
-    def selection(self, config: CheckConfig, path: str) -> RuleSelection:
-        """Return the rules for a file."""
-        if config.path and config.path not in self._checked:
-            check_config.check_rules(config)
-            self._checked.add(config.path)
-        chosen = RuleSelection(
-            self.select or config.select,
-            (*config.extend, *self.extend),
-            (*config.ignore, *config.ignored_in(Path(path)), *self.ignore),
-            self.target or config.target,
-            {**config.parameters, **self.parameters},
-        )
-        chosen.check()
-        return chosen
-
-
-def _check_file(path: str, selection: RuleSelection) -> tuple[Sequence[Finding], AnimError | None]:
-    """Findings of a file, and the error for which other commands refuse it."""
-    try:
-        with checked_files.open_checked(path) as (_, file):
-            faults = file.facts.faults
-            return find_all(file, selection), faults[0] if faults else None
-    except AnimError as error:
-        fault = checked_files.fault_of(path, error)
-        return [INVALID.finding([each], (), INVALID.severity) for each in fault_occurrences([fault])], fault
-
-
-def _fix_file(path: str, selection: RuleSelection, voice: Reporter, *, unsafe: bool, dry_run: bool) -> None:
-    """Fix a file in place; broken ones stay as they are, and are reported when they are checked."""
-    if path == documents.PIPE:
-        raise UsageError("stdin can't be fixed in place: name files")
-    with suppress(FormatError), checked_files.open_checked(path) as (source, file):
-        result = fix_all(file, selection, unsafe=unsafe)
-        for each in result.refused:
-            error = format_length(each.error_m)
-            voice.warn(f"{source.name}: {each.rule.code} {each.rule.name} is not fixed: a vertex would move by {error}")
-        if result.applied:
-            documents.write(result.document, path, source, dry_run=dry_run, voice=voice)
-            fixes = ", ".join(
-                f"{each.count} {each.rule.code} {each.rule.name} (error {format_length(each.error_m)})"
-                for each in result.applied
-            )
-            voice.info(f"{source.name}  fixed {fixes}{DRY if dry_run else ''}")
+        documents.write_text(baseline.dump(checker.found), write_known)
+        voice.info(f"{write_known}  {len(checker.found)} findings")
+        return _worst(checker.refused, len(checker.files))
+    report = CheckReport(checker.files, checker.found, checker.refused)
+    return _report(report, expected, checker.limits, format, quiet=quiet)
 
 
 def _report(
@@ -270,34 +208,3 @@ def _parameters(words: Sequence[str]) -> dict[str, str]:
 def _load_baseline(path: str) -> Counter[str]:
     with documents.content(path, ending=".json") as (data, _):
         return baseline.load(data.tobytes().decode(errors="replace"))
-
-
-def _folder(path: str) -> Path:
-    return Path.cwd() if path == documents.PIPE else Path(path).resolve().parent
-
-
-def _rule_table() -> str:
-    rows: list[list[tables.Cell]] = [
-        [rule.code, rule.name, rule.severity.value if rule.is_default else "off", _fix(rule), rule.about]
-        for rule in sorted(RULES, key=lambda rule: rule.code)
-    ]
-    return tables.text(["rule", "name", "severity", "fix", "finds"], rows, left=5, indent="")
-
-
-def _fix(rule: Rule) -> str:
-    return "" if rule.fix is None else "safe" if rule.fix.is_safe else "unsafe"
-
-
-def _explanation(rule: Rule) -> str:
-    level = rule.severity.value if rule.is_default else f"{rule.severity.value}, off by default (--extend-select)"
-    lines = [f"{rule.code} {rule.name}  [{level}]", "", rule.about, "", fill(rule.why, WIDTH)]
-    lines += [f"With --target {target}: {severity}." for target, severity in rule.targets.items()]
-    if rule.advice:
-        advice = rule.advice.format(fps="FPS", finer="FPS", clips="")
-        lines += ["", fill(f"Advice: {advice}", WIDTH)]
-    if rule.fix is not None:
-        lines += ["", f"Fix ({_fix(rule)}): {rule.fix.about}"]
-    for name, each in rule.parameters.items():
-        unit = "" if each.unit == "%" else each.unit
-        lines += ["", f"--param {rule.code}.{name}={each.default:g}{unit}  {each.about}"]
-    return "\n".join(lines) + "\n"

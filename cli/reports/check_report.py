@@ -10,6 +10,7 @@ from itertools import groupby
 from anim.check.baseline import FileFinding, fingerprint
 from anim.check.finding import Severity
 from anim.errors import AnimError
+from cli import tables
 from cli.tables import escape_control
 from cli.text import plural
 
@@ -73,6 +74,14 @@ def summary(report: CheckReport) -> str:
     if report.refused:
         line += f"; {plural(len(report.refused), 'file')} unreadable"
     return line
+
+
+def budget_table(rows: Sequence[tuple[str, str, float, float]]) -> str:
+    """Return a table of file, name, value and limit, with the fraction of the limit that is used."""
+    cells: list[list[tables.Cell]] = [
+        [path, name, value, limit, f"{100 * value / limit:.0f} %" if limit else ""] for path, name, value, limit in rows
+    ]
+    return tables.text(["file", "budget", "value", "limit", "used"], cells, left=2, indent="")
 
 
 def as_json(report: CheckReport) -> str:

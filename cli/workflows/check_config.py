@@ -10,18 +10,30 @@ from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from anim.check.budget import MEASURES
 from anim.check.finding import Severity
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError
 from cli.errors import UsageError
 
 NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
-_KEYS: Mapping[str, Mapping[str, type]] = {
-    "": {"check": dict},
+_KEYS: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
+    "": {"check": dict, "budget": list},
     "check": {"select": list, "extend-select": list, "ignore": list, "target": str, "fail-on": str}
     | {"files": list, "params": dict},
     "check.files": {"match": str, "ignore": list},
+    "budget": {"match": str, "error": str, "against": str} | dict.fromkeys(MEASURES, (int, float)),
 }
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits of matching files. error: as text, "0.5mm" or "0.1%"; against: the source, with {path} or {name}."""
+
+    match: str
+    limits: tuple[tuple[str, float], ...]
+    error: str = ""
+    against: str = ""
 
 
 @dataclass(frozen=True)
@@ -37,14 +49,26 @@ class CheckConfig:
     fail_on: Severity | None = None
     files: Sequence[tuple[str, Sequence[str]]] = ()
     parameters: Mapping[str, str] = field(default_factory=dict)
+    budgets: Sequence[Budget] = ()
 
     def ignored_in(self, path: Path) -> Sequence[str]:
         """Return the rules ignored in a file: those of the first pattern that matches its path from the folder."""
-        absolute = path.resolve()
-        if not absolute.is_relative_to(self.folder):
-            return ()
-        relative = absolute.relative_to(self.folder).as_posix()
+        relative = self._relative(path)
         return next((ignored for pattern, ignored in self.files if matches(relative, pattern)), ())
+
+    def budget_of(self, path: Path) -> Budget | None:
+        """Return the first budget whose pattern matches the path of a file from the folder."""
+        relative = self._relative(path)
+        return next((each for each in self.budgets if matches(relative, each.match)), None)
+
+    def source_of(self, path: Path, budget: Budget) -> Path:
+        """Return the file that a file's error is measured against."""
+        return self.folder / budget.against.replace("{path}", self._relative(path)).replace("{name}", path.name)
+
+    def _relative(self, path: Path) -> str:
+        """Path from the folder, "" outside of it."""
+        absolute = path.resolve()
+        return absolute.relative_to(self.folder).as_posix() if absolute.is_relative_to(self.folder) else ""
 
 
 def matches(path: str, pattern: str) -> bool:
@@ -104,6 +128,7 @@ def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
         _check_keys(path, "check.files", entry)
         if "match" not in entry:
             raise UsageError(f"{path}: [[check.files]] has no match")
+    budgets = tuple(_budget(path, entry) for entry in table.get("budget", ()))
     try:
         fail_on = Severity(about["fail-on"]) if "fail-on" in about else None
     except ValueError:
@@ -120,7 +145,17 @@ def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
         fail_on=fail_on,
         files=tuple((each["match"], tuple(map(str, each.get("ignore", ())))) for each in about.get("files", ())),
         parameters={key: str(value) for key, value in about.get("params", {}).items()},
+        budgets=budgets,
     )
+
+
+def _budget(path: Path, entry: Any) -> Budget:
+    _check_keys(path, "budget", entry)
+    for key in ("match", *(("against",) if "error" in entry else ())):
+        if key not in entry:
+            raise UsageError(f"{path}: [[budget]] has no {key}")
+    limits = tuple((name, float(entry[name])) for name in MEASURES if name in entry)
+    return Budget(entry["match"], limits, entry.get("error", ""), entry.get("against", ""))
 
 
 def _check_keys(path: Path, section: str, table: Any) -> None:
@@ -134,7 +169,9 @@ def _check_keys(path: Path, section: str, table: Any) -> None:
             near = difflib.get_close_matches(key, known, n=1)
             raise UsageError(f"{path}: unknown key '{where}'", help=f"did you mean {near[0]}?" if near else "")
         if not isinstance(value, known[key]):
-            raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {known[key].__name__})")
+            kind = known[key]
+            expected = kind.__name__ if isinstance(kind, type) else "a number"
+            raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {expected})")
 
 
 def check_rules(config: CheckConfig) -> None:

@@ -244,6 +244,7 @@ def test_settings_in_the_help_are_toml(call: Call) -> None:
     settings = tomllib.loads(text[text.index("[check]") : text.index("--write-baseline")])
     assert settings["check"]["fail-on"] == "warning"
     assert settings["check"]["files"] == [{"match": "crowd/**", "ignore": ["GA2"]}]
+    assert settings["budget"][0]["bytes"] == 500_000
 
 
 def test_safe_fixes_change_the_file_in_place_once(folder: Path, call: Call) -> None:
@@ -284,3 +285,36 @@ def test_broken_files_and_stdin_are_not_fixed(folder: Path, call: Call) -> None:
     assert call("check", "bad.glb", "--fix").code == 3
     assert (folder / "bad.glb").read_bytes() == b"no glTF"
     assert call("check", "-", "--fix", stdin=built("noop")).code == 2
+
+
+def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None:
+    assert call("resample", "noop.glb", "coarse.glb", "--fps", "2").code == 0
+    (folder / "gltf-anim.toml").write_text(
+        '[[budget]]\nmatch = "noop.*"\nclips = 3\nbytes = 1_000_000\nkeys = 100_000\n'
+        '[[budget]]\nmatch = "coarse.*"\nerror = "1mm"\nagainst = "noop.glb"\n'
+        '[[budget]]\nmatch = "none/**"\nbytes = 1\n'
+    )
+    run = call("check", ".", "--format", "json", "--select", "GA402")
+    assert run.code == 6
+    assert "the budget 'none/**' matches no checked file" in run.err
+    found = {(each["file"], each["where"]): each["problem"] for each in run.json["findings"]}
+    assert set(found) == {("noop.glb", "clips"), ("coarse.glb", "error")}
+    assert found["noop.glb", "clips"].startswith("clips is ")
+    table = call("check", "noop.glb", "--budget-report").text
+    assert [line.split()[1] for line in table.splitlines()[1:]] == ["bytes", "keys", "clips"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('match = "*"\nbyte = 3', "did you mean bytes?"),
+        ('match = "*"\nbytes = "3 MB"', "budget.bytes is str (expected a number)"),
+        ("bytes = 3", "has no match"),
+        ('match = "*"\nerror = "1mm"', "has no against"),
+    ],
+)
+def test_wrong_budgets_are_refused(text: str, words: str, folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(f"[[budget]]\n{text}\n")
+    run = call("check", "noop.glb")
+    assert (run.code, run.text) == (2, "")
+    assert words in run.err

@@ -1,0 +1,140 @@
+"""Files of `check`: rules from options and settings, fixes, budgets, and findings of each file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePath
+
+from anim.check.baseline import FileFinding
+from anim.check.budget import ERROR, measure_budget
+from anim.check.checked_file import CheckedFile
+from anim.check.find import find_all
+from anim.check.finding import Severity
+from anim.check.fixing import fix_all
+from anim.check.rules.invalid import RULE as INVALID
+from anim.check.rules.invalid import fault_occurrences
+from anim.check.selection import RuleSelection
+from anim.errors import AnimError, FormatError
+from cli import units
+from cli.errors import UsageError
+from cli.io import documents
+from cli.text import Reporter, format_length
+from cli.workflows import check_config, checked_files
+from cli.workflows.check_config import Budget, CheckConfig
+from cli.workflows.edit_clips import DRY
+
+
+@dataclass(frozen=True, slots=True)
+class RuleOptions:
+    """Rules and parameters of the command line, which replace or extend those of a configuration."""
+
+    select: Sequence[str] = ()
+    extend: Sequence[str] = ()
+    ignore: Sequence[str] = ()
+    target: str = ""
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+    def selection(self, config: CheckConfig, path: str) -> RuleSelection:
+        """Return the rules for a file."""
+        chosen = RuleSelection(
+            self.select or config.select,
+            (*config.extend, *self.extend),
+            (*config.ignore, *config.ignored_in(Path(path)), *self.ignore),
+            self.target or config.target,
+            {**config.parameters, **self.parameters},
+        )
+        chosen.check()
+        return chosen
+
+
+@dataclass
+class FileChecker:
+    """Checks files one by one, and collects what it finds.
+
+    config: for all files, None for the nearest one of each. limits: severity by file from which on it fails.
+    headroom: file, name, value and limit of each entry of a budget. unsafe: apply unsafe fixes too, None for no fix.
+    """
+
+    options: RuleOptions
+    voice: Reporter
+    config: CheckConfig | None = None
+    fail_on: Severity | None = None
+    unsafe: bool | None = None
+    dry_run: bool = False
+    files: list[str] = field(default_factory=list)
+    found: list[FileFinding] = field(default_factory=list)
+    refused: list[tuple[str, AnimError]] = field(default_factory=list)
+    limits: dict[str, Severity] = field(default_factory=dict)
+    headroom: list[tuple[str, str, float, float]] = field(default_factory=list)
+    _configs: dict[str, CheckConfig] = field(default_factory=dict)
+    _used: set[Budget] = field(default_factory=set)
+
+    def check(self, path: str) -> None:
+        """Fix a file, if wanted, and check it."""
+        name = PurePath(documents.called(path)).as_posix()
+        config = self._config(path)
+        selection = self.options.selection(config, path)
+        self.files.append(name)
+        self.limits[name] = self.fail_on or config.fail_on or Severity.ERROR
+        if self.unsafe is not None:
+            self._fix(path, selection, unsafe=self.unsafe)
+        try:
+            with checked_files.open_checked(path) as (_, opened):
+                file = self._with_budget(opened, path, config)
+                self.found += [(name, each) for each in find_all(file, selection)]
+                self.headroom += [(name, *each) for each in measure_budget(file)]
+                faults = file.facts.faults
+        except UsageError:
+            raise
+        except AnimError as error:
+            faults = (checked_files.fault_of(path, error),)
+            for each in fault_occurrences(faults):
+                self.found.append((name, INVALID.finding([each], (), INVALID.severity)))
+        self.refused += [(name, fault) for fault in faults[:1]]
+
+    def warn_of_unused_budgets(self) -> None:
+        """Warn of budgets whose pattern matches no checked file."""
+        for config in self._configs.values():
+            for budget in config.budgets:
+                if budget not in self._used:
+                    self.voice.warn(f"{config.path}: the budget '{budget.match}' matches no checked file")
+
+    def _config(self, path: str) -> CheckConfig:
+        folder = Path.cwd() if path == documents.PIPE else Path(path).resolve().parent
+        config = self.config or check_config.nearest(folder)
+        if config.path and config.path not in self._configs:
+            check_config.check_rules(config)
+            self._configs[config.path] = config
+        return config
+
+    def _with_budget(self, file: CheckedFile, path: str, config: CheckConfig) -> CheckedFile:
+        """The file with its limits, and with the source that its error is measured against."""
+        budget = config.budget_of(Path(path))
+        if budget is None:
+            return file
+        self._used.add(budget)
+        if not budget.error:
+            return replace(file, budget=dict(budget.limits))
+        with checked_files.open_checked(str(config.source_of(Path(path), budget))) as (_, source):
+            limit = units.parse_length(budget.error, "error", lambda: source.diagonal)
+            return replace(file, budget={**dict(budget.limits), ERROR: limit}, source=source)
+
+    def _fix(self, path: str, selection: RuleSelection, *, unsafe: bool) -> None:
+        """Fix a file in place; broken ones stay as they are, and are reported when they are checked."""
+        if path == documents.PIPE:
+            raise UsageError("stdin can't be fixed in place: name files")
+        with suppress(FormatError), checked_files.open_checked(path) as (source, file):
+            result = fix_all(file, selection, unsafe=unsafe)
+            for each in result.refused:
+                error = format_length(each.error_m)
+                rule = f"{each.rule.code} {each.rule.name}"
+                self.voice.warn(f"{source.name}: {rule} is not fixed: a vertex would move by {error}")
+            if result.applied:
+                documents.write(result.document, path, source, dry_run=self.dry_run, voice=self.voice)
+                fixes = ", ".join(
+                    f"{each.count} {each.rule.code} {each.rule.name} (error {format_length(each.error_m)})"
+                    for each in result.applied
+                )
+                self.voice.info(f"{source.name}  fixed {fixes}{DRY if self.dry_run else ''}")
