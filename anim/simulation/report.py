@@ -106,4 +106,4 @@ def describe_elongation(worst: Mapping[str, Any] | None, substeps: int, limit: f
 def advise_elongation(solver: str) -> str:
     """Return advice for a cloth that is stretched beyond the limit in spite of many substeps."""
     fabric = {"mass-spring": "a higher --stiffness", "relaxation": "more --iterations"}
-    return f"a larger --max-stretch, a higher --fps, or {fabric.get(solver, 'a lower --density')}"
+    return f"a larger --max-stretch, a higher --fps, or {fabric.get(solver, 'a mesh with longer edges')}"

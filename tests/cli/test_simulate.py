@@ -253,6 +253,31 @@ def test_the_picture_of_cloth_draws_every_solver(fixture: Fixture, call: Call, t
     assert "this run: ω·h = 20.67 →" in drawn
 
 
+def test_cloth_keeps_the_materials_that_bake_keeps(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    found = []
+    for path, command in ((tmp_path / "a.glb", ("bake",)), (tmp_path / "b.glb", ("simulate", "cloth"))):
+        more = ("--rigid",) if command == ("bake",) else ("--pin", "x-min", "--duration", "0.1")
+        call(*command, fixture("flag"), path, "--mesh", "flag", *more).product()
+        document = container.read(np.frombuffer(path.read_bytes(), np.uint8)).json
+        primitives = [part for mesh in document["meshes"] for part in mesh["primitives"]]
+        found.append((document["materials"], [(set(part["attributes"]), part["material"]) for part in primitives]))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("threads", ["1", "2", "7"])
+def test_the_same_seed_gives_the_same_bytes_for_any_number_of_threads(
+    threads: str, fixture: Fixture, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    args = ("--mesh", "flag", "--pin", "x-min", "--wind", "5,0,2", "--seed", "3", "--duration", "0.3")
+    call("simulate", "cloth", fixture("flag"), tmp_path / "a.glb", *args).product()
+    monkeypatch.setattr("os.cpu_count", lambda: int(threads))
+    monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
+    call("simulate", "cloth", fixture("flag"), tmp_path / "b.glb", *args).product()
+    assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
+    call("simulate", "cloth", fixture("flag"), tmp_path / "c.glb", *args, "--seed", "4").product()
+    assert (tmp_path / "a.glb").read_bytes() != (tmp_path / "c.glb").read_bytes()
+
+
 @needs_validator
 def test_cloth_as_morph_targets_is_valid(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     out = tmp_path / "out.glb"
@@ -286,7 +311,7 @@ def test_cloth_beyond_its_largest_stretch_ends_with_a_report_and_no_cache(
     problem, help = run.err.splitlines()[-2:]
     assert problem.startswith("gltf-anim: stretched by ")
     assert problem.endswith(" s with 80 substeps a frame (limit 0.0001 %)")
-    assert help == "help: a larger --max-stretch, a higher --fps, or a lower --density"
+    assert help == "help: a larger --max-stretch, a higher --fps, or a mesh with longer edges"
     if not dry:
         found = json.loads(report.read_text())
         assert found["substeps"] == 80
@@ -312,6 +337,8 @@ def test_cloth_beyond_its_largest_stretch_ends_with_a_report_and_no_cache(
         (("--mesh", "flag", "--pin", "weight:hip"), 2, "expected weight:GLOB,MIN"),
         (("--mesh", "flag", "--report", "x.txt"), 2, "unsupported report format"),
         (("--mesh", "flag", "--step", "0"), 2, "--step is '0'"),
+        (("--mesh", "flag", "--stretch-compliance", "-1"), 2, "--stretch-compliance is -1"),
+        (("--mesh", "flag", "--pin", "x-min", "--gravity", "0,-1e12,0"), 6, "diverges at frame 1"),
         (("--mesh", "flag", "--pin", "box:0,0,0,9,9,9"), 5, "every point"),
     ],
 )

@@ -15,6 +15,7 @@ from anim.simulation.cloth.model import ClothModel, Fabric
 NO_FLOOR_M = -1e30
 AIR_KG_M3 = 1.2
 MAX_SPEED_M_S = 1e4
+MAX_LENGTH_PER_REST = 3.0  # of an edge, times the fabric's own elongation; beyond, the run has diverged
 GUST_RATES_HZ = (0.31, 0.73, 1.37, 2.9)
 XPBD_SWEEPS = 2  # of the constraints per substep: half the stretch for 1.5 times the time
 MAX_ELONGATION = 0.01  # of edges, beyond the fabric's own elongation
@@ -88,7 +89,9 @@ def run_xpbd(
     elastic = 0.0
     anchors = model.anchors if tethers else np.full((len(p), 1), -1)
     slack = 1 + (max_elongation or 0.0) + _elastic_elongation(model, fabric, environment)
-    numbers = _numbers(h, model, fabric, environment, max_elongation or 0.0)
+    outward = np.ascontiguousarray(topology.edges[model.outward])
+    most = (1 + (max_elongation or 0.0)) * model.edge_lengths[model.outward]
+    numbers = _numbers(h, model, fabric, environment)
     for frame in range(first, num_frames):
         if frame > first:
             times = (frame - 1) / fps + h * np.arange(substeps + 1, dtype=np.float64)
@@ -104,6 +107,8 @@ def run_xpbd(
                 model.hinge_lengths,
                 anchors,
                 model.tethers * slack,
+                outward,
+                most,
                 model.outward,
                 topology.faces,
                 driver.colliders(times),
@@ -114,11 +119,13 @@ def run_xpbd(
                 0 if max_elongation is None else LIMIT_SWEEPS,
             )
             _check(p, v, frame)
+            if max_elongation is not None:
+                _check_lengths(model, p, MAX_LENGTH_PER_REST * slack, frame)
         if frame >= 0:
             yield p.copy(), elastic + _energy(masses, environment, p, v)
 
 
-def _numbers(h: float, model: ClothModel, fabric: Fabric, environment: Environment, max_elongation: float) -> Floats:
+def _numbers(h: float, model: ClothModel, fabric: Fabric, environment: Environment) -> Floats:
     """The numbers of `step_frame`, in its order."""
     return np.array(
         [
@@ -132,7 +139,6 @@ def _numbers(h: float, model: ClothModel, fabric: Fabric, environment: Environme
             fabric.thickness,
             fabric.friction,
             model.self_collision,
-            max_elongation,
         ]
     )
 
@@ -148,6 +154,13 @@ def _elastic_elongation(model: ClothModel, fabric: Fabric, environment: Environm
 def _energy(masses: Floats, environment: Environment, p: Floats, v: Floats) -> float:
     """Kinetic and potential energy in J of masses (P,), 0 for pinned points; the potential is 0 at the origin."""
     return float(masses @ (0.5 * np.einsum("pc,pc->p", v, v) - p @ np.asarray(environment.gravity)))
+
+
+def _check_lengths(model: ClothModel, p: Floats, factor: float, frame: int) -> None:
+    """Raise UnstableError for an edge that is longer than `factor` times its rest length."""
+    a, b = p[model.topology.edges].transpose(1, 0, 2)
+    if (((a - b) ** 2).sum(axis=1) > (factor * model.edge_lengths) ** 2).any():
+        raise UnstableError(f"the simulation diverges at frame {frame}: an edge is over {factor:.2g} times as long")
 
 
 def _check(p: Floats, v: Floats, frame: int) -> None:

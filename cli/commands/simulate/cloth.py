@@ -53,10 +53,10 @@ def command(
         typer.Option("--pin", metavar="WHICH", help="Vertices that follow the animation, chosen as by --cloth."),
     ] = None,
     density: Annotated[float, typer.Option("--density", metavar="KG/M2", help="Mass per area.")] = 0.2,
-    stretch: Annotated[
+    stretch_compliance: Annotated[
         float, typer.Option("--stretch-compliance", metavar="M/N", help="Compliance of edges; 0 is rigid.")
     ] = 1e-7,
-    bend: Annotated[
+    bend_compliance: Annotated[
         float, typer.Option("--bend-compliance", metavar="M/N", help="Compliance of hinges; 0 is rigid.")
     ] = 1e-2,
     damping: Annotated[float, typer.Option("--damping", metavar="N", help="Damping per second.")] = 0.3,
@@ -158,7 +158,12 @@ def command(
         node = _mesh_node(scene, mesh)
         options = ClothOptions(
             Fabric(
-                density, stretch, bend, damping, units.parse_length(thickness, "--thickness", lambda: 1.0), friction
+                density,
+                stretch_compliance,
+                bend_compliance,
+                damping,
+                units.parse_length(thickness, "--thickness", lambda: 1.0),
+                friction,
             ),
             Environment(
                 parse_vector(gravity, "--gravity"), parse_vector(wind, "--wind"), gusts, floor=floor, seed=seed

@@ -22,13 +22,15 @@ from anim.simulation.cloth.colliders import Capsule, Plane, from_spring_collider
 from anim.simulation.cloth.driver import ClothDriver
 from anim.simulation.cloth.kernels.self_collision import separate_points
 from anim.simulation.cloth.kernels.xpbd import step_frame
-from anim.simulation.cloth.model import Fabric
+from anim.simulation.cloth.mass_spring_solver import as_mass_spring
+from anim.simulation.cloth.model import Fabric, build_cloth
 from anim.simulation.cloth.options import ClothOptions
 from anim.simulation.cloth.selection import select_vertices
 from anim.simulation.cloth.simulate import ClothRun, simulate_cloth
 from anim.simulation.cloth.solver import Environment
 from anim.simulation.cloth.tethers import tether_lengths
 from anim.simulation.cloth.topology import build_topology
+from anim.simulation.integrators import INTEGRATORS, integrate
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.skinning.bake import bake, prepare_bake
 
@@ -84,8 +86,8 @@ def advance(
     targets = np.broadcast_to(p[pinned], (substeps, len(pinned), 3)).copy()
     anchors, limits = np.full((len(p), 1), -1), np.zeros((len(p), 1))
     order, faces, colliders = np.arange(len(edges)), np.zeros((0, 3), np.int64), np.zeros((substeps + 1, 0, 8))
-    numbers = np.array([h, 0, -gravity, 0, compliance, 0, damping, 0, -1e30, 0, 0, 0, 0])
-    constraints = (edges, lengths, none, np.zeros(0), anchors, limits, order)
+    numbers = np.array([h, 0, -gravity, 0, compliance, 0, damping, 0, -1e30, 0, 0, 0])
+    constraints = (edges, lengths, none, np.zeros(0), anchors, limits, edges, lengths, order)
     step_frame(
         p,
         v,
@@ -372,6 +374,41 @@ def test_integrators_agree_at_small_steps(integrator: str) -> None:
     _, expected = simulate(positions, faces, positions[:, 0] == 0, **options)
     _, found = simulate(positions, faces, positions[:, 0] == 0, **options, integrator=integrator)
     assert np.abs(found - expected).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["symplectic-euler", "velocity-verlet", "rk4", "implicit-euler"])
+def test_the_mass_spring_cloth_converges_with_the_order_of_its_integrator(name: str) -> None:
+    """Undamped, so that forces depend on positions alone; against RK4 with an eighth of the step."""
+    positions, faces = sheet(5, 5)
+    model = build_cloth(positions, faces, positions[:, 0] == 0, Fabric(damping=0.0))
+    system = as_mass_spring(model, Fabric(damping=0.0), STILL, 50.0)
+    system = replace(system, damping=np.zeros_like(system.damping))
+    x = model.rest + 0.02 * np.random.default_rng(1).standard_normal(model.rest.shape) * system.is_free[:, None]
+
+    def end(name: str, steps: int) -> Array:
+        *_, (found, _) = integrate(system, name, x, np.zeros_like(x), 0.08 / steps, steps)
+        return found
+
+    exact = end("rk4", 4096)
+    errors = [float(np.abs(end(name, steps) - exact).max()) for steps in (256, 512)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(INTEGRATORS[name].order, abs=0.2)
+
+
+@pytest.mark.parametrize("name", ["verlet", "velocity-verlet", "symplectic-euler"])
+def test_a_free_mass_spring_cloth_keeps_momentum_and_angular_momentum(name: str) -> None:
+    positions, faces = sheet(5, 5)
+    model = build_cloth(positions, faces, np.zeros(25, bool), Fabric(damping=0.0))
+    system = as_mass_spring(model, Fabric(damping=0.0), replace(STILL, gravity=(0.0, 0.0, 0.0)), 50.0)
+    method, h = INTEGRATORS[name], 1 / 2000
+    v = np.cross([1.0, 2, 3], positions) + np.random.default_rng(0).standard_normal(positions.shape)
+    m = system.masses[:, None]
+    state, first = method.start(system, 0.0, positions, v, h), (m * v).sum(0)
+    spin = [np.cross(state[0], m * method.velocity(system, 0.0, state, h)).sum(axis=0)]
+    for _ in range(500):
+        state = method.step(system, 0.0, *state, h)
+    spin.append(np.cross(state[0], m * method.velocity(system, 0.0, state, h)).sum(axis=0))
+    np.testing.assert_allclose((m * method.velocity(system, 0.0, state, h)).sum(axis=0), first, atol=1e-12)
+    np.testing.assert_allclose(spin[1], spin[0], rtol=2e-3)
 
 
 def test_relaxation_is_stiffer_with_more_iterations() -> None:

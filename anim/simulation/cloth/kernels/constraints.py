@@ -39,33 +39,27 @@ def project_distances(p: Floats, w: Floats, pairs: Ints, rest: Floats, complianc
 
 @jit
 def limit_elongation(
-    p: Floats,
-    w: Floats,
-    pairs: Ints,
-    rest: Floats,
-    order: Ints,
-    limit: float,
-    compliance: float,
-    multipliers: Floats,
+    p: Floats, w: Floats, pairs: Ints, most: Floats, order: Ints, compliance: float, multipliers: Floats
 ) -> bool:
-    """Shorten pairs (E, 2) that are longer than their limit, in an order (E,); return whether there was any.
+    """Shorten pairs (E, 2) that are longer than their limit, one after another; return whether there was any.
 
-    The limit is the rest length (E,), a fraction `limit` of it, and the elastic elongation that the multipliers (E,) of
-    `project_distances` stand for, so that a soft fabric is stretched as its compliance says.
+    The limit is a length `most` (E,), and the elastic elongation that the multipliers of `project_distances` stand for,
+    so that a soft fabric is stretched as its compliance says. order: (E,) of the pairs in the multipliers.
     """
     found = False
-    for n in range(len(order)):
-        k = order[n]
+    for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
         square = dx * dx + dy * dy + dz * dz
-        most = rest[k] * (1.0 + limit) - min(compliance * multipliers[k], 0.0)
+        if square <= most[k] * most[k]:
+            continue
+        limit = most[k] - min(compliance * multipliers[order[k]], 0.0)
         total = w[i] + w[j]
-        if square <= most * most or total == 0.0:
+        if square <= limit * limit or total == 0.0:
             continue
         found = True
         length = np.sqrt(square)
-        s = (most - length) / (total * length)
+        s = (limit - length) / (total * length)
         p[i, 0] += s * w[i] * dx
         p[i, 1] += s * w[i] * dy
         p[i, 2] += s * w[i] * dz

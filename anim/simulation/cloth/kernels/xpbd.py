@@ -29,6 +29,8 @@ def step_frame(
     hinge_lengths: Floats,
     anchors: Ints,
     limits: Floats,
+    outward: Ints,
+    most: Floats,
     order: Ints,
     faces: Ints,
     colliders: Floats,
@@ -40,15 +42,15 @@ def step_frame(
 ) -> float:
     """Advance positions and velocities (P, 3) in place by S substeps; return the elastic energy in J at their end.
 
-    pinned: (N,) indices of points that go to targets (S, N, 3). anchors, limits: (P, K), see `limit_tethers`. order:
-    (E,) of the edges, see `limit_elongation`. colliders: (S + 1, C, 8), from the end of the step before, see
-    `push_out`. wind: (S, 3) m/s. at_rest: (P, 3), for pairs that self-collision leaves alone. numbers: substep s,
-    gravity x, y, z m/s², compliance of edges and of hinges m/N, damping 1/s, density of air kg/m³, floor m,
-    thickness m, friction, self-collision thickness m or 0, largest elongation. iterations: of the constraints in each
-    substep. limit_sweeps: at most so many of `limit_elongation`, until no edge is too long.
+    pinned: (N,) indices of points that go to targets (S, N, 3). anchors, limits: (P, K), see `limit_tethers`. outward:
+    (E, 2) edges in another order, most: their longest lengths, order: see `limit_elongation`. colliders: (S + 1, C, 8),
+    from the end of the step before, see `push_out`. wind: (S, 3) m/s. at_rest: (P, 3), for pairs that self-collision
+    leaves alone. numbers: substep s, gravity x, y, z m/s², compliance of edges and of hinges m/N, damping 1/s, density
+    of air kg/m³, floor m, thickness m, friction, self-collision thickness m or 0. iterations: of the constraints in
+    each substep. limit_sweeps: at most so many of `limit_elongation`, until no edge is too long.
     """
     h, damping, air = numbers[0], numbers[6], numbers[7]
-    floor, thickness, friction, own, elongation = numbers[8], numbers[9], numbers[10], numbers[11], numbers[12]
+    floor, thickness, friction, own = numbers[8], numbers[9], numbers[10], numbers[11]
     stretch, bend = numbers[4] / (h * h), numbers[5] / (h * h)
     keep = 1.0 - min(1.0, damping * h)
     old = np.empty_like(p)
@@ -75,7 +77,7 @@ def step_frame(
             project_distances(p, w, hinges, hinge_lengths, bend, hinge_multipliers)
         limit_tethers(p, w, anchors, limits)
         for _ in range(limit_sweeps):
-            if not limit_elongation(p, w, edges, edge_lengths, order, elongation, stretch, edge_multipliers):
+            if not limit_elongation(p, w, outward, most, order, stretch, edge_multipliers):
                 break
         if own > 0.0 and s % 2 == 0:
             separate_points(p, w, at_rest, own)
