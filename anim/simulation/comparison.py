@@ -43,15 +43,17 @@ class IntegratorRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Runs of all integrators on one system. omega_h: of its stiffest part. step: s.
+    """Runs of all integrators on one system. omega_h: of its stiffest part, 0 without one. step: s.
 
-    springs: (S, 2) pairs of points to draw; with one spring the motion is drawn in phase space.
+    springs: (S, 2) pairs of points to draw; with one spring the motion is drawn in phase space, without as points.
+    test_equation: "oscillator", x″ = −ω²x, or "drag", x″ = −r x′, whose r·h is `omega_h`: a name in GAINS.
     """
 
     runs: list[IntegratorRun]
     omega_h: float
     step: float
     springs: Ints
+    test_equation: str = "oscillator"
 
 
 def compare_integrators(

@@ -43,7 +43,8 @@ class Integrator:
 
     about: for `--help`. order: of the error in h; 1 for both Verlet forms if forces depend on velocity.
     limit: largest stable ωh of the undamped oscillator; 0 if it grows at every step size, infinite if it never does.
-    gain: amplitude factor per step, of arrays of ωh.
+    gain: amplitude factor per step, of arrays of ωh. drag_gain: of the velocity of x″ = −r x′, of arrays of rh.
+    drag_limit: largest rh at which it is 1 or less.
     step: (system, t, x, v, h) → (x, v) at t + h. staggered: the velocities of the state are those at t − h/2.
     """
 
@@ -52,6 +53,8 @@ class Integrator:
     limit: float
     gain: Callable[[Floats], Floats]
     step: Step
+    drag_gain: Callable[[Floats], Floats]
+    drag_limit: float
     staggered: bool = False
 
     def start(self, system: System, time: float, x: Floats, v: Floats, step: float) -> State:
@@ -106,14 +109,44 @@ def _rk4_gain(w: Floats) -> Floats:
     return np.hypot(1 - w**2 / 2 + w**4 / 24, w - w**3 / 6)
 
 
+def _euler_drag_gain(z: Floats) -> Floats:
+    return np.abs(1 - z)
+
+
+def _verlet_drag_gain(z: Floats) -> Floats:
+    """Of velocity Verlet, whose half steps both take the velocity that they have."""
+    return np.square(1 - 0.5 * z)
+
+
+def _rk4_drag_gain(z: Floats) -> Floats:
+    return np.abs(1 - z + z**2 / 2 - z**3 / 6 + z**4 / 24)
+
+
+RK4_DRAG_LIMIT = 2.7852935634052816  # root of the polynomial − 1
 INTEGRATORS = {
-    "explicit-euler": Integrator("order 1, gains energy", 1, 0.0, lambda w: np.sqrt(1 + w * w), _explicit_euler),
-    "symplectic-euler": Integrator("order 1, keeps energy", 1, 2.0, _verlet_gain, _symplectic_euler),
-    "verlet": Integrator("order 2, keeps energy", 2, 2.0, _verlet_gain, _symplectic_euler, staggered=True),
-    "velocity-verlet": Integrator("as verlet, velocities in step", 2, 2.0, _verlet_gain, _velocity_verlet),
-    "rk4": Integrator("order 4, loses little energy", 4, 2 * np.sqrt(2.0), _rk4_gain, _rk4),
+    "explicit-euler": Integrator(
+        "order 1, gains energy", 1, 0.0, lambda w: np.sqrt(1 + w * w), _explicit_euler, _euler_drag_gain, 2.0
+    ),
+    "symplectic-euler": Integrator(
+        "order 1, keeps energy", 1, 2.0, _verlet_gain, _symplectic_euler, _euler_drag_gain, 2.0
+    ),
+    "verlet": Integrator(
+        "order 2, keeps energy", 2, 2.0, _verlet_gain, _symplectic_euler, _verlet_drag_gain, 4.0, staggered=True
+    ),
+    "velocity-verlet": Integrator(
+        "as verlet, velocities in step", 2, 2.0, _verlet_gain, _velocity_verlet, _verlet_drag_gain, 4.0
+    ),
+    "rk4": Integrator(
+        "order 4, loses little energy", 4, 2 * np.sqrt(2.0), _rk4_gain, _rk4, _rk4_drag_gain, RK4_DRAG_LIMIT
+    ),
     "implicit-euler": Integrator(
-        "order 1, stable, loses energy", 1, np.inf, lambda w: 1 / np.sqrt(1 + w * w), _implicit_euler
+        "order 1, stable, loses energy",
+        1,
+        np.inf,
+        lambda w: 1 / np.sqrt(1 + w * w),
+        _implicit_euler,
+        lambda z: 1 / (1 + z),
+        np.inf,
     ),
 }
 

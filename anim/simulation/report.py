@@ -90,6 +90,15 @@ def advise_step(omega_h: float, limit: float, step: float, integrator: str, rk4_
     return f"{words}: --step 1/{per_second}{other}"
 
 
+def advise_drag_step(drag_h: float, limit: float, step: float, integrator: str) -> str:
+    """Return advice for drag beyond the stability limit: "drag·h = 15, explicit-euler's limit is 2: --step 1/500 …"."""
+    if drag_h <= limit:
+        return ""
+    per_second = math.ceil(drag_h / (step * limit * SAFE_STEP_FRACTION))
+    words = f"drag·h = {drag_h:.3g}, {integrator}'s limit is {limit:.3g}"
+    return f"{words}: --step 1/{per_second} or --integrator implicit-euler"
+
+
 def advise_half_step(step: float) -> str:
     """Return advice for a run that diverges by a method without a stability limit: "--step 1/1200"."""
     return f"--step 1/{math.ceil(2 / step - 1e-6)}"

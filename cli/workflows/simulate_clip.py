@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from pathlib import PurePath
+
+import numpy as np
 
 from anim.errors import UnstableError
 from anim.gltf.document import Document
@@ -19,7 +22,7 @@ from cli.workflows.edit_clips import note_images
 from cli.workflows.simulation_report import check_report, write_report
 
 NO_CLIP = Clip("", ())
-Simulate = Callable[[Document, Scene, Clip, int | None], tuple[Document, SimulationReport, str]]
+Simulate = Callable[[Document, Scene, Clip, int | None], tuple[Document | bytes, SimulationReport, str]]
 
 
 def simulate_clip(
@@ -31,16 +34,19 @@ def simulate_clip(
     *,
     report: str | None,
     dry_run: bool,
+    others: Collection[str] = (),
 ) -> None:
     """Simulate on one clip of a file, write the file and the report, and sum up in one line on stderr.
 
     clip: glob of the driving clip; the first clip without it. simulate: gets the document, its scene, the driving clip,
-    without tracks where the file has none, and its index; returns the document, the report, and a summary. The report
-    of an UnstableError is written too, before it is raised again.
+    without tracks where the file has none, and its index; returns the document, or the bytes of a file of another
+    format, the report, and a summary. The report of an UnstableError is written too, before it is raised again.
+    others: extensions of other formats.
     """
     began = time.perf_counter()
     if not dry_run:
-        documents.check_output(output)
+        is_other = output != documents.PIPE and PurePath(output).suffix.lower() in others
+        (documents.check_file if is_other else documents.check_output)(output)
         check_report(report)
     with documents.source(input, voice) as source:
         scene = scenes.read_scene(source.document, source.name, voice)
@@ -52,9 +58,15 @@ def simulate_clip(
             if report is not None and error.report is not None and not dry_run:
                 write_report(error.report, report)
             raise
-        size = documents.write(result, output, source, dry_run=dry_run, voice=voice)
+        if isinstance(result, bytes):
+            size = len(result)
+            if not dry_run:
+                documents.write_bytes([np.frombuffer(result, np.uint8)], output)
+        else:
+            size = documents.write(result, output, source, dry_run=dry_run, voice=voice)
     if not dry_run:
-        note_images(result, source, output, voice)
+        if not isinstance(result, bytes):
+            note_images(result, source, output, voice)
         if report is not None:
             write_report(found, report)
     name = source.name if output == documents.PIPE else output

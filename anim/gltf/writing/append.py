@@ -77,15 +77,18 @@ def append_mesh(
     return _with_json(document, json), len(json["meshes"]) - 1
 
 
-def append_nodes(document: Document, nodes: Sequence[Json]) -> tuple[Document, list[int]]:
-    """Return the document with new root nodes in its default scene, and their indices.
+def append_nodes(document: Document, nodes: Sequence[Json], *, in_scene: bool = True) -> tuple[Document, list[int]]:
+    """Return the document with new nodes, and their indices.
 
-    nodes: their JSON. A document without a scene gets one.
+    nodes: their JSON. in_scene: as root nodes of the default scene; a document without a scene gets one. Else they are
+    for a parent to name as its children.
     """
     json = dict(document.json)
     first = len(json_array(json, "nodes"))
     indices = list(range(first, first + len(nodes)))
     json["nodes"] = [*json_array(json, "nodes"), *nodes]
+    if not in_scene:
+        return _with_json(document, json), indices
     scenes = [*json_array(json, "scenes")]
     if not scenes:
         scenes, json["scene"] = [{}], 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +24,7 @@ from anim.show.plots.figure import (
     style,
 )
 from anim.simulation.comparison import Comparison, IntegratorRun
-from anim.simulation.integrators import INTEGRATORS
+from anim.simulation.integrators import INTEGRATORS, Integrator
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,10 +45,47 @@ NUM_POSES = 9
 MAX_SHOWN_GROWTH = 4  # of energy, beyond which a run leaves the picture
 MANY_SPRINGS = 200  # drawn as thin lines without points
 VERLET_LIMIT = 2.0  # ω·h
-MAX_OMEGA_H, MIN_GAIN, MAX_GAIN = 3.4, 0.5, 1.6
+MIN_GAIN, MAX_GAIN = 0.5, 1.6
+MAX_RIPPLE = 0.5  # of the energy; a larger change is a loss, by drag or impacts
+LIMIT_WORDS = {INTEGRATORS["rk4"].limit: "2√2"}
 WIDTH, LEFT, HEAD, GAP = 11.6, 0.65, 0.95, 0.6  # inches
 CURVES, LOG, CHANGE, POSES = 6.3, 1.75, 1.45, 2.6
 LABELS = 1.75  # of the curves, at their right
+
+
+@dataclass(frozen=True, slots=True)
+class TestEquation:
+    """Equation by which stability is judged. symbol: of the rate times the step, about: of the axis.
+
+    max_value: end of the axis. gain, limit: of an integrator.
+    """
+
+    symbol: str
+    about: str
+    gain_of: str
+    max_value: float
+    gain: Callable[[Integrator, Floats], Floats]
+    limit: Callable[[Integrator], float]
+
+
+TEST_EQUATIONS = {
+    "oscillator": TestEquation(
+        "ω·h",
+        "ω·h: angular frequency of the stiffest part × step",
+        "Amplitude",
+        3.4,
+        lambda method, w: method.gain(w),
+        lambda method: method.limit,
+    ),
+    "drag": TestEquation(
+        "drag·h",
+        "drag·h: drag of the fastest particle × step",
+        "Velocity",
+        4.6,
+        lambda method, z: method.drag_gain(z),
+        lambda method: method.drag_limit,
+    ),
+}
 
 
 def stability_plot(compared: Comparison, *, kind: str) -> bytes:
@@ -58,10 +96,11 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
     runs, omega_h, step, springs = compared.runs, compared.omega_h, compared.step, compared.springs
     with style(kind):
         sheet = Figure(WIDTH, HEAD + LOG + 0.25 + CHANGE + GAP + 0.3 + POSES + 0.25)
-        sheet.text(LEFT - 0.4, 0.35, _title(runs, omega_h, step), fontsize=TITLE + 2, weight="bold")
-        sheet.text(LEFT - 0.4, 0.6, _subtitle(omega_h, step), color=SOFT)
+        equation = TEST_EQUATIONS[compared.test_equation]
+        sheet.text(LEFT - 0.4, 0.35, _title(runs, equation, omega_h, step), fontsize=TITLE + 2, weight="bold")
+        sheet.text(LEFT - 0.4, 0.6, _subtitle(equation, omega_h, step), color=SOFT)
         _draw_energy(sheet, runs)
-        _draw_gain(sheet, omega_h)
+        _draw_gain(sheet, equation, omega_h)
         top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
         shown = [run for name in SHOWN for run in runs if run.name == name]
         width = (WIDTH - LEFT - 0.2) / len(shown)
@@ -72,7 +111,7 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
         return sheet.render(kind)
 
 
-def _title(runs: Sequence[IntegratorRun], omega_h: float, step: float) -> str:
+def _title(runs: Sequence[IntegratorRun], equation: TestEquation, omega_h: float, step: float) -> str:
     gone = [run for run in runs if run.diverged_at is not None]
     stable = [run.name for run in runs if run.diverged_at is None]
     if not gone:
@@ -84,7 +123,8 @@ def _title(runs: Sequence[IntegratorRun], omega_h: float, step: float) -> str:
     else:
         words = [f"{run.name} ({run.diverged_at:.2f} s)" if len(gone) < 3 else run.name for run in gone]
         result = f"{', '.join(words)} diverge{'s' if len(gone) == 1 else ''}"
-    return f"Step {_seconds(step)}, ω·h = {_product(omega_h)}: {result}"
+    value = f", {equation.symbol} = {_product(omega_h)}" if omega_h > 0 else ""
+    return f"Step {_seconds(step)}{value}: {result}"
 
 
 def _product(omega_h: float) -> str:
@@ -92,11 +132,13 @@ def _product(omega_h: float) -> str:
     return f"{omega_h:.2f}" if omega_h >= 0.1 else format_number(float(f"{omega_h:.2g}"))
 
 
-def _subtitle(omega_h: float, step: float) -> str:
+def _subtitle(equation: TestEquation, omega_h: float, step: float) -> str:
     if omega_h <= 0:
-        return ""
-    limits = [f"{name} {_seconds(step * INTEGRATORS[name].limit / omega_h)}" for name in ("verlet", "rk4")]
-    return f"Largest stable steps of this system: {', '.join(limits)}; implicit-euler any, explicit-euler none."
+        return "No force depends on the position or the velocity: every step is stable."
+    names = ("verlet", "rk4") if equation.symbol == "ω·h" else ("explicit-euler", "verlet", "rk4")
+    limits = [f"{name} {_seconds(step * equation.limit(INTEGRATORS[name]) / omega_h)}" for name in names]
+    none = [f"{name} none" for name, method in INTEGRATORS.items() if equation.limit(method) == 0]
+    return f"Largest stable steps of this system: {', '.join(limits)}; {', '.join(['implicit-euler any', *none])}."
 
 
 def _seconds(step: float) -> str:
@@ -141,7 +183,11 @@ def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float) -> None
 
 def _keeps_energy(run: IntegratorRun) -> bool:
     """True for a stable run of a symplectic integrator: its energy oscillates about the start's."""
-    return run.diverged_at is None and run.name in INTEGRATORS and INTEGRATORS[run.name].limit == VERLET_LIMIT
+    return run.diverged_at is None and abs(run.energy_change) < MAX_RIPPLE and _is_symplectic(run.name)
+
+
+def _is_symplectic(name: str) -> bool:
+    return name in INTEGRATORS and INTEGRATORS[name].limit == VERLET_LIMIT
 
 
 def _change(run: IntegratorRun) -> str:
@@ -155,38 +201,53 @@ def _change(run: IntegratorRun) -> str:
     return words.replace("-", "−")
 
 
-def _draw_gain(sheet: Figure, omega_h: float) -> None:
+def _draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> None:
     left = CURVES + 0.45
     height = LOG + 0.25 + CHANGE
     axes = sheet.panel(left, HEAD, WIDTH - left - 0.25, height)
-    w = np.linspace(1e-3, MAX_OMEGA_H, 500)
+    lowest = MIN_GAIN if equation.symbol == "ω·h" else 0.0
+    w = np.linspace(1e-3, equation.max_value, 500)
     for name, method in INTEGRATORS.items():
         if name != "velocity-verlet":  # the same curve as verlet
             dotted = ":" if name == "symplectic-euler" else "-"
             axes.plot(
-                w, method.gain(w), color=COLORS[name], linewidth=THICK if name in SHOWN else THIN, linestyle=dotted
+                w,
+                equation.gain(method, w),
+                color=COLORS[name],
+                linewidth=THICK if name in SHOWN else THIN,
+                linestyle=dotted,
             )
     axes.axhspan(1, MAX_GAIN, color="#d55e00", alpha=0.06, linewidth=0)
     axes.text(0.06, MAX_GAIN - 0.06, "grows", fontsize=SMALL, color="#a33")
-    axes.text(0.06, MIN_GAIN + 0.03, "fades", fontsize=SMALL, color=SOFT)
-    for limit, words in ((2.0, "2: verlet, symplectic-euler"), (float(2 * np.sqrt(2)), "2√2: rk4")):
+    axes.text(0.06, lowest + 0.03, "fades", fontsize=SMALL, color=SOFT)
+    for limit, words in _limits(equation):
         axes.axvline(limit, color=HAIR, linewidth=0.8)
-        axes.text(
-            limit - 0.03, MIN_GAIN + 0.03, words, fontsize=SMALL, rotation=90, ha="right", va="bottom", color=SOFT
-        )
-    if omega_h <= MAX_OMEGA_H:
+        axes.text(limit - 0.03, lowest + 0.03, words, fontsize=SMALL, rotation=90, ha="right", va="bottom", color=SOFT)
+    if 0 < omega_h <= equation.max_value:
         axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
         for name in (each for each in SHOWN if each in INTEGRATORS):
-            gain = float(INTEGRATORS[name].gain(np.array(omega_h)))
-            if MIN_GAIN <= gain <= MAX_GAIN:
+            gain = float(equation.gain(INTEGRATORS[name], np.array(omega_h)))
+            if lowest <= gain <= MAX_GAIN:
                 axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
-        axes.text(omega_h + 0.05, MIN_GAIN + 0.1, f"this run\nω·h = {_product(omega_h)}", fontsize=SMALL)
-    else:
-        axes.text(MAX_OMEGA_H - 0.05, 1.06, f"this run: ω·h = {_product(omega_h)} →", fontsize=SMALL, ha="right")
-    axes.set_xlim(0, MAX_OMEGA_H)
-    axes.set_ylim(MIN_GAIN, MAX_GAIN)
-    axes.set_xlabel("ω·h: angular frequency of the stiffest part × step", fontsize=SMALL, color=SOFT)
-    sheet.text(left, HEAD - 0.1, "Amplitude gained per step", fontsize=TEXT)
+        words = f"this run\n{equation.symbol} = {_product(omega_h)}"
+        axes.text(omega_h + 0.05, lowest + 0.1, words, fontsize=SMALL)
+    elif omega_h > 0:
+        words = f"this run: {equation.symbol} = {_product(omega_h)} →"
+        axes.text(equation.max_value - 0.05, 1.06, words, fontsize=SMALL, ha="right")
+    axes.set_xlim(0, equation.max_value)
+    axes.set_ylim(lowest, MAX_GAIN)
+    axes.set_xlabel(equation.about, fontsize=SMALL, color=SOFT)
+    sheet.text(left, HEAD - 0.1, f"{equation.gain_of} gained per step", fontsize=TEXT)
+
+
+def _limits(equation: TestEquation) -> list[tuple[float, str]]:
+    """Finite limits above 0 and the integrators that have them."""
+    names: dict[float, list[str]] = {}
+    for name, method in INTEGRATORS.items():
+        limit = equation.limit(method)
+        if 0 < limit < np.inf and name != "velocity-verlet":
+            names.setdefault(limit, []).append(name)
+    return [(limit, f"{LIMIT_WORDS.get(limit, f'{limit:.3g}')}: {', '.join(each)}") for limit, each in names.items()]
 
 
 def _span(runs: Sequence[IntegratorRun], drawn: Sequence[Floats]) -> tuple[Floats, float]:
@@ -203,7 +264,7 @@ def _stays_near(run: IntegratorRun) -> bool:
 
 def motion_points(run: IntegratorRun, springs: Ints, omega: float) -> Floats:
     """Points (n, P, 2) to draw: x and y, or position and velocity / ω of the one moving point."""
-    if len(springs) > 1:
+    if len(springs) != 1:
         spread = np.ptp(run.positions[0], axis=0)  # seen from the side that shows more of the start
         return np.asarray(run.positions[..., [0 if spread[0] >= spread[2] else 2, 1]])
     return np.stack([run.positions[:, -1:, 0], run.velocities[:, -1:, 0] / max(omega, 1e-300)], axis=-1)
@@ -219,7 +280,7 @@ def _draw_motion(
 ) -> None:
     x, y, width = place
     last = len(run.times) - 1
-    phase = len(springs) <= 1
+    phase = len(springs) == 1
     until = min(last, int(np.searchsorted(run.times, 1.0)) if not phase else last)
     what = "phase space: velocity / ω against position" if phase else f"0 to {run.times[until]:.2f} s"
     wide = sheet.text(x, y - 0.12, run.name, color=COLORS[run.name], weight="bold")
@@ -245,6 +306,9 @@ def _draw_motion(
 def _draw_poses(axes: Axes, poses: Floats, springs: Ints, color: str) -> None:
     for i, pose in enumerate(poses):
         alpha = 0.15 + 0.85 * i / (NUM_POSES - 1)
+        if not len(springs):
+            axes.plot(pose[:, 0], pose[:, 1], "o", color=color, markersize=2.5, alpha=alpha, markeredgewidth=0)
+            continue
         lines = edge_lines(pose, springs)
         look = "-o" if len(springs) < MANY_SPRINGS else "-"
         width = 1.0 if len(springs) < MANY_SPRINGS else 0.4

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
+from anim.maths import quaternion
+from anim.simulation.particles.attractors import Attractor
+from anim.simulation.particles.obstacles import Drive
+
+if TYPE_CHECKING:
+    from anim.simulation.particles.kernels.force_field import ForceField
 
 NUM_MODES = 24  # of the turbulence; more are not seen
 EARTH_GRAVITY_M_S2 = (0.0, -9.81, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Forces:
     """Accelerations of particles, per mass.
 
@@ -44,52 +51,21 @@ class Forces:
 
     @property
     def is_constant(self) -> bool:
-        """True if the acceleration is the same everywhere: paths between events are parabolas."""
+        """True if the acceleration of these forces is the same everywhere."""
         return not (self.linear_drag or self.quadratic_drag)
-
-    def acceleration(self, time: Floats | float, x: Floats, v: Floats) -> Floats:
-        """Return the acceleration (P, 3) m/s² at `time`, s or (P, 1) s."""
-        gravity = np.asarray(self.gravity)
-        if self.is_constant:
-            return np.broadcast_to(gravity, x.shape)
-        relative, factor = self._drag(time, x, v)
-        return np.asarray(gravity - factor * relative)
-
-    def solve_implicit(self, time: Floats | float, x: Floats, v: Floats, step: Floats | float) -> Floats:
-        """Return the velocity change of an implicit Euler step; the gradient of the turbulence is left out."""
-        if self.is_constant:
-            return step * self.acceleration(time, x, v)
-        relative, factor = self._drag(time, x, v)
-        change = step * (np.asarray(self.gravity) - factor * relative)
-        speed = np.linalg.norm(relative, axis=1, keepdims=True)
-        a, b = 1 + step * factor, step * self.quadratic_drag / np.maximum(speed, 1e-300)  # a I + b r rᵀ
-        along = (relative * change).sum(axis=1, keepdims=True)
-        return np.asarray((change - relative * (b * along / (a + b * speed**2))) / a)
 
     def drag_rate(self, speed: float) -> float:
         """Return the rate 1/s at which drag slows a particle of this speed: the fastest of the system."""
         return self.linear_drag + 2 * self.quadratic_drag * speed
 
-    def _drag(self, time: Floats | float, x: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The velocity relative to the air (P, 3), and the drag (P, 1) in 1/s."""
-        relative = v - np.asarray(self.wind)
-        if self.turbulence:
-            relative = relative - self._turbulence(time, x)
-        speed = np.linalg.norm(relative, axis=1, keepdims=True)
-        return relative, self.linear_drag + self.quadratic_drag * speed
+    def turbulence_modes(self, period: float | None = None) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return wave vectors (M, 3) 1/m, amplitudes (M, 3) m/s, angular rates (M,) 1/s, and phases (M,).
 
-    def _turbulence(self, time: Floats | float, x: Floats) -> Floats:
-        """Velocity (P, 3) of random Fourier modes, each at right angles to its wave vector, so free of divergence.
-
+        Modes are at right angles to their waves, so that the air has no divergence. Their rates include the wind, which
+        takes them along. period: s, after which they repeat: rates are rounded to it.
         Source: Kraichnan, Diffusion by a random velocity field, 1970.
         """
-        waves, amplitudes, rates, phases = self._modes
-        angles = (x - np.asarray(self.wind) * time) @ waves.T + rates * time + phases
-        return np.asarray(np.cos(angles) @ amplitudes)
-
-    @cached_property
-    def _modes(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Wave vectors (M, 3) 1/m, amplitudes (M, 3) m/s, angular rates (M,) 1/s, and phases (M,)."""
+        num = NUM_MODES if self.turbulence else 0
         random = np.random.default_rng([self.seed, NUM_MODES])
         directions = random.standard_normal((NUM_MODES, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -97,5 +73,30 @@ class Forces:
         across = np.cross(directions, random.standard_normal((NUM_MODES, 3)))
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         amplitudes = self.turbulence * np.sqrt(2.0 / NUM_MODES) * across
-        rates = lengths * self.turbulence * random.uniform(-1, 1, NUM_MODES)
-        return directions * lengths[:, None], amplitudes, rates, random.uniform(0, 2 * np.pi, NUM_MODES)
+        waves = directions * lengths[:, None]
+        rates = lengths * self.turbulence * random.uniform(-1, 1, NUM_MODES) - waves @ np.asarray(self.wind)
+        if period is not None:
+            rates = 2 * np.pi / period * np.round(rates * period / (2 * np.pi))
+        return waves[:num], amplitudes[:num], rates[:num], random.uniform(0, 2 * np.pi, NUM_MODES)[:num]
+
+
+def pack_forces(
+    forces: Forces, attractors: Sequence[Attractor], step: float, first: int, drive: Drive | None, period: float | None
+) -> ForceField:
+    """Return all forces for the kernels. step, first: of the times that `drive` places nodes at. period: of a loop."""
+    from anim.simulation.particles.kernels.force_field import ForceField, UniformForces
+
+    centers = np.array([[each.center for each in attractors]], np.float64).reshape(1, -1, 3)
+    nodes = [k for k, each in enumerate(attractors) if each.node is not None]
+    if nodes and drive is not None:
+        positions, rotations = drive([each.node for each in attractors if each.node is not None])
+        centers = np.repeat(centers, len(positions), axis=0)
+        centers[:, nodes] = positions + quaternion.rotate(rotations, centers[:, nodes])
+    x, y, z = (float(value) for value in forces.gravity)
+    wind = (float(forces.wind[0]), float(forces.wind[1]), float(forces.wind[2]))
+    waves, amplitudes, rates, phases = forces.turbulence_modes(period)
+    modes = np.concatenate([waves, amplitudes, rates[:, None], phases[:, None]], axis=1)
+    pulls = np.array([[each.strength, each.radius] for each in attractors], np.float64).reshape(-1, 2)
+    uniform = UniformForces((x, y, z), float(forces.linear_drag), float(forces.quadratic_drag), wind)
+    is_uniform = not forces.turbulence and not attractors
+    return ForceField(uniform, modes, pulls, np.ascontiguousarray(centers), step, first, is_uniform)

@@ -1,152 +1,126 @@
-"""Document + emitter + forces → document with a clip of particles."""
+"""Scene + clip + emitter + forces → paths of particles, and a report."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from anim.errors import RangeError
-from anim.gltf.authoring import add_clips
-from anim.gltf.document import Document, Json
-from anim.gltf.writing.append import append_mesh, append_nodes
-from anim.gltf.writing.writer import replace_clips
+from anim.arrays import Floats
+from anim.errors import RangeError, UnstableError
+from anim.gltf.document import Document
 from anim.model import Clip, Scene
-from anim.simulation.integrators import INTEGRATORS
-from anim.simulation.particles import tracks
+from anim.model.point_cache import PointCache
+from anim.simulation.particles import gltf_output, tracks
 from anim.simulation.particles.emission import Births, Emitter, emit, repeat_births
-from anim.simulation.particles.forces import Forces
-from anim.simulation.particles.obstacles import Obstacle
-from anim.simulation.particles.solver import Contact, ParticleKeys, ParticleSolver
-from anim.simulation.report import SimulationReport, advise_step
+from anim.simulation.particles.key_paths import evaluate_keys, largest_distance, sample_points
+from anim.simulation.particles.node_motion import NodeMotion
+from anim.simulation.particles.options import ParticleOptions
+from anim.simulation.particles.reduction import reduce_keys
+from anim.simulation.particles.report import make_failed_report, make_report
+from anim.simulation.particles.solver import DivergedError, ParticleKeys, ParticleSolver
+from anim.simulation.report import SimulationReport
 from anim.simulation.steps import Steps
 
-MATERIAL: Json = {
-    "name": "particle",
-    "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.45, 0.1, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.6},
-    "emissiveFactor": [1.0, 0.4, 0.05],
-}
-
-
-@dataclass(frozen=True, slots=True)
-class ParticleOptions:
-    """Forces, obstacles and time of a run.
-
-    step: s, the longest; it is shortened so that it divides a frame. loop: begin with the particles that are alive at
-    the end. size: m, radius of a particle. start: s, of the driving clip, the time of the simulation's 0.
-    """
-
-    forces: Forces = field(default_factory=Forces)
-    obstacles: tuple[Obstacle, ...] = ()
-    contact: Contact = field(default_factory=Contact)
-    integrator: str = "velocity-verlet"
-    step: float = 1 / 240
-    fps: float = 60.0
-    duration: float = 2.0
-    warm_up: float = 0.0
-    loop: bool = False
-    seed: int = 0
-    size: float = 0.01
-    start: float = 0.0
+__all__ = ["ParticleOptions", "ParticleRun", "add_particles", "simulate_particles"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParticleRun:
-    """Result of a run: paths by node, and the report."""
+    """Result of a run: paths by node, all keys with births and deaths (P,) s, and the report."""
 
     nodes: list[list[tracks.ParticlePath]]
+    keys: ParticleKeys
+    births: Births
+    options: ParticleOptions
     report: SimulationReport
+
+    def points(self) -> PointCache:
+        """Return the particles alive at each frame."""
+        options = self.options
+        frames = Steps(options.step, options.duration).frames(options.fps)
+        births = self.births
+        return sample_points(self.keys, births.times, births.deaths, frames, size=options.size, start=options.start)
 
 
 def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: ParticleOptions) -> ParticleRun:
-    """Return the paths of all particles. Raises UnstableError, or RangeError for a run without particles."""
+    """Return the paths of all particles.
+
+    Raises UnstableError with a report, or RangeError for a run without particles.
+    """
     substeps = max(1, int(np.ceil(1 / (options.fps * options.step) - 1e-9)))
     step = 1 / (options.fps * substeps)
     start = 0.0 if options.loop else -options.warm_up
     births = emit(scene, clip, emitter, start, options.duration, options.seed, options.start)
-    if options.loop:
-        births = repeat_births(births, options.duration)
     if not len(births):
         raise RangeError("no particle is emitted", help="raise the rate, the burst or the duration")
+    num_emitted = len(births)
+    if options.loop:
+        births = repeat_births(births, options.duration)
     steps = Steps(step, options.duration, max(0.0, -float(births.times.min())))
-    keys = _solve(births, options, steps, substeps)
-    finer = Steps(step / 2, options.duration, steps.warm_up_s)
-    error = _distance(keys, _solve(births, options, finer, 2 * substeps))
-    nodes = tracks.share_nodes(tracks.split_paths(keys, options.start))
-    return ParticleRun(nodes, _report(births, keys, options, steps, error, len(nodes)))
+    motion = NodeMotion(scene.skeleton, clip, options.start, options.duration if options.loop else None)
+    try:
+        keys = _solve(births, options, motion, steps, substeps)
+    except DivergedError as error:
+        found = make_failed_report(births, options, steps, motion, error)
+        raise UnstableError(str(error)).with_report(found).advise(found.advice) from None
+    estimate = None
+    if options.estimate_error:
+        estimate = _estimate_error(births, keys, options, motion, steps, substeps)
+    seam = _seam(keys, births, options.duration, num_emitted) if options.loop else None
+    reduction = None
+    written = keys
+    if options.max_error:
+        written, reduction = reduce_keys(keys, options.max_error)
+    nodes = tracks.share_nodes(tracks.split_paths(written, options.start))
+    report = make_report(
+        births, written, options, steps, motion, num_nodes=len(nodes), error=estimate, seam=seam, reduction=reduction
+    )
+    return ParticleRun(nodes, keys, births, options, report)
 
 
 def add_particles(
-    document: Document, run: ParticleRun, options: ParticleOptions, name: str, merge: tuple[int, Clip] | None = None
+    document: Document, run: ParticleRun, name: str, merge: tuple[int, Clip] | None = None, form: str = "node"
 ) -> Document:
-    """Return the document with a mesh, a node for every particle alive at a time, and a clip that moves them.
-
-    merge: index and clip that gets the tracks, instead of a new one.
-    """
-    corners, faces = tracks.octahedron()
-    document, mesh = append_mesh(document, name, corners, faces, normals=corners, material=MATERIAL)
-    digits = len(str(len(run.nodes) - 1))
-    made: list[Json] = [
-        {"name": f"{name}_{i:0{digits}}", "mesh": mesh, "translation": _start(paths), "scale": [0.0, 0.0, 0.0]}
-        for i, paths in enumerate(run.nodes)
-    ]
-    document, indices = append_nodes(document, made)
-    moving = [
-        track
-        for node, paths in zip(indices, run.nodes, strict=True)
-        for track in tracks.make_tracks(node, paths, options.size, options.start + options.duration, options.start)
-    ]
-    if merge is not None:
-        number, clip = merge
-        return replace_clips(document, {number: Clip(clip.name, (*clip.tracks, *moving))})
-    return add_clips(document, [Clip(name, tuple(moving))])
-
-
-def _solve(births: Births, options: ParticleOptions, steps: Steps, substeps: int) -> ParticleKeys:
-    solver = ParticleSolver(births, options.forces, options.obstacles, options.contact, options.integrator)
-    return solver.run(steps, substeps)
-
-
-def _distance(keys: ParticleKeys, finer: ParticleKeys) -> float:
-    """Largest distance between both runs at keys of the same particle and time; impacts are left out."""
-    rows = [np.stack([each.particles, np.round(each.times * 1e7)], axis=1).astype(np.int64) for each in (keys, finer)]
-    table = {tuple(row): i for i, row in enumerate(rows[1].tolist())}
-    pairs = [(i, table[tuple(row)]) for i, row in enumerate(rows[0].tolist()) if tuple(row) in table]
-    if not pairs:
-        return 0.0
-    a, b = np.array(pairs).T
-    return float(np.linalg.norm(keys.positions[a] - finer.positions[b], axis=1).max())
-
-
-def _report(
-    births: Births, keys: ParticleKeys, options: ParticleOptions, steps: Steps, error: float, num_nodes: int
-) -> SimulationReport:
-    omega_h = options.forces.drag_rate(keys.max_speed) * steps.step_s
-    limit = INTEGRATORS[options.integrator].limit
-    figures = {
-        "particles": len(births),
-        "nodes": num_nodes,
-        "keys": len(keys.times),
-        "impacts": keys.num_impacts,
-        "max_speed_m_s": keys.max_speed,
-        "max_step_m": keys.max_speed * steps.step_s,
-    }
-    return SimulationReport(
-        "particles",
-        steps.step_s,
-        steps.num_steps,
-        options.fps,
-        options.duration,
-        warm_up_s=steps.warm_up_s,
-        integrator=options.integrator,
-        omega_h=omega_h or None,
-        omega_h_limit=limit if omega_h else None,
-        error_estimate_m=error,
-        figures=figures,
-        advice=advise_step(omega_h, limit, steps.step_s, options.integrator) if limit else "",
+    """Return the document with the particles of a run; see `gltf_output.add_particles`."""
+    options = run.options
+    end = options.start + options.duration
+    return gltf_output.add_particles(
+        document, run.nodes, size=options.size, start=options.start, end=end, name=name, form=form, merge=merge
     )
 
 
-def _start(paths: Sequence[tracks.ParticlePath]) -> list[float]:
-    return [round(float(value), 6) for value in paths[0].positions[0]]
+def _solve(births: Births, options: ParticleOptions, motion: NodeMotion, steps: Steps, substeps: int) -> ParticleKeys:
+    solver = ParticleSolver(
+        births,
+        options.forces,
+        options.obstacles,
+        options.contact,
+        options.integrator,
+        options.attractors,
+        motion,
+        options.duration if options.loop else None,
+    )
+    return solver.run(steps, substeps)
+
+
+def _estimate_error(
+    births: Births, keys: ParticleKeys, options: ParticleOptions, motion: NodeMotion, steps: Steps, substeps: int
+) -> float:
+    """Largest distance in m to the run with half the step."""
+    finer = Steps(steps.step_s / 2, options.duration, steps.warm_up_s)
+    return largest_distance(keys, _solve(births, options, motion, finer, 2 * substeps))
+
+
+def _seam(keys: ParticleKeys, births: Births, period: float, num_emitted: int) -> float:
+    """Largest distance in m between a particle at the start, and the one that takes its place, at the end.
+
+    births: those of the rounds, one after another, the last of which is the loop's own.
+    """
+    at_start = np.flatnonzero((births.times <= 0) & (births.deaths > 0))
+    at_start = at_start[at_start + num_emitted < len(births)]
+    a, _, one = evaluate_keys(keys, at_start, np.zeros(len(at_start)))
+    b, _, other = evaluate_keys(keys, at_start + num_emitted, np.full(len(at_start), period))
+    both = one & other
+    distances: Floats = np.linalg.norm(a - b, axis=1)[both]
+    return float(distances.max(initial=0.0))

@@ -14,7 +14,7 @@ import numba
 
 import anim
 
-KERNEL_FOLDERS = ("skinning/kernels", "simulation/cloth/kernels")  # in `anim`
+KERNEL_FOLDERS = ("skinning/kernels", "simulation/cloth/kernels", "simulation/particles/kernels")  # in `anim`
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 

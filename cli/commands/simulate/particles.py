@@ -4,31 +4,47 @@ from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
+from pathlib import PurePath
 from typing import Annotated
 
+import numpy as np
 import typer
 
+from anim.caches.points import POINT_FORMATS, encode_points
 from anim.errors import UnsupportedError
 from anim.gltf.document import Document
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
+from anim.simulation.particles.attractors import Attractor
 from anim.simulation.particles.emission import Emitter
 from anim.simulation.particles.forces import Forces
 from anim.simulation.particles.obstacles import Box, Floor, Obstacle, Sphere
-from anim.simulation.particles.simulate import ParticleOptions, add_particles, simulate_particles
+from anim.simulation.particles.options import SPARK_KG, ParticleOptions
+from anim.simulation.particles.simulate import ParticleRun, add_particles, simulate_particles
 from anim.simulation.particles.solver import Contact
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.units import is_zero_angle
 from cli import text, units
+from cli.errors import UsageError
 from cli.options import common, simulation
-from cli.options.simulation import parse_numbers, parse_seconds, parse_vector
+from cli.options.simulation import parse_seconds, parse_vector
+from cli.progress import announce_compiling
 from cli.text import Reporter
 from cli.workflows.simulate_clip import simulate_clip
 
 ROUNDING_M = 1e-9
+ATTRACTOR_RADIUS = "10%"
+MANY_DRAWS = 1000  # nodes, from which one skinned mesh is the better file
 MANY_NODES, MAX_NODES = 2000, 10_000  # players take milliseconds a frame; binding alone takes seconds
+
+
+class Form(StrEnum):
+    """Form of particles in a file."""
+
+    NODE = "node"
+    SKIN = "skin"
 
 
 class Source(StrEnum):
@@ -68,9 +84,15 @@ def command(
     inherit: Annotated[
         float, typer.Option("--inherit", metavar="N", help="Fraction of the emitter's own velocity that is added.")
     ] = 1.0,
+    form: Annotated[
+        Form, typer.Option("--as", help="node: a node each. skin: one skinned mesh, a joint each, in one draw call.")
+    ] = Form.NODE,
     size: Annotated[
         str, typer.Option("--size", metavar="LENGTH", help="Radius of a particle, such as 2cm, or % of the model.")
     ] = "0.5%",
+    mass: Annotated[
+        float, typer.Option("--mass", metavar="KG", help="Mass of a particle, for energies in the report.")
+    ] = SPARK_KG,
     gravity: simulation.Gravity = simulation.EARTH_GRAVITY,
     drag: Annotated[float, typer.Option("--drag", metavar="N", help="Linear drag per second.", min=0)] = 0.0,
     quadratic_drag: Annotated[
@@ -83,14 +105,22 @@ def command(
     turbulence_size: Annotated[
         float, typer.Option("--turbulence-size", metavar="M", help="Size of the eddies of the air in metres.")
     ] = 0.5,
+    attractor: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--attractor",
+            metavar="NODE:N[:LENGTH]",
+            help="A node that pulls with N m/s² at LENGTH, 10% of the model without it; below 0 pushes; repeatable.",
+        ),
+    ] = None,
     floor: simulation.FloorHeight = None,
     sphere: Annotated[
         list[str] | None,
-        typer.Option("--sphere", metavar="X,Y,Z,R", help="A ball to bounce off, in metres; may be repeated."),
+        typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or on a node, and its radius; may be repeated."),
     ] = None,
     box: Annotated[
         list[str] | None,
-        typer.Option("--box", metavar="X,Y,Z,SX,SY,SZ", help="A box to bounce off: center, size; may be repeated."),
+        typer.Option("--box", metavar="AT,SX,SY,SZ", help="A box at X,Y,Z or on a node, and its sizes; repeatable."),
     ] = None,
     restitution: simulation.Restitution = 0.5,
     friction: simulation.Friction = 0.3,
@@ -105,6 +135,7 @@ def command(
     merge: simulation.Merge = False,
     name: simulation.Name = "particles",
     force: Annotated[bool, typer.Option("--force", help=f"Write more than {MAX_NODES} nodes.")] = False,
+    max_error: simulation.MaxError = None,
     report: simulation.ReportFile = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
@@ -112,11 +143,13 @@ def command(
 ) -> None:
     """Emit particles from nodes, and let forces move them.
 
-    Each is a node with one shared mesh; a node is used again when its particle has died. Without drag, and with verlet,
-    velocity-verlet or rk4 only, a path is written as the exact parabolas between impacts; else it has a key per frame.
-    The time of an impact is found inside the step. Wind and turbulence need drag. --floor, --sphere and --box stop the
-    centers of particles, not their surfaces. --loop begins with the particles that are alive at the end, so that the
-    clip repeats without a seam.
+    Each is a node with one shared mesh, or a joint of one skinned mesh; a node is used again when its particle has
+    died. OUT.npz, .usdc or .usda hold points with ids instead. Without drag, turbulence and attractors, and with
+    verlet, velocity-verlet or rk4 only, a path is written as the exact parabolas between impacts; else it has a key per
+    frame, of which --max-error removes some. The time of an impact is found inside the step. Wind and turbulence need
+    drag. Obstacles and attractors on nodes follow the clip in every step. --floor, --sphere and --box stop the centers
+    of particles, not their surfaces. --loop begins with the particles that are alive at the end, so that the clip
+    repeats without a seam.
     """
     simulation.check_fps(fps)
     options = ParticleOptions(
@@ -129,7 +162,7 @@ def command(
             turbulence_size,
             seed,
         ),
-        _obstacles(floor, sphere or [], box or []),
+        (),
         Contact(restitution, friction),
         integrator.value,
         parse_seconds(step, "--step"),
@@ -137,11 +170,13 @@ def command(
         warm_up=warm_up,
         loop=loop,
         seed=seed,
+        mass=mass,
     )
+    ending = PurePath(output).suffix.lower()
 
     def simulate(
         document: Document, scene: Scene, driver: Clip, number: int | None
-    ) -> tuple[Document, SimulationReport, str]:
+    ) -> tuple[Document | bytes, SimulationReport, str]:
         found = Selection((), node).chosen_nodes(scene.skeleton)
         emitter = Emitter(
             tuple(sorted(found)),
@@ -160,44 +195,109 @@ def command(
         )
         seconds = duration if duration is not None else driver.end - driver.start or 2.0
         radius = units.parse_length(size, "--size", lambda: diagonal(scene))
-        chosen = replace(options, duration=seconds, size=radius, start=driver.start)
+        chosen = replace(
+            options,
+            duration=seconds,
+            size=radius,
+            start=driver.start,
+            obstacles=_obstacles(floor, sphere or [], box or [], scene),
+            attractors=tuple(_attractor(each, scene) for each in attractor or ()),
+            max_error=0.0
+            if max_error is None
+            else units.parse_length(max_error, "--max-error", lambda: diagonal(scene)),
+        )
+        announce_compiling(voice)
         run = simulate_particles(scene, driver, emitter, chosen)
-        _check_nodes(len(run.nodes), voice, force=force)
+        if ending in POINT_FORMATS:
+            return encode_points(run.points(), fps, ending), run.report, _summary(run.report, has_nodes=False)
+        _check_nodes(run, form, voice, force=force)
         merged = (number, driver) if merge and number is not None else None
-        return add_particles(document, run, chosen, name, merged), run.report, _summary(run.report)
+        return add_particles(document, run, name, merged, form.value), run.report, _summary(run.report)
 
     voice = Reporter(quiet, verbose)
-    simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)
+    simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run, others=POINT_FORMATS)
 
 
-def _summary(report: SimulationReport) -> str:
+def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
     figures = report.figures
     parts = [
         text.plural(figures["particles"], "particle"),
-        text.plural(figures["nodes"], "node"),
+        *([text.plural(figures["nodes"], "node")] if has_nodes else []),
         text.plural(figures["impacts"], "impact"),
         f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
     ]
     if report.error_estimate_m and report.error_estimate_m > ROUNDING_M:
         parts.append(f"half the step differs by {text.format_length(report.error_estimate_m)}")
+    if report.loop_seam_m is not None:
+        parts.append(f"seam of the loop {text.format_length(report.loop_seam_m)}")
+    if has_nodes and "max_error_m" in figures:
+        parts.append(f"{figures['keys']} keys with an error of {text.format_length(figures['max_error_m'])}")
     return ", ".join(parts)
 
 
-def _check_nodes(count: int, voice: Reporter, *, force: bool) -> None:
+def _check_nodes(run: ParticleRun, form: Form, voice: Reporter, *, force: bool) -> None:
+    count = len(run.nodes)
     if count > MAX_NODES and not force:
         raise UnsupportedError(
-            f"{count} particles at a time (limit {MAX_NODES} nodes)", help="lower --rate, or --force"
+            f"{count} particles at a time (limit {MAX_NODES} nodes)", help="lower --rate, or --force, or OUT.npz"
         )
     if count > MANY_NODES:
         voice.warn(f"{count} nodes: players need several milliseconds a frame for them")
+    elif count > MANY_DRAWS and form is Form.NODE:
+        voice.info(f"note: {count} nodes are as many draw calls; --as skin needs one")
 
 
-def _obstacles(floor: float | None, spheres: list[str], boxes: list[str]) -> tuple[Obstacle, ...]:
+def _obstacles(floor: float | None, spheres: list[str], boxes: list[str], scene: Scene) -> tuple[Obstacle, ...]:
     found: list[Obstacle] = [] if floor is None else [Floor(floor)]
     for each in spheres:
-        values = parse_numbers(each, 4, "--sphere")
-        found.append(Sphere((values[0], values[1], values[2]), values[3]))
+        at, node, (radius,) = _place(each, 1, "--sphere", "NODE,R or X,Y,Z,R", scene)
+        found.append(Sphere(at, radius, node))
     for each in boxes:
-        values = parse_numbers(each, 6, "--box")
-        found.append(Box((values[0], values[1], values[2]), (values[3], values[4], values[5])))
+        at, node, (x, y, z) = _place(each, 3, "--box", "NODE,SX,SY,SZ or X,Y,Z,SX,SY,SZ", scene)
+        found.append(Box(at, (x, y, z), node))
     return tuple(found)
+
+
+def _place(
+    given: str, count: int, option: str, expected: str, scene: Scene
+) -> tuple[tuple[float, float, float], int | None, list[float]]:
+    """A point or a node, and `count` numbers after it."""
+    parts = given.split(",")
+    try:
+        numbers = [float(each) for each in parts[-count - 3 :]]
+        if len(parts) == count + 3 and np.isfinite(numbers).all():
+            return (numbers[0], numbers[1], numbers[2]), None, numbers[3:]
+    except ValueError:
+        pass
+    try:
+        sizes = [float(each) for each in parts[-count:]]
+    except ValueError:
+        sizes = []
+    if len(sizes) != count or len(parts) < count + 1 or not np.isfinite(sizes).all():
+        raise UsageError(f"{option} is '{given}' (expected {expected})")
+    return (0.0, 0.0, 0.0), _node(",".join(parts[:-count]), option, scene), sizes
+
+
+def _attractor(given: str, scene: Scene) -> Attractor:
+    parts = given.split(":")
+    has_radius = len(parts) > 2 and _as_number(parts[-2]) is not None
+    strength = _as_number(parts[-2 if has_radius else -1])
+    name = ":".join(parts[: -2 if has_radius else -1])
+    if strength is None or not name:
+        raise UsageError(f"--attractor is '{given}' (expected NODE:STRENGTH or NODE:STRENGTH:RADIUS)")
+    radius = units.parse_length(parts[-1] if has_radius else ATTRACTOR_RADIUS, "--attractor", lambda: diagonal(scene))
+    return Attractor(strength, radius, _node(name, "--attractor", scene))
+
+
+def _as_number(given: str) -> float | None:
+    try:
+        return float(given)
+    except ValueError:
+        return None
+
+
+def _node(glob: str, option: str, scene: Scene) -> int:
+    found = sorted(Selection((), (glob,)).chosen_nodes(scene.skeleton))
+    if len(found) > 1:
+        raise UsageError(f"{option} '{glob}' names {len(found)} nodes (expected one)")
+    return found[0]

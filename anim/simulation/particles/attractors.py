@@ -1,0 +1,34 @@
+"""Attractors: nodes or points that pull particles like the gravity of a ball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.errors import RangeError
+
+
+@dataclass(frozen=True, slots=True)
+class Attractor:
+    """Ball of uniform density around a node's origin, or around `center` (3,) m.
+
+    strength: m/s² on its surface, below 0 to push away; it grows linearly inside and falls with the squared distance
+    outside. radius: m, > 0. center: in the space of `node`, or of the scene for None. Raises RangeError.
+    """
+
+    strength: float
+    radius: float
+    node: int | None = None
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.radius) and self.radius > 0):
+            raise RangeError(f"the radius of an attractor is {self.radius:g} m (expected above 0)")
+        if not np.isfinite(self.strength):
+            raise RangeError(f"the strength of an attractor is {self.strength:g} m/s² (expected a finite number)")
+
+    @property
+    def max_frequency(self) -> float:
+        """Largest angular frequency in rad/s of a particle around it: inside."""
+        return float(np.sqrt(max(self.strength, 0.0) / self.radius))

@@ -1,0 +1,39 @@
+"""Positions and rotations of nodes at every step of a simulation, from the driving clip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.maths import matrix, quaternion
+from anim.model import Clip, Skeleton
+from anim.sampling import PoseSampler, world_matrices
+
+CHUNK_STEPS = 256  # poses of all nodes are in memory for this many
+
+
+class NodeMotion:
+    """Motion of nodes; before its start the clip has the pose of its start, or repeats with a period."""
+
+    def __init__(self, skeleton: Skeleton, clip: Clip, start: float = 0.0, period: float | None = None) -> None:
+        """start: s of the clip, at 0 s of the simulation. period: s of a loop."""
+        self._skeleton, self._sampler = skeleton, PoseSampler(skeleton, clip)
+        self._start, self._period = start, period
+
+    def at(self, times: Floats, nodes: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return positions (S, n, 3) m and rotations (S, n, 4), sign-continuous, at times (S,) s."""
+        positions = np.empty((len(times), len(nodes), 3))
+        rotations = np.empty((len(times), len(nodes), 4))
+        wrapped = np.maximum(times, 0.0) if self._period is None else _wrap(times, self._period)
+        for first in range(0, len(times), CHUNK_STEPS):
+            chunk = slice(first, first + CHUNK_STEPS)
+            world = world_matrices(self._skeleton, self._sampler.at(self._start + wrapped[chunk]))[:, list(nodes)]
+            positions[chunk], rotations[chunk], _, _ = matrix.decompose(world)
+        return positions, quaternion.align_signs(rotations)
+
+
+def _wrap(times: Floats, period: float) -> Floats:
+    """Times in 0 … period; those from 0 on stay."""
+    return np.asarray(np.where(times < 0, times - np.floor(times / period) * period, times))
