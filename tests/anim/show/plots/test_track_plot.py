@@ -172,11 +172,9 @@ def test_names_in_any_letters(name: str) -> None:
 @pytest.mark.parametrize("name", REAL)
 def test_real_files(asset: Callable[[str], Path], name: str) -> None:
     found = select_tracks(opened_path(asset(name)), ALL, limit=2)
-    first = track_plot(found.shown, title=name, kind="svg")
-    said = words(first)
+    said = words(track_plot(found.shown, title=name, kind="svg"))
     assert name in said
     assert all(any(text[-12:] == each.target[-12:] for text in said) for each in found.shown)
-    assert track_plot(found.shown, title=name, kind="svg") == first
 
 
 @pytest.mark.parametrize("name", ["interpolations", "noop", "pointer", "morph_cube"])
