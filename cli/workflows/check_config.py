@@ -6,7 +6,6 @@ import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -84,7 +83,6 @@ def _match(parts: tuple[str, ...], patterns: tuple[str, ...]) -> bool:
     return bool(parts) and PurePosixPath(parts[0]).match(patterns[0]) and _match(parts[1:], patterns[1:])
 
 
-@cache
 def nearest(folder: Path) -> CheckConfig:
     """Return the configuration of a folder: the nearest one, from the folder upwards; an empty one without any."""
     for each in (folder, *folder.parents):

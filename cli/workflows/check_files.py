@@ -68,6 +68,7 @@ class FileChecker:
     refused: list[tuple[str, AnimError]] = field(default_factory=list)
     limits: dict[str, Severity] = field(default_factory=dict)
     headroom: list[tuple[str, str, float, float]] = field(default_factory=list)
+    _nearest: dict[Path, CheckConfig] = field(default_factory=dict)
     _configs: dict[str, CheckConfig] = field(default_factory=dict)
     _used: set[Budget] = field(default_factory=set)
 
@@ -103,7 +104,9 @@ class FileChecker:
 
     def _config(self, path: str) -> CheckConfig:
         folder = Path.cwd() if path == documents.PIPE else Path(path).resolve().parent
-        config = self.config or check_config.nearest(folder)
+        if folder not in self._nearest:
+            self._nearest[folder] = self.config or check_config.nearest(folder)
+        config = self._nearest[folder]
         if config.path and config.path not in self._configs:
             check_config.check_rules(config)
             self._configs[config.path] = config
