@@ -28,6 +28,8 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     Raises ShapeError for a wrong shape or type, RangeError for NaN or infinity.
     as_floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
     """
+    if isinstance(values, np.ndarray) and values.dtype.kind == "c":
+        raise ShapeError(f"{name} has complex numbers (expected real ones)")
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -37,7 +37,7 @@ def test_shapes(shape: str, good: list[tuple[int, ...]], bad: list[tuple[int, ..
             arrays.check_shape(np.zeros(each), shape, name="values")
 
 
-@pytest.mark.parametrize("values", [["a"], [None, "b"], [[1], [1, 2]], [1j], {"a": 1}])
+@pytest.mark.parametrize("values", [["a"], [None, "b"], [[1], [1, 2]], [1j], np.array([1j]), {"a": 1}])
 def test_what_is_no_number_is_refused(values: Any) -> None:
     with pytest.raises(ShapeError):
         arrays.as_floats(values, "K")
