@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from anim.exchange.retarget.ground_contact import with_descendants
 from anim.model import Scene
-from anim.operations.selection import match_names
+from anim.operations.selection import match_names, not_found
 from anim.skinning.methods.registry import SKINNING_METHODS
 
 Meshes = Annotated[
@@ -32,15 +33,28 @@ ABOUT = "; ".join(f"{name}: {method.about}" for name, method in SKINNING_METHODS
 
 
 def nodes(scene: Scene, globs: list[str] | None) -> list[int] | None:
-    """Return the nodes of the selected meshes, by the name of mesh or node; None for all.
+    """Return the nodes of the selected meshes, by the name of mesh or node, or "#3" by the node; None for all.
 
     Raises NotFoundError for a glob that matches none.
     """
     if not globs:
         return None
-    meshes = [each.mesh.name or str(each.node) for each in scene.instances]
-    nodes = [scene.skeleton.names[each.node] or str(each.node) for each in scene.instances]
-    return [scene.instances[i % len(meshes)].node for i in match_names(globs, [*meshes, *nodes], "mesh")]
+    chosen = set[int]().union(*(_nodes_of(scene, glob) for glob in globs))
+    return [each.node for each in scene.instances if each.node in chosen]
+
+
+def _nodes_of(scene: Scene, glob: str) -> set[int]:
+    """Nodes of the meshes that a glob selects; "#3" or "3" is the node of this index, unless that is a name."""
+    stated = [each.mesh.name for each in scene.instances]
+    stated += [scene.skeleton.names[each.node] for each in scene.instances]
+    names = [name or f"#{scene.instances[i % len(scene.instances)].node}" for i, name in enumerate(stated)]
+    index = re.fullmatch(r"#?([0-9]{1,9})", glob)
+    if index is None or glob in stated:
+        return {scene.instances[i % len(scene.instances)].node for i in match_names([glob], names, "mesh")}
+    found = {each.node for each in scene.instances if each.node == int(index[1])}
+    if not found:
+        raise not_found(glob, names, "mesh")
+    return found
 
 
 def visible_meshes(scene: Scene, globs: list[str] | None, hidden: list[str] | None) -> list[int] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -212,3 +213,18 @@ def test_a_real_file_with_every_clip(call: Call, asset: Find, tmp_path: Path) ->
         positions = np.load(tmp_path / f"{each.name}.npz")["positions"]
         assert positions.shape[1:] == (1728, 3)
         assert np.isfinite(positions).all()
+
+
+def test_unnamed_meshes_are_chosen_by_their_node(call: Call, tmp_path: Path) -> None:
+    """ "#3" was the third of the names of meshes and nodes, another mesh than "3" without a word."""
+    document = opened_fixture("arm")
+    nodes = [{**each, "name": ""} for each in document.json["nodes"]]
+    nodes += [{"mesh": 0, "translation": [x, 0, 0]} for x in (10, 20, 30)]
+    meshes = [{**each, "name": ""} for each in document.json["meshes"]]
+    changes = {"nodes": nodes, "meshes": meshes, "scenes": [{"nodes": [0, 2, 3, 4, 5]}]}
+    path, out = tmp_path / "unnamed.glb", tmp_path / "x.npz"
+    path.write_bytes(glb_of(replace(document, json={**document.json, **changes})))
+    for glob, x in (("#3", 10), ("4", 20), ("#5", 30)):
+        assert call("bake", path, out, "--clip", "bend", "--rigid", "--mesh", glob, "--fps", 1).code == 0
+        assert abs(np.load(out)["positions"][0, :, 0].mean() - x) < 2
+    assert "no mesh matches '#0'" in refusal(call("bake", path, out, "--clip", "bend", "--mesh", "#0"), 5)

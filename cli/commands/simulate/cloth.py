@@ -222,7 +222,7 @@ def _summary(run: ClothRun) -> str:
     parts = [
         f"{text.plural(run.cache.frame_count, 'frame')} of {figures['points']} points ({figures['pinned']} pinned)",
         f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s",
-        f"stretched by {100 * worst['fraction']:.2g} % at most, at {worst['time_s']:.2f} s",
+        f"stretched by {text.format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s",
     ]
     if run.report.loop_seam_m is not None:
         parts.append(_loop(figures["loop_rounds"], run.report.loop_seam_m, settled=figures["loop_settled"]))
@@ -240,7 +240,7 @@ def _mesh_node(scene: Scene, mesh: list[str] | None) -> int:
     chosen = meshes.nodes(scene, mesh)
     nodes = [each.node for each in scene.instances if chosen is None or each.node in chosen]
     if len(nodes) != 1:
-        names = ", ".join(f"'{each.mesh.name}'" for each in scene.instances[:8])
+        names = ", ".join(f"'{each.mesh.name or f'#{each.node}'}'" for each in scene.instances[:8])
         raise UsageError(f"{len(nodes)} meshes are chosen (expected one)", help=f"choose with --mesh: {names}")
     return nodes[0]
 
