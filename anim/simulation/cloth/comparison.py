@@ -18,7 +18,7 @@ from anim.simulation.comparison import Comparison, IntegratorRun, compare_integr
 
 MAX_COMPARED_S = 1.0
 START_PER_EDGE = 0.002
-MAX_POINT_STEPS = 300_000  # points times steps: implicit Euler solves a linear system in each
+MAX_POINT_STEPS = 150_000  # points times steps: implicit Euler solves a linear system in each
 
 
 def compare(model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int) -> Comparison:
