@@ -13,7 +13,7 @@ from anim.errors import AnimError
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.loop_analysis import Loop, LoopKind, best_ranges, judge_range
+from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loop, best_ranges
 from anim.measure.loops.recommendations import recommend
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
@@ -119,7 +119,7 @@ class _Closing:
 
 def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float | None) -> Clip:
     root = root_motion_node(skin.skeleton, clip)
-    found = judge_range(skin, clip, root=root)
+    found = analyze_loop(skin, clip, root=root)
     if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
         clip = closing.append_first_frame(clip, fps=found.fps, tracks=tracks, root=root)
     elif found.kind is not LoopKind.CLOSED and blend is None:
@@ -155,7 +155,7 @@ def _report(
                 parts.append((i, best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)))
                 rows += [(name, each) for each in parts[-1][1]]
             else:
-                judged.append((i, judge_range(skin, clips[i], root=root)))
+                judged.append((i, analyze_loop(skin, clips[i], root=root)))
                 rows.append((name, judged[-1][1]))
     advised, notes = list(recommend(judged)), list(_no_better(clips, parts))
     if format is Format.JSON:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import TypeAlias, TypeGuard
+from typing import TypeAlias
 
 import numpy as np
 
@@ -47,12 +47,11 @@ def _read_external(address: str, resolve: Resolve | None) -> Bytes:
             f"the bytes of '{path}' are not given",
             help="container.read(data, resolve=…) takes a function that reads it",
         )
-    data = resolve(path)
-    if isinstance(data, (bytes, bytearray, memoryview)):
-        data = np.frombuffer(data, np.uint8)
-    if not is_bytes(data):
+    given = resolve(path)
+    data = as_array(given)
+    if data is None:
         raise ShapeError(
-            f"resolve gives {describe_type(data)} for '{path}' (expected a uint8 array or bytes)",
+            f"resolve gives {describe_type(given)} for '{path}' (expected a uint8 array or bytes)",
             help="raise FormatError in resolve where there is no such file",
         )
     return data
@@ -70,9 +69,11 @@ def _check_binary(about: Json, binary: Bytes | None) -> None:
         )
 
 
-def is_bytes(data: object) -> TypeGuard[Bytes]:
-    """Return whether `data` is an array of bytes (N,)."""
-    return isinstance(data, np.ndarray) and data.dtype == np.uint8 and data.ndim == 1
+def as_array(data: object) -> Bytes | None:
+    """Return bytes, or an array of bytes (N,), as an array without a copy; None for anything else."""
+    if isinstance(data, (bytes, bytearray, memoryview)):
+        return as_bytes(data)
+    return data if isinstance(data, np.ndarray) and data.dtype == np.uint8 and data.ndim == 1 else None
 
 
 def describe_type(value: object) -> str:
@@ -82,6 +83,6 @@ def describe_type(value: object) -> str:
     return "None" if value is None else type(value).__name__
 
 
-def as_bytes(content: bytes) -> Bytes:
+def as_bytes(content: bytes | bytearray | memoryview) -> Bytes:
     """Return bytes as an array (N,), without a copy."""
     return np.frombuffer(content, np.uint8)

@@ -9,12 +9,10 @@ from dataclasses import replace
 from itertools import count
 from typing import TypeAlias
 
-import numpy as np
-
 from anim.errors import FormatError, ShapeError, UnsupportedError
 from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.io import json_text, uri
-from anim.gltf.io.buffers import Resolve, as_bytes, buffers_of, describe_type, is_bytes
+from anim.gltf.io.buffers import Resolve, as_array, as_bytes, buffers_of, describe_type
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import schema
 
@@ -36,9 +34,8 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
     no folder.
     Raises FormatError with the fault and its position, ShapeError if `data` is not bytes.
     """
-    if isinstance(data, (bytes, bytearray, memoryview)):
-        data = np.frombuffer(data, np.uint8)
-    if not is_bytes(data):
+    content = as_array(data)
+    if content is None:
         raise ShapeError(
             f"data is no bytes (got {describe_type(data)}, expected a uint8 array or bytes)",
             help='the library opens no files: container.read(np.fromfile("walk.glb", np.uint8))',
@@ -48,16 +45,16 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
             f"resolve is {describe_type(resolve)} (expected a function from a relative path to bytes)",
             help='container.read(data, resolve=lambda name: np.fromfile(f"folder/{name}", np.uint8))',
         )
-    head = data[:4096].tobytes()
+    head = content[:4096].tobytes()
     if head[:4] == MAGIC:
-        return _read_glb(data, resolve)
+        return _read_glb(content, resolve)
     if head.startswith(LFS_POINTER):
         raise FormatError("is a Git LFS pointer, not the file itself", help="git lfs pull")
-    if not len(data):
+    if not len(content):
         raise FormatError("is empty (expected glTF)")
     if head.lstrip()[:1] != b"{":
         raise FormatError(f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)")
-    raw = data.tobytes()
+    raw = content.tobytes()
     parsed, expanded = _parse(raw)
     return Document(parsed, buffers_of(parsed, None, resolve, glb=False), (), json_text.indent_of(raw), expanded)
 

@@ -13,7 +13,7 @@ from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.joint_gaps import JointGap, joint_gaps, moving_nodes
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Clip, Scene
+from anim.model import Clip
 from anim.sampling.pose import sample_pose
 from anim.sampling.world import world_by_node
 
@@ -73,18 +73,13 @@ class Loop:
     joints: tuple[JointGap, ...] = ()
 
 
-def analyze_loop(scene: Scene, clip: Clip, *, root: int = -1) -> Loop:
+def analyze_loop(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
     """Return the kind of loop of a clip.
 
     Closed: no visible jump of a vertex. Closed except some joints: fewer joints are open than close while they move,
     and they jump no further than the clip moves from frame to frame. Open by one frame: the gap is about the next
     frame's motion. root: node whose displacement is ignored, −1 for none.
     """
-    return judge_range(SkinMotion(scene), clip, root=root)
-
-
-def judge_range(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
-    """Return the kind of loop of a clip on an existing skin: for many clips."""
     return _judge(skin, clip, clip.start, clip.end, root)
 
 

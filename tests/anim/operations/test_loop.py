@@ -36,17 +36,17 @@ SKIN = SkinMotion(SCENE)
 
 
 def test_the_walk_is_closed() -> None:
-    assert judged(SCENE, WALK).kind is LoopKind.CLOSED
+    assert judged(SKIN, WALK).kind is LoopKind.CLOSED
 
 
 def test_without_its_last_frame_it_is_open_by_one() -> None:
     cut = trim(WALK, end=23 / 24)
-    found = judged(SCENE, cut)
+    found = judged(SKIN, cut)
     assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
     closed = append_first_frame(cut, fps=found.fps)
     assert closed.end == pytest.approx(1.0, abs=1e-6)
-    assert judged(SCENE, closed).kind is LoopKind.CLOSED
-    assert judged(SCENE, closed).seam < 1e-6
+    assert judged(SKIN, closed).kind is LoopKind.CLOSED
+    assert judged(SKIN, closed).seam < 1e-6
 
 
 def test_a_root_travels_on_in_the_appended_frame() -> None:
@@ -63,13 +63,13 @@ def test_a_root_travels_on_in_the_appended_frame() -> None:
 
 
 def test_half_a_walk_is_no_loop() -> None:
-    assert judged(SCENE, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
+    assert judged(SKIN, trim(WALK, end=0.5)).kind is LoopKind.NOT_A_LOOP
 
 
 def test_blend_closes_it() -> None:
     half = trim(WALK, end=0.5)
     closed = loop(half, blend=0.25)
-    assert judged(SCENE, closed).seam < 1e-9
+    assert judged(SKIN, closed).seam < 1e-9
     early = np.linspace(0, 0.24, 50)
     for old, new in zip(half.tracks, closed.tracks, strict=True):
         np.testing.assert_allclose(sample(new, early), sample(old, early), atol=1e-9)
@@ -151,7 +151,7 @@ def test_a_root_that_walks_on_travels_and_one_that_sways_does_not() -> None:
     walking = Clip("", (*WALK.tracks[:hips], moved, *WALK.tracks[hips + 1 :]))
     root = root_motion_node(SKELETON, walking)
     assert root == track.node
-    found = judged(SCENE, walking, root=root)
+    found = judged(SKIN, walking, root=root)
     assert found.kind is LoopKind.CLOSED
     assert found.travel == pytest.approx(1.4, abs=1e-6)
 
@@ -167,8 +167,8 @@ def _again(track: Track) -> np.ndarray:
 
 def test_a_seam_without_a_corner_has_no_speed() -> None:
     smooth = spline(WALK, tangents=TANGENTS["natural"], cyclic=True)
-    assert judged(SCENE, WALK).speed_seam > 0.1
-    assert judged(SCENE, smooth).speed_seam < 0.01
+    assert judged(SKIN, WALK).speed_seam > 0.1
+    assert judged(SKIN, smooth).speed_seam < 0.01
 
 
 @pytest.mark.parametrize("key", [key for key in TRACKS if "short" not in key])

@@ -56,13 +56,13 @@ def _swinging(**ends: float) -> Clip:
 
 
 def test_a_swing_that_comes_back_is_closed() -> None:
-    found = analyze_loop(CHAIN, _swinging())
+    found = analyze_loop(SkinMotion(CHAIN), _swinging())
     assert (found.kind, found.seam, found.joints) == (LoopKind.CLOSED, 0.0, ())
 
 
 def test_a_joint_that_stays_open_is_named_with_its_own_gap() -> None:
     """Joint 1 is 5° off, with vertices at 0.5 m and 1.5 m from it: 2 r sin(θ/2), and nothing of the joints around."""
-    found = analyze_loop(CHAIN, _swinging(j1=5))
+    found = analyze_loop(SkinMotion(CHAIN), _swinging(j1=5))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [each.joint for each in found.joints] == ["1"]
     assert found.joints[0].gap == pytest.approx(3 * np.sin(np.radians(2.5)))
@@ -71,46 +71,46 @@ def test_a_joint_that_stays_open_is_named_with_its_own_gap() -> None:
 
 
 def test_gaps_that_reach_further_than_the_motion_are_no_loop() -> None:
-    assert analyze_loop(CHAIN, _swinging(j1=150)).kind is LoopKind.NOT_A_LOOP
+    assert analyze_loop(SkinMotion(CHAIN), _swinging(j1=150)).kind is LoopKind.NOT_A_LOOP
 
 
 def test_all_joints_one_frame_short_are_open_by_one_frame() -> None:
     whole = _swinging()
     short = clip(*(each.with_keys(each.times[:-1], each.values[:-1]) for each in whole.tracks))
-    found = analyze_loop(CHAIN, short)
+    found = analyze_loop(SkinMotion(CHAIN), short)
     assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
     assert len(found.joints) == 3
 
 
 def test_a_control_that_moves_no_vertex_does_not_count() -> None:
     control = track("translation", [0, 1], [[0, 5, 0], [7, 5, 0]], node=3)
-    found = analyze_loop(CHAIN, clip(*_swinging().tracks, control))
+    found = analyze_loop(SkinMotion(CHAIN), clip(*_swinging().tracks, control))
     assert (found.kind, found.seam) == (LoopKind.CLOSED, 0.0)
     without = Scene(CHAIN.skeleton, ())  # no vertices anywhere: then all nodes count
-    assert analyze_loop(without, clip(*_swinging().tracks, control)).kind is LoopKind.NOT_A_LOOP
+    assert analyze_loop(SkinMotion(without), clip(*_swinging().tracks, control)).kind is LoopKind.NOT_A_LOOP
 
 
 def test_a_turn_that_comes_back_with_the_other_sign_is_closed() -> None:
     around = track("rotation", AT, np.r_[about("z", 36.0 * np.arange(10)), -about("z", [0.0])], node=0)
-    found = analyze_loop(CHAIN, clip(around, *_swinging().tracks[1:]))
+    found = analyze_loop(SkinMotion(CHAIN), clip(around, *_swinging().tracks[1:]))
     assert (found.kind, found.joints) == (LoopKind.CLOSED, ())
 
 
 def test_a_seam_below_the_usual_motion_is_closed() -> None:
     """A tenth of the usual motion from frame to frame is not seen, but a thousandth of the size at most."""
-    found = analyze_loop(CHAIN, _swinging(j2=0.01))
+    found = analyze_loop(SkinMotion(CHAIN), _swinging(j2=0.01))
     assert 0 < found.seam < 0.1 * found.inside.typical
     assert found.kind is LoopKind.CLOSED
     slow = clip(*(replace(each, values=about("z", 1e-3 * SWING) * [1, 1, 1, 1]) for each in _swinging().tracks[:2]))
     jump = track("rotation", AT, about("z", np.r_[1e-3 * SWING[:10], 0.01]), node=2)
-    assert analyze_loop(CHAIN, clip(*slow.tracks, jump)).kind is not LoopKind.CLOSED
+    assert analyze_loop(SkinMotion(CHAIN), clip(*slow.tracks, jump)).kind is not LoopKind.CLOSED
 
 
 def test_morph_weights_that_stay_open_are_named() -> None:
     """A target of 0.2 m, at half weight in the end."""
     scene = _chain([0, 0.2, 0])
     smile = track("weights", AT, np.r_[np.zeros(10), 0.5][:, None], node=2)
-    found = analyze_loop(scene, clip(*_swinging().tracks, smile))
+    found = analyze_loop(SkinMotion(scene), clip(*_swinging().tracks, smile))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [(each.joint, each.is_morph) for each in found.joints] == [("2", True)]
     assert found.joints[0].gap == pytest.approx(0.1)
@@ -120,7 +120,7 @@ def test_steps_inside_are_those_of_the_vertices() -> None:
     """One vertex that turns evenly by 36° a frame, 0.5 m off its axis: the chord, and no change of speed."""
     scene = Scene(CHAIN.skeleton, CHAIN.instances[:1])
     around = clip(track("rotation", AT, about("z", 36.0 * np.arange(11)), node=0))
-    found = analyze_loop(scene, around).inside
+    found = analyze_loop(SkinMotion(scene), around).inside
     chord = 2 * 0.5 * np.sin(np.radians(18))
     assert (found.largest, found.typical) == pytest.approx((chord, chord))
     turn = np.radians(36) * FPS  # rad/s
@@ -130,7 +130,7 @@ def test_steps_inside_are_those_of_the_vertices() -> None:
 def test_a_corner_inside_is_measured_as_one_at_the_seam() -> None:
     """Up at 2 m/s and down again: the same corner in the middle and where the loop meets."""
     up_and_down = clip(track("translation", [0, 1, 2], np.array([[0, 0, 0], [0, 2.0, 0], [0, 0, 0]]), node=0))
-    found = analyze_loop(CHAIN, up_and_down)
+    found = analyze_loop(SkinMotion(CHAIN), up_and_down)
     assert found.inside.speed == pytest.approx(4.0)
     assert found.speed_seam == pytest.approx(4.0)
 
@@ -139,7 +139,7 @@ def test_a_corner_inside_is_measured_as_one_at_the_seam() -> None:
 def test_a_jump_inside_is_no_speed(interpolation: Interpolation) -> None:
     values = np.array([[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0]])
     jump = track("translation", [0, 1, 1 + 2.0**-23, 2], values, interpolation, node=0)
-    assert analyze_loop(CHAIN, clip(jump)).inside.speed == pytest.approx(0.0, abs=1e-9)
+    assert analyze_loop(SkinMotion(CHAIN), clip(jump)).inside.speed == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_seam_is_that_of_a_plain_loop_over_vertices() -> None:
@@ -165,7 +165,7 @@ def test_the_seam_is_how_far_a_bake_ends_from_its_start(name: str) -> None:
     scene = reader.scene(document)
     for each in reader.clips(document):
         first, last = bake(scene, each, times=np.array([each.start, each.end]), rigid=True).load_all().positions
-        assert analyze_loop(scene, each).seam == pytest.approx(
+        assert analyze_loop(SkinMotion(scene), each).seam == pytest.approx(
             np.linalg.norm(last - first, axis=1).max(), rel=1e-5, abs=1e-6
         )
 
@@ -177,7 +177,7 @@ def test_steps_inside_are_those_of_a_bake(name: str, monkeypatch: pytest.MonkeyP
     document = opened(fixtures.build(name))
     scene = reader.scene(document)
     for each in reader.clips(document):
-        found = analyze_loop(scene, each)
+        found = analyze_loop(SkinMotion(scene), each)
         step = min(1 / found.fps, (each.end - each.start) / 2)
         count = max(round((each.end - each.start) / step), 2)
         times = np.minimum(each.start + step * np.arange(count + 1), each.end)
@@ -200,7 +200,7 @@ def test_seams_of_a_bent_tube_are_closed_forms() -> None:
     axis = quaternion.rotation_vector(bend.tracks[0].values[-1])
     from_elbow = matrix.apply(instance.skin.inverse_bind[upper], instance.mesh.positions[carried])
     off = np.linalg.norm(np.cross(from_elbow, axis / np.linalg.norm(axis)), axis=1).max()
-    found = analyze_loop(scene, bend)
+    found = analyze_loop(SkinMotion(scene), bend)
     assert found.seam == pytest.approx(np.sqrt(2) * off, rel=1e-5)
     assert found.speed_seam == pytest.approx(np.sqrt(2) * np.pi / 2 * off, rel=1e-3)
 
@@ -211,31 +211,33 @@ def test_a_step_is_a_gap_and_no_speed(late: float) -> None:
     turn = track("rotation", [0, 1], about("z", [0, np.degrees(0.2)]), node=0)
     values = np.array([[1.0, 0, 0]] * 2 + [[1, 0.05, 0]])
     jump = track("translation", [0, 0.5, 1 - late], values, STEP, node=2)
-    found = analyze_loop(CHAIN, clip(turn, jump))
-    still = analyze_loop(CHAIN, clip(turn))
+    found = analyze_loop(SkinMotion(CHAIN), clip(turn, jump))
+    still = analyze_loop(SkinMotion(CHAIN), clip(turn))
     assert found.speed_seam == pytest.approx(still.speed_seam, abs=0.2 * 0.05)
     assert still.speed_seam == pytest.approx(2 * np.sin(0.1) * 0.2 * 2.5, rel=1e-3)
     assert found.joints[-1].gap == pytest.approx(0.05)
     first = track("translation", [0, late + 1e-9, 1], np.array([[1, 0.05, 0], [1, 0, 0], [1, 0, 0]]), STEP, node=2)
-    assert analyze_loop(CHAIN, clip(turn, first)).speed_seam == pytest.approx(still.speed_seam, abs=0.2 * 0.05)
+    assert analyze_loop(SkinMotion(CHAIN), clip(turn, first)).speed_seam == pytest.approx(
+        still.speed_seam, abs=0.2 * 0.05
+    )
 
 
 def test_two_keys_in_one_moment_are_a_step_too() -> None:
     values = np.zeros((4, 3))
     values[-1, 1] = 0.05
     pair = track("translation", [0, 0.5, 1 - 2.0**-24, 1], values, node=0)
-    found = analyze_loop(CHAIN, clip(pair))
+    found = analyze_loop(SkinMotion(CHAIN), clip(pair))
     assert (found.speed_seam, found.node) == (0.0, "0")
     assert found.seam == pytest.approx(0.05)
     closed = track("translation", [0, 0.5, 1], np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0]]), STEP, node=0)
-    found = analyze_loop(CHAIN, clip(closed))
+    found = analyze_loop(SkinMotion(CHAIN), clip(closed))
     assert (found.kind, found.seam, found.speed_seam, found.node) == (LoopKind.CLOSED, 0.0, 0.0, "")
 
 
 def test_a_jump_at_the_end_counts() -> None:
     """STEP: the last key is shown for no time, but players that stop there show it."""
     stepped = track("translation", AT, np.r_[np.zeros((10, 3)), [[0, 0.05, 0]]], STEP, node=1)
-    found = analyze_loop(CHAIN, clip(*_swinging().tracks, stepped))
+    found = analyze_loop(SkinMotion(CHAIN), clip(*_swinging().tracks, stepped))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [each.gap for each in found.joints] == [pytest.approx(0.05)]
 
