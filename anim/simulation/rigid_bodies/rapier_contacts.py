@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from anim.errors import UnsupportedError
-from anim.simulation.rigid_bodies.description import combine
+from anim.simulation.rigid_bodies.description import Material, combine
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, RigidScene
 
 MAX_FILTERS = 32
@@ -19,29 +17,43 @@ class MaterialHooks:
 
     def __init__(self, colliders: dict[int, tuple[int, BodyCollider]]) -> None:
         self._colliders = colliders
+        self._pairs: dict[tuple[Material, Material], tuple[float, float, float]] = {}
 
     def modify_solver_contacts(self, context: Any) -> None:
         """Set friction and restitution of one pair, before each step."""
-        first, second = (self._colliders[h.index][1].material for h in (context.collider1, context.collider2))
-        modes = (first.friction_combine, second.friction_combine)
-        static = combine(modes, first.static_friction, second.static_friction)
-        dynamic = combine(modes, first.dynamic_friction, second.dynamic_friction)
-        slides = static == dynamic or _sliding_speed(context) > MAX_STICKING_SPEED_M_S
+        static, dynamic, restitution = self._combined(context.collider1.index, context.collider2.index)
+        slides = static == dynamic or _slides(context)
         context.friction = dynamic if slides else static
-        modes = (first.restitution_combine, second.restitution_combine)
-        context.restitution = combine(modes, first.restitution, second.restitution)
+        context.restitution = restitution
+
+    def _combined(self, first: int, second: int) -> tuple[float, float, float]:
+        """Static and dynamic friction, and restitution, of two colliders."""
+        pair = (self._colliders[first][1].material, self._colliders[second][1].material)
+        if pair not in self._pairs:
+            a, b = pair
+            modes = (a.friction_combine, b.friction_combine)
+            static = combine(modes, a.static_friction, b.static_friction)
+            dynamic = combine(modes, a.dynamic_friction, b.dynamic_friction)
+            modes = (a.restitution_combine, b.restitution_combine)
+            self._pairs[pair] = static, dynamic, combine(modes, a.restitution, b.restitution)
+        return self._pairs[pair]
 
 
-def _sliding_speed(context: Any) -> float:
-    """Largest tangential speed of a pair's contact points in m/s."""
-    bodies = [context.bodies[each] for each in (context.rigid_body1, context.rigid_body2) if each is not None]
-    normal = np.array(context.normal.to_tuple())
-    fastest = 0.0
+def _slides(context: Any) -> bool:
+    """Whether a contact point of a pair moves along the surface; plain numbers, for speed."""
+    handles = [each for each in (context.rigid_body1, context.rigid_body2) if each is not None]
+    bodies = [body for body in (context.bodies[each] for each in handles) if not body.is_fixed]
+    nx, ny, nz = context.normal.to_tuple()
     for contact in context.solver_contacts:
-        velocities = [np.array(body.velocity_at_point(contact.point).to_tuple()) for body in bodies]
-        relative = velocities[0] - (velocities[1] if len(velocities) > 1 else 0.0)
-        fastest = max(fastest, float(np.linalg.norm(relative - (relative @ normal) * normal)))
-    return fastest
+        x = y = z = 0.0
+        point = contact.point
+        for body, sign in zip(bodies, (1.0, -1.0), strict=False):
+            vx, vy, vz = body.velocity_at_point(point).to_tuple()
+            x, y, z = x + sign * vx, y + sign * vy, z + sign * vz
+        along = x * nx + y * ny + z * nz
+        if x * x + y * y + z * z - along * along > MAX_STICKING_SPEED_M_S**2:
+            return True
+    return False
 
 
 def needs_hooks(scene: RigidScene) -> bool:
