@@ -40,7 +40,7 @@ class MaterialHooks:
 
 
 def _slides(context: Any) -> bool:
-    """Whether a contact point of a pair moves along the surface; plain numbers, for speed."""
+    """True if a contact point of a pair moves along the surface; plain numbers, for speed."""
     handles = [each for each in (context.rigid_body1, context.rigid_body2) if each is not None]
     bodies = [body for body in (context.bodies[each] for each in handles) if not body.is_fixed]
     nx, ny, nz = context.normal.to_tuple()
