@@ -112,7 +112,12 @@ def describe_elongation(worst: Mapping[str, Any] | None, substeps: int, limit: f
     return f"{stretched} with {substeps} substeps a frame (limit {100 * limit:.3g} %)"
 
 
-def advise_elongation(solver: str) -> str:
-    """Return advice for a cloth that is stretched beyond the limit in spite of many substeps."""
+def advise_elongation(solver: str, *, is_start: bool = False) -> str:
+    """Return advice for a cloth that is stretched beyond the limit in spite of many substeps.
+
+    is_start: the pose that it begins with is the one that is stretched.
+    """
+    if is_start:
+        return "the clip's first pose stretches it: --warm-up 1 lets it relax before"
     fabric = {"mass-spring": "a higher --stiffness", "relaxation": "more --iterations"}
     return f"a larger --max-stretch, a higher --fps, or {fabric.get(solver, 'a mesh with longer edges')}"

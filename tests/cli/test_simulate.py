@@ -319,6 +319,19 @@ def test_cloth_beyond_its_largest_stretch_ends_with_a_report_and_no_cache(
         assert found["advice"] == help.removeprefix("help: ")
 
 
+def test_cloth_that_the_first_pose_stretches_is_advised_to_warm_up(
+    fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    args = ("--mesh", "body", "--clip", "walk", "--cloth", "weight:*hand*,0.5", "--duration", "0.2")
+    out = tmp_path / "out.npz"
+    run = call("simulate", "cloth", fixture("biped"), out, *args, "--max-stretch", "5%")
+    assert (run.code, out.exists()) == (6, False), run.err
+    assert "at 0 s with 10 substeps a frame (limit 5 %)" in run.err
+    assert run.err.splitlines()[-1] == "help: the clip's first pose stretches it: --warm-up 1 lets it relax before"
+    relaxed = call("simulate", "cloth", fixture("biped"), out, *args, "--max-stretch", "5%", "--warm-up", "1")
+    assert relaxed.code == 0, relaxed.err
+
+
 @pytest.mark.parametrize(
     ("args", "code", "words"),
     [

@@ -46,7 +46,7 @@ def make_report(
     worst = _worst_stretch(model, frames.positions, options.fps)
     advice = ""
     if describe_elongation(worst, substeps, options.max_stretch):
-        advice = advise_elongation(options.solver)
+        advice = advise_elongation(options.solver, is_start=worst["time_s"] == 0)
     seam = frames.seam
     return _report(
         model,

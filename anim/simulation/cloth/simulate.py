@@ -74,6 +74,8 @@ def _simulate_under_limit(model: ClothModel, driver: ClothDriver, options: Cloth
         frames = _simulate(model, driver, options, substeps, stop_above=options.max_stretch)
         if worst_edges(model, frames.positions)[1].max() <= options.max_stretch:
             return substeps, frames
+        if worst_edges(model, frames.positions[:1])[1][0] > options.max_stretch:
+            break  # the first pose itself is stretched
         substeps *= 2
     return substeps, _simulate(model, driver, options, substeps)
 
