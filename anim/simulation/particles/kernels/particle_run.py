@@ -100,7 +100,7 @@ def run_particles(
             )
             keys = _run_particle(keys, count, births[p], deaths[p], x, v, field, solids, grid, energies, statistics)
         offsets[p + 1] = count[0]
-    return keys[: count[0]].copy(), offsets, energies, statistics
+    return keys[: count[0]], offsets, energies, statistics
 
 
 @jit
