@@ -13,9 +13,9 @@ from anim.gltf.validation.channel_targets import EXTENSION
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the file."""
+    """Yield the file. Channels whose pointer was lost, as by tools that skip the extension, have no use for it."""
     clips = json_array(file.json, "animations")
-    uses = sum(channel["target"]["path"] == "pointer" for clip in clips for channel in clip["channels"])
+    uses = sum(EXTENSION in channel["target"].get("extensions", {}) for clip in clips for channel in clip["channels"])
     if uses and EXTENSION not in file.json.get("extensionsUsed", ()):
         problem = f"{uses} channels use {EXTENSION}, which is not in extensionsUsed"
         yield Occurrence("extensionsUsed", "/extensionsUsed", uses, problem=problem)

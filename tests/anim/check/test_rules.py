@@ -195,6 +195,13 @@ def test_a_clip_that_loops_by_name_may_not_jump_further() -> None:
     assert found(with_tracks(steps(values), name="run_loop"), "GA107")
 
 
+def test_a_channel_that_lost_its_pointer_uses_no_extension() -> None:
+    """Tools that skip the extension write it: declared, the file would name an extension that nothing uses."""
+    lost = edited(put("animations/0/channels/0/target", {"path": "pointer"}))
+    assert found(lost, "GA501") == []
+    assert found(lost, "GA015")
+
+
 def test_eight_active_targets_are_promised() -> None:
     def names(count: int) -> list[Finding]:
         document = opened_fixture("morph_cube")
