@@ -213,6 +213,13 @@ def test_cloth_meets_colliders_of_a_file_and_of_nodes(fixture: Fixture, call: Ca
     assert call("simulate", "cloth", fixture("flag"), out, *args, *plane).code == 0
 
 
+def test_cloth_that_begins_inside_a_collider_says_how_deep(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    args = ("--mesh", "flag", "--pin", "x-min", "--duration", "0.1", "--sphere", "1.2,2,0,0.3")
+    run = call("simulate", "cloth", fixture("flag"), tmp_path / "out.npz", *args)
+    assert run.code == 0, run.err
+    assert ", 30 cm inside a collider or below the floor at most," in run.err
+
+
 def test_cloth_meets_the_colliders_of_spring_bones(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     report = tmp_path / "report.json"
     args = ("--mesh", "flag", "--pin", "x-min", "--duration", "0.2", "--colliders", "vrm", "--report", report)

@@ -224,6 +224,8 @@ def _summary(run: ClothRun) -> str:
         f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s",
         f"stretched by {text.format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s",
     ]
+    if run.report.penetration_m:
+        parts.append(f"{text.format_length(run.report.penetration_m)} inside a collider or below the floor at most")
     if run.report.loop_seam_m is not None:
         parts.append(_loop(figures["loop_rounds"], run.report.loop_seam_m, settled=figures["loop_settled"]))
     return ", ".join(parts)
