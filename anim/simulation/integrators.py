@@ -175,12 +175,12 @@ def find_integrator(name: str) -> Integrator:
     return INTEGRATORS[name]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DampedOscillator:
-    """System x″ = −omega² x − 2 ratio omega x′ of points (P, 3); omega: rad/s."""
+    """System x″ = −omega² x − 2 ratio omega x′ of points (P, 3); omega: rad/s, also (P, 1), as the ratio."""
 
-    omega: float
-    ratio: float
+    omega: Scalar
+    ratio: Scalar
 
     def acceleration(self, time: Scalar, x: Floats, v: Floats) -> Floats:
         """Return the accelerations (P, 3)."""
@@ -189,7 +189,7 @@ class DampedOscillator:
     def solve_implicit(self, time: Scalar, x: Floats, v: Floats, step: Scalar) -> Floats:
         """Return the change of velocity over an implicit Euler step, exactly."""
         under = 1 + step * 2 * self.ratio * self.omega + np.square(step * self.omega)
-        return np.asarray(step * (self.acceleration(0.0, x, v) - step * self.omega**2 * v) / under)
+        return np.asarray(step * (self.acceleration(0.0, x, v) - step * np.square(self.omega) * v) / under)
 
 
 def damped_limit(name: str, ratio: float) -> float:

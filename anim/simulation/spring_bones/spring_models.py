@@ -6,14 +6,13 @@ Each model holds the state of one batch, in world space or in the space of the c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import matrix
-from anim.simulation.integrators import Scalar, find_integrator
+from anim.simulation.integrators import DampedOscillator, find_integrator
 from anim.simulation.spring_bones.chains import SpringParameters
 from anim.simulation.spring_bones.collisions import TINY, norms
 
@@ -137,7 +136,7 @@ class MassSpringModel(OscillatorModel):
         self._method = find_integrator(integrator)
         frequency = np.array([[2 * np.pi * (each.frequency or 0.0)] for each in parameters])
         ratio = np.array([[each.damping_ratio] for each in parameters])
-        self._system = _Oscillators(frequency * frequency, 2 * ratio * frequency)
+        self._system = DampedOscillator(frequency, ratio)
         self._free = np.zeros((len(parameters), 3))
         self._relative = (self._free, self._free)
         self.elongation = np.zeros(len(parameters))
@@ -166,7 +165,7 @@ class MassSpringModel(OscillatorModel):
         """Take the tails at the end of the step. free: before collisions; without one, the stretched tail counts."""
         self.elongation = (norms(self._free - head) / np.maximum(norms(tail - head), TINY))[:, 0] - 1
         error, velocity = self._relative
-        elastic = (self._system.square * error * error).sum(axis=-1)
+        elastic = np.square(self._system.omega * error).sum(axis=-1)
         self.energy = (elastic + (velocity * velocity).sum(axis=-1)) / 2
         pushed = tail - free
         hit = pushed.any(axis=-1, keepdims=True)
@@ -175,21 +174,6 @@ class MassSpringModel(OscillatorModel):
         velocity = velocity - np.where(against, _along(velocity, pushed), 0.0)
         self._velocity = _rotate_back(center, velocity)
         self._tail, self._head = to_center(center, np.where(hit, tail, self._free)), to_center(center, head)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Oscillators:
-    """System e″ = −square · e − rate · e′ of m independent points. square, rate: (m, 1)."""
-
-    square: Floats
-    rate: Floats
-
-    def acceleration(self, time: Scalar, x: Floats, v: Floats) -> Floats:
-        return -self.square * x - self.rate * v
-
-    def solve_implicit(self, time: Scalar, x: Floats, v: Floats, step: Scalar) -> Floats:
-        force = self.acceleration(time, x, v) - step * self.square * v
-        return np.asarray(step * force / (1 + step * self.rate + step * step * self.square))
 
 
 def apply_each(matrices: Floats, points: Floats) -> Floats:
