@@ -45,6 +45,7 @@ def main() -> None:
             say(f"    and substep; stretched by {100 * worst:.1f} % at most")
     for name, seconds, worst in run_peers(PEER_SIZE):
         say(f"{name}, cloth {PEER_SIZE} × {PEER_SIZE}, held at an edge: {seconds:.2f} s, {100 * worst:.3g} % at most")
+    _particles(Forces(), 4)
     for name, forces in (("gravity", Forces()), ("drag", Forces(linear_drag=0.1))):
         began = time.process_time()
         _particles(forces)
@@ -74,13 +75,13 @@ def _sheet(size: int, corners: bool) -> tuple[Floats, Ints, Bools]:
     return positions, grid_faces(size), pinned
 
 
-def _particles(forces: Forces) -> None:
+def _particles(forces: Forces, steps: int = STEPS) -> None:
     random = np.random.default_rng(0)
     shape = (PARTICLES, 3)
     births = Births(
         np.zeros(PARTICLES), np.full(PARTICLES, 99.0), random.uniform(0, 2, shape), random.normal(size=shape)
     )
-    ParticleSolver(births, forces, (Floor(),), Contact(), "velocity-verlet").run(Steps(1 / 240, STEPS / 240), 4)
+    ParticleSolver(births, forces, (Floor(),), Contact(), "velocity-verlet").run(Steps(1 / 240, steps / 240), 4)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import anim
 from anim.sampling.track import sample
 from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Player
+from tests.judge import judge, needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
 
 SPARKS = ("--node", "head", "--floor", "0", "--rate", "30", "--duration", "1")
@@ -46,6 +47,36 @@ def test_a_skin_moves_its_vertices_as_the_nodes_move_their_mesh(fixture: Fixture
             corners = np.array(_decode(nodes, nodes.document["meshes"][-1]["primitives"][0]["attributes"]["POSITION"]))
             expected = corners.reshape(-1, 3) @ own_node[:3, :3].T + own_node[:3, 3]
             np.testing.assert_allclose(moved, expected, atol=2e-6)
+
+
+@needs_judge
+def test_three_js_shows_both_forms_alike(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    paths = [tmp_path / f"{form}.glb" for form in ("node", "skin")]
+    for path in paths:
+        simulate(call, fixture("biped"), path, *SPARKS, "--as", path.stem)
+    clip = Player(paths[0].read_bytes()).names().index("particles")
+    for time in (0.0, 0.4, 1.0):
+        a, b = (vertices(path, clip=clip, time=time) for path in paths)
+        assert len(a) == len(b) > 0
+        np.testing.assert_allclose(a, b, atol=2e-6)
+
+
+@needs_judge
+@pytest.mark.parametrize("form", ["node", "skin"])
+def test_three_js_measures_the_error_of_removed_keys(form: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    args = (*SPARKS, "--drag", "1", "--turbulence", "1", "--as", form)
+    simulate(call, fixture("biped"), tmp_path / "full.glb", *args)
+    simulate(call, fixture("biped"), tmp_path / "few.glb", *args, "--max-error", "1mm")
+    found = judge(tmp_path / "full.glb", tmp_path / "few.glb")
+    assert 1e-5 < max(each.max_error for each in found.clips) <= 1.001e-3
+
+
+def test_more_than_two_thousand_nodes_are_warned_of(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    said = simulate(call, fixture("flag"), tmp_path / "out.glb", "--node", "pole", "--rate", "0", "--burst", "2001")
+    assert "warning: 2001 nodes: players take about a second" in said
+    run = call("simulate", "particles", fixture("flag"), "-", "--node", "pole", "--rate", "0", "--burst", "10001")
+    assert (run.code, run.out) == (4, b"")
+    assert "limit 10000 nodes" in run.err
 
 
 def _decode(player: Player, accessor: int) -> object:

@@ -37,7 +37,7 @@ from cli.workflows.simulate_clip import simulate_clip
 ROUNDING_M = 1e-9
 ATTRACTOR_RADIUS = "10%"
 MANY_DRAWS = 1000  # nodes, from which one skinned mesh is the better file
-MANY_NODES, MAX_NODES = 2000, 10_000  # players take milliseconds a frame; binding alone takes seconds
+MANY_NODES, MAX_NODES = 2000, 10_000  # players take a second to bind the tracks of some 2 500; then ever more
 
 
 class Form(StrEnum):
@@ -242,7 +242,7 @@ def _check_nodes(run: ParticleRun, form: Form, voice: Reporter, *, force: bool) 
             f"{count} particles at a time (limit {MAX_NODES} nodes)", help="lower --rate, or --force, or OUT.npz"
         )
     if count > MANY_NODES:
-        voice.warn(f"{count} nodes: players need several milliseconds a frame for them")
+        voice.warn(f"{count} nodes: players take about a second to bind their tracks")
     elif count > MANY_DRAWS and form is Form.NODE:
         voice.info(f"note: {count} nodes are as many draw calls; --as skin needs one")
 
