@@ -35,7 +35,9 @@ Packages, from the bottom up, each imported as anim.<package>.<module>
     exchange                BVH, CSV and JSON curves; retargeting
     skinning, caches        methods and bakes; .npz, .usdc, .pc2, .glb and other vertex caches
     optimization            fewest keys and bits within an error bound, verified
+    simulation              particles, springs, cloth and rigid bodies, and the integrators behind them
     show                    plots and filmstrips
+    check                   rules about files, their fixes, baselines and budgets
 
 Metres, seconds and radians; right-handed, Y up; quaternions (x, y, z, w). Arrays are read-only, so that values can be
 shared: `values.copy()` gives one to write to.

@@ -18,7 +18,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     table = file.scales
     at_rest = joints[_is_spread(file.skeleton.scale[joints], parameters["spread"])]
     animated = table.nodes[table.count(_is_spread(table.values, parameters["spread"])) > 0]
-    for joint in np.union1d(at_rest, animated[np.isin(animated, joints)]).tolist():
+    for joint in sorted({*at_rest.tolist(), *animated[np.isin(animated, joints)].tolist()}):
         yield file.in_node(joint)
 
 
