@@ -65,6 +65,6 @@ def parse_angle(text: str, name: str) -> float:
 
 def _split(text: str, name: str) -> tuple[float, str]:
     match = _NUMBER.fullmatch(text)
-    if match is None:
+    if match is None or not math.isfinite(float(match[1])):  # "1e400" is infinite, and would pass every limit
         raise RangeError(f"{name} is '{text}' (expected a number with a unit)")
     return float(match[1]), match[2]

@@ -1,0 +1,21 @@
+"""Numbers with units: what is no finite number is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from anim.errors import RangeError
+from anim.units import parse_angle, parse_fraction, parse_length
+
+
+def test_a_number_beyond_float64_is_refused() -> None:
+    """As infinity it would pass every limit: `diff --fail-above 1e400m` never failed."""
+    with pytest.raises(RangeError, match="1e400mm"):
+        parse_length("1e400mm", "max_error", lambda: 1.0)
+    with pytest.raises(RangeError, match="1e999%"):
+        parse_length("1e999%", "max_error", lambda: 1.0)
+    with pytest.raises(RangeError, match="1e400"):
+        parse_fraction("1e400", "tolerance")
+    with pytest.raises(RangeError, match="1e400deg"):
+        parse_angle("1e400deg", "tolerance")
+    assert parse_length("1e300mm", "max_error", lambda: 1.0) == pytest.approx(1e297)
