@@ -291,7 +291,7 @@ def _clip(asset: Asset, key: ClipKey) -> Clip:
 
 def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
     if fps is not None and times is not None:
-        raise RangeError("fps and times exclude each other")
+        raise RangeError("`fps` and `times` exclude each other")
     if times is not None:
         return as_floats(np.atleast_1d(np.asarray(times)), "F", name="times")
     if fps is not None:

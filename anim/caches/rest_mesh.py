@@ -47,7 +47,7 @@ def write(cache: VertexCache, outputs: Outputs, ending: str, mark: str, *, fps: 
     mark: fingerprint of the cache's first frame, returned by `frame_blocks.write`.
     """
     if ending not in REST_EXTENSIONS:
-        raise RangeError(f"rest is '{ending}' (expected .ply, .obj or nothing)")
+        raise RangeError(f"`rest` is '{ending}' (expected .ply, .obj or nothing)")
     if not ending:
         return
     remark = {"up": cache.up, "of": mark} | ({} if fps is None else {"fps": f"{fps:.9g}"})

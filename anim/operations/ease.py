@@ -59,7 +59,7 @@ def ease(
     """
     chosen = track_indices(clip, tracks)
     if interpolation not in OUTPUTS:
-        raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
+        raise RangeError(f"`interpolation` is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
     easing = table.parse(easing) if isinstance(easing, str) else easing
     check_type(easing, Easing, "easing", help="anim.EASINGS has their names")
     job = _Job(easing, start, end, tolerances, interpolation)

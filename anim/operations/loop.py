@@ -66,7 +66,9 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> C
     chosen = track_indices(clip, tracks)
     check_number(blend, "blend")
     if not 0 < blend <= clip.end - clip.start:
-        raise RangeError(f"blend is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)")
+        raise RangeError(
+            f"`blend` is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)"
+        )
     return Clip(clip.name, tuple(_close(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
 
 

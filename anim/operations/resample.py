@@ -38,7 +38,7 @@ def resample(
     """
     chosen = track_indices(clip, tracks)
     if interpolation not in INTERPOLATIONS:
-        raise RangeError(f"interpolation is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
+        raise RangeError(f"`interpolation` is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
     axis = TimeAxis(key_times(frame_times(clip.start, clip.end, fps=fps)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}

@@ -41,7 +41,7 @@ def retime(
     """
     chosen = track_indices(clip, tracks)
     if speed is not None and duration is not None:
-        raise RangeError("speed and duration exclude each other")
+        raise RangeError("`speed` and `duration` exclude each other")
     factor = _factor(clip, speed, duration)
     start, end = clip.start, clip.start + (clip.end - clip.start) * factor
     offset = _resolve_offset(offset, start)
@@ -120,13 +120,15 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if speed is not None:
         check_number(speed, "speed")
         if not (math.isfinite(speed) and speed > 0):
-            raise RangeError(f"speed is {speed:g} (expected a number above 0)", help="to play it backwards, reverse it")
+            raise RangeError(
+                f"`speed` is {speed:g} (expected a number above 0)", help="to play it backwards, reverse it"
+            )
         return 1 / speed
     if duration is None:
         return 1.0
     check_number(duration, "duration")
     if not (math.isfinite(duration) and duration > 0):
-        raise RangeError(f"duration is {duration:g} s (expected a number above 0)")
+        raise RangeError(f"`duration` is {duration:g} s (expected a number above 0)")
     own = clip.end - clip.start
     if own == 0:
         raise RangeError("the clip has no duration, so it can't be stretched to one")

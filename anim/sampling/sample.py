@@ -48,7 +48,7 @@ def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") 
     check_type(skeleton, Skeleton, "skeleton")
     check_type(clip, Clip, "clip")
     if space not in SPACES:
-        raise RangeError(f"space is '{space}' (expected local or world)")
+        raise RangeError(f"`space` is '{space}' (expected local or world)")
     local = sample_pose(skeleton, clip, at)
     pointers = {
         track.pointer: sampled(track, at) for track in clip.tracks if track.node is None and track.pointer is not None

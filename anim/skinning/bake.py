@@ -195,23 +195,23 @@ def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:
 
 def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -> None:
     if method not in SKINNING_METHODS:
-        raise RangeError(f"method is '{method}' (expected one of {', '.join(SKINNING_METHODS)})")
+        raise RangeError(f"`method` is '{method}' (expected one of {', '.join(SKINNING_METHODS)})")
     if blend is not None:
         check_number(blend, "blend")
     if blend is not None and not 0 <= blend <= 1:
-        raise RangeError(f"blend is {blend:g} (expected 0 … 1)")
+        raise RangeError(f"`blend` is {blend:g} (expected 0 … 1)")
     if method == "lbs" and (blend is not None or bulge_clamp):
         what = "blend" if blend is not None else "bulge_clamp"
         raise RangeError(f"`{what}` requires a method other than lbs (expected dqs or cor)")
     if space not in SPACES:
-        raise RangeError(f"space is '{space}' (expected one of {', '.join(SPACES)})")
+        raise RangeError(f"`space` is '{space}' (expected one of {', '.join(SPACES)})")
 
 
 def _check_indices(nodes: Sequence[int] | None, threads: int | None) -> None:
     if isinstance(nodes, str) or not all(isinstance(node, int | np.integer) for node in nodes or ()):
         raise ShapeError(f"nodes is {nodes!r} (expected indices)", help="anim.bake takes names as `meshes`")
     if threads is not None and threads < 0:
-        raise RangeError(f"threads is {threads} (expected 1 or more, or None)")
+        raise RangeError(f"`threads` is {threads} (expected 1 or more, or None)")
 
 
 def _hint(scene: Scene, *, rigid: bool) -> str:

@@ -49,7 +49,7 @@ SHAPES: dict[str, tuple[Callable[[], object], str]] = {
 }
 RANGES: dict[str, tuple[Callable[[], object], str]] = {
     "track": (lambda: ops.resample(CLIP, fps=10, tracks=frozenset({999})), "there is no track 999"),
-    "threads": (lambda: bake(ASSET.scene, CLIP, times=np.zeros(1), threads=-1), "threads is -1"),
+    "threads": (lambda: bake(ASSET.scene, CLIP, times=np.zeros(1), threads=-1), "`threads` is -1"),
     "diff fps": (lambda: anim.diff(ASSET, ASSET, fps=0), "`fps` is 0"),
 }
 

@@ -34,7 +34,7 @@ LAYOUTS: dict[str, Write] = {
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a GLB in the layout `writing.layout`. Raises RangeError for an unknown one."""
     if writing.layout not in LAYOUTS:
-        raise RangeError(f"layout is '{writing.layout}' (expected {', '.join(LAYOUTS)})")
+        raise RangeError(f"`layout` is '{writing.layout}' (expected {', '.join(LAYOUTS)})")
     return LAYOUTS[writing.layout](cache, outputs, writing)
 
 

@@ -20,7 +20,7 @@ def to_up_axis(cache: VertexCache, up: str) -> VertexCache:
     Raises RangeError for another axis. The cache itself if it has this axis.
     """
     if up not in UPS:
-        raise RangeError(f"up is '{up}' (expected y or z)")
+        raise RangeError(f"`up` is '{up}' (expected y or z)")
     if up == cache.up:
         return cache
     turn = _y_to_z if up == "z" else _z_to_y

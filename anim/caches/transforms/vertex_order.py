@@ -21,7 +21,7 @@ def reorder(cache: VertexCache, order: str) -> VertexCache:
     primitive. Raises RangeError for another order.
     """
     if order not in ORDERS:
-        raise RangeError(f"order is '{order}' (expected file or blender)")
+        raise RangeError(f"`order` is '{order}' (expected file or blender)")
     return cache if order == "file" else _only_used(cache)
 
 

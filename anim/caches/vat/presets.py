@@ -43,7 +43,7 @@ def preset(name: str, ending: str) -> Preset:
     """Return a preset. Raises RangeError for an unknown one, or an extension lossy in the engine."""
     found = PRESETS.get(name)
     if found is None:
-        raise RangeError(f"preset is '{name}' (expected {', '.join(PRESETS)})")
+        raise RangeError(f"`preset` is '{name}' (expected {', '.join(PRESETS)})")
     if ending not in found.endings:
         raise RangeError(f"preset {name}: it cuts 16-bit PNG to 8 bits", help=f"write {found.endings[0]}")
     return found

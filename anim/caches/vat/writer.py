@@ -77,7 +77,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
     grid = _grid(cache)
     kind = "unorm16" if ending == ".png" else writing.depth
     if kind not in ("unorm16", *exr.TYPES):
-        raise RangeError(f"depth is '{kind}' (expected {', '.join(exr.TYPES)})")
+        raise RangeError(f"`depth` is '{kind}' (expected {', '.join(exr.TYPES)})")
     still = rest_mesh.positions(cache)
     base = np.zeros_like(still) if kind == "float" else presets.to_engine(still, engine)
     packed = _encode_pixels(cache, engine, base, kind)

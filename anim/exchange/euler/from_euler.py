@@ -57,7 +57,7 @@ def from_euler(
     XYZ (0, 0, 0) at 0 s → (90°, 90°, 0) at 1 s, tolerance 0.1° → a rotation track of 15 keys
     """
     if not MIN_TOLERANCE <= tolerance <= np.pi:
-        raise RangeError(f"tolerance is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
+        raise RangeError(f"`tolerance` is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
     bones = skeleton(motion)
     size = bounding_size(bones) or 1.0
     stored = Float32Times()

@@ -122,7 +122,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     keys = clip.key_times
     if fps is not None:
         if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
-            raise RangeError(f"fps is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
+            raise RangeError(f"`fps` is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
         shown = np.arange(int(np.ceil((end - start) * fps - GRID_TOLERANCE_FRAMES)) + 1) / fps
     else:
         step = (end - start) / max(len(keys) - 1, 1)

@@ -59,7 +59,7 @@ def to_euler(
     """
     orders = order if isinstance(order, OrderRules) else OrderRules(euler.check_order(order))
     if tolerance is not None and not 1e-6 <= tolerance < np.inf:
-        raise RangeError(f"tolerance is {tolerance:g} rad (expected 1e-06 or more)")
+        raise RangeError(f"`tolerance` is {tolerance:g} rad (expected 1e-06 or more)")
     frames = key_times(frame_times(clip.start, clip.end, fps=fps)) if fps is not None else None
     names = labels(skeleton)
     orders.check(names)

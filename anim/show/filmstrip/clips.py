@@ -116,7 +116,7 @@ def of_document(
     """
     for name in methods:
         if name not in SKINNING_METHODS:
-            raise RangeError(f"method is '{name}' (expected {', '.join(SKINNING_METHODS)})")
+            raise RangeError(f"`method` is '{name}' (expected {', '.join(SKINNING_METHODS)})")
     whole_scene = reader.scene(document)
     scene = _visible(whole_scene, nodes)
     is_drawn = any(len(instance.mesh.faces) for instance in whole_scene.instances)

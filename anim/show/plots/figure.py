@@ -99,7 +99,7 @@ def style(kind: str) -> Iterator[None]:
     kind: "png" or "svg", RangeError for another. Raises UnsupportedError where matplotlib is not installed.
     """
     if kind not in FORMATS:
-        raise RangeError(f"format is '{kind}' (expected {' or '.join(FORMATS)})")
+        raise RangeError(f"`format` is '{kind}' (expected {' or '.join(FORMATS)})")
     try:
         import matplotlib
     except ImportError:

@@ -75,9 +75,9 @@ def test_reversed_lines_are_reversed_to_the_bit() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"speed": 0.0}, "speed is 0"),
+        ({"speed": 0.0}, "`speed` is 0"),
         ({"speed": -1.0}, "reverse it"),
-        ({"duration": 0.0}, "duration is 0"),
+        ({"duration": 0.0}, "`duration` is 0"),
         ({"offset": -1.0}, "leads to -1 s"),
         ({"speed": 1.0, "duration": 1.0}, "exclude"),
     ],

@@ -106,7 +106,7 @@ def test_refusals() -> None:
         tangent_plot([0, 1, 1], [0, 1, 0], ["flat"], kind="svg")
     with pytest.raises(ShapeError):
         tangent_plot([0, 1], [0, 1, 0], ["flat"], kind="svg")
-    with pytest.raises(RangeError, match="format is 'pdf'"):
+    with pytest.raises(RangeError, match="`format` is 'pdf'"):
         easing_plot([parse("linear")], kind="pdf")
 
 

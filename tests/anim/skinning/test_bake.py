@@ -195,11 +195,11 @@ def test_rest_is_the_scene_without_a_clip() -> None:
 @pytest.mark.parametrize(
     ("how", "problem"),
     [
-        ({"method": "lsb"}, r"method is 'lsb' \(expected one of lbs, dqs, cor\)"),
-        ({"method": "dqs", "blend": 1.5}, r"blend is 1.5 \(expected 0 … 1\)"),
+        ({"method": "lsb"}, r"`method` is 'lsb' \(expected one of lbs, dqs, cor\)"),
+        ({"method": "dqs", "blend": 1.5}, r"`blend` is 1.5 \(expected 0 … 1\)"),
         ({"blend": 0.5}, "`blend` requires a method other than lbs"),
         ({"bulge_clamp": True}, "`bulge_clamp` requires a method other than lbs"),
-        ({"space": "bind"}, r"space is 'bind' \(expected one of world, mesh\)"),
+        ({"space": "bind"}, r"`space` is 'bind' \(expected one of world, mesh\)"),
     ],
 )
 def test_parameters_out_of_range(how: dict[str, object], problem: str) -> None:

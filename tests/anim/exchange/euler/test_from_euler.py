@@ -212,7 +212,7 @@ def test_a_cubic_translation_is_followed() -> None:
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, 1e-9, 50.0])
 def test_a_tolerance_out_of_range_is_refused(tolerance: float) -> None:
-    with pytest.raises(RangeError, match="tolerance is"):
+    with pytest.raises(RangeError, match="`tolerance` is"):
         from_euler(EulerMotion(()), tolerance=tolerance)
 
 
