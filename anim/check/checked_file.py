@@ -14,6 +14,7 @@ from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene, Skeleton, Track
 from anim.sampling.pose import rest_world
 
@@ -61,6 +62,11 @@ class CheckedFile:
     def rest_world(self) -> Floats:
         """World matrices of all nodes at rest (N, 3, 4)."""
         return rest_world(self.skeleton)
+
+    @cached_property
+    def motion(self) -> SkinMotion:
+        """Motion of the scene's vertices."""
+        return SkinMotion(self.scene)
 
     @cached_property
     def joints(self) -> list[int]:

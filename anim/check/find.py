@@ -22,16 +22,23 @@ def find_all(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple[Fin
 
 
 def find_grouped(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple[Finding, ...]:
-    """Return one finding per rule for those that can sum up occurrences, else one per occurrence."""
+    """Return one finding per rule for those that can sum up occurrences, else one per occurrence.
+
+    Costly rules are left out.
+    """
     result: list[Finding] = []
-    for rule, found in occurrences(file, selection):
+    for rule, found in occurrences(file, selection, costly=False):
         parts: Sequence[Sequence[Occurrence]] = [found] if rule.problem is not None else [[each] for each in found]
         result += (rule.finding(part, file.facts.clips, selection.severity(rule)) for part in parts)
     return tuple(result)
 
 
-def occurrences(file: CheckedFile, selection: RuleSelection = DEFAULT) -> Iterator[tuple[Rule, list[Occurrence]]]:
+def occurrences(
+    file: CheckedFile, selection: RuleSelection = DEFAULT, *, costly: bool = True
+) -> Iterator[tuple[Rule, list[Occurrence]]]:
     """Yield each selected rule with its occurrences, if it has any."""
     for rule in selection.rules():
+        if rule.is_costly and not costly:
+            continue
         if found := list(rule.find(file, selection.values(rule))):
             yield rule, found

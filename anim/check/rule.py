@@ -48,6 +48,7 @@ class Rule:
     file. problem: text on several occurrences, which `inspect` lists as one finding; None: each has its own text.
     advice: the remedy, with {fps}, {finer} and {clips} for a command on these clips (see `advice.clip_advice`), or ""
     if each occurrence has its own. is_default: False for rules that only `--select` turns on.
+    is_costly: True for rules that sample whole clips; `inspect` leaves them to `check`.
     targets: severities for players named by `--target`.
     """
 
@@ -62,6 +63,7 @@ class Rule:
     fix: Fix | None = None
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: _NONE)
     is_default: bool = True
+    is_costly: bool = False
     targets: Mapping[str, Severity] = field(default_factory=lambda: MappingProxyType({}))
 
     def defaults(self) -> dict[str, float]:

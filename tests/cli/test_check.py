@@ -37,7 +37,8 @@ def test_findings_are_those_of_inspect_one_per_clip(folder: Path, call: Call) ->
     assert run.code == 0
     found = run.json["findings"]
     inspected = call("inspect", "noop.glb", "--format", "json").json["files"][0]["findings"]
-    assert {each["name"] for each in found} == {each["name"] for each in inspected}
+    costly = {"missing-end-frame", "clip-leaves-bounds"}  # those that sample whole clips
+    assert {each["name"] for each in found} - costly == {each["name"] for each in inspected}
     flips = [each for each in found if each["name"] == "sign-flips"]
     assert [each["where"] for each in flips] == ["clip 'signs'"]
     assert flips[0]["pointer"].startswith("/animations/")
@@ -83,7 +84,7 @@ def test_unreadable_files_exit_3_and_the_others_are_checked(folder: Path, call: 
         (("--select", "sign-flips,GA112"), {"GA103", "GA112"}),
         (
             ("--select", "GA1", "--ignore", "GA103,GA101"),
-            {"GA104", "GA105", "GA106", "GA107", "GA111", "GA112", "GA113"},
+            {"GA104", "GA105", "GA106", "GA107", "GA108", "GA111", "GA113"},
         ),
     ],
 )
