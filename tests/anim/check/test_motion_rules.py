@@ -1,0 +1,85 @@
+"""Rules on motion: planted faults are found, and the smooth motion that they were planted in is clean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from anim.arrays import Floats
+from anim.check.find import find_all
+from anim.check.finding import Finding
+from anim.check.selection import RuleSelection
+from anim.model import Track
+from tests.anim.check.test_rules import checked, found, with_tracks
+from tests.clips import track
+from tests.files import opened_fixture
+
+FRAMES = np.arange(40)
+Plant = Callable[[Floats], Floats]
+
+
+def swing(plant: Plant = lambda degrees: degrees) -> Track:
+    """Return a joint that swings about X by 30°, with a planted fault, and with random signs."""
+    degrees = plant(30 * np.sin(FRAMES / 6))
+    values = Rotation.from_euler("x", degrees[:, None], degrees=True).as_quat()
+    signs = np.where(np.random.default_rng(1).random(len(values)) < 0.5, -1.0, 1.0)
+    joint = opened_fixture("arm").json["skins"][0]["joints"][1]
+    return track("rotation", FRAMES / 30, values * signs[:, None], node=joint)
+
+
+def pop(degrees: Floats) -> Floats:
+    return np.asarray(degrees + 12.0 * (FRAMES == 20))
+
+
+def jump(degrees: Floats) -> Floats:
+    return np.asarray(degrees * 0.05 + 60.0 * (FRAMES >= 20))
+
+
+def tremble(degrees: Floats) -> Floats:
+    return np.asarray(degrees * 0.02 + 1.5 * (-1.0) ** FRAMES * ((FRAMES > 10) & (FRAMES < 22)))
+
+
+@pytest.mark.parametrize(("code", "plant"), [("GA301", pop), ("GA302", jump), ("GA303", tremble)])
+def test_planted_faults_are_found(code: str, plant: Plant) -> None:
+    def run(fault: Plant) -> list[Finding]:
+        return found(with_tracks(swing(fault)), code)
+
+    assert len(run(plant)) == 1
+    assert run(lambda degrees: degrees) == []
+    others = {"GA301": jump, "GA302": pop, "GA303": jump}
+    assert run(others[code]) == []
+
+
+@pytest.mark.parametrize(("angle", "count"), [("13deg", 0), ("5deg", 1), ("0.0873rad", 1)])
+def test_parameters_have_units(angle: str, count: int) -> None:
+    assert len(found(with_tracks(swing(pop)), "GA301", angle=angle)) == count
+
+
+def test_a_loop_that_creeps_is_found() -> None:
+    file = checked(opened_fixture("arm"))
+    root, way = file.joints[0], np.linspace(0, 1, 5)[:, None] * [0.02 * file.diagonal, 0, 0]
+    findings = found(with_tracks(track("translation", np.arange(5) / 4, way, node=root)), "GA305")
+    assert [each.problem for each in findings] == ["the root moves by 2 % of the model's size each time round"]
+    assert found(with_tracks(track("translation", np.arange(5) / 4, 0 * way, node=root)), "GA305") == []
+    assert found(with_tracks(track("translation", np.arange(5) / 4, 20 * way, node=root)), "GA305") == []
+
+
+def test_wide_steps_for_nlerp_and_stretched_joints() -> None:
+    joint = opened_fixture("arm").json["skins"][0]["joints"][1]
+    half = np.sqrt(0.5)
+    turn = track("rotation", [0, 1], [[0.0, 0.0, 0.0, 1.0], [half, 0.0, 0.0, half]], node=joint)
+    assert found(with_tracks(turn), "GA102")
+    assert "clip 'walk'" not in {each.where for each in found(with_tracks(swing()), "GA102")}
+    assert found(with_tracks(track("translation", [0, 1], [[0.0, 1, 0], [0.0, 2, 0]], node=joint)), "GA212")
+    assert found(with_tracks(swing()), "GA212") == []
+
+
+def test_they_are_off_unless_selected_or_the_target_needs_them() -> None:
+    file = checked(with_tracks(swing(pop)))
+    assert "GA301" not in {each.code for each in find_all(file)}
+    assert "GA301" in {each.code for each in find_all(file, RuleSelection(extend=("GA301",)))}
+    assert "GA102" in {rule.code for rule in RuleSelection(target="unity").rules()}
+    assert "GA102" not in {rule.code for rule in RuleSelection().rules()}
