@@ -20,7 +20,7 @@ from anim.measure.inspect.report import Facts
 from anim.operations.selection import Selection
 from cli import errors, tables
 from cli.errors import CheckError
-from cli.io import documents
+from cli.io import documents, input_files
 from cli.options import common
 from cli.reports import inspect_report
 from cli.reports.inspect_report import Inspected, Smoothness
@@ -39,7 +39,8 @@ class Format(StrEnum):
 
 def command(
     inputs: Annotated[
-        list[str] | None, typer.Argument(metavar="FILE...", help="Files to inspect; '-' for stdin.", show_default=False)
+        list[str] | None,
+        typer.Argument(metavar="FILE...", help="Files, folders, or patterns; '-' for stdin.", show_default=False),
     ] = None,
     *,
     format: Annotated[Format, typer.Option("--format", help="Text, or one JSON or CSV document.")] = Format.TEXT,
@@ -69,11 +70,12 @@ def command(
     done: list[Inspected] = []
     smooth: list[Smoothness] = []
     refused: list[AnimError] = []
-    for path in inputs or [documents.PIPE]:
+    paths = input_files.expand(inputs or [documents.PIPE])
+    for path in paths:
         try:
             inspected, tracks_of_clips = _inspected(path, selection, tracks=tracks, continuity=continuity)
         except AnimError as error:
-            if len(inputs or ()) < 2 and (format is Format.TEXT or not isinstance(error, FormatError)):
+            if len(paths) < 2 and (format is Format.TEXT or not isinstance(error, FormatError)):
                 raise
             inspected, tracks_of_clips = _unreadable(path, error), ()
         done.append(inspected)

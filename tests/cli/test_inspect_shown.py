@@ -79,7 +79,7 @@ def test_codes_and_breaks_in_names_are_shown_not_obeyed(call: Call, fixture: Fix
 
 
 def test_a_folder_is_refused_with_a_way_out(call: Call, tmp_path: Path) -> None:
-    run = call("inspect", tmp_path)
+    run = call("convert", tmp_path, "-")
     assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
     assert run.err.splitlines()[1] == "help: name a file (there is no .glb in it)"
     for name in ("b.glb", "a.glb"):
@@ -94,7 +94,7 @@ def test_a_name_that_looks_like_an_option_is_advised_as_a_path(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "-o.glb").write_bytes(built("noop"))
-    advised = call("inspect", ".").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
+    advised = call("convert", ".", "-").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
     assert advised == "./-o.glb"
     assert call("inspect", advised).code == 0
 
@@ -166,3 +166,13 @@ def test_severities_are_shown_as_fail_on_takes_them(call: Call, fixture: Fixture
     shown = {line.split()[0] for line in call("inspect", path).text.splitlines() if "gltf-anim optimize" in line}
     assert shown == {"info"}
     assert call("inspect", path, "--fail-on", *shown).code == 6
+
+
+def test_folders_and_patterns_are_inspected(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "crowd").mkdir()
+    for name in ("b.glb", "a.glb"):
+        (tmp_path / "crowd" / name).write_bytes(built("arm"))
+    for words in (tmp_path, f"{tmp_path}/**/*.glb"):
+        files = call("inspect", words, "--format", "json").json["files"]
+        assert [Path(each["file"]).name for each in files] == ["a.glb", "b.glb"]
+    assert call("inspect", f"{tmp_path}/*.gltf").code == 5
