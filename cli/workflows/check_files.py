@@ -83,16 +83,16 @@ class FileChecker:
             self._fix(path, selection, unsafe=self.unsafe)
         try:
             with checked_files.open_checked(path) as (_, opened):
-                file = self._with_budget(opened, path, config)
+                file, source_faults = self._with_budget(opened, path, config)
                 self.found += [(name, each) for each in find_all(file, selection)]
                 self.headroom += [(name, *each) for each in measure_budget(file)]
-                faults = file.facts.faults
+                self._report_faults(name, source_faults)
+                faults = (*file.facts.faults, *source_faults)
         except UsageError:
             raise
         except AnimError as error:
             faults = (checked_files.fault_of(path, error),)
-            for each in fault_occurrences(faults):
-                self.found.append((name, INVALID.finding([each], (), INVALID.severity)))
+            self._report_faults(name, faults)
         self.refused += [(name, fault) for fault in faults[:1]]
 
     def warn_of_unused_budgets(self) -> None:
@@ -101,6 +101,9 @@ class FileChecker:
             for budget in config.budgets:
                 if budget not in self._used:
                     self.voice.warn(f"{config.path}: the budget '{budget.match}' matches no checked file")
+
+    def _report_faults(self, name: str, faults: Sequence[AnimError]) -> None:
+        self.found += [(name, INVALID.finding([each], (), INVALID.severity)) for each in fault_occurrences(faults)]
 
     def _config(self, path: str) -> CheckConfig:
         folder = Path.cwd() if path == documents.PIPE else Path(path).resolve().parent
@@ -112,17 +115,32 @@ class FileChecker:
             self._configs[config.path] = config
         return config
 
-    def _with_budget(self, file: CheckedFile, path: str, config: CheckConfig) -> CheckedFile:
-        """The file with its limits, and with the source that its error is measured against."""
+    def _with_budget(
+        self, file: CheckedFile, path: str, config: CheckConfig
+    ) -> tuple[CheckedFile, tuple[AnimError, ...]]:
+        """The file with its limits, and with the source that its error is measured against; faults of the source.
+
+        Without the source, all other limits hold.
+        """
         budget = config.budget_of(Path(path))
         if budget is None:
-            return file
+            return file, ()
         self._used.add(budget)
+        limited = replace(file, budget=dict(budget.limits))
         if not budget.error:
-            return replace(file, budget=dict(budget.limits))
-        with checked_files.open_checked(str(config.source_of(Path(path), budget))) as (_, source):
-            limit = units.parse_length(budget.error, "error", lambda: source.diagonal)
-            return replace(file, budget={**dict(budget.limits), ERROR: limit}, source=source)
+            return limited, ()
+        source_path = str(config.source_of(Path(path), budget))
+        try:
+            with checked_files.open_checked(source_path) as (_, source):
+                limit = units.parse_length(budget.error, "error", lambda: source.diagonal)
+                return replace(limited, budget={**limited.budget, ERROR: limit}, source=source), ()
+        except UsageError:
+            raise
+        except AnimError as error:
+            fault = checked_files.fault_of(source_path, error)
+            fault.where = f"source {Path(source_path).relative_to(config.folder).as_posix()}"
+            fault.help = f"correct `against` of [[budget]] in {Path(config.path).name}"
+            return limited, (fault,)
 
     def _fix(self, path: str, selection: RuleSelection, *, unsafe: bool) -> None:
         """Fix a file in place; broken ones stay as they are, and are reported when they are checked."""

@@ -305,6 +305,21 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     assert [line.split()[1] for line in table.splitlines()[1:]] == ["bytes", "keys", "clips"]
 
 
+def test_a_missing_source_leaves_the_other_findings_and_limits(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(
+        '[[budget]]\nmatch = "noop.glb"\nclips = 3\nerror = "1mm"\nagainst = "source/{path}"\n'
+    )
+    run = call("check", "noop.glb", "--format", "json")
+    assert run.code == 3
+    found = {each["name"]: each for each in run.json["findings"]}
+    assert {"over-budget", "no-effect-tracks"} <= set(found)
+    assert found["invalid"]["where"] == "source source/noop.glb"
+    assert found["invalid"]["problem"] == "can't be read (no such file or directory)"
+    assert found["invalid"]["advice"] == "correct `against` of [[budget]] in gltf-anim.toml"
+    assert str(folder) not in run.text
+    assert "noop.glb: source source/noop.glb: can't be read" in run.err
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
