@@ -16,7 +16,7 @@ from anim.check.fixing import fix_all
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.rules.invalid import fault_occurrences
 from anim.check.selection import RuleSelection
-from anim.errors import AnimError, FormatError
+from anim.errors import AnimError, FormatError, UnsupportedError
 from cli import units
 from cli.errors import UsageError
 from cli.io import documents
@@ -146,12 +146,16 @@ class FileChecker:
         """Fix a file in place; broken ones stay as they are, and are reported when they are checked."""
         if path == documents.PIPE:
             raise UsageError("stdin can't be fixed in place: name files")
-        with suppress(FormatError), checked_files.open_checked(path) as (source, file):
-            result = fix_all(file, selection, unsafe=unsafe)
+        with suppress(FormatError, UnsupportedError), checked_files.open_checked(path) as (source, file):
+            try:
+                result = fix_all(file, selection, unsafe=unsafe)
+            except AnimError as error:
+                self.voice.warn(f"{source.name} is not fixed: {error}")
+                return
             for each in result.refused:
-                error = format_length(each.error_m)
+                distance = format_length(each.error_m)
                 rule = f"{each.rule.code} {each.rule.name}"
-                self.voice.warn(f"{source.name}: {rule} is not fixed: a vertex would move by {error}")
+                self.voice.warn(f"{source.name}: {rule} is not fixed: a vertex would move by {distance}")
             if result.applied:
                 documents.write(result.document, path, source, dry_run=self.dry_run, voice=self.voice)
                 fixes = ", ".join(

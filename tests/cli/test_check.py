@@ -11,6 +11,8 @@ import pytest
 
 from anim.check.finding import Severity
 from anim.check.registry import RULES
+from anim.errors import UnsupportedError
+from cli.workflows import check_files
 from tests.cli.conftest import Call
 from tests.cli.running import built
 from tests.files import glb_of, opened
@@ -334,3 +336,16 @@ def test_wrong_budgets_are_refused(text: str, words: str, folder: Path, call: Ca
     run = call("check", "noop.glb")
     assert (run.code, run.text) == (2, "")
     assert words in run.err
+
+
+def test_a_file_that_cannot_be_fixed_stays_and_the_others_are_fixed(
+    folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*args: object, **options: object) -> None:
+        raise UnsupportedError("has an extension that names its keys")
+
+    monkeypatch.setattr(check_files, "fix_all", refuse)
+    before = (folder / "noop.glb").read_bytes()
+    run = call("check", "noop.glb", "--fix", "-q")
+    assert (run.code, run.err) == (0, "warning: noop.glb is not fixed: has an extension that names its keys\n")
+    assert (folder / "noop.glb").read_bytes() == before
