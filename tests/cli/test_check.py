@@ -85,7 +85,7 @@ def test_unreadable_files_exit_3_and_the_others_are_checked(folder: Path, call: 
         (("--select", "GA103"), {"GA103"}),
         (("--select", "sign-flips,GA112"), {"GA103", "GA112"}),
         (
-            ("--select", "GA1", "--ignore", "GA103,GA101"),
+            ("--select", "GA1", "--ignore", "GA103,GA101,GA102"),
             {"GA104", "GA105", "GA106", "GA107", "GA108", "GA111", "GA113"},
         ),
     ],
