@@ -16,7 +16,7 @@ from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.gltf.writing.append import append_mesh, append_nodes
-from anim.model import Clip, Scene
+from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling.sample import sample
 from anim.simulation.cloth.colliders import Capsule, Plane, from_spring_colliders
 from anim.simulation.cloth.driver import ClothDriver
@@ -517,3 +517,15 @@ def flag() -> tuple[Scene, Clip, int, NDArray[np.bool_]]:
     instance = next(each for each in scene.instances if each.mesh.name == "flag")
     pinned = select_vertices("x-min", instance, instance.mesh.positions, scene.skeleton.names, [])
     return scene, reader.clips(document)[0], instance.node, pinned
+
+
+def test_stretch_of_pinned_points_by_the_clip_is_no_divergence() -> None:
+    """Two triangles, one pinned: the clip scales its edges to five times their rest length, as joints of a skin may."""
+    triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1]])
+    scene, node = scene_of(np.vstack((triangle, triangle + np.array([3, 0, 0]))), np.arange(6).reshape(2, 3))
+    scaling = Track(node, "scale", Interpolation.LINEAR, [0.0, 0.2], [[1, 1, 1], [5, 5, 5]])
+    options = ClothOptions(duration=0.2)
+    run = simulate_cloth(scene, Clip("grow", (scaling,)), node, np.arange(6) < 3, options)
+    positions = run.cache.load_all().positions.astype(float)[-1]
+    assert np.linalg.norm(positions[1] - positions[0]) == pytest.approx(5)
+    assert np.linalg.norm(positions[4] - positions[3]) == pytest.approx(1, abs=0.01)
