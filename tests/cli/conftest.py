@@ -63,3 +63,13 @@ def walk(tmp_path: Path) -> Path:
     path = tmp_path / "walk.glb"
     path.write_bytes(built("biped"))
     return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Three files: one with findings, one without, one that is not glTF."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "crowd").mkdir()
+    (tmp_path / "noop.glb").write_bytes(built("noop"))
+    (tmp_path / "crowd" / "arm 1.glb").write_bytes(built("arm"))
+    return tmp_path

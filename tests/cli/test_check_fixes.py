@@ -1,0 +1,67 @@
+"""`check --fix`: files are fixed in place, or stay as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from anim.errors import UnsupportedError
+from cli.workflows import check_files
+from tests.cli.checking import codes
+from tests.cli.conftest import Call
+from tests.cli.running import built
+from tests.files import glb_of, opened
+
+
+def test_safe_fixes_change_the_file_in_place_once(folder: Path, call: Call) -> None:
+    path = folder / "noop.glb"
+    before = path.read_bytes()
+    dry = call("check", "noop.glb", "--fix", "--dry-run")
+    assert path.read_bytes() == before
+    assert "(dry run: nothing written)" in dry.err
+    run = call("check", "noop.glb", "--fix", "--format", "json")
+    assert not {"GA101", "GA103", "GA104", "GA105"} & codes(run.json)
+    assert "fixed" in run.err
+    fixed = path.read_bytes()
+    assert fixed != before
+    (folder / "before.glb").write_bytes(before)
+    assert call("diff", "before.glb", "noop.glb", "--fail-above", "0.0001%").code == 0
+    again = call("check", "noop.glb", "--fix")
+    assert (path.read_bytes(), again.err) == (fixed, "")
+
+
+def test_unsafe_fixes_need_their_option(folder: Path, call: Call) -> None:
+    rename(folder / "noop.glb", ["", "walk", "walk"])
+    assert codes(call("check", "noop.glb", "--fix", "--select", "GA0", "--format", "json").json) == {"GA001", "GA002"}
+    run = call("check", "noop.glb", "--unsafe-fixes", "--select", "GA0", "--format", "json")
+    assert codes(run.json) == set()
+    clips = call("inspect", "noop.glb", "--format", "json").json["files"][0]["clips"]
+    assert [clip["name"] for clip in clips][:3] == ["animation_0", "walk", "walk_2"]
+
+
+def rename(path: Path, names: list[str]) -> None:
+    document = opened(path.read_bytes())
+    for animation, name in zip(document.json["animations"], names, strict=False):
+        animation["name"] = name
+    path.write_bytes(glb_of(document))
+
+
+def test_broken_files_and_stdin_are_not_fixed(folder: Path, call: Call) -> None:
+    (folder / "bad.glb").write_bytes(b"no glTF")
+    assert call("check", "bad.glb", "--fix").code == 3
+    assert (folder / "bad.glb").read_bytes() == b"no glTF"
+    assert call("check", "-", "--fix", stdin=built("noop")).code == 2
+
+
+def test_a_file_that_cannot_be_fixed_stays_and_the_others_are_fixed(
+    folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*args: object, **options: object) -> None:
+        raise UnsupportedError("has an extension that names its keys")
+
+    monkeypatch.setattr(check_files, "fix_all", refuse)
+    before = (folder / "noop.glb").read_bytes()
+    run = call("check", "noop.glb", "--fix", "-q")
+    assert (run.code, run.err) == (0, "warning: noop.glb is not fixed: has an extension that names its keys\n")
+    assert (folder / "noop.glb").read_bytes() == before

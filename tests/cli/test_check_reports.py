@@ -1,0 +1,61 @@
+"""`check`: reports for CI systems, and the list of rules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from anim.check.registry import RULES
+from tests.cli.conftest import Call
+from tests.cli.running import built
+
+
+def test_github_shows_ten_of_a_severity_and_escapes_names(folder: Path, call: Call) -> None:
+    for i in range(12):
+        (folder / f"{i}, a%.glb").write_bytes(built("noop"))
+    lines = call("check", ".", "--format", "github", "--select", "GA103").text.splitlines()
+    notices = [line for line in lines if line.startswith("::notice")]
+    assert len(notices) == 10
+    assert notices[0].startswith("::notice file=0%2C a%25.glb,title=GA103 sign-flips::")
+    assert "4 more" in notices[-1]
+
+
+def test_sarif_has_a_region_and_an_encoded_path_in_every_result(folder: Path, call: Call) -> None:
+    (folder / "a b#.glb").write_bytes(built("noop"))
+    run = call("check", "a b#.glb", "--format", "sarif").json["runs"][0]
+    rules = run["tool"]["driver"]["rules"]
+    assert run["results"]
+    for result in run["results"]:
+        place = result["locations"][0]["physicalLocation"]
+        assert place == {"artifactLocation": {"uri": "a%20b%23.glb"}, "region": {"startLine": 1}}
+        assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
+    prints = [result["partialFingerprints"]["gltfAnim/v1"] for result in run["results"]]
+    assert len(set(prints)) == len(prints)
+
+
+def test_junit_has_a_case_per_file(folder: Path, call: Call) -> None:
+    (folder / "bad.glb").write_bytes(b"no glTF")
+    root = ElementTree.fromstring(call("check", ".", "--format", "junit").text)
+    cases = {case.attrib["name"]: [child.tag for child in case] for case in root.iter("testcase")}
+    assert cases["bad.glb"] == ["error"]
+    assert cases["noop.glb"] == ["system-out"]
+    assert root.attrib["tests"] == "3"
+
+
+def test_markdown_is_a_table_that_names_cannot_break(folder: Path, call: Call) -> None:
+    (folder / "a_b [x].glb").write_bytes(built("noop"))
+    out = call("check", "a_b [x].glb", "--format", "md", "--select", "GA103").text
+    assert "| a\\_b \\[x\\].glb | info | GA103 sign-flips |" in out
+    (folder / "<a|b>&.glb").write_bytes(built("noop"))
+    out = call("check", "<a|b>&.glb", "--format", "md", "--select", "GA103").text
+    assert "| &#60;a&#124;b&#62;&#38;.glb | info |" in out
+
+
+def test_every_rule_is_listed_and_explained(call: Call) -> None:
+    listed = call("check", "--list").text
+    for rule in RULES:
+        assert f"{rule.code}  {rule.name}" in listed
+        text = call("check", "--explain", rule.name).text
+        assert text.startswith(f"{rule.code} {rule.name}  [")
+        assert rule.about in text
+        assert "{" not in text

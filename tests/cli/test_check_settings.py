@@ -1,0 +1,102 @@
+"""`check`: settings, budgets and baselines."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.cli.checking import codes
+from tests.cli.conftest import Call
+
+
+def test_settings_come_from_the_nearest_file_upwards(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(
+        '[check]\nselect = ["GA1"]\nfail-on = "info"\nparams = {"GA109.regular" = 0.5}\n'
+        '[[check.files]]\nmatch = "noop.*"\nignore = ["GA103"]\n'
+    )
+    run = call("check", "noop.glb", "--format", "json")
+    assert run.code == 6
+    assert "GA103" not in codes(run.json)
+    (folder / "crowd" / "pyproject.toml").write_text('[tool.gltf-anim.check]\nignore = ["ALL"]\n')
+    assert call("check", "crowd", "--fail-on", "info").code == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[check]\nselct = []\n", "unknown key 'check.selct'"),
+        ("[checks]\n", "did you mean check?"),
+        ('[check]\nselect = "GA1"\n', "check.select is str (expected list)"),
+        ('[check]\nfail-on = "bad"\n', "expected one of error, warning, info"),
+        ('[check]\nselect = ["GA999"]\n', "gltf-anim.toml: there is no rule 'GA999'"),
+        ('[check]\ntarget = "nobody"\n', "there is no target"),
+        ('[[check.files]]\nignore = ["GA1"]\n', "has no match"),
+        ("[check\n", "gltf-anim.toml: "),
+    ],
+)
+def test_wrong_settings_are_refused(text: str, words: str, folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(text)
+    run = call("check", "noop.glb")
+    assert (run.code, run.text) == (2, "")
+    assert words in run.err
+
+
+def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text("[check]\n")
+    (folder / "pyproject.toml").write_text("[tool.gltf-anim]\n")
+    assert "expected one of them" in call("check", "noop.glb").err
+
+
+def test_only_what_is_new_counts_with_a_baseline(folder: Path, call: Call) -> None:
+    assert call("check", "noop.glb", "--write-baseline", "known.json", "--fail-on", "info").code == 0
+    run = call("check", "noop.glb", "--baseline", "known.json", "--fail-on", "info", "--format", "json")
+    assert run.code == 0
+    assert run.json["findings"] == []
+    run = call("check", "crowd/arm 1.glb", "--baseline", "known.json", "--format", "json")
+    assert run.json["gone"]
+    (folder / "known.json").write_text("[]")
+    run = call("check", "noop.glb", "--baseline", "known.json")
+    assert (run.code, run.err) == (3, "gltf-anim: known.json: is no baseline (expected JSON of --write-baseline)\n")
+
+
+def test_settings_in_the_help_are_toml(call: Call) -> None:
+    text = call("check", "--help").text
+    settings = tomllib.loads(text[text.index("[check]") : text.index("--write-baseline")])
+    assert settings["check"]["fail-on"] == "warning"
+    assert settings["check"]["files"] == [{"match": "crowd/**", "ignore": ["GA2"]}]
+    assert settings["budget"][0]["bytes"] == 500_000
+
+
+def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None:
+    assert call("resample", "noop.glb", "coarse.glb", "--fps", "2").code == 0
+    (folder / "gltf-anim.toml").write_text(
+        '[[budget]]\nmatch = "noop.*"\nclips = 3\nbytes = 1_000_000\nkeys = 100_000\n'
+        '[[budget]]\nmatch = "coarse.*"\nerror = "1mm"\nagainst = "noop.glb"\n'
+        '[[budget]]\nmatch = "none/**"\nbytes = 1\n'
+    )
+    run = call("check", ".", "--format", "json", "--select", "GA402")
+    assert run.code == 6
+    assert "the budget 'none/**' matches no checked file" in run.err
+    found = {(each["file"], each["where"]): each["problem"] for each in run.json["findings"]}
+    assert set(found) == {("noop.glb", "clips"), ("coarse.glb", "error")}
+    assert found["noop.glb", "clips"].startswith("clips is ")
+    table = call("check", "noop.glb", "--budget-report").text
+    assert [line.split()[1] for line in table.splitlines()[1:]] == ["bytes", "keys", "clips"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('match = "*"\nbyte = 3', "did you mean bytes?"),
+        ('match = "*"\nbytes = "3 MB"', "budget.bytes is str (expected a number)"),
+        ("bytes = 3", "has no match"),
+        ('match = "*"\nerror = "1mm"', "has no against"),
+    ],
+)
+def test_wrong_budgets_are_refused(text: str, words: str, folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text(f"[[budget]]\n{text}\n")
+    run = call("check", "noop.glb")
+    assert (run.code, run.text) == (2, "")
+    assert words in run.err
