@@ -85,5 +85,6 @@ def driving_clip(document: Document, glob: str | None) -> int | None:
     chosen = Selection((glob,)).chosen_clips(names)
     if len(chosen) > 1:
         listed = ", ".join(reader.clip_label(names[i], i) for i in chosen[:4])
-        raise UsageError(f"--clip '{glob}' names {len(chosen)} clips ({listed} …): one drives a simulation")
+        more = " …" if len(chosen) > 4 else ""
+        raise UsageError(f"--clip '{glob}' names {len(chosen)} clips ({listed}{more}): one drives a simulation")
     return chosen[0]

@@ -71,6 +71,20 @@ def test_three_js_measures_the_error_of_removed_keys(form: str, fixture: Fixture
     assert 1e-5 < max(each.max_error for each in found.clips) <= 1.001e-3
 
 
+@pytest.mark.parametrize(("ending", "words"), [(".npz", "holds points without faces"), (".usda", "are no mesh")])
+def test_points_are_no_vertex_cache(ending: str, words: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    simulate(call, fixture("biped"), tmp_path / f"a{ending}", *SPARKS)
+    run = call("render", tmp_path / f"a{ending}", tmp_path / "a.png")
+    assert run.code == 3
+    assert words in run.err
+
+
+def test_two_driving_clips_are_listed_without_an_ellipsis(fixture: Fixture, call: Call) -> None:
+    run = call("simulate", "particles", fixture("biped"), "-", "--node", "head", "--clip", "w*")
+    assert (run.code, run.out) == (2, b"")
+    assert "names 2 clips (clip 'walk', clip 'wave'): one" in run.err
+
+
 def test_more_than_two_thousand_nodes_are_warned_of(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     said = simulate(call, fixture("flag"), tmp_path / "out.glb", "--node", "pole", "--rate", "0", "--burst", "2001")
     assert "warning: 2001 nodes: players take about a second" in said

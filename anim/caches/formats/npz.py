@@ -42,6 +42,8 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # of every member, for reproducible bytes
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the cache in the main file; frames are read on iteration, a chunk at a time."""
     with inputs.open(inputs.main) as file, _opened(file) as archive:
+        if {"offsets.npy", "ids.npy"} <= set(archive.namelist()):
+            raise FormatError("holds points without faces, of `simulate particles` (expected positions of vertices)")
         shape = _shape(archive, "positions")
         if shape is None:
             raise FormatError("has no array 'positions' (expected positions, times and faces)")

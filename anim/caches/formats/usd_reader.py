@@ -68,7 +68,7 @@ class _Stage:
         self._ends = np.cumsum([0, *counts])
         self.vertices = int(self._ends[-1])
         if not self.vertices:
-            raise FormatError("has no mesh with points")
+            raise FormatError("has no mesh with points (points of `simulate particles` are no mesh)")
         self.rate = float(self._stage.GetTimeCodesPerSecond()) or usd_writer.DEFAULT_FPS
         self.unit = float(geom.GetStageMetersPerUnit(self._stage))
         self.up = "z" if geom.GetStageUpAxis(self._stage) == geom.Tokens.z else "y"

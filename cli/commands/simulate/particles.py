@@ -56,7 +56,14 @@ class Source(StrEnum):
 
 def command(
     input: common.Input = "-",
-    output: common.Output = "-",
+    output: Annotated[
+        str,
+        typer.Argument(
+            metavar="OUT",
+            help="A .glb or .gltf file, '-' for stdout (GLB); or points as .npz, .usdc or .usda.",
+            show_default=False,
+        ),
+    ] = "-",
     *,
     node: Annotated[
         list[str], typer.Option("--node", metavar="GLOB", help="Nodes that emit; may be repeated.", show_default=False)
