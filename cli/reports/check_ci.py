@@ -110,17 +110,20 @@ def as_junit(report: CheckReport) -> str:
     by_file: dict[str, list[Finding]] = {path: [] for path in report.files}
     for path, each in report.found:
         by_file[path].append(each)
-    failures = sum(any(each.severity is Severity.ERROR for each in found) for found in by_file.values())
+    errors = {path: [each for each in found if each.severity is Severity.ERROR] for path, found in by_file.items()}
+    failures = sum(bool(found) and path not in refused for path, found in errors.items())
     counts = {"tests": str(len(by_file)), "failures": str(failures), "errors": str(len(refused))}
     root = ElementTree.Element("testsuites", counts)
     suite = ElementTree.SubElement(root, "testsuite", {"name": "gltf-anim check", **counts, "skipped": "0"})
     for path, found in by_file.items():
         case = ElementTree.SubElement(suite, "testcase", {"name": _xml(path), "classname": "gltf-anim"})
         if path in refused:
-            ElementTree.SubElement(case, "error", {"message": _xml(str(refused[path]))})
-        elif errors := [each for each in found if each.severity is Severity.ERROR]:
-            failure = ElementTree.SubElement(case, "failure", {"message": _xml(_line(errors[0])), "type": "error"})
-            failure.text = "\n".join(_xml(_line(each)) for each in errors)
+            outcome = ElementTree.SubElement(case, "error", {"message": _xml(str(refused[path]))})
+            outcome.text = "\n".join(_xml(_line(each)) for each in errors[path])
+        elif errors[path]:
+            message = _xml(_line(errors[path][0]))
+            outcome = ElementTree.SubElement(case, "failure", {"message": message, "type": "error"})
+            outcome.text = "\n".join(_xml(_line(each)) for each in errors[path])
         if others := [each for each in found if each.severity is not Severity.ERROR]:
             ElementTree.SubElement(case, "system-out").text = "\n".join(_xml(_line(each)) for each in others)
     ElementTree.indent(root, " ")

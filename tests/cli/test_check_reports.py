@@ -59,3 +59,12 @@ def test_every_rule_is_listed_and_explained(call: Call) -> None:
         assert text.startswith(f"{rule.code} {rule.name}  [")
         assert rule.about in text
         assert "{" not in text
+
+
+def test_junit_counts_a_broken_file_as_an_error_alone(folder: Path, call: Call) -> None:
+    (folder / "bad.glb").write_bytes(b"no glTF")
+    run = call("check", "bad.glb", "noop.glb", "--format", "junit")
+    root = ElementTree.fromstring(run.text)
+    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("2", "0", "1")
+    assert len(root.findall(".//error")) == 1
+    assert "GA010" in (root.findtext(".//error") or "")
