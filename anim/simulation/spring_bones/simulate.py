@@ -146,7 +146,7 @@ def _run(
     if not duration > 0:
         raise RangeError(
             f"`duration` is {duration:g} s (expected more than 0)",
-            help="choose `duration`, since the clip has no length",
+            help="choose `duration`, since no clip has a length",
         )
     steps = Steps(options.step, duration, options.warm_up)
     if options.loop:

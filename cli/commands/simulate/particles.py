@@ -151,7 +151,8 @@ def command(
     """Emit particles from nodes, and let forces move them.
 
     Each is a node with one shared mesh, or a joint of one skinned mesh; a node is used again when its particle has
-    died. OUT.npz, .usdc or .usda hold points with ids instead. Without drag, turbulence and attractors, and with
+    died. Their clip is a new one, without the motion of the driving clip; --merge adds them to that. OUT.npz, .usdc or
+    .usda hold points with ids instead. Without drag, turbulence and attractors, and with
     verlet, velocity-verlet or rk4 only, a path is written as the exact parabolas between impacts; else it has a key per
     frame, of which --max-error removes some. The time of an impact is found inside the step. Wind and turbulence need
     drag. Obstacles and attractors on nodes follow the clip in every step. --floor, --sphere and --box stop the centers
