@@ -91,7 +91,10 @@ class FileChecker:
         except UsageError:
             raise
         except AnimError as error:
-            faults = (checked_files.fault_of(path, error),)
+            fault = checked_files.fault_of(path, error)
+            if path != documents.PIPE and not Path(path).exists():
+                fault.help = "name another file"
+            faults = (fault,)
             self._report_faults(name, faults)
         self.refused += [(name, fault) for fault in faults[:1]]
 

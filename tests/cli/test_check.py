@@ -133,3 +133,10 @@ def test_rules_are_selected_by_code_prefix_and_name(
     found = codes(call("check", "noop.glb", "--format", "json", *options).json)
     assert found == kept & found
     assert found
+
+
+def test_advice_on_a_missing_file_is_about_its_name(folder: Path, call: Call) -> None:
+    run = call("check", "none.glb")
+    assert run.code == 3
+    assert "name another file" in run.text
+    assert "where the file is made" not in run.text
