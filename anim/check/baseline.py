@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from anim.check.finding import Finding
 from anim.errors import FormatError
@@ -18,9 +18,12 @@ def fingerprint(path: str, finding: Finding) -> str:
     return f"{finding.code}:{path}:{finding.where}"
 
 
-def dump(found: Iterable[FileFinding]) -> str:
-    """Return the JSON of a baseline, sorted, so that versions of it can be compared line by line."""
-    counts = Counter(fingerprint(*each) for each in found)
+def dump(found: Iterable[FileFinding], rename: Callable[[str], str] = str) -> str:
+    """Return the JSON of a baseline, sorted, so that versions of it can be compared line by line.
+
+    rename: gives the path of a file that the baseline names.
+    """
+    counts = Counter(fingerprint(rename(path), each) for path, each in found)
     return json.dumps({"schema": SCHEMA, "findings": dict(sorted(counts.items()))}, indent=1, ensure_ascii=False) + "\n"
 
 
@@ -38,12 +41,14 @@ def load(text: str) -> Counter[str]:
     return Counter(findings)
 
 
-def split(found: Sequence[FileFinding], known: Counter[str]) -> tuple[list[FileFinding], Counter[str]]:
+def split(
+    found: Sequence[FileFinding], known: Counter[str], rename: Callable[[str], str] = str
+) -> tuple[list[FileFinding], Counter[str]]:
     """Return the findings that are not known, and the known ones that are gone, with their counts."""
     left = known.copy()
     new = []
     for each in found:
-        key = fingerprint(*each)
+        key = fingerprint(rename(each[0]), each[1])
         if left[key] > 0:
             left[key] -= 1
         else:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -127,7 +130,8 @@ def command(
 
     --write-baseline keeps the findings of today, by rule, file and part; with --baseline only new ones count.
     Budgets limit bytes, animation_bytes, keys, keys_per_second, seconds, clips, joints, targets, and the error against
-    a source; --budget-report shows the values beside the limits.
+    a source ({path}: the file's path from the folder of the settings; {name}: its name). --budget-report shows the
+    values beside the limits.
     --format github prints annotations, sarif is for code scanning, junit for test reports, md for job summaries.
     """
     if explain is not None:
@@ -156,25 +160,23 @@ def command(
         documents.write_text(check_report.budget_table(checker.headroom))
         return _worst(checker.refused, len(checker.files))
     if write_known is not None:
-        documents.write_text(baseline.dump(checker.found), write_known)
+        documents.write_text(baseline.dump(checker.found, _relative_to(write_known)), write_known)
         voice.info(f"{write_known}  {len(checker.found)} findings")
         return _worst(checker.refused, len(checker.files))
     report = CheckReport(checker.files, checker.found, checker.refused)
-    return _report(report, expected, checker.limits, format, quiet=quiet)
+    if expected is not None and known is not None:
+        new, gone = baseline.split(report.found, expected, _relative_to(known))
+        report = replace(report, found=new, known=len(report.found) - len(new), gone=sorted(gone.items()))
+    return _report(report, checker.limits, format, quiet=quiet)
 
 
 def _report(
     report: CheckReport,
-    expected: Counter[str] | None,
     limits: Mapping[str, Severity],
     format: Format,
     *,
     quiet: bool,
 ) -> int:
-    if expected is not None:
-        new, gone = baseline.split(report.found, expected)
-        known = len(report.found) - len(new)
-        report = CheckReport(report.files, new, report.refused, known, sorted(gone.items()))
     if format is not Format.TEXT or not quiet:
         documents.write_text(WRITERS[format](report))
     worst = _worst(report.refused, len(report.files))
@@ -203,6 +205,19 @@ def _parameters(words: Sequence[str]) -> dict[str, str]:
             raise UsageError(f"--param is '{each}' (expected RULE.NAME=VALUE, like GA201.influences=8)")
         found[key] = value
     return found
+
+
+def _relative_to(path: str) -> Callable[[str], str]:
+    """Names of files as a baseline has them: relative to its folder, wherever the command is run."""
+    folder = Path.cwd() if path == documents.PIPE else Path(path).resolve().parent
+    return lambda name: name if name == documents.called(documents.PIPE) else _relative(Path(name).resolve(), folder)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # on another drive
+        return path.as_posix()
 
 
 def _load_baseline(path: str) -> Counter[str]:

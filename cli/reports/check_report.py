@@ -81,6 +81,8 @@ def budget_table(rows: Sequence[tuple[str, str, float, float]]) -> str:
     cells: list[list[tables.Cell]] = [
         [path, name, value, limit, f"{100 * value / limit:.0f} %" if limit else ""] for path, name, value, limit in rows
     ]
+    if not cells:
+        return "no checked file has a budget\n"
     return tables.text(["file", "budget", "value", "limit", "used"], cells, left=2, indent="")
 
 

@@ -81,7 +81,7 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     assert "the budget 'none/**' matches no checked file" in run.err
     found = {(each["file"], each["where"]): each["problem"] for each in run.json["findings"]}
     assert set(found) == {("noop.glb", "clips"), ("coarse.glb", "error")}
-    assert found["noop.glb", "clips"].startswith("clips is ")
+    assert found["noop.glb", "clips"].endswith("above the limit of 3 (300 %)")
     table = call("check", "noop.glb", "--budget-report").text
     assert [line.split()[1] for line in table.splitlines()[1:]] == ["bytes", "keys", "clips"]
 
@@ -100,3 +100,14 @@ def test_wrong_budgets_are_refused(text: str, words: str, folder: Path, call: Ca
     run = call("check", "noop.glb")
     assert (run.code, run.text) == (2, "")
     assert words in run.err
+
+
+def test_a_baseline_is_the_same_from_every_folder(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    call("check", ".", "--write-baseline", "known.json")
+    monkeypatch.chdir(folder / "crowd")
+    run = call("check", "..", "--baseline", "../known.json", "--format", "json", "--fail-on", "info")
+    assert (run.code, run.json["findings"], run.json["gone"]) == (0, [], {})
+
+
+def test_no_budget_is_said(folder: Path, call: Call) -> None:
+    assert call("check", "noop.glb", "--budget-report").text == "no checked file has a budget\n"

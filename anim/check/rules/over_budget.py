@@ -15,8 +15,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for name, value, limit in measure_budget(file):
         if value > limit:
             unit = " m" if name == ERROR else ""
-            share = f", {100 * value / limit:.0f} %" if limit else ""
-            problem = f"{name} is {value:.6g}{unit} (limit {limit:.6g}{unit}{share})"
+            share = f" ({100 * value / limit:.0f} %)" if limit else ""
+            problem = f"{value:.6g}{unit}, above the limit of {limit:.6g}{unit}{share}"
             yield Occurrence(name, "", value=value, problem=problem, name=name)
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameter, Parameters, Rule, counted
+from anim.model import Interpolation
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips with the number of such keys."""
-    table = file.scales
+    """Yield the clips with the number of such keys; under STEP they hide a node, which works everywhere."""
+    table = file.tracks("scale", lambda track: track.interpolation is not Interpolation.STEP)
     zero = np.asarray((np.abs(table.values) < parameters["scale"]).any(axis=1))
     yield from file.per_clip(table, table.count(zero))
 

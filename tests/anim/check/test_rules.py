@@ -189,6 +189,11 @@ def test_a_rule_is_silent_on_a_sound_file(code: str) -> None:
     assert found(SOUND.get(code, opened_fixture("arm")), code) == []
 
 
+def test_a_node_hidden_by_step_is_no_zero_scale() -> None:
+    hidden = track("scale", np.array([0.0, 1.0]), [[1, 1, 1], [0, 0, 0]], STEP, node=1)
+    assert found(with_tracks(hidden), "GA116") == []
+
+
 def test_steps_that_are_not_isolated_are_no_lost_step() -> None:
     assert found(with_tracks(steps([0] * 5 + [1, 2, 3] + [3] * 6)), "GA114") == []
 
