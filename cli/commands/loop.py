@@ -157,7 +157,7 @@ def _report(
             else:
                 judged.append((i, analyze_loop(skin, clips[i], root=root)))
                 rows.append((name, judged[-1][1]))
-    advised, notes = list(recommend(judged)), list(_no_better(clips, parts))
+    advised, notes = list(recommend(judged)), list(_no_better(clips, parts)) if clips else ["no clips"]
     if format is Format.JSON:
         documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
     elif not voice.quiet:

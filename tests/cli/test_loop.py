@@ -32,6 +32,11 @@ def test_json_has_units_in_its_keys(call: Call, fixture: Fixture) -> None:
     assert {"clip", "kind", "start_s", "end_s", "seam_m", "speed_seam_m_per_s", "travel_m"} <= report["loops"][0].keys()
 
 
+@pytest.mark.parametrize("options", [(), ("--find",)])
+def test_a_file_without_clips_is_called_so(options: tuple[str, ...], call: Call, fixture: Fixture) -> None:
+    assert call("loop", fixture("wall"), *options).text == "  no clips\n"
+
+
 def test_a_file_without_a_vertex_is_measured_at_nodes(call: Call, fixture: Fixture) -> None:
     document = opened(fixture("biped").read_bytes())
     nodes = [
