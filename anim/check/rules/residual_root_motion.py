@@ -27,7 +27,7 @@ def problem(found: Sequence[Occurrence]) -> str:
 
 RULE = Rule(
     "GA305",
-    "root-drift",
+    "residual-root-motion",
     Severity.INFO,
     "A loop in place moves its root a little each time round.",
     "Players that add up root motion let the figure creep away.",

@@ -23,7 +23,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 RULE = Rule(
     "GA212",
-    "joint-stretch",
+    "translated-joints",
     Severity.INFO,
     "Joints below others are translated.",
     "Retargeting keeps lengths, and VRM animations allow translations of the hips only.",
