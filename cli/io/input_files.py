@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -21,15 +22,15 @@ def expand(inputs: Sequence[str]) -> list[str]:
 
 
 def _expand_one(path: str) -> list[str]:
-    if path == documents.PIPE:
+    if path in ("", documents.PIPE):  # an empty name is refused where it is opened
         return [path]
-    if Path(path).is_dir():
+    if os.path.isdir(path):  # False, not an error, for names that no file can have
         found = sorted(_in_folder(Path(path)))
         if not found:
             raise NotFoundError(f"{path}: has no {' or '.join(container.SUFFIXES)} file")
         return found
-    if glob.has_magic(path) and not Path(path).exists():
-        found = sorted(each for each in glob.glob(path, recursive=True) if Path(each).is_file())
+    if glob.has_magic(path) and not os.path.lexists(path):
+        found = sorted(each for each in glob.glob(path, recursive=True) if os.path.isfile(each))
         if not found:
             raise NotFoundError(f"{path}: matches no file")
         return found
