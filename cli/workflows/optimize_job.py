@@ -77,7 +77,8 @@ class OptimizeJob:
         """Return the rate-distortion point of a bound, in m, by a fast search."""
         found = self.run(replace(_bounded(request, max_error), effort="fast"))
         smaller = self.smaller(found)
-        return RatePoint(max_error, self.size(smaller), optimize_report.worst(found), optimize_report.cost(smaller))
+        error = 0.0 if smaller is self.source.document else optimize_report.worst(found)  # the source moves no vertex
+        return RatePoint(max_error, self.size(smaller), error, optimize_report.cost(smaller))
 
     def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
         """Return the request and the result with the smallest error that fits into `max_bytes`.

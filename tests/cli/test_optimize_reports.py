@@ -153,6 +153,15 @@ def test_a_curve_as_csv(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert len(run.err.splitlines()) == len(rows)
 
 
+def test_a_curve_states_no_error_where_the_file_stays(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    compressed, path = tmp_path / "compressed.glb", tmp_path / "curve.csv"
+    assert call("optimize", fixture("arm"), compressed, "--max-error", "0", "--meshopt", "ext", *FAST).code == 0
+    assert call("optimize", compressed, "--curve", path, "-q").code == 0  # without the codec: larger at most bounds
+    unchanged = [row for row in table(path.read_bytes()) if int(row["bytes"]) == compressed.stat().st_size]
+    assert len(unchanged) > 1
+    assert {float(row["error_m"]) for row in unchanged} == {0.0}
+
+
 @pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_a_curve_as_a_picture(ending: str, start: bytes, fixture: Fixture, tmp_path: Path, call: Call) -> None:
     path = tmp_path / f"curve.{ending}"
