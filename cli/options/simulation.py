@@ -52,6 +52,10 @@ ReportFile = Annotated[
 ]
 Gravity = Annotated[str, typer.Option("--gravity", metavar="X,Y,Z", help="Acceleration in m/s².")]
 Wind = Annotated[str, typer.Option("--wind", metavar="X,Y,Z", help="Velocity of the air in m/s.")]
+Spheres = Annotated[
+    list[str] | None,
+    typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or at a node, and its radius; may be repeated."),
+]
 FloorHeight = Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height in metres of a floor.")]
 Friction = Annotated[float, typer.Option("--friction", metavar="N", help="Coulomb's friction.", min=0)]
 Restitution = Annotated[

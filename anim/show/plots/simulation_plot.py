@@ -20,6 +20,7 @@ from anim.show.plots.figure import (
     style,
 )
 from anim.show.plots.stability_plot import stability_plot
+from anim.show.plots.stability_titles import format_step
 from anim.simulation.report import RunHistory, SimulationReport
 
 WIDTH, LEFT, HEAD = 11.6, 0.75, 0.95  # inches
@@ -50,7 +51,7 @@ def simulation_plot(report: SimulationReport, *, kind: str) -> bytes:
 
 
 def _title(report: SimulationReport) -> str:
-    start = f"{report.kind}: steps of {_seconds(report.step_s)}, {format_number(report.duration_s)} s"
+    start = f"{report.kind}: steps of {format_step(report.step_s)}, {format_number(report.duration_s)} s"
     if report.first_bad_step is not None:
         return f"{start}: diverges at {format_number(report.first_bad_step * report.step_s)} s"
     parts = []
@@ -69,10 +70,6 @@ def _subtitle(report: SimulationReport) -> str:
     if report.loop_seam_m is not None:
         parts.append(f"seam of the loop {_length(report.loop_seam_m)}")
     return ", ".join(parts)
-
-
-def _seconds(step: float) -> str:
-    return f"1/{1 / step:.4g} s" if step < 1 else f"{step:.3g} s"
 
 
 def _length(meters: float) -> str:

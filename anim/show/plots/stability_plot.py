@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,8 +22,10 @@ from anim.show.plots.figure import (
     separate_labels,
     style,
 )
+from anim.show.plots.stability_equations import TEST_EQUATIONS, TestEquation
+from anim.show.plots.stability_titles import format_product, subtitle, title
 from anim.simulation.comparison import Comparison, IntegratorRun
-from anim.simulation.integrators import INTEGRATORS, Integrator
+from anim.simulation.integrators import INTEGRATORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,41 +54,6 @@ CURVES, LOG, CHANGE, POSES = 6.3, 1.75, 1.45, 2.6
 LABELS = 1.75  # of the curves, at their right
 
 
-@dataclass(frozen=True, slots=True)
-class TestEquation:
-    """Equation by which stability is judged. symbol: of the rate times the step, about: of the axis.
-
-    max_value: end of the axis. gain, limit: of an integrator.
-    """
-
-    symbol: str
-    about: str
-    gain_of: str
-    max_value: float
-    gain: Callable[[Integrator, Floats], Floats]
-    limit: Callable[[Integrator], float]
-
-
-TEST_EQUATIONS = {
-    "oscillator": TestEquation(
-        "ω·h",
-        "ω·h: angular frequency of the stiffest part × step",
-        "Amplitude",
-        3.4,
-        lambda method, w: method.gain(w),
-        lambda method: method.limit,
-    ),
-    "drag": TestEquation(
-        "drag·h",
-        "drag·h: drag of the fastest particle × step",
-        "Velocity",
-        4.6,
-        lambda method, z: method.drag_gain(z),
-        lambda method: method.drag_limit,
-    ),
-}
-
-
 def stability_plot(compared: Comparison, *, kind: str) -> bytes:
     """Return the plot as the bytes of a PNG or SVG file. Its title states the result of these runs.
 
@@ -97,8 +63,8 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
     with style(kind):
         sheet = Figure(WIDTH, HEAD + LOG + 0.25 + CHANGE + GAP + 0.3 + POSES + 0.25)
         equation = TEST_EQUATIONS[compared.test_equation]
-        sheet.text(LEFT - 0.4, 0.35, _title(runs, equation, omega_h, step), fontsize=TITLE + 2, weight="bold")
-        sheet.text(LEFT - 0.4, 0.6, _subtitle(equation, omega_h, step), color=SOFT)
+        sheet.text(LEFT - 0.4, 0.35, title(runs, equation, omega_h, step), fontsize=TITLE + 2, weight="bold")
+        sheet.text(LEFT - 0.4, 0.6, subtitle(equation, omega_h, step), color=SOFT)
         _draw_energy(sheet, runs)
         _draw_gain(sheet, equation, omega_h)
         top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
@@ -109,40 +75,6 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
         for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
             _draw_motion(sheet, run, points, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
         return sheet.render(kind)
-
-
-def _title(runs: Sequence[IntegratorRun], equation: TestEquation, omega_h: float, step: float) -> str:
-    gone = [run for run in runs if run.diverged_at is not None]
-    stable = [run.name for run in runs if run.diverged_at is None]
-    if not gone:
-        result = f"no integrator diverges within {max(float(run.times[-1]) for run in runs):.2g} s"
-    elif len(gone) == len(runs):
-        result = "every integrator diverges"
-    elif len(gone) > len(stable):
-        result = f"all but {', '.join(stable)} diverge"
-    else:
-        words = [f"{run.name} ({run.diverged_at:.2f} s)" if len(gone) < 3 else run.name for run in gone]
-        result = f"{', '.join(words)} diverge{'s' if len(gone) == 1 else ''}"
-    value = f", {equation.symbol} = {_product(omega_h)}" if omega_h > 0 else ""
-    return f"Step {_seconds(step)}{value}: {result}"
-
-
-def _product(omega_h: float) -> str:
-    """ω·h with two decimals, or two digits if it is small."""
-    return f"{omega_h:.2f}" if omega_h >= 0.1 else format_number(float(f"{omega_h:.2g}"))
-
-
-def _subtitle(equation: TestEquation, omega_h: float, step: float) -> str:
-    if omega_h <= 0:
-        return "No force depends on the position or the velocity: every step is stable."
-    names = ("verlet", "rk4") if equation.symbol == "ω·h" else ("explicit-euler", "verlet", "rk4")
-    limits = [f"{name} {_seconds(step * equation.limit(INTEGRATORS[name]) / omega_h)}" for name in names]
-    none = [f"{name} none" for name, method in INTEGRATORS.items() if equation.limit(method) == 0]
-    return f"Largest stable steps of this system: {', '.join(limits)}; {', '.join(['implicit-euler any', *none])}."
-
-
-def _seconds(step: float) -> str:
-    return f"1/{1 / step:.4g} s" if step < 1 else f"{step:.3g} s"
 
 
 def _draw_energy(sheet: Figure, runs: Sequence[IntegratorRun]) -> None:
@@ -229,10 +161,10 @@ def _draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> None:
             gain = float(equation.gain(INTEGRATORS[name], np.array(omega_h)))
             if lowest <= gain <= MAX_GAIN:
                 axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
-        words = f"this run\n{equation.symbol} = {_product(omega_h)}"
+        words = f"this run\n{equation.symbol} = {format_product(omega_h)}"
         axes.text(omega_h + 0.05, lowest + 0.1, words, fontsize=SMALL)
     elif omega_h > 0:
-        words = f"this run: {equation.symbol} = {_product(omega_h)} →"
+        words = f"this run: {equation.symbol} = {format_product(omega_h)} →"
         axes.text(equation.max_value - 0.05, 1.06, words, fontsize=SMALL, ha="right")
     axes.set_xlim(0, equation.max_value)
     axes.set_ylim(lowest, MAX_GAIN)

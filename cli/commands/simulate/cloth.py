@@ -66,10 +66,7 @@ def command(
         float, typer.Option("--gusts", metavar="N", help="Gusts, as a fraction of the wind.", min=0)
     ] = 0.3,
     floor: simulation.FloorHeight = None,
-    sphere: Annotated[
-        list[str] | None,
-        typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or at a node, and its radius; may be repeated."),
-    ] = None,
+    sphere: simulation.Spheres = None,
     capsule: Annotated[
         list[str] | None,
         typer.Option("--capsule", metavar="A,B,R", help="A capsule from node A to node B; may be repeated."),

@@ -121,10 +121,7 @@ def command(
         ),
     ] = None,
     floor: simulation.FloorHeight = None,
-    sphere: Annotated[
-        list[str] | None,
-        typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or on a node, and its radius; may be repeated."),
-    ] = None,
+    sphere: simulation.Spheres = None,
     box: Annotated[
         list[str] | None,
         typer.Option("--box", metavar="AT,SX,SY,SZ", help="A box at X,Y,Z or on a node, and its sizes; repeatable."),
