@@ -37,9 +37,10 @@ def parameter(time: Floats, x1: Floats | float, x2: Floats | float) -> Floats:
         least, most = np.where(error <= 0, s, low[left]), np.where(error >= 0, s, high[left])
         step = s - error / np.where(rate > 0, rate, 1.0)
         inside = (rate > 0) & (step >= least) & (step <= most)
-        following = np.where(error == 0, s, np.where(inside, step, (least + most) / 2))
+        met = np.abs(error) <= TOLERANCE * goal[left]  # a step from rounding alone can go anywhere if the rate is tiny
+        following = np.where(met, s, np.where(inside, step, (least + most) / 2))
         solution[left], low[left], high[left] = following, least, most
-        left = left[(np.abs(following - s) > TOLERANCE) & (np.abs(error) > TOLERANCE * goal[left])]
+        left = left[(np.abs(following - s) > TOLERANCE) & ~met]
         if not left.size:
             break
     return solution.reshape(full[0].shape)

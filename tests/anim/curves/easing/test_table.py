@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -160,6 +160,7 @@ def test_bezier_agrees_with_de_casteljau(name: str, handles: tuple[float, float,
     np.testing.assert_allclose(parse(name).value(u), [bezier(*handles, float(x)) for x in u], atol=1e-11)
 
 
+@example(1.0, 2.220446049250313e-16, 0.0, 0.0)  # nearly vertical in the middle
 @given(*(st.floats(0, 1) for _ in range(2)), *(st.floats(-2, 3) for _ in range(2)))
 def test_bezier_meets_its_ends_and_stays_a_function(x1: float, x2: float, y1: float, y2: float) -> None:
     ease = parse(f"cubic-bezier({x1!r}, {y1!r}, {x2!r}, {y2!r})")
