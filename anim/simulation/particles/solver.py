@@ -89,8 +89,9 @@ class ParticleSolver:
 
         substeps: steps per frame. Raises UnstableError, whose `step` is the first bad step.
         """
+        from anim.simulation.particles.kernels.contact import Grid
         from anim.simulation.particles.kernels.force_field import METHODS
-        from anim.simulation.particles.kernels.particle_run import STATISTICS, Grid, run_particles
+        from anim.simulation.particles.kernels.particle_run import STATISTICS, run_particles
 
         first = -steps.num_warm_up_steps
         times: Floats = np.arange(first, steps.num_steps + 1, dtype=np.float64) * steps.step_s

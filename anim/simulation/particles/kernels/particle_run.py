@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats, Ints
+from anim.arrays import Floats, Ints
+from anim.simulation.particles.kernels.contact import ORIGIN, Grid, respond, slide_face, slide_surface
 from anim.simulation.particles.kernels.force_field import (
     ForceField,
     acceleration,
@@ -14,6 +15,7 @@ from anim.simulation.particles.kernels.force_field import (
     integrate_uniform,
     potential,
 )
+from anim.simulation.particles.kernels.recording import KEY_WIDTH, MAX_IMPACTS_PER_STEP, add_energy, grow, write_key
 from anim.simulation.particles.kernels.solids import (
     BALL,
     FLOOR,
@@ -24,41 +26,13 @@ from anim.simulation.particles.kernels.solids import (
     is_flat,
     is_on_face,
     normal,
-    pose_at,
     surface_velocity,
-    to_local,
-    to_world,
 )
 from anim.simulation.particles.kernels.vectors import Vector, add, dot, hermite, hermite_velocity, length
 from anim.skinning.kernels.jit import jit
 
-MAX_IMPACTS_PER_STEP = 12  # then the particle stays where it is until the next step
-MIN_FLIGHT_S = 4e-3  # of a bounce, 20 µm high; whatever the step, so that it doesn't change the result
 MAX_SPEED_M_S = 1e5  # beyond, the run is called unstable
-MAX_KEYS_PER_STEP = 4 * MAX_IMPACTS_PER_STEP
-KEY_WIDTH = 10  # time, position, velocities before and after
-ORIGIN = (0.0, 0.0, 0.0)
 STATISTICS = ("impacts", "max_speed", "penetration", "bad_step", "bad_speed", "energy_change", "kinetic_s", "inside")
-
-
-class Grid(NamedTuple):
-    """Steps and rules of a run.
-
-    step: s. first: index of the first step; those before 0 are not written. num_steps: from 0 on. duration: s.
-    substeps: of a frame. method: index in METHODS. has_frames: write a key per frame; else paths are parabolas between
-    events. can_sleep: forces don't change with time.
-    """
-
-    step: float
-    first: int
-    num_steps: int
-    duration: float
-    substeps: int
-    method: int
-    has_frames: bool
-    can_sleep: bool
-    restitution: float
-    friction: float
 
 
 class State(NamedTuple):
@@ -117,8 +91,8 @@ def _run_particle(
     is_asleep, has_begun = False, birth >= 0.0
     statistics[7] += 1.0 if ignored else 0.0
     if has_begun:
-        keys = _grow(keys, count)
-        _write(keys, count, birth, x, v, v)
+        keys = grow(keys, count)
+        write_key(keys, count, birth, x, v, v)
     first_energy = 0.5 * dot(v, v) + potential(field, birth, x)
     while n < grid.num_steps:
         if n >= statistics[3]:
@@ -126,11 +100,11 @@ def _run_particle(
         start, end = max(birth, n * h), grid.duration if n == grid.num_steps - 1 else (n + 1) * h
         stop = min(end, death)
         if n == 0 and not has_begun:
-            keys = _grow(keys, count)
-            _write(keys, count, 0.0, x, v, v)
+            keys = grow(keys, count)
+            write_key(keys, count, 0.0, x, v, v)
             first_energy = 0.5 * dot(v, v) + potential(field, 0.0, x)
         if n == 0 and birth <= 0.0:
-            _add_energy(energies, 0, field, 0.0, x, v)
+            add_energy(energies, 0, field, 0.0, x, v)
         if resting < 0 and start == n * h:
             last = min(grid.num_steps - 1, int(np.ceil(death / h)) - 1, int(statistics[3]))
             if grid.has_frames or n < 0:  # stop for a key
@@ -139,14 +113,14 @@ def _run_particle(
             if n > begun:
                 ignored = 0
                 if grid.has_frames and n > 0 and n % grid.substeps == 0:
-                    keys = _grow(keys, count)
-                    _write(keys, count, n * h, x, v, v)
+                    keys = grow(keys, count)
+                    write_key(keys, count, n * h, x, v, v)
                 if n == last:
                     continue
                 start, end = n * h, grid.duration if n == grid.num_steps - 1 else (n + 1) * h
                 stop = min(end, death)
         if not is_asleep:
-            keys = _grow(keys, count)
+            keys = grow(keys, count)
             before = count[0]
             x, v, resting, face, ignored, is_asleep = _advance(
                 State(x, v, resting, face, ignored, False), keys, count, n, start, stop - start,
@@ -167,15 +141,15 @@ def _run_particle(
         n += 1
         if n > 0 and (n % grid.substeps == 0 or n == grid.num_steps):
             frame = (n + grid.substeps - 1) // grid.substeps
-            _add_energy(energies, frame, field, end, x, v)
+            add_energy(energies, frame, field, end, x, v)
             statistics[6] += 0.5 * dot(v, v) * h * grid.substeps
             has_key = grid.has_frames or (resting >= 0 and not is_flat(solids, resting))
             if n < grid.num_steps and has_key and not is_asleep:
-                keys = _grow(keys, count)
-                _write(keys, count, end, x, v, v)
+                keys = grow(keys, count)
+                write_key(keys, count, end, x, v, v)
     finish = min(death, grid.duration)
-    keys = _grow(keys, count)
-    _write(keys, count, finish, x, v, v)
+    keys = grow(keys, count)
+    write_key(keys, count, finish, x, v, v)
     statistics[5] += 0.5 * dot(v, v) + potential(field, finish, x) - first_energy
     return keys
 
@@ -193,9 +167,9 @@ def _advance(
         if resting < 0:
             x1, v1 = integrate(field, grid.method, t, x, v, h)
         elif not is_flat(solids, resting):
-            on_surface, x1, v1 = _slide_surface(resting, i, t / grid.step - n, t, h, x, v, field, solids, grid)
+            on_surface, x1, v1 = slide_surface(resting, i, t / grid.step - n, t, h, x, v, field, solids, grid)
             if not on_surface:
-                _write(keys, count, t, x, v, v)
+                write_key(keys, count, t, x, v, v)
                 resting = -1
                 continue
         else:
@@ -203,16 +177,16 @@ def _advance(
             if dot(a, face) > 0.0:
                 resting = -1
                 continue
-            span, x1, v1, stops, asleep = _slide_face(a, face, h, x, v, grid.friction)
+            span, x1, v1, stops, asleep = slide_face(a, face, h, x, v, grid.friction)
         f0 = t / grid.step - n
         f1 = f0 + span / grid.step
         hit, u = _first_impact(solids, resting, ignored, i, f0, f1, grid.step, span, x, v, x1, v1)
         if hit < 0:
             if resting >= 0 and is_flat(solids, resting):
                 if stops:
-                    _write(keys, count, t + span, x1, v1, v1)
+                    write_key(keys, count, t + span, x1, v1, v1)
                 if not is_on_face(solids, resting, x1, face):
-                    _write(keys, count, t + span, x1, v1, v1)
+                    write_key(keys, count, t + span, x1, v1, v1)
                     resting, asleep = -1, False
                 elif stops and not asleep:  # slides back
                     x, v, t, h = x1, v1, t + span, h - span
@@ -227,9 +201,9 @@ def _advance(
         t += u * span
         a = acceleration(field, t, x, before)
         moving = surface_velocity(solids, hit, i, f, grid.step, x)
-        v, stays = _respond(before, moving, face, a, grid)
+        v, stays = respond(before, moving, face, a, grid)
         resting = hit if stays else -1
-        _write(keys, count, t, x, before, v)
+        write_key(keys, count, t, x, before, v)
         h -= u * span
         if h <= 0.0:
             return State(x, v, resting, face, ignored, False)
@@ -249,75 +223,6 @@ def _first_impact(
             if u < first:
                 hit, first = k, u
     return hit, first
-
-
-@jit
-def _respond(v: Vector, moving: Vector, face: Vector, a: Vector, grid: Grid) -> tuple[Vector, bool]:
-    """The velocity after an impact, by Newton's restitution and Coulomb's friction, and whether the particle stays.
-
-    It stays if it would come back at once. moving: velocity of the surface.
-    """
-    relative = add(v, -1.0, moving)
-    approach = dot(relative, face)
-    tangential = add(relative, -approach, face)
-    speed = length(tangential)
-    pull = -dot(a, face)
-    bounce = max(-grid.restitution * approach, 0.0)
-    stays = pull > 0.0 and 2 * bounce < pull * MIN_FLIGHT_S
-    if stays:
-        bounce = 0.0
-    factor = max(1 - grid.friction * max(bounce - approach, 0.0) / max(speed, 1e-300), 0.0)
-    return add(add(moving, factor, tangential), bounce, face), stays
-
-
-@jit
-def _slide_face(
-    a: Vector, face: Vector, h: float, x: Vector, v: Vector, friction: float
-) -> tuple[float, Vector, Vector, bool, bool]:
-    """Slide on a flat static face, exact for a constant acceleration: Coulomb's friction against the other forces.
-
-    Returns the time until it stops, at most h, position and velocity then, whether it stops, and whether it stays.
-    """
-    push = dot(a, face)
-    along = add(a, -push, face)
-    speed, pull = length(v), length(along)
-    grip = friction * max(-push, 0.0)
-    if speed == 0.0 and pull <= grip:
-        return h, x, ORIGIN, False, True
-    d, size = (v, speed) if speed > 0.0 else (along, pull)
-    total = add(along, -grip / size, d)
-    slowing = -dot(total, d) / size
-    if speed > 0.0 and slowing > 0.0 and speed < slowing * h:
-        t = speed / slowing
-        return t, add(add(x, t, v), 0.5 * t * t, total), ORIGIN, True, pull <= grip
-    return h, add(add(x, h, v), 0.5 * h * h, total), add(v, h, total), False, False
-
-
-@jit
-def _slide_surface(
-    k: int, i: int, f0: float, t: float, h: float, x: Vector, v: Vector, field: ForceField, solids: Solids, grid: Grid
-) -> tuple[bool, Vector, Vector]:
-    """One step of Moreau's time stepping on a curved or moving surface: false for a particle that leaves it.
-
-    The velocity loses what points into the surface at the end of the step, and Coulomb's friction acts on its impulse.
-    """
-    f1 = f0 + h / grid.step
-    v1 = add(v, h, acceleration(field, t, x, v))
-    x1 = add(x, h, v1)
-    face, moving = normal(solids, k, i, f1, x1), surface_velocity(solids, k, i, f1, grid.step, x1)
-    relative = add(v1, -1.0, moving)
-    approach = dot(relative, face)
-    if approach > 0.0:
-        return False, x, v
-    tangential = add(relative, -approach, face)
-    speed = length(tangential)
-    factor = max(1 + grid.friction * approach / max(speed, 1e-300), 0.0)
-    if factor == 0.0:  # moves with the surface
-        x1 = to_world(pose_at(solids, k, i, f1), to_local(pose_at(solids, k, i, f0), x))
-        return True, x1, surface_velocity(solids, k, i, f1, grid.step, x1)
-    v1 = add(moving, factor, tangential)
-    x1 = add(x, h, v1)
-    return True, add(x1, -distance(solids, k, i, f1, x1), normal(solids, k, i, f1, x1)), v1
 
 
 @jit
@@ -380,29 +285,3 @@ def _containing(solids: Solids, i: int, f: float, x: Vector) -> int:
         if distance(solids, k, i, f, x) < -TOUCH_M:
             found |= 1 << k
     return found
-
-
-@jit
-def _add_energy(energies: Floats, frame: int, field: ForceField, t: float, x: Vector, v: Vector) -> None:
-    energies[frame, 0] += 1.0
-    energies[frame, 1] += 0.5 * dot(v, v)
-    energies[frame, 2] += potential(field, t, x)
-
-
-@jit
-def _write(keys: Floats, count: Ints, t: float, x: Vector, before: Vector, after: Vector) -> None:
-    row = count[0]
-    keys[row, 0] = t
-    for c in range(3):
-        keys[row, 1 + c], keys[row, 4 + c], keys[row, 7 + c] = x[c], before[c], after[c]
-    count[0] += 1
-
-
-@jit
-def _grow(keys: Floats, count: Ints) -> AnyArray:
-    """Return the keys, with space for those of a step."""
-    if count[0] + MAX_KEYS_PER_STEP <= len(keys):
-        return keys
-    larger = np.empty((2 * len(keys), KEY_WIDTH))
-    larger[: len(keys)] = keys
-    return larger
