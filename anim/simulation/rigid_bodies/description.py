@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -191,9 +191,9 @@ class PhysicsDescription:
     floor_material: Material = field(default_factory=Material)
 
 
-def combine(modes: tuple[str, str], first: float, second: float) -> float:
-    """Return the friction or restitution of two materials, by the mode of both that counts first in COMBINE_MODES."""
-    mode = min(modes, key=COMBINE_MODES.index)
+def combine(modes: tuple[str, str], first: float, second: float, order: Sequence[str] = COMBINE_MODES) -> float:
+    """Return the friction or restitution of two materials, by the mode of both that counts first in `order`."""
+    mode = min(modes, key=order.index)
     if mode == "average":
         return (first + second) / 2
     if mode == "multiply":

@@ -14,7 +14,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.simulation.rigid_bodies.rapier_world import RapierWorld
+from anim.simulation.rigid_bodies.rapier.world import RapierWorld
 from anim.simulation.rigid_bodies.rigid_scene import BodyKind, RigidScene
 
 MIN_IMPACT_SPEED_M_S = 0.3  # change of velocity that is an impact; bodies at rest in contact jitter less

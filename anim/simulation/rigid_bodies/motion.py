@@ -13,7 +13,7 @@ from anim.maths import quaternion
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.driver import AnimatedBodies
 from anim.simulation.rigid_bodies.impacts import Impact, ImpactFinder
-from anim.simulation.rigid_bodies.rapier_world import RapierWorld
+from anim.simulation.rigid_bodies.rapier.world import RapierWorld
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from anim.simulation.steps import Steps
 

@@ -7,8 +7,7 @@ import numpy as np
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.assembly import ancestors
 from anim.simulation.rigid_bodies.motion import RigidMotion
-from anim.simulation.rigid_bodies.rapier_joints import find_approximations
-from anim.simulation.rigid_bodies.rapier_world import PLANE_REACH_M
+from anim.simulation.rigid_bodies.rapier.world import PLANE_REACH_M, find_approximations
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 
 MIN_OVERLAP_PER_RADIUS = 0.02  # of the smaller body; less is the tolerance of contacts

@@ -65,6 +65,14 @@ def ground(material: Material | None = None) -> RigidBody:
     return body(Shape("plane"), kind=BodyKind.STATIC, material=material)
 
 
+def box_pile(count: int, static_friction: float = 0.5) -> list[RigidBody]:
+    """A floor, and boxes in layers of 16 that lean until they fall over."""
+    material, box = Material(static_friction, 0.5), Shape("box", (0.5, 0.5, 0.5))
+    rows = [divmod(i, 16) for i in range(count)]
+    places = [(i // 4 * 0.6 + 0.05 * y, 0.5 + 0.7 * y, i % 4 * 0.6 + 0.02 * y) for y, i in rows]
+    return [ground(material), *(body(box, place, material=material) for place in places)]
+
+
 def run(
     *bodies: RigidBody,
     seconds: float = 1.0,

@@ -7,7 +7,7 @@ import pytest
 
 from anim.maths import quaternion
 from anim.simulation.rigid_bodies.description import JointLimit, Material, Motion, Shape
-from anim.simulation.rigid_bodies.rapier_world import RapierWorld
+from anim.simulation.rigid_bodies.rapier.world import RapierWorld
 from anim.simulation.rigid_bodies.rigid_scene import WORLD, RigidJoint, RigidScene
 from tests.anim.simulation.rigid_bodies.cases import G, body, frame, ground, needs_rapier, run
 

@@ -26,7 +26,6 @@ from anim.simulation.rigid_bodies.simulate import (
     simulate_rigid_bodies,
 )
 from tests.anim.simulation.rigid_bodies.cases import NO_CLIP, G, collider, document, needs_rapier, node, path, simulate
-from tests.cli.running import ROOT
 from tests.files import glb_of, opened, opened_fixture
 
 pytestmark = needs_rapier
@@ -136,14 +135,6 @@ def test_reduction_stays_within_its_bound(max_error: float) -> None:
 def test_a_body_inside_another_is_noted() -> None:
     made = document([node((0, 0.3, 0), **FALLING), node(collider=collider(1))], BALL)
     assert simulate(made, duration=0.2).notes == ["node 0 and node 1 overlap by 20 cm at the start"]
-
-
-def test_only_modules_of_its_name_know_rapier() -> None:
-    folder = ROOT / "anim" / "simulation"
-    found = {path.stem for path in folder.rglob("*.py") if "import rapier3d" in path.read_text()}
-    assert found == {"rapier_package"}
-    users = {path.stem for path in folder.rglob("*.py") if "load_package" in path.read_text()}
-    assert all(name.startswith("rapier_") for name in users)
 
 
 def test_an_endless_plane_supports_hulls_far_from_its_node() -> None:

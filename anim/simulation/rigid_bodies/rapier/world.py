@@ -1,4 +1,4 @@
-"""Engine Rapier: scenes become its world, centered, in float32. No module but those named rapier_* knows Rapier.
+"""Engine Rapier: scenes become its world, centered, in float32. This module is the interface of the package.
 
 Rapier solves each step in SUBSTEPS substeps of symplectic Euler, which moves a free fall ½·g·t·h/SUBSTEPS ahead of
 its parabola. All velocities begin half a substep earlier, as in leapfrog; then a free flight is exact.
@@ -12,21 +12,21 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError
-from anim.maths import quaternion
-from anim.simulation.rigid_bodies import rapier_joints
 from anim.simulation.rigid_bodies.description import MAX_SPEED_M_S
-from anim.simulation.rigid_bodies.rapier_contacts import MaterialHooks, interaction_groups, needs_hooks
-from anim.simulation.rigid_bodies.rapier_package import load_package
+from anim.simulation.rigid_bodies.rapier.filters import interaction_groups
+from anim.simulation.rigid_bodies.rapier.frames import isometry, shape_frame
+from anim.simulation.rigid_bodies.rapier.friction import FrictionHooks
+from anim.simulation.rigid_bodies.rapier.joints import build_joint, find_approximations
+from anim.simulation.rigid_bodies.rapier.package import load_package
+from anim.simulation.rigid_bodies.rapier.shapes import INFINITE_MASS_KG, PLANE_REACH_M, ShapeBuilder
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidScene
+
+__all__ = ["PLANE_REACH_M", "RapierWorld", "find_approximations"]
 
 SUBSTEPS = 4
 MAX_PENETRATION_M = 0.005  # that Rapier leaves; of small bodies MAX_PENETRATION_PER_RADIUS
 MAX_PENETRATION_PER_RADIUS, MIN_PENETRATION_M = 0.01, 1e-5
 MAX_RECYCLED_M = 1e-3  # motion since the distances of contacts were measured; impacts need those of the step
-INFINITE_MASS_KG = 1e9
-PLANE_REACH_M, PLANE_DEPTH_M = 500.0, 50.0  # half the size of a plane's box; at 10 km contacts are wrong by its depth
-CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
 
 
 class RapierWorld:
@@ -45,8 +45,9 @@ class RapierWorld:
         parameters.normalized_allowed_linear_error = _allowed_penetration(scene)
         parameters.normalized_max_linear_velocity = MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
-        self._groups = interaction_groups(self._rapier, scene)
-        self._hooked = needs_hooks(scene)
+        self._groups = interaction_groups(scene)
+        self._shapes = ShapeBuilder(scene, self._center)
+        self._friction = FrictionHooks([each.material for body in scene.bodies for each in body.colliders], step)
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
@@ -55,17 +56,26 @@ class RapierWorld:
         anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))
         for joint in scene.joints:
             ends = (self._handles[i] if i >= 0 else anchor for i in joint.bodies)
-            world.impulse_joints.insert(*ends, rapier_joints.build_joint(joint), True)
-        if self._hooked:
-            world.physics_hooks = MaterialHooks(self._colliders)
+            world.impulse_joints.insert(*ends, build_joint(joint), True)
+        if self._friction.are_needed:
+            world.physics_hooks = self._friction
 
     def step(self) -> None:
         """Advance the world by a step."""
+        self._friction.begin_step(self._find_slow)
         self._world.step()
+
+    def _find_slow(self, speed: float) -> list[bool]:
+        """Return whether no point of a body is faster than `speed` m/s, for each."""
+        found = []
+        for body, own in zip(self._bodies, self._scene.bodies, strict=True):
+            spin = 2 * own.radius * math.hypot(*body.angvel.to_tuple())  # around its center of mass, anywhere inside
+            found.append(math.hypot(*body.linvel.to_tuple()) + spin < speed)
+        return found
 
     def move(self, index: int, position: Floats, rotation: Floats) -> None:
         """Move an animated body to a frame by the end of the next step."""
-        self._bodies[index].set_next_kinematic_position(self._isometry(Frame(position - self._center, rotation)))
+        self._bodies[index].set_next_kinematic_position(isometry(Frame(position - self._center, rotation)))
 
     def states(self) -> list[tuple[float, ...]]:
         """Return position and quaternion xyzw of the moving bodies: 7 numbers each, relative to `center`."""
@@ -153,119 +163,24 @@ class RapierWorld:
             BodyKind.ANIMATED: rapier.RigidBody.kinematic_position_based,
         }
         frame = Frame(body.frame.position - self._center, body.frame.rotation)
-        builder = makers[kind]().position(self._isometry(frame)).ccd_enabled(kind is BodyKind.DYNAMIC)
+        builder = makers[kind]().position(isometry(frame)).ccd_enabled(kind is BodyKind.DYNAMIC)
         if kind in (BodyKind.DYNAMIC, BodyKind.KINEMATIC):
             factor = body.motion.gravity_factor if kind is BodyKind.DYNAMIC else 0.0
             builder = builder.linvel(tuple(body.linear_velocity + factor * self._early)).gravity_scale(factor)
             builder = builder.angvel(tuple(body.angular_velocity))
-        shapes = [self._shape(each, body) for each in body.colliders]
+        shapes = [self._shapes.build(each, body) for each in body.colliders]
         if kind is BodyKind.DYNAMIC:
-            builder = builder.additional_mass_properties(self._mass(body, shapes))
+            builder = builder.additional_mass_properties(self._shapes.mass(body, shapes))
         handle = self._world.add_body(builder)
         for each, shape in zip(body.colliders, shapes, strict=True):
             added = self._world.add_collider(self._collider(each, shape), handle)
             self._colliders[added.index] = (index, each)
+            self._friction.add(added.index, index, each.material, self._world.colliders[added])
         return handle
 
     def _collider(self, collider: BodyCollider, shape: Any) -> Any:
-        rapier, material = self._rapier, collider.material
-        modes = {"average": "AVERAGE", "minimum": "MIN", "maximum": "MAX", "multiply": "MULTIPLY"}
-        rule = rapier.CoefficientCombineRule
-        builder = rapier.Collider.new(shape).position(self._isometry(_shape_frame(collider))).density(0.0)
-        builder = builder.friction(material.dynamic_friction).restitution(material.restitution)
-        builder = builder.friction_combine_rule(getattr(rule, modes[material.friction_combine]))
-        builder = builder.restitution_combine_rule(getattr(rule, modes[material.restitution_combine]))
-        builder = builder.collision_groups(self._groups[collider.filter])
-        return builder.active_hooks(rapier.ActiveHooks.MODIFY_SOLVER_CONTACTS) if self._hooked else builder
-
-    def _shape(self, collider: BodyCollider, body: RigidBody) -> Any:
-        """Rapier's shape. A dynamic mesh, which has no inside, becomes its hull, or convex pieces of it."""
-        shape, kind, make = collider.shape, body.kind, self._rapier.SharedShape
-        if shape.kind == "sphere":
-            return make.ball(*shape.size)
-        if shape.kind == "box":
-            return make.cuboid(*(length / 2 for length in shape.size))
-        if shape.kind == "plane":
-            return self._plane(collider, body)
-        if shape.kind in ("capsule", "cylinder"):
-            height, radius, _ = shape.size
-            return (make.capsule_y if shape.kind == "capsule" else make.cylinder)(height / 2, radius)
-        points, faces = shape.points.astype(np.float32), shape.faces.astype(np.uint32)
-        if shape.kind == "mesh" and kind is not BodyKind.DYNAMIC:
-            return make.trimesh(points, faces)
-        hull = self._hull(points)
-        if shape.kind == "hull" or _volume(make.trimesh(points, faces)) >= CONVEX_VOLUME_FRACTION * _volume(hull):
-            return hull
-        return make.convex_decomposition(points, faces)
-
-    def _plane(self, collider: BodyCollider, body: RigidBody) -> Any:
-        """A half-space; where hulls fall, which topple on it (Rapier 0.36), the top of a large box under the bodies."""
-        has_hulls = any(each.shape.kind in ("hull", "mesh") for body in self._scene.bodies for each in body.colliders)
-        make = self._rapier.SharedShape
-        if body.kind is BodyKind.DYNAMIC or not has_hulls:
-            return make.halfspace((0.0, 1.0, 0.0))
-        x, z = self._beside(collider, body) if body.kind is BodyKind.STATIC else (0.0, 0.0)
-        down = self._rapier.Isometry3(translation=(x, -PLANE_DEPTH_M, z))
-        return make.compound([(down, make.cuboid(PLANE_REACH_M, PLANE_DEPTH_M, PLANE_REACH_M))])
-
-    def _beside(self, collider: BodyCollider, body: RigidBody) -> tuple[float, float]:
-        """Position of the bodies along a plane's own x and z."""
-        own = _shape_frame(collider)
-        back = quaternion.conjugate(quaternion.multiply(body.frame.rotation, own.rotation))
-        origin = body.frame.position + quaternion.rotate(body.frame.rotation, own.position)
-        x, _, z = quaternion.rotate(back, self._center - origin).tolist()
-        return x, z
-
-    def _hull(self, points: Any) -> Any:
-        flat = RangeError("the collider is flat: its hull has no volume")
-        if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1] <= 1e-6 * np.ptp(points):
-            raise flat
-        try:
-            return self._rapier.SharedShape.convex_hull(points)
-        except Exception:  # the package raises a plain one
-            raise flat from None
-
-    def _mass(self, body: RigidBody, shapes: list[Any]) -> Any:
-        """Mass, center and inertia: those of the colliders, unless the motion gives its own."""
-        rapier, motion = self._rapier, body.motion
-        total = rapier.MassProperties.zero()
-        for each, shape in zip(body.colliders, shapes, strict=True):
-            total = total + self._solid(each, shape, motion.density).transform_by(self._isometry(_shape_frame(each)))
-        volume = total.mass
-        mass = motion.mass if motion.mass is not None else volume
-        mass = INFINITE_MASS_KG if math.isinf(mass) else (mass or 1.0)
-        factor = mass / volume if volume else 1.0
-        inertia = [factor * value for value in total.principal_inertia.to_tuple()] if volume else [mass] * 3
-        turned = total.principal_inertia_local_frame if volume else rapier.Rotation3()
-        if motion.inertia_diagonal is not None:
-            x, y, z, w = motion.inertia_orientation
-            inertia, turned = list(motion.inertia_diagonal), rapier.Rotation3(w=w, x=x, y=y, z=z)
-        center = total.local_com.to_tuple() if motion.center_of_mass is None else motion.center_of_mass
-        return rapier.MassProperties(tuple(center), mass, tuple(inertia), turned)
-
-    def _solid(self, collider: BodyCollider, shape: Any, density: float) -> Any:
-        """Mass of one collider; of a closed mesh, and not of its convex pieces, which overlap a little."""
-        if collider.shape.kind != "mesh":
-            return shape.mass_properties(density)
-        points, faces = collider.shape.points.astype(np.float32), collider.shape.faces.astype(np.uint32)
-        solid = self._rapier.SharedShape.trimesh(points, faces)
-        is_closed = 0 < _volume(solid) <= _volume(shape) * 1.5
-        return (solid if is_closed else shape).mass_properties(density)
-
-    def _isometry(self, frame: Frame) -> Any:
-        x, y, z, w = frame.rotation.tolist()
-        rotation = self._rapier.Rotation3(w=w, x=x, y=y, z=z)
-        return self._rapier.Isometry3(translation=tuple(frame.position.tolist()), rotation=rotation)
-
-
-def _shape_frame(collider: BodyCollider) -> Frame:
-    """The shape's own frame in the body, its center included."""
-    offset = quaternion.rotate(collider.frame.rotation, np.array(collider.shape.center))
-    return Frame(collider.frame.position + offset, collider.frame.rotation)
-
-
-def _volume(shape: Any) -> float:
-    return float(shape.mass_properties(1.0).mass)
+        builder = self._rapier.Collider.new(shape).position(isometry(shape_frame(collider))).density(0.0)
+        return builder.collision_groups(self._groups[collider.filter])
 
 
 def _center(scene: RigidScene) -> Floats:

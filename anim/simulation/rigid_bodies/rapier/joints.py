@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from anim.simulation.rigid_bodies.description import JointDrive, JointLimit
-from anim.simulation.rigid_bodies.rapier_package import load_package
+from anim.simulation.rigid_bodies.rapier.package import load_package
 from anim.simulation.rigid_bodies.rigid_scene import Frame, RigidJoint
 
 AXES = (("LIN_X", "LIN_Y", "LIN_Z"), ("ANG_X", "ANG_Y", "ANG_Z"))  # linear, angular

@@ -1,0 +1,1 @@
+"""Engine Rapier: other packages import its interface `world` alone, and `package` alone imports rapier3d."""

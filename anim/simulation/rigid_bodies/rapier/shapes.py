@@ -1,0 +1,105 @@
+"""Shapes and masses of colliders in Rapier."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import RangeError
+from anim.maths import quaternion
+from anim.simulation.rigid_bodies.rapier.frames import isometry, shape_frame
+from anim.simulation.rigid_bodies.rapier.package import load_package
+from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, RigidBody, RigidScene
+
+INFINITE_MASS_KG = 1e9
+PLANE_REACH_M, PLANE_DEPTH_M = 500.0, 50.0  # half the size of a plane's box; at 10 km contacts are wrong by its depth
+CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
+
+
+class ShapeBuilder:
+    """Builder of Rapier's shapes for the colliders of a scene, and of the masses of its bodies."""
+
+    def __init__(self, scene: RigidScene, center: Floats) -> None:
+        """center: (3,) m, near the bodies."""
+        self._rapier, self._scene, self._center = load_package(), scene, center
+
+    def build(self, collider: BodyCollider, body: RigidBody) -> Any:
+        """Rapier's shape. A dynamic mesh, which has no inside, becomes its hull, or convex pieces of it."""
+        shape, kind, make = collider.shape, body.kind, self._rapier.SharedShape
+        if shape.kind == "sphere":
+            return make.ball(*shape.size)
+        if shape.kind == "box":
+            return make.cuboid(*(length / 2 for length in shape.size))
+        if shape.kind == "plane":
+            return self._plane(collider, body)
+        if shape.kind in ("capsule", "cylinder"):
+            height, radius, _ = shape.size
+            return (make.capsule_y if shape.kind == "capsule" else make.cylinder)(height / 2, radius)
+        points, faces = shape.points.astype(np.float32), shape.faces.astype(np.uint32)
+        if shape.kind == "mesh" and kind is not BodyKind.DYNAMIC:
+            return make.trimesh(points, faces)
+        hull = self._hull(points)
+        if shape.kind == "hull" or _volume(make.trimesh(points, faces)) >= CONVEX_VOLUME_FRACTION * _volume(hull):
+            return hull
+        return make.convex_decomposition(points, faces)
+
+    def _plane(self, collider: BodyCollider, body: RigidBody) -> Any:
+        """A half-space; where hulls fall, which topple on it (Rapier 0.36), the top of a large box under the bodies."""
+        has_hulls = any(each.shape.kind in ("hull", "mesh") for body in self._scene.bodies for each in body.colliders)
+        make = self._rapier.SharedShape
+        if body.kind is BodyKind.DYNAMIC or not has_hulls:
+            return make.halfspace((0.0, 1.0, 0.0))
+        x, z = self._beside(collider, body) if body.kind is BodyKind.STATIC else (0.0, 0.0)
+        down = self._rapier.Isometry3(translation=(x, -PLANE_DEPTH_M, z))
+        return make.compound([(down, make.cuboid(PLANE_REACH_M, PLANE_DEPTH_M, PLANE_REACH_M))])
+
+    def _beside(self, collider: BodyCollider, body: RigidBody) -> tuple[float, float]:
+        """Position of the bodies along a plane's own x and z."""
+        own = shape_frame(collider)
+        back = quaternion.conjugate(quaternion.multiply(body.frame.rotation, own.rotation))
+        origin = body.frame.position + quaternion.rotate(body.frame.rotation, own.position)
+        x, _, z = quaternion.rotate(back, self._center - origin).tolist()
+        return x, z
+
+    def _hull(self, points: Any) -> Any:
+        flat = RangeError("the collider is flat: its hull has no volume")
+        if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1] <= 1e-6 * np.ptp(points):
+            raise flat
+        try:
+            return self._rapier.SharedShape.convex_hull(points)
+        except Exception:  # the package raises a plain one
+            raise flat from None
+
+    def mass(self, body: RigidBody, shapes: list[Any]) -> Any:
+        """Mass, center and inertia: those of the colliders, unless the motion gives its own."""
+        rapier, motion = self._rapier, body.motion
+        total = rapier.MassProperties.zero()
+        for each, shape in zip(body.colliders, shapes, strict=True):
+            total = total + self._solid(each, shape, motion.density).transform_by(isometry(shape_frame(each)))
+        volume = total.mass
+        mass = motion.mass if motion.mass is not None else volume
+        mass = INFINITE_MASS_KG if math.isinf(mass) else (mass or 1.0)
+        factor = mass / volume if volume else 1.0
+        inertia = [factor * value for value in total.principal_inertia.to_tuple()] if volume else [mass] * 3
+        turned = total.principal_inertia_local_frame if volume else rapier.Rotation3()
+        if motion.inertia_diagonal is not None:
+            x, y, z, w = motion.inertia_orientation
+            inertia, turned = list(motion.inertia_diagonal), rapier.Rotation3(w=w, x=x, y=y, z=z)
+        center = total.local_com.to_tuple() if motion.center_of_mass is None else motion.center_of_mass
+        return rapier.MassProperties(tuple(center), mass, tuple(inertia), turned)
+
+    def _solid(self, collider: BodyCollider, shape: Any, density: float) -> Any:
+        """Mass of one collider; of a closed mesh, and not of its convex pieces, which overlap a little."""
+        if collider.shape.kind != "mesh":
+            return shape.mass_properties(density)
+        points, faces = collider.shape.points.astype(np.float32), collider.shape.faces.astype(np.uint32)
+        solid = self._rapier.SharedShape.trimesh(points, faces)
+        is_closed = 0 < _volume(solid) <= _volume(shape) * 1.5
+        return (solid if is_closed else shape).mass_properties(density)
+
+
+def _volume(shape: Any) -> float:
+    return float(shape.mass_properties(1.0).mass)
