@@ -68,6 +68,11 @@ def format_length(meters: float) -> str:
     return f"{format_number(meters, 3)} m"
 
 
+def format_step_error(meters: float) -> str:
+    """Return words for the error estimate of a simulation: "a run with half the step differs by up to 2 mm"."""
+    return f"a run with half the step differs by up to {format_length(meters)}"
+
+
 def format_fraction(part: float, whole: float) -> str:
     """Return " (0.41 %)", or "" if the whole is 0 or the fraction is negligible."""
     percent = 100 * part / whole if whole else 0.0

@@ -59,7 +59,7 @@ def _title(report: SimulationReport) -> str:
         ends = [format_number(report.energy_j[key]) for key in ("start", "end")]
         parts.append(f"energy {ends[0]} → {ends[1]} J")
     if report.error_estimate_m is not None:
-        parts.append(f"half the step differs by {_length(report.error_estimate_m)}")
+        parts.append(f"a run with half the step differs by up to {_length(report.error_estimate_m)}")
     return ": ".join([start, ", ".join(parts)]) if parts else start
 
 

@@ -13,13 +13,13 @@ from anim.maths import quaternion
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.driver import AnimatedBodies
 from anim.simulation.rigid_bodies.impacts import Impact, ImpactFinder
+from anim.simulation.rigid_bodies.options import SETTLED_M
 from anim.simulation.rigid_bodies.rapier.world import RapierWorld
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from anim.simulation.steps import Steps
 
 NUM_CONTACT_SAMPLES = 60  # steps of a run at which penetration is measured
 MAX_ENERGY_FACTOR = 1e3  # of the energy at the start and of the fall, beyond which a run diverges
-SETTLED_M = 1e-4  # largest distance of a body between both ends of a round that counts as none
 SPEED_ENERGY_J_PER_KG = 1.0  # 1.4 m/s: contacts at the start may give this without a fall
 
 

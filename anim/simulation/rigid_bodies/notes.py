@@ -6,17 +6,21 @@ import numpy as np
 
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.assembly import ancestors
+from anim.simulation.rigid_bodies.loop import BLEND_S
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.rapier.world import PLANE_REACH_M, find_approximations
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 
 MIN_OVERLAP_PER_RADIUS = 0.02  # of the smaller body; less is the tolerance of contacts
 SHEAR_TOLERANCE = 1e-3
+MAX_SEAM_PER_RADIUS = 0.1  # of the smallest body; less is hardly seen
 MAX_LISTED = 3
 
 
-def find_notes(rigid: RigidScene, skeleton: Skeleton, clip: Clip, motion: RigidMotion, shear: float) -> list[str]:
-    """Return remarks: overlaps at the start, approximations, animated parents, shear; empty for none."""
+def find_notes(
+    rigid: RigidScene, skeleton: Skeleton, clip: Clip, motion: RigidMotion, shear: float, seam: float
+) -> list[str]:
+    """Return remarks: overlaps at the start, approximations, animated parents, shear, a loop's seam; empty for none."""
     return [
         *_overlaps(rigid, skeleton, motion),
         *_far(rigid, motion),
@@ -26,6 +30,7 @@ def find_notes(rigid: RigidScene, skeleton: Skeleton, clip: Clip, motion: RigidM
             [f"nodes under scaled parents are sheared by up to {shear:.1%}, which keys can't hold"]
             * (shear > SHEAR_TOLERANCE)
         ),
+        *_seam(rigid, motion, seam),
     ]
 
 
@@ -61,3 +66,11 @@ def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list
         return []
     label = skeleton.label(rigid.bodies[below[0]].node)
     return [f"a parent of {label} is animated: play its clip too, or merge both"]
+
+
+def _seam(rigid: RigidScene, motion: RigidMotion, seam: float) -> list[str]:
+    radii = [rigid.bodies[i].radius for i in rigid.moving if rigid.bodies[i].radius > 0]
+    if seam <= MAX_SEAM_PER_RADIUS * min(radii, default=0.0):
+        return []
+    rounds = f"{motion.num_rounds} rounds of the clip"
+    return [f"bodies don't repeat their motion in {rounds}: the last {BLEND_S:g} s move them {seam:.3g} m to the start"]

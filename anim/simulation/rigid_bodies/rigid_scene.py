@@ -89,3 +89,10 @@ class RigidScene:
     def animated(self) -> list[int]:
         """Indices of the bodies that the driving clip moves."""
         return [i for i, body in enumerate(self.bodies) if body.kind is BodyKind.ANIMATED]
+
+    @property
+    def can_repeat(self) -> bool:
+        """True if a clip, a motor or its own constant velocity moves a body: others only come to rest."""
+        return any(body.kind in (BodyKind.ANIMATED, BodyKind.KINEMATIC) for body in self.bodies) or any(
+            joint.drives for joint in self.joints
+        )

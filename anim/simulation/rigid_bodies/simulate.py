@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import UnstableError
+from anim.errors import RangeError, UnstableError
 from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.writing.writer import replace_clips
@@ -51,7 +51,8 @@ def read_description(document: Document, skeleton: Skeleton) -> PhysicsDescripti
 def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescription, options: RigidOptions) -> RigidRun:
     """Return the tracks of all bodies, from the start of the clip on.
 
-    Raises UnstableError with a report for a run that diverges, RangeError without a body.
+    Raises UnstableError with a report for a run that diverges, RangeError without a body, or for a loop of bodies that
+    nothing moves again.
     """
     skeleton, start = scene.skeleton, clip.start
     clip = Clip(clip.name, tuple(shift_time(track, -start) for track in clip.tracks))
@@ -59,7 +60,12 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     steps = Steps(1 / (options.fps * substeps), options.duration, options.warm_up)
     world = world_matrices(skeleton, sample_pose(skeleton, clip, np.zeros(1)))[0]
     rigid = assemble(description, skeleton, clip, world, options.gravity)
-    rounds = MAX_ROUNDS if options.loop and rigid.animated else 1
+    if options.loop and not rigid.can_repeat:
+        raise RangeError(
+            "`loop` needs a clip or motor that moves bodies: those that only fall don't come back",
+            help=("leave it out: players repeat any clip"),
+        )
+    rounds = MAX_ROUNDS if options.loop else 1
     try:
         motion = run_scene(rigid, skeleton, clip, steps, substeps=substeps, max_rounds=rounds)
     except UnstableError as error:
@@ -75,7 +81,7 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     worlds = tracks.WorldAtTimes(skeleton, clip, world, rigid, motion)
     made = tracks.make_tracks(skeleton, rigid, motion, frames, worlds, start=start, max_error=options.max_error)
     report = make_report(rigid, motion, options, steps, errors=errors, made=made, seam=seam)
-    return RigidRun(made.tracks, report, find_notes(rigid, skeleton, clip, motion, made.shear))
+    return RigidRun(made.tracks, report, find_notes(rigid, skeleton, clip, motion, made.shear, seam or 0.0))
 
 
 def _step_errors(

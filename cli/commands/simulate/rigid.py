@@ -16,7 +16,7 @@ from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.simulation.rigid_bodies.description import WATER_KG_M3, Material, Motion, PhysicsDescription
 from anim.simulation.rigid_bodies.node_globs import SHAPES, ChosenNodes, add_chosen
-from anim.simulation.rigid_bodies.options import RigidOptions
+from anim.simulation.rigid_bodies.options import SETTLED_M, RigidOptions
 from anim.simulation.rigid_bodies.simulate import (
     add_rigid_motion,
     read_description,
@@ -77,8 +77,10 @@ def command(
 
     Bodies are nodes named by --body, and those of KHR_physics_rigid_bodies or OMI_physics_body in the file, with their
     colliders, materials, filters, joints and motors. Colliders that the driving clip moves push bodies. Impacts get
-    keys at their own time between frames; a body that sleeps has no more keys. The same file and options give the same
-    bytes on the same kind of processor. Requires rapier3d: pip install 'gltf-anim[physics]'.
+    keys at their own time between frames; a body that sleeps has no more keys. --loop repeats the driving clip until
+    the bodies repeat their motion within 0.1 mm, at most 20 times; then the last 0.2 s lead back to the start. The same
+    file and options give the same bytes on the same kind of processor. Requires rapier3d: pip install
+    'gltf-anim[physics]'.
     """
     simulation.check_fps(fps)
     options = RigidOptions(
@@ -144,8 +146,12 @@ def _summary(report: SimulationReport) -> str:
         f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
     ]
     if report.loop_seam_m is not None:
-        rounds = text.plural(figures["loop_rounds"], "round")
-        parts.append(f"loop after {rounds}, a seam of {text.format_length(report.loop_seam_m)} closed")
+        rounds, seam = text.plural(figures["loop_rounds"], "round"), text.format_length(report.loop_seam_m)
+        settled = report.loop_seam_m < SETTLED_M
+        parts.append(
+            f"loop after {rounds}, seam {seam}" if settled else f"no loop after {rounds}: a seam of {seam} is blended"
+        )
     if report.error_estimate_m and report.error_estimate_m > ROUNDING_M:
-        parts.append(f"half the step differs by {text.format_length(report.error_estimate_m)}")
+        amplified = ", amplified by each impact" if figures["impacts"] else ""
+        parts.append(text.format_step_error(report.error_estimate_m) + amplified)
     return ", ".join(parts)

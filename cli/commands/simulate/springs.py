@@ -261,5 +261,5 @@ def _summary(report: SimulationReport, result: SpringResult) -> str:
             f"no loop after {result.loop.rounds} rounds: a seam of {text.format_length(result.loop.seam)} is blended"
         )
     if report.error_estimate_m is not None and report.omega_h is not None:  # VRM: another motion, not an error
-        parts.append(f"half the step differs by {text.format_length(report.error_estimate_m)}")
+        parts.append(text.format_step_error(report.error_estimate_m))
     return ", ".join(parts)

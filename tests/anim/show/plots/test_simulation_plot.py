@@ -25,7 +25,7 @@ def test_the_title_and_the_curves_are_those_of_the_run() -> None:
     energy = {"start": 20.0, "end": 19.5, "peak": 20.0}
     report = SimulationReport("rigid", 1 / 240, 240, 60, 1.0, energy_j=energy, error_estimate_m=1e-3)
     drawn = simulation_plot(_with(report, history=_history()), kind="svg").decode()
-    assert "rigid: steps of 1/240 s, 1 s: energy 20 → 19.5 J, half the step differs by 1 mm" in drawn
+    assert "rigid: steps of 1/240 s, 1 s: energy 20 → 19.5 J, a run with half the step differs by up to 1 mm" in drawn
     for words in ("kinetic", "potential", "total", "Distance to the run with half the step, mm"):
         assert words in drawn
     assert "Distance to" not in simulation_plot(_with(report, history=_history(0)), kind="svg").decode()
