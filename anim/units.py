@@ -1,4 +1,4 @@
-"""Parsing of numbers with units: lengths, angles, fractions."""
+"""Numbers in text: parsing of lengths, angles and fractions with units, and plain decimals."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ _ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
 _ZERO_ANGLE = re.compile(r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*")
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+
+
+def format_number(value: float, digits: int) -> str:
+    """Return the value rounded to `digits` significant digits, without exponent: "0.41", "102", "1200"."""
+    rounded = f"{float(f'{value:.{digits}g}'):.10f}"
+    return rounded.rstrip("0").rstrip(".")
 
 
 def parse_fraction(text: str, name: str) -> float:

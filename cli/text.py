@@ -6,6 +6,8 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass, field
 
+from anim.units import format_number
+
 MIN_PERCENT = 1e-4
 MIN_LENGTH_M = 1e-11  # m; smaller lengths come from rounding
 
@@ -107,11 +109,6 @@ def _round_significant(seconds: float) -> str:
 def format_duration(seconds: float) -> str:
     """Return the run time of the command, marked to differ from a clip's duration: "took 0.8 s"."""
     return f"took {format_number(seconds, 2 if seconds < 10 else 3)} s"
-
-
-def format_number(value: float, count: int) -> str:
-    """Return the value rounded to `count` significant digits, without exponent."""
-    return f"{float(f'{value:.{count}g}'):.10f}".rstrip("0").rstrip(".")
 
 
 def plural(count: int, noun: str) -> str:

@@ -17,6 +17,7 @@ from anim.operations.loop import open_tracks
 from anim.operations.selection import Selection
 from anim.operations.spline import max_key_change
 from anim.operations.spline import spline as splined
+from anim.units import format_number
 from cli.io import documents
 from cli.options import common
 from cli.text import Reporter
@@ -79,7 +80,7 @@ def _notes(before: Clips, after: Clips) -> Iterator[str]:
     found = {i: each for i, each in found.items() if each[0] or each[1] > MIN_DEVIATION_RAD}
     if found:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))
-        far = [f"rotations by up to {math.degrees(turned):.2g}°"] if turned > MIN_DEVIATION_RAD else []
+        far = [f"rotations by up to {format_number(math.degrees(turned), 2)}°"] if turned > MIN_DEVIATION_RAD else []
         far += [f"other values by up to {moved:.3g}"] if moved else []
         where = reader.clip_labels([(before[i].name, i) for i in found])
         yield f"{where}: the curve does not pass through its keys ({', '.join(far)}); --tangents natural does"

@@ -21,6 +21,7 @@ from anim.gltf.reading import reader
 from anim.maths.euler import AxesConvention
 from anim.model import Clip
 from anim.operations.selection import Selection
+from anim.units import format_number
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import documents
@@ -109,7 +110,7 @@ def command(
     for note in motion.notes:
         voice.warn(note)
     if limit is None and math.degrees(deviation) > WARNED_DEVIATION_DEG:
-        error = f"{math.degrees(deviation):.2g}°"
+        error = f"{format_number(math.degrees(deviation), 2)}°"
         voice.warn(f"between keys, the curves are off by up to {error}: --angle-tolerance 0.1deg adds keys")
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
@@ -195,7 +196,7 @@ def _motion(
         without=holders,
     )
     words = (
-        f"between keys off by up to {math.degrees(found.deviation):.2g}°, "
+        f"between keys off by up to {format_number(math.degrees(found.deviation), 2)}°, "
         if math.degrees(found.deviation) > MIN_DEVIATION_DEG
         else ""
     )

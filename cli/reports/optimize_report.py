@@ -20,6 +20,7 @@ from anim.optimization.rate_distortion import RatePoint
 from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from anim.optimization.writing import KEY
+from anim.units import format_number
 from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length, plural
@@ -153,7 +154,7 @@ def _clip_line(about: OptimizeReport, number: int, solution: Solution) -> str:
 def curve_line(sized: RatePoint, scale: float) -> str:
     """Return one point of the curve as text."""
     percent = 100 * sized.max_error / scale if scale else 0.0
-    bound = f"{format_length(sized.max_error)} ({percent:.2g} %)" if sized.max_error else "without loss"
+    bound = f"{format_length(sized.max_error)} ({format_number(percent, 2)} %)" if sized.max_error else "without loss"
     sizes = f"animation {format_bytes(sized.animation)}, file {format_bytes(sized.size)}"
     return f"  {bound}: {sizes}, max {format_length(sized.error)}"
 
@@ -207,7 +208,7 @@ def _error_words(verdict: Verification, about: OptimizeReport) -> str:
         where = f" at '{error.joint}', {error.time:.3f} s" if error.joint else ""
         words = _length(error.max_error, about.scale) + where
     if error.max_pointer_error > 0:
-        words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
+        words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"
     return words
 
 

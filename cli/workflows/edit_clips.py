@@ -22,6 +22,7 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection
+from anim.units import format_number
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
@@ -195,7 +196,7 @@ def _error(found: Proof, diagonal: float) -> str:
     where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
     words = f"max {least}{text.format_length(error.max_error)}{text.format_fraction(error.max_error, diagonal)}{where}"
     if error.max_pointer_error > 0:
-        words += f", pointers max {100 * error.max_pointer_error:.2g} % of range at {error.pointer}"
+        words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"
     return words
 
 

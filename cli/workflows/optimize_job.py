@@ -19,7 +19,7 @@ from anim.operations.selection import Selection
 from anim.optimization.optimize import Optimized, optimize
 from anim.optimization.options import Bounds, Request
 from anim.optimization.rate_distortion import MAX_BOUND_PER_DIAGONAL, RatePoint, smallest_error
-from anim.units import is_zero
+from anim.units import format_number, is_zero
 from cli import units
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
@@ -100,7 +100,7 @@ class OptimizeJob:
 
     def _check_fit(self, sized: RatePoint, max_bytes: int) -> None:
         if sized.size > max_bytes:
-            percent = f" ({100 * sized.max_error / self.scale:.2g} %)" if self.scale else ""
+            percent = f" ({format_number(100 * sized.max_error / self.scale, 2)} %)" if self.scale else ""
             kept = optimize_report.retained_keys(self.source.document, self.chosen)
             raise CheckError(
                 f"doesn't fit {plural(max_bytes, 'byte')}: "

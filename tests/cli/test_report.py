@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cli.text import format_bytes, format_change, format_length, format_number, format_speed
+from anim.units import format_number
+from cli.text import format_bytes, format_change, format_length, format_speed
 
 
 @pytest.mark.parametrize(

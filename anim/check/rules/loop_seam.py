@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameter, Parameters, Rule
+from anim.units import format_number
 
 LOOP_NAME = re.compile(r"(^|[^a-z])(loop|cycle|idle)([^a-z]|$)", re.IGNORECASE)
 
@@ -24,7 +25,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 def problem(found: Sequence[Occurrence]) -> str:
     """Return the largest gap."""
     largest = max(each.value for each in found)
-    return f"a loop jumps by {100 * largest:.2g} % of the model's size"
+    return f"a loop jumps by {format_number(100 * largest, 2)} % of the model's size"
 
 
 RULE = Rule(

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameter, Parameters, Rule
+from anim.units import format_number
 
 VISIBLE_GAP = 1e-3  # of the model's size: larger gaps are no loop
 
@@ -22,7 +23,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 def problem(found: Sequence[Occurrence]) -> str:
     """Return the largest displacement."""
-    return f"the root moves by {100 * max(each.value for each in found):.2g} % of the model's size each time round"
+    percent = format_number(100 * max(each.value for each in found), 2)
+    return f"the root moves by {percent} % of the model's size each time round"
 
 
 RULE = Rule(

@@ -23,6 +23,7 @@ from anim.simulation.cloth.simulate import ClothRun, simulate_cloth
 from anim.simulation.cloth.solver import Environment
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import describe_elongation
+from anim.units import format_number
 from cli import text, units
 from cli.errors import CheckError, UsageError
 from cli.io import cache_files, documents, scenes
@@ -219,7 +220,7 @@ def _summary(run: ClothRun) -> str:
     parts = [
         f"{text.plural(run.cache.frame_count, 'frame')} of {figures['points']} points ({figures['pinned']} pinned)",
         f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s",
-        f"stretched by {text.format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s",
+        f"stretched by {format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s",
     ]
     if run.report.penetration_m:
         parts.append(f"{text.format_length(run.report.penetration_m)} inside a collider or below the floor at most")

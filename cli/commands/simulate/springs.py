@@ -30,6 +30,7 @@ from anim.simulation.spring_bones.read import read_spring_bones
 from anim.simulation.spring_bones.reduction import reduce_keys
 from anim.simulation.spring_bones.report import make_report, report_divergence, step_error
 from anim.simulation.spring_bones.simulate import SpringOptions, SpringResult, simulate_springs
+from anim.units import format_number
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import documents
@@ -252,7 +253,7 @@ def _summary(report: SimulationReport, result: SpringResult) -> str:
         text.plural(report.figures["joints"], "joint"),
         text.plural(report.figures["colliders"], "collider"),
         f"{report.duration_s:.4g} s in steps of 1/{1 / report.step_s:.4g} s",
-        f"largest rotation {text.format_number(report.figures['max_rotation_deg'], 2)}°",
+        f"largest rotation {format_number(report.figures['max_rotation_deg'], 2)}°",
     ]
     if result.loop is not None and result.loop.settled:
         parts.append(f"loop after {result.loop.rounds} rounds, seam {text.format_length(result.loop.seam)}")

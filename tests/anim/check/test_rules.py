@@ -11,9 +11,10 @@ import pytest
 
 from anim.check.checked_file import CheckedFile
 from anim.check.find import find_all, find_grouped
-from anim.check.finding import Finding
+from anim.check.finding import Finding, Occurrence
 from anim.check.fixing import fix_all
 from anim.check.registry import RULES
+from anim.check.rules import loop_seam, residual_root_motion
 from anim.check.selection import RuleSelection
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -249,3 +250,9 @@ def test_a_fixed_file_is_clean_and_moves_no_vertex(code: str) -> None:
     fixed = checked(result.document)
     assert find_all(fixed, selection) == ()
     assert fix_all(fixed, selection, unsafe=True).document is fixed.document
+
+
+def test_gaps_of_the_size_of_the_model_have_no_exponent() -> None:
+    found = [Occurrence("clip 'walk'", "/animations/0", value=1.02)]
+    assert loop_seam.problem(found) == "a loop jumps by 100 % of the model's size"
+    assert residual_root_motion.problem(found).startswith("the root moves by 100 % ")
