@@ -43,8 +43,8 @@ def command(
     """Change the timing of clips: speed, duration, direction, delay.
 
     Times are the clip's own seconds, not frames. Values stay, and tangents are scaled by the chain rule: all changes
-    except --warp are exact. They are applied in the order --warp, --speed or --duration, --reverse, --ping-pong,
-    --offset.
+    except --warp are exact, but for the rounding of times to float32. They are applied in the order --warp, --speed or
+    --duration, --reverse, --ping-pong, --offset.
     """
     selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
     if speed is None and duration is None and not (reverse or ping_pong or offset or warp_ease):
