@@ -1,6 +1,6 @@
 """`python -m anim`: the command `gltf-anim`."""
 
-from cli.main import main
+from cli.entry_point import main
 
 if __name__ == "__main__":
     main()

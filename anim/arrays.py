@@ -35,7 +35,7 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{name} holds something that is no number ({error})") from None
     check_shape(array, shape, name=name)
-    if not _is_finite(array):
+    if not is_finite(array):
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise RangeError(f"{name} holds {array[at]} at {list(at)} (expected finite numbers)")
     if _is_frozen(array):
@@ -78,8 +78,8 @@ def unique_sorted(values: Floats) -> Floats:
     return ordered[np.concatenate(([True], ordered[1:] > ordered[:-1]))] if len(ordered) else ordered
 
 
-def _is_finite(array: AnyArray) -> bool:
-    """True if every number is finite; a finite sum of squares is a fast proof."""
+def is_finite(array: AnyArray) -> bool:
+    """Return whether every number is finite; a finite sum of squares is a fast proof."""
     flat = array.reshape(-1)
     return math.isfinite(flat.dot(flat)) or bool(np.isfinite(array).all())
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from anim.errors import RangeError
 
+BYTES_PER_UNIT = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
 _ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
 _ZERO_ANGLE = re.compile(r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*")
@@ -67,6 +68,15 @@ def parse_angle(text: str, name: str) -> float:
     if unit not in ANGLES or value <= 0:
         raise RangeError(f"{name} is '{text}' (expected an angle above 0 with its unit, like 0.05deg or 0.001rad)")
     return value * ANGLES[unit]
+
+
+def parse_size(text: str, name: str) -> int:
+    """Return a number of bytes above 0: "800kB", "1.5 MB", "65536". Raises RangeError otherwise."""
+    value, unit = _split(text.lower(), name) if _NUMBER.fullmatch(text.lower()) else (0.0, "")
+    size = int(value * BYTES_PER_UNIT.get(unit, 0))
+    if size <= 0:
+        raise RangeError(f"{name} is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
+    return size
 
 
 def _split(text: str, name: str) -> tuple[float, str]:

@@ -19,7 +19,7 @@ from anim.errors import (
     UnsupportedError,
     is_out_of_memory,
 )
-from cli.tables import escape_control
+from cli.tables import cut_middle, escape_control
 from cli.text import Reporter
 
 PROGRAM = "gltf-anim"
@@ -67,6 +67,8 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
         _print_error("the input is nested too deep", "")
         return FORMAT
     except Exception as error:
+        if (ended := _end_of(error)) is not None:
+            return ended
         if is_out_of_memory(error):
             _print_error("out of memory", "")
             return UNSUPPORTED
@@ -75,13 +77,25 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
         return BUG
 
 
+def _end_of(error: BaseException | None) -> int | None:
+    """Exit code of a signal that some package turned into another exception; None for other errors."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return INTERRUPTED
+        if isinstance(error, SystemExit) and isinstance(error.code, int):
+            return error.code
+        error = error.__cause__ or error.__context__
+    return None
+
+
 def report_error(error: AnimError) -> int:
     """Report an error as one line, with its help if any, and return the exit code."""
     code = CODES.get(type(error), BUG)
     if code == BUG:
         vars(error).pop("__notes__", None)  # the help, which is written separately
         _print_trace()
-    _print_error(str(error), error.help)
+    where = f"{cut_middle(error.where)}: " if error.where else ""
+    _print_error(where + cut_middle(error.problem), error.help)
     return code
 
 
@@ -118,7 +132,7 @@ def _print_error(problem: str, hint: str) -> None:
     voice = Reporter()  # the exit code stays the same if stderr is closed
     voice.info(f"{PROGRAM}: {escape_control(problem)}")
     if hint:
-        voice.info(f"help: {escape_control(hint)}")
+        voice.info(f"help: {escape_control(cut_middle(hint))}")
 
 
 def _print_trace() -> None:

@@ -9,6 +9,7 @@ import inspect
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -17,6 +18,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from anim import __version__
+from cli.signals import install_handlers
 from cli.typer_options import Command, Parsing, set_parsers
 
 PROGRAM = "gltf-anim"
@@ -270,18 +272,26 @@ def main() -> None:
     """Run the command line of this process and exit with its exit code."""
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends the process silently, as for other tools
-    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
-            signal.signal(
-                number, lambda number, _: sys.exit(128 + number)
-            )  # exits normally, so that temporary files are removed
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrix products are small: more threads only cost time
     gc.disable()  # one short job over many long-lived objects: collection only costs time
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of packages: they are for programmers, and stderr is for messages
+    with suppress(ImportError):  # raised again, and reported, when the command runs
+        _import_command(sys.argv[1:])
+    received = install_handlers()
     code = run(sys.argv[1:])
+    code = 128 + received[0] if received else code
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, AttributeError):  # closed by the parent process
             stream.flush()
     os._exit(code)  # without deallocating all objects first
+
+
+def _import_command(args: list[str]) -> None:
+    """Import the command's module, while signals still end the process at once."""
+    name = next((each for each in args if not each.startswith("-")), "")
+    if name in COMMANDS:
+        importlib.import_module(f"{LazyGroup.package}.{name.replace('-', '_')}")
 
 
 def run(args: list[str]) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
+MAX_QUOTED_LENGTH = 300  # characters of a problem, or of its position: names in a file can have any length
 Cell = str | int | float | bool | None
 
 
@@ -40,6 +41,14 @@ def escape_control(words: str) -> str:
     if words.isprintable():
         return words
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
+
+
+def cut_middle(words: str, length: int = MAX_QUOTED_LENGTH) -> str:
+    """Return text of at most `length` characters, with "…" in the middle if it was longer."""
+    if len(words) <= length:
+        return words
+    end = length // 3
+    return f"{words[: length - end - 1]}…{words[-end:]}"
 
 
 def _shown(cell: Cell) -> str:

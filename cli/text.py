@@ -7,7 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from anim.units import format_number
+from cli.tables import cut_middle
 
+MAX_LINE_LENGTH = 1000  # characters of a message: names in a file can have any length
 MIN_PERCENT = 1e-4
 MIN_LENGTH_M = 1e-11  # m; smaller lengths come from rounding
 
@@ -24,10 +26,13 @@ class Reporter:
     warnings: list[str] = field(default_factory=list, compare=False)
 
     def info(self, line: str) -> None:
-        """Write a line to stderr, unless quiet."""
+        """Write a line to stderr, cut if very long, unless quiet."""
         if not self.quiet:
-            with suppress(OSError, AttributeError):  # stderr is closed
-                sys.stderr.write(line + "\n")
+            self._write("\n".join(cut_middle(each, MAX_LINE_LENGTH) for each in line.split("\n")))
+
+    def _write(self, line: str) -> None:
+        with suppress(OSError, AttributeError):  # stderr is closed
+            sys.stderr.write(line + "\n")
 
     def warn(self, words: str) -> None:
         """Write "warning: words" to stderr once, even when quiet: facts that change the meaning of a figure."""
@@ -37,8 +42,8 @@ class Reporter:
 
     def verbose_info(self, line: str) -> None:
         """Write a line to stderr if details are requested."""
-        if self.verbose:
-            self.info(line)
+        if self.verbose and not self.quiet:
+            self._write(line)
 
 
 def format_bytes(count: int) -> str:

@@ -12,11 +12,13 @@ from typing import Any
 
 import typer
 from typer import TyperException
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperOption
 from typer.models import ArgumentInfo, OptionInfo
 
-from anim.errors import AnimError, not_written
+from anim import units
+from anim.errors import AnimError, RangeError, not_written
 
+MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
 METAVARS = {str: "TEXT", int: "N", float: "N"}
 LISTINGS = {"EASINGS": "gltf-anim ease --list", "TANGENTS": "gltf-anim spline --list"}  # by the library's table
 
@@ -47,10 +49,20 @@ class Parsing:
 class Command(Parsing, TyperCommand):
     """Command with a help page that shows arguments without a type, and with its options named in errors."""
 
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.params.append(_memory_option())
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command; errors of the library name its options instead of parameters."""
+        import numpy as np
+
+        from anim.memory import memory_limit
+
         try:
-            return super().invoke(ctx)
+            # Results that are not finite are errors where they are written.
+            with np.errstate(all="ignore"), memory_limit(ctx.meta.get(MEMORY_LIMIT)):
+                return super().invoke(ctx)
         except AnimError as error:
             options = {str(each.name): each.opts[0] for each in self.params if each.param_type_name == "option"}
             name_options(error, options)
@@ -64,6 +76,26 @@ class Command(Parsing, TyperCommand):
             if shown:
                 with formatter.section(heading):
                     formatter.write_dl(shown)
+
+
+def _memory_option() -> TyperOption:
+    """Option of every command, outside its function."""
+    return TyperOption(
+        param_decls=["--memory-limit"],
+        type=str,
+        metavar="SIZE",
+        expose_value=False,
+        callback=_set_memory_limit,
+        help="Largest size of an input's decoded data: 4GB. Default: 1GB, or 64 times the file.",
+    )
+
+
+def _set_memory_limit(ctx: Any, param: Any, value: str | None) -> None:
+    if value is not None:
+        try:
+            ctx.meta[MEMORY_LIMIT] = units.parse_size(value, "--memory-limit")
+        except RangeError as error:
+            raise typer.BadParameter(error.problem) from None
 
 
 def name_options(error: AnimError, options: Mapping[str, str]) -> None:

@@ -28,6 +28,12 @@ def parse_angle(text: str, option: str) -> float:
         return units.parse_angle(text, option)
 
 
+def parse_size(text: str, option: str) -> int:
+    """Return a number of bytes above 0 from "800kB", "1.5MB" or "65536". Raises UsageError otherwise."""
+    with _usage_errors():
+        return units.parse_size(text, option)
+
+
 @contextmanager
 def _usage_errors() -> Iterator[None]:
     try:

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Packages from the bottom up; one may import from its own level only where NEIGHBORS says so.
 LEVELS = (
     {"errors"},
-    {"arrays", "units"},
+    {"arrays", "memory", "units"},
     {"arguments", "maths", "files"},
     {"model"},
     {"gltf", "sampling"},

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 def test_the_project_names_two_packages() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert project["tool"]["hatch"]["build"]["targets"] == {"wheel": {"packages": ["anim", "cli"]}}
-    assert project["project"]["scripts"] == {"gltf-anim": "cli.main:main"}
+    assert project["project"]["scripts"] == {"gltf-anim": "cli.entry_point:main"}
 
 
 def test_a_wheel_holds_two_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

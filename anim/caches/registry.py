@@ -9,6 +9,8 @@ from enum import Enum
 from functools import partial
 from typing import TypeAlias
 
+import numpy as np
+
 from anim.caches.formats import gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.signatures import Signature, is_mdd, is_obj, is_stl, starts_with
@@ -20,6 +22,7 @@ from anim.model.vertex_cache import Chunks
 
 Read: TypeAlias = Callable[[Inputs, ReadOptions], VertexCache]
 Write: TypeAlias = Callable[[VertexCache, Outputs, WriteOptions], WriteResult]
+MAX_FLOAT32 = float(np.finfo(np.float32).max)
 SIGNATURE_BYTES = 1024  # bytes that are enough for every signature
 
 
@@ -107,7 +110,7 @@ def reader_for(ending: str) -> Read:
 
 def writer_for(ending: str) -> Write:
     """Return the writer of a format: writer_for(".npz")(cache, outputs, WriteOptions()) → WriteResult."""
-    return _of(ending).write
+    return partial(_write, _of(ending).write)
 
 
 def _read(read: Read, inputs: Inputs, reading: ReadOptions) -> VertexCache:
@@ -118,7 +121,21 @@ def _read(read: Read, inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 def _chunks(chunks: Chunks) -> Iterator[FrameChunk]:
     with _format_errors((ShapeError, RangeError)):
-        yield from chunks()
+        for chunk in chunks():
+            yield chunk.check_finite()
+
+
+def _write(write: Write, cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
+    """Write a cache of finite numbers. Raises FormatError for others, which come from the input's transforms."""
+    if not cache.times[-1] <= MAX_FLOAT32:
+        raise FormatError(f"the last frame is at {cache.times[-1]:g} s, beyond float32")
+    if cache.rest is not None and not (within := (np.abs(cache.rest) <= MAX_FLOAT32).all(axis=1)).all():
+        vertex = int(np.argmin(within))
+        raise FormatError(
+            f"vertex {vertex} is beyond float32 (got {cache.rest[vertex].tolist()})", where="the rest mesh"
+        )
+    checked = replace(cache, chunks=lambda: (chunk.check_finite() for chunk in cache.chunks()))
+    return write(checked, outputs, writing)
 
 
 @contextmanager

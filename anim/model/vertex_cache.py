@@ -10,7 +10,7 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import AnyArray, Floats, Ints
-from anim.errors import ShapeError
+from anim.errors import FormatError, ShapeError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +29,19 @@ class FrameChunk:
         """Return the chunk with `change` applied to positions, normals and tangents."""
         turned = (None if each is None else change(each) for each in (self.normals, self.tangents))
         return FrameChunk(self.first, change(self.positions), *turned)
+
+    def check_finite(self) -> FrameChunk:
+        """Return this chunk. Raises FormatError for NaN or infinity, with the frame and the vertex."""
+        for name in ("positions", "normals", "tangents"):
+            values = getattr(self, name)
+            if values is not None and not arrays.is_finite(values):
+                frame, vertex = (int(i) for i in np.argwhere(~np.isfinite(values))[0][:2])
+                noun = "is" if name == "positions" else f"has {name}"
+                raise FormatError(
+                    f"vertex {vertex} {noun} beyond float32 (got {values[frame, vertex].tolist()})",
+                    where=f"frame {self.first + frame}",
+                )
+        return self
 
     def __repr__(self) -> str:
         frames, vertices = self.positions.shape[:2]

@@ -83,7 +83,8 @@ class ChunkPipeline:
         for layer in self.layers:
             layer.finish(started.frames, started.output)
         _, positions, normals, tangents = started.output
-        return FrameChunk(first, positions, normals if self.normals else None, tangents if self.tangents else None)
+        directions = (normals if self.normals else None, tangents if self.tangents else None)
+        return FrameChunk(first, positions, *directions).check_finite()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from copy import copy
 from dataclasses import asdict
 from enum import StrEnum
@@ -22,7 +21,7 @@ from cli import errors, tables
 from cli.errors import CheckError
 from cli.io import documents, input_files
 from cli.options import common
-from cli.reports import inspect_report
+from cli.reports import inspect_report, json_report
 from cli.reports.inspect_report import Inspected, Smoothness
 from cli.workflows import checked_files
 
@@ -150,7 +149,7 @@ def _json(done: list[Inspected], smooth: list[Smoothness]) -> str:
     files = [{"file": each.name, "bytes": each.file_bytes, **_plain(each)} for each in done]
     if any(smooth):
         _add_smoothness(files, smooth)
-    return json.dumps({"schema": SCHEMA, "files": files}, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump({"schema": SCHEMA, "files": files})
 
 
 def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> None:

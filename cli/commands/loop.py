@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated
@@ -24,6 +23,7 @@ from cli.errors import UsageError
 from cli.io import documents, scenes
 from cli.options import common
 from cli.options.common import Format
+from cli.reports import json_report
 from cli.text import Reporter, format_length, format_speed
 from cli.workflows.edit_clips import edit_clips
 
@@ -250,4 +250,4 @@ def _json(
         loops.append({"clip": name, **{units.get(key, key): value for key, value in facts.items()}})
     report: dict[str, object] = {"schema": SCHEMA, "measured_on": "skin" if on_skin else "nodes", "loops": loops}
     report |= {"advice": advised, "notes": notes, "warnings": warnings}
-    return json.dumps(report, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump(report)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated, Any
@@ -23,6 +22,7 @@ from cli import tables
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
+from cli.reports import json_report
 from cli.text import Reporter
 
 SCHEMA = 1
@@ -124,7 +124,7 @@ def _json(taken: Taken, skeleton: Skeleton, nodes: list[int], space: Space) -> s
         if poses.pointers:
             about["pointers"] = {pointer: values.tolist() for pointer, values in poses.pointers.items()}
         clips.append(about)
-    return json.dumps({"schema": SCHEMA, "space": str(space), "clips": clips}, allow_nan=False) + "\n"
+    return json_report.dump({"schema": SCHEMA, "space": str(space), "clips": clips}, indent=None)
 
 
 def _node(i: int, skeleton: Skeleton, poses: PoseTable) -> dict[str, Any]:

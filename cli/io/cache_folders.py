@@ -55,8 +55,8 @@ class CacheFolder:
         self._folder = path.parent
 
     def open(self, name: str) -> BinaryIO:
-        """Open the file of this name."""
-        path = self._folder / name
+        """Open the file of this name: one that another names must be a regular file beside it."""
+        path = self._folder / name if name == self.main else resolver.locate(self._folder, name)
         try:
             if path.is_dir():
                 raise FormatError("is a folder")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -13,6 +12,7 @@ from anim import __version__
 from anim.check.baseline import fingerprint
 from anim.check.finding import Finding, Severity
 from anim.check.registry import RULES
+from cli.reports import json_report
 from cli.reports.check_report import CheckReport, summary
 from cli.tables import escape_control
 
@@ -81,7 +81,7 @@ def as_sarif(report: CheckReport) -> str:
     run: dict[str, Any] = {"tool": {"driver": driver}, "columnKind": "utf16CodeUnits", "results": results}
     run["invocations"] = [{"executionSuccessful": not notes, "toolExecutionNotifications": notes}]
     content = {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
-    return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump(content)
 
 
 def _result(path: str, found: Finding, rule: int, seen: Counter[str]) -> dict[str, Any]:

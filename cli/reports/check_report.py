@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
@@ -11,6 +10,7 @@ from anim.check.baseline import FileFinding, fingerprint
 from anim.check.finding import Severity
 from anim.errors import AnimError
 from cli import tables
+from cli.reports import json_report
 from cli.tables import escape_control
 from cli.text import plural
 
@@ -99,7 +99,7 @@ def as_json(report: CheckReport) -> str:
         "gone": dict(report.gone),
         "counts": {each.value: report.count(each) for each in Severity},
     }
-    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump(content)
 
 
 def as_markdown(report: CheckReport) -> str:

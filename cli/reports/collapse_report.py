@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_colla
 from anim.skinning.analysis.method_scores import BULGE_RATIO, MethodScore
 from anim.skinning.analysis.recommendations import CollapseFinding, recommend
 from cli import tables
+from cli.reports import json_report
 from cli.text import plural
 
 SCHEMA = 1
@@ -78,7 +78,7 @@ def as_json(seen: CollapseReport) -> str:
         "advice": list(recommend(seen.found, clamped=seen.clamped)),
         "warnings": list(seen.warnings),
     }
-    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump(content)
 
 
 def _head(seen: CollapseReport, *, every: bool) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from anim.measure.error.statistics import Peak
 from anim.measure.inspect.storage_cost import StorageCost
 from anim.units import format_number
 from cli import tables
+from cli.reports import json_report
 from cli.text import format_change, format_length, format_speed, plural
 
 SCHEMA = 1
@@ -100,7 +100,7 @@ def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
         "added_nodes": list(diff.added_nodes),
         "warnings": list(warnings),
     }
-    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump(content)
 
 
 def worst(found: DiffReport) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import degrees
@@ -15,6 +14,7 @@ from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.model import Skeleton
 from cli import tables, text
+from cli.reports import json_report
 
 SCHEMA = 1
 MAX_LISTED_NAMES = 8  # names in a line
@@ -102,7 +102,7 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
             "lowered_m": list(made.onto.lowered),
             "joints_at_bind_pose": made.onto.num_bound,
         }
-    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
+    return json_report.dump(content)
 
 
 def listed(names: list[str]) -> str:

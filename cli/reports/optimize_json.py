@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +11,7 @@ from anim.gltf.reading import reader
 from anim.measure.inspect.storage_cost import storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.optimization.search.plan import Solution
-from cli.reports import optimize_bound
+from cli.reports import json_report, optimize_bound
 from cli.reports.optimize_report import OptimizeReport, count_keys
 
 SCHEMA = 1
@@ -56,7 +55,7 @@ def as_json(about: OptimizeReport, *, warnings: Sequence[str] = ()) -> str:
         "clips": [] if about.unchanged else [_clip(about, i, each) for i, each in about.found.solutions.items()],
         "warnings": list(warnings),
     }
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_report.dump(content, indent=2)
 
 
 def _bytes(file: int, document: Document) -> dict[str, int]:

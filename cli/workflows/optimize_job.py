@@ -21,14 +21,13 @@ from anim.optimization.options import Bounds, Request
 from anim.optimization.rate_distortion import MAX_BOUND_PER_DIAGONAL, RatePoint, smallest_error
 from anim.units import format_number, is_zero
 from cli import units
-from cli.errors import CheckError, UsageError
+from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress
 from cli.reports import optimize_report
 from cli.text import Reporter, format_length, plural
 
 DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
-BYTES_PER_UNIT = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,12 +201,4 @@ def nodes_to_keep(globs: Sequence[str], scene: Scene) -> frozenset[int]:
 
 def count_of_bytes(text: str) -> int:
     """Return a number of bytes above 0: 800kB, 1.5 MB, 65536. Raises UsageError."""
-    number = text.strip().lower().rstrip("bkmgi ")
-    unit = text.strip().lower()[len(number) :].strip()
-    try:
-        count = int(float(number) * BYTES_PER_UNIT[unit])
-    except (ValueError, KeyError, OverflowError):
-        count = 0
-    if count <= 0:
-        raise UsageError(f"--max-bytes is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
-    return count
+    return units.parse_size(text, "--max-bytes")

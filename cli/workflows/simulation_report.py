@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import PurePath
 
 import numpy as np
@@ -12,6 +11,7 @@ from anim.show.plots.simulation_plot import simulation_plot
 from anim.simulation.report import SimulationReport
 from cli.errors import UsageError
 from cli.io import documents
+from cli.reports import json_report
 
 
 def check_report(path: str | None) -> str:
@@ -30,6 +30,6 @@ def write_report(report: SimulationReport, path: str) -> None:
     """Write a report as JSON, or as its picture, in the format of the path's extension."""
     kind = PurePath(path).suffix.lower()[1:]
     if kind == "json":
-        documents.write_text(json.dumps(report.to_json(), indent=2, ensure_ascii=False) + "\n", path)
+        documents.write_text(json_report.dump(report.to_json(), indent=2), path)
         return
     documents.write_bytes([np.frombuffer(simulation_plot(report, kind=kind), np.uint8)], path)

@@ -18,6 +18,7 @@ read frame by frame; compressed members (`np.savez_compressed`) are read too.
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
@@ -30,11 +31,13 @@ from numpy.lib import format as npy
 from anim.arrays import AnyArray, Floats
 from anim.caches import frame_blocks
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.storage import COPY_BYTES, Inputs, Outputs
+from anim.caches.storage import COPY_BYTES, Inputs, Outputs, size_of
 from anim.errors import AnimError, FormatError
+from anim.memory import MemoryBudget
 from anim.model import FrameChunk, MeshPart, VertexCache
 
 SCHEMA = 1
+EXPECTED = {"meta": "text", "faces": "integers"}
 DIRECTIONS = ("normals", "tangents")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of every member, for reproducible bytes
 
@@ -42,6 +45,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # of every member, for reproducible bytes
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the cache in the main file; frames are read on iteration, a chunk at a time."""
     with inputs.open(inputs.main) as file, _opened(file) as archive:
+        budget = MemoryBudget(size_of(file))
         if {"offsets.npy", "ids.npy"} <= set(archive.namelist()):
             raise FormatError("holds points without faces, of `simulate particles` (expected positions of vertices)")
         shape = _shape(archive, "positions")
@@ -51,11 +55,13 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
         for name in present:
             if _shape(archive, name) != shape:
                 raise FormatError(f"{name} have another shape than positions, {shape}")
-        times, faces, rest, signs = (_array(archive, name) for name in ("times", "faces", "rest", "handedness"))
-        meta = _meta(archive)
+        wanted = ("times", "faces", "rest", "handedness")
+        times, faces, rest, signs = (_array(archive, name, budget) for name in wanted)
+        meta = _meta(archive, budget)
+    budget.add(shape[1] * 3 * 8 * (1 + len(present)))  # a frame, the least that is read at a time
     if times is None or faces is None:
         raise FormatError(f"has no array '{'times' if times is None else 'faces'}'")
-    if len(times) != shape[0] or faces.shape[1:] != (3,) or (rest is not None and rest.shape != (shape[1], 3)):
+    if times.shape != shape[:1] or faces.shape[1:] != (3,) or (rest is not None and rest.shape != (shape[1], 3)):
         raise FormatError(f"times {times.shape}, faces {faces.shape} and positions {shape} don't fit together")
     if ("tangents" in present) != (signs is not None) or (signs is not None and signs.shape != (shape[1],)):
         raise FormatError("tangents and handedness don't go together (expected both, a sign for each vertex)")
@@ -118,18 +124,18 @@ def _reads(job: Callable[[], Any]) -> Any:
         return job()
     except AnimError:
         raise
-    except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError, RuntimeError) as error:
-        raise FormatError(f"is damaged ({' '.join(str(error).lower().split())})") from None
-    except Exception as error:
-        if type(error).__name__ != "error":  # zlib.error
-            raise
-        raise FormatError(f"is damaged ({error})") from None
+    except MemoryError:
+        raise
+    except Exception as error:  # of zip, of its compressions, and of headers, which are Python literals
+        raise FormatError(f"is damaged ({' '.join(str(error).lower().split())[:80]})") from None
 
 
 def _header(member: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
     version = npy.read_magic(member)
     header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, fortran, dtype = header(member)
+    if min(shape, default=0) < 0 or any(type(each) is not int for each in shape):
+        raise FormatError(f"array '{name}' has shape {shape}")
     if (fortran and len(shape) > 1) or dtype.kind not in "fiuU":
         raise FormatError(f"array '{name}' has an order or type that is not handled ({dtype})")
     return shape, dtype
@@ -141,24 +147,33 @@ def _shape(archive: zipfile.ZipFile, name: str) -> tuple[int, ...] | None:
 
     def shape() -> tuple[int, ...]:
         with archive.open(f"{name}.npy") as member:
-            found, _ = _header(member, name)
-        if len(found) != 3 or found[2] != 3:
-            raise FormatError(f"array '{name}' has shape {found} (expected (F, V, 3))")
+            found, dtype = _header(member, name)
+            size = archive.getinfo(f"{name}.npy").file_size - member.tell()
+        if len(found) != 3 or found[2] != 3 or dtype.kind == "U":
+            raise FormatError(f"array '{name}' has shape {found} of {dtype} (expected (F, V, 3) of numbers)")
+        if size != dtype.itemsize * math.prod(found):
+            raise FormatError(f"array '{name}' has {size} bytes for shape {found}")
         return found
 
     return _reads(shape)  # type: ignore[no-any-return]
 
 
-def _array(archive: zipfile.ZipFile, name: str) -> AnyArray | None:
+def _array(archive: zipfile.ZipFile, name: str, budget: MemoryBudget) -> AnyArray | None:
     if f"{name}.npy" not in archive.namelist():
         return None
 
     def array() -> AnyArray:
         with archive.open(f"{name}.npy") as member:
             shape, dtype = _header(member, name)
+            if dtype.kind not in ("U" if name == "meta" else "iu" if name == "faces" else "iuf"):
+                raise FormatError(f"array '{name}' holds {dtype} (expected {EXPECTED.get(name, 'numbers')})")
+            size, expected = archive.getinfo(f"{name}.npy").file_size - member.tell(), math.prod(shape)
+            if size != dtype.itemsize * expected:
+                raise FormatError(f"array '{name}' has {size} bytes for shape {shape}")
+            budget.add((dtype.itemsize + 8) * expected)  # as stored, and as float64 or int64
             data = member.read()
-        if len(data) != dtype.itemsize * int(np.prod(shape)):
-            raise FormatError(f"array '{name}' has {len(data)} bytes for shape {shape}")
+        if len(data) != size:
+            raise FormatError(f"is truncated: array '{name}' ends early")
         found: AnyArray = np.frombuffer(data, dtype).reshape(shape)
         if dtype.kind == "f" and not np.isfinite(found).all():
             raise FormatError(f"array '{name}' holds NaN or infinity")
@@ -167,11 +182,11 @@ def _array(archive: zipfile.ZipFile, name: str) -> AnyArray | None:
     return _reads(array)  # type: ignore[no-any-return]
 
 
-def _meta(archive: zipfile.ZipFile) -> dict[str, Any]:
-    text = _array(archive, "meta")
+def _meta(archive: zipfile.ZipFile, budget: MemoryBudget) -> dict[str, Any]:
+    text = _array(archive, "meta", budget)
     try:
         meta = json.loads(str(text)) if text is not None else {}
-    except ValueError:
+    except (ValueError, RecursionError):
         raise FormatError("array 'meta' is no JSON") from None
     return meta if isinstance(meta, dict) else {}
 
@@ -183,7 +198,7 @@ def parts_of(meta: dict[str, Any]) -> tuple[MeshPart, ...]:
             MeshPart(str(p["name"]), _pair(p["vertices"]), _pair(p["faces"]), int(p["node"]), int(p["material"]))
             for p in meta.get("parts", ())
         )
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise FormatError("array 'meta' has parts that are not understood") from None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -61,7 +62,7 @@ class _Stage:
 
     def __init__(self, path: str) -> None:
         stages, geom, _ = usd_writer.package()
-        self._stage = stages.Stage.Open(path)
+        self._stage = stages.Stage.Open(_single_layer(path))
         self._geom, self._default = geom, stages.TimeCode.Default()
         self._meshes = [geom.Mesh(prim) for prim in self._stage.Traverse() if prim.IsA(geom.Mesh)]
         counts = [len(self._points(mesh)) for mesh in self._meshes]
@@ -71,6 +72,8 @@ class _Stage:
             raise FormatError("has no mesh with points (points of `simulate particles` are no mesh)")
         self.rate = float(self._stage.GetTimeCodesPerSecond()) or usd_writer.DEFAULT_FPS
         self.unit = float(geom.GetStageMetersPerUnit(self._stage))
+        if not (math.isfinite(self.rate) and self.rate > 0 and math.isfinite(self.unit) and self.unit > 0):
+            raise FormatError(f"has {self.rate:g} time codes per second and {self.unit:g} m per unit")
         self.up = "z" if geom.GetStageUpAxis(self._stage) == geom.Tokens.z else "y"
         self.has_normals = all(self._normals(mesh, self._first(mesh)) is not None for mesh in self._meshes)
         self.handedness = self._handedness()
@@ -147,6 +150,28 @@ class _Stage:
             return None
         found = mesh.GetNormalsAttr().Get(code)
         return found if found is not None and len(found) == len(self._points(mesh)) else None
+
+
+def _single_layer(path: str) -> Any:
+    """The layer in a file. Raises FormatError if it names other files: only files that the user names are read."""
+    from pxr import Sdf, Tf
+
+    layer = Sdf.Layer.FindOrOpen(path)
+    if layer is None:
+        raise Tf.ErrorException("no layer")
+    others = [each for each in layer.GetCompositionAssetDependencies() if each]
+    clips: list[str] = []
+
+    def look(spec_path: Any) -> None:
+        spec = layer.GetObjectAtPath(spec_path)
+        if spec is not None and spec.HasInfo("clips"):
+            clips.append(str(spec_path))
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, look)
+    if others or clips:
+        other = f"'{others[0]}'" if others else f"value clips at {clips[0]}"
+        raise FormatError(f"refers to other files ({other}): only one layer is read", help="flatten the stage")
+    return layer
 
 
 def _fans(counts: Ints, corners: Ints) -> Ints:

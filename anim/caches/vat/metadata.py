@@ -9,6 +9,7 @@ Positions are in the engine's axes and units.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -108,10 +109,12 @@ def parse(data: bytes) -> VatMetadata:
             tuple(float(value) for value in content["times_s"]),
             str(content["up"]),
         )
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise FormatError(NOT_METADATA) from None
     shapes_fit = len(found.offset) == len(found.scale) == 3 and found.format in FORMATS and found.times
-    if not shapes_fit or not 0 < found.vertices <= found.width * found.rows:
+    if not all(map(math.isfinite, (*found.offset, *found.scale, *found.times))):
+        raise FormatError("JSON holds NaN or infinity")
+    if not shapes_fit or found.rows < 1 or not 0 < found.vertices <= found.width * found.rows:
         raise FormatError("JSON contradicts itself")
     return found
 

@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats import exr, png
 from anim.caches.options import ReadOptions
-from anim.caches.storage import Inputs, read_all
+from anim.caches.storage import Inputs, read_all, size_of
 from anim.caches.vat import metadata, presets
 from anim.caches.vat.metadata import VatMetadata
 from anim.caches.vat.presets import Preset
@@ -15,6 +15,7 @@ from anim.caches.vat.writer import PixelEncoding, of_directions
 from anim.errors import FormatError
 from anim.gltf.io import container
 from anim.gltf.reading import reader as gltf
+from anim.memory import MemoryBudget
 from anim.model import FrameChunk, Mesh, VertexCache
 
 
@@ -55,15 +56,19 @@ def _mesh(inputs: Inputs, about: VatMetadata) -> Mesh:
 
 def _pixels(inputs: Inputs, name: str, about: VatMetadata) -> AnyArray:
     """The pixels (F, V, 3) of all frames."""
+    width, height = about.width, about.rows * len(about.times)
+    MemoryBudget(_stored_bytes(inputs, name)).add(3 * 8 * 4 * width * height)  # as pixels, float64 and positions
     if about.format == "unorm16":
         with read_all(inputs, name) as data:
-            image: AnyArray = png.read(data)
+            image: AnyArray = png.read(data, width=width, height=height)
     else:
-        image = exr.read(inputs, name)
-    expected = (about.rows * len(about.times), about.width, 3)
-    if image.shape != expected:
-        raise FormatError(f"'{name}' has {image.shape[1]} × {image.shape[0]} pixels (expected {expected[1::-1]})")
+        image = exr.read(inputs, name, width=width, height=height)
     return image.reshape(len(about.times), -1, 3)[:, : about.vertices]
+
+
+def _stored_bytes(inputs: Inputs, name: str) -> int:
+    with inputs.open(name) as file:
+        return size_of(file)
 
 
 def _normals(inputs: Inputs, name: str, about: VatMetadata, engine: Preset) -> Floats:

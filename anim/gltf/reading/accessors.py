@@ -15,6 +15,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.validation import buffer_layout
+from anim.memory import MemoryBudget
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOAT = 5126
@@ -30,6 +31,7 @@ class Accessors:
         self._views = json_array(document.json, "bufferViews")
         self._bytes: dict[int, Bytes] = {}
         self._given: Mapping[int, NDArray[Any]] = {}
+        self.budget = MemoryBudget(_stored_bytes(document))
 
     def over(self, given: Mapping[int, NDArray[Any]]) -> Accessors:
         """Return accessors with replaced values (count, components), by accessor index."""
@@ -72,6 +74,7 @@ class Accessors:
         raw = self.raw(index)
         if raw.dtype.kind == "f":
             raise FormatError("holds floats (expected integers)", where=f"accessor {index}")
+        self.budget.add(8 * raw.size)
         return raw.astype(np.int64)
 
     def indices(self, index: int) -> Ints:
@@ -115,6 +118,7 @@ class Accessors:
         if places[-1] >= about["count"] or (np.diff(places) <= 0).any():
             raise FormatError("sparse indices are not increasing, or beyond its count")
         view = self.view(values["bufferView"])
+        self.budget.add(base.size * base.itemsize)
         full = base.copy()
         full[places] = _strided(view, values.get("byteOffset", 0), count, form.columns * form.column, form)
         full.flags.writeable = False
@@ -122,6 +126,7 @@ class Accessors:
 
     def _floats(self, index: int) -> Floats:
         raw = self._raw(index)
+        self.budget.add(8 * raw.size)
         values = raw.astype(np.float64)
         if raw.dtype.kind != "f" and self._accessors[index].get("normalized"):
             return denormalized(values, raw.dtype)
@@ -144,6 +149,7 @@ class Accessors:
                 stored = _slice(self._document.buffers[compressed["buffer"]].data, compressed)
                 from anim.gltf.meshopt import codec
 
+                self.budget.add(compressed["count"] * compressed["byteStride"])
                 plain = codec.decode(stored, compressed)
                 if len(plain) < view["byteLength"]:
                     raise FormatError(f"decodes to {len(plain)} bytes (expected {view['byteLength']})")
@@ -154,6 +160,12 @@ class Accessors:
             return _slice(self._document.buffers[view["buffer"]].data, view)
         except AnimError as error:
             raise error.at(f"bufferView {number}") from None
+
+
+def _stored_bytes(document: Document) -> int:
+    """Bytes of all buffers with data, a file that several use counted once."""
+    sizes = {each.uri or str(i): each.byte_length for i, each in enumerate(document.buffers) if each.has_data}
+    return sum(sizes.values())
 
 
 def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:

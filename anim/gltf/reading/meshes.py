@@ -123,6 +123,7 @@ class Meshes:
 
     def _displacements(self, targets: Sequence[Json], attribute: str, vertices: int) -> Floats:
         """Morph displacements of an attribute (M, V, 3); empty if a target has none."""
+        self._accessors.budget.add(2 * 8 * len(targets) * vertices * 3)  # concatenated with those of other primitives
         result = np.zeros((len(targets), vertices, 3))
         for i, target in enumerate(targets):
             if attribute in target:

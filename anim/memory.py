@@ -1,0 +1,46 @@
+"""Limit of the memory that the decoded data of one file may take, checked before it is allocated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from anim.errors import UnsupportedError
+
+MIN_LIMIT_BYTES = 10**9
+LIMIT_PER_FILE_BYTE = 64  # above the ratio of good compression, of keys and of vertices, to float64
+
+_chosen: ContextVar[int | None] = ContextVar("memory_limit", default=None)
+
+
+@contextmanager
+def memory_limit(size: int | None) -> Iterator[None]:
+    """Use another limit, in bytes, inside the block; None for the limit by the file's size."""
+    token = _chosen.set(size)
+    try:
+        yield
+    finally:
+        _chosen.reset(token)
+
+
+def limit_for(file_bytes: int) -> int:
+    """Return the limit for a file of this size: the chosen one, or the larger of 1 GB and 64 times the file."""
+    return _chosen.get() or max(MIN_LIMIT_BYTES, LIMIT_PER_FILE_BYTE * file_bytes)
+
+
+class MemoryBudget:
+    """Sum of the bytes that one file decodes to. file_bytes: the file's own size."""
+
+    def __init__(self, file_bytes: int) -> None:
+        self.limit = limit_for(file_bytes)
+        self._sum = 0
+
+    def add(self, size: int) -> None:
+        """Count data before it is allocated. Raises UnsupportedError if the sum is above the limit."""
+        self._sum += size
+        if self._sum > self.limit:
+            raise UnsupportedError(
+                f"decoded data would take {self._sum / 1e9:.3g} GB or more (limit {self.limit / 1e9:.3g} GB)",
+                help="raise `memory_limit`, or split the file",
+            )

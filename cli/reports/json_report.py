@@ -1,0 +1,32 @@
+"""JSON of reports: UTF-8 text, in which every number is finite."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+
+from anim.errors import FormatError
+
+
+def dump(content: object, *, indent: int | None = 1) -> str:
+    """Return a report as a JSON document that ends with a line break. Raises FormatError for NaN and infinity."""
+    try:
+        return json.dumps(content, allow_nan=False, ensure_ascii=indent is None, indent=indent) + "\n"
+    except ValueError:
+        where, value = next(_not_finite(content, ""), ("a number", math.nan))
+        raise FormatError(
+            f"{where} is {value}: no report of it is possible", help="the file has values beyond those of float32"
+        ) from None
+
+
+def _not_finite(value: object, path: str) -> Iterator[tuple[str, float]]:
+    """Yield paths and values of the numbers that JSON has no form for."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _not_finite(item, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list | tuple):
+        for i, item in enumerate(value):
+            yield from _not_finite(item, f"{path}[{i}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield path, value
