@@ -58,7 +58,7 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
     except AnimError as error:
         return report_error(error)
     except TyperException as error:
-        problem, hint = _usage(error)
+        problem, hint = usage_problem(error)
         _print_error(problem, _file_hint(error, args) or hint)
         return USAGE
     except KeyboardInterrupt:
@@ -106,8 +106,8 @@ def _file_hint(error: TyperException, args: Sequence[str]) -> str:
     return f"if it is a file, write ./{files[0]}" if unknown and files else ""
 
 
-def _usage(error: TyperException) -> tuple[str, str]:
-    """Problem of the command line and the hint for it."""
+def usage_problem(error: TyperException) -> tuple[str, str]:
+    """Return the problem of a command line, and the hint for it."""
     context = getattr(error, "ctx", None)
     command = getattr(context, "info_name", None)
     near = getattr(error, "possibilities", None) or ()

@@ -50,6 +50,14 @@ COMMANDS = {
             "gltf-anim check '**/*.glb' --format sarif > findings.sarif",
         ),
     ),
+    "run": CommandInfo(
+        "Run recipes over many files: cached, on all cores.",
+        (
+            "gltf-anim run",
+            "gltf-anim run crowd --recipe small --jobs 4",
+            "gltf-anim run --resume --no-cache",
+        ),
+    ),
     "sample": CommandInfo(
         "Sample the pose of every node at chosen times.",
         (

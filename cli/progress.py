@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
+from cli.streams import step_streams
 from cli.text import Reporter
 
 DELAY_S = 1.0  # s, before the bar is shown
@@ -20,12 +21,13 @@ class Progress:
 
     def __init__(self, words: str, total: int, *, shown: bool = True) -> None:
         self._words, self._total = words, max(total, 1)
-        self._shown = shown and sys.stderr is not None and sys.stderr.isatty()
+        self._shown = shown and step_streams() is None and sys.stderr is not None and sys.stderr.isatty()
         self._began = self._drawn = time.monotonic()
         self._length = 0
 
-    def __call__(self, done: int) -> None:
-        """Draw the bar if an update is due."""
+    def __call__(self, done: int, words: str = "") -> None:
+        """Draw the bar if an update is due. words: the work from now on."""
+        self._words = words or self._words
         now = time.monotonic()
         if not self._shown or now - self._began < DELAY_S or now - self._drawn < UPDATE_INTERVAL_S:
             return
@@ -49,7 +51,7 @@ class Progress:
 
 def announce_compiling(voice: Reporter) -> None:
     """Report the compilation of kernels to a terminal if the user's cache folder has none yet."""
-    if voice.quiet or sys.stderr is None or not sys.stderr.isatty():
+    if voice.quiet or step_streams() is not None or sys.stderr is None or not sys.stderr.isatty():
         return
     from anim.skinning.kernels.jit import is_compiled
 

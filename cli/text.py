@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from anim.units import format_number
+from cli.streams import step_streams
 from cli.tables import cut_middle
 
 MAX_LINE_LENGTH = 1000  # characters of a message: names in a file can have any length
@@ -31,6 +32,9 @@ class Reporter:
             self._write("\n".join(cut_middle(each, MAX_LINE_LENGTH) for each in line.split("\n")))
 
     def _write(self, line: str) -> None:
+        if (step := step_streams()) is not None:
+            step.messages.append(line)
+            return
         with suppress(OSError, AttributeError):  # stderr is closed
             sys.stderr.write(line + "\n")
 

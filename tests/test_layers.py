@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LEVELS = (
     {"errors"},
     {"arrays", "memory", "units"},
-    {"arguments", "maths", "files"},
+    {"arguments", "maths", "files", "worker_processes"},
     {"model"},
     {"gltf", "sampling"},
     {"curves"},

@@ -1,4 +1,4 @@
-"""Defer termination signals during critical file operations."""
+"""Signals deferred during critical file operations, and broken pipes as errors."""
 
 from __future__ import annotations
 
@@ -28,3 +28,17 @@ def hold_signals() -> Iterator[None]:
             signal.signal(each, handler)
     if came:
         signal.raise_signal(came[0])
+
+
+@contextmanager
+def ignore_broken_pipes() -> Iterator[None]:
+    """Ignore SIGPIPE inside: `concurrent.futures` handles writes to ended workers itself.
+
+    After an error its thread may still write, so the signal then stays ignored. Only the main thread can.
+    """
+    if not hasattr(signal, "SIGPIPE") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    usual = signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGPIPE, usual)

@@ -1,8 +1,5 @@
 """A process pool for work on many clips; results keep the order of tasks for any number of processes.
 
-Worker processes live only as long as their parent: each waits on a pipe without any writer, whose other end only the
-parent holds open. The system closes that end when the parent exits, and the workers exit too.
-
 Workers read the shared value from a temporary file: sent as an argument of a process, a value larger than the buffer of
 a pipe would block the parent for ever if the process ends before it reads.
 """
@@ -10,20 +7,17 @@ a pipe would block the parent for ever if the process ends before it reads.
 from __future__ import annotations
 
 import multiprocessing
-import os
 import pickle
-import signal
 import tempfile
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, TypeVar
 
 from anim.errors import UnsupportedError, not_written
+from anim.worker_processes import Lifeline, follow_parent, open_lifeline
 
 Result = TypeVar("Result")
 
@@ -83,17 +77,15 @@ def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator
         yield ProcessPool(None, shared)
         return
     context = multiprocessing.get_context(start)
-    lifeline, parent_end = context.Pipe(duplex=False)
-    inherited = parent_end if start == "fork" else None  # forked copies inherit the parent's end and must close it
-    with _as_file(shared) as path:
-        pool = ProcessPoolExecutor(workers, context, _set_up, (path, lifeline, inherited))
+    with _as_file(shared) as path, ExitStack() as stack:
+        lifeline = stack.enter_context(open_lifeline(context, start))
+        pool = ProcessPoolExecutor(workers, context, _set_up, (path, lifeline))
         try:
             yield ProcessPool(pool, shared)
             pool.shutdown()
         finally:
-            parent_end.close()  # running workers exit now
+            stack.close()  # running workers exit now
             pool.shutdown(cancel_futures=True)  # the pool's thread has ended before the interpreter shuts down
-            lifeline.close()
 
 
 @contextmanager
@@ -112,21 +104,10 @@ def _as_file(shared: Any) -> Iterator[str]:
 _run_in_worker: list[Any] = []  # the shared value of a worker process; set once, before its first task
 
 
-def _set_up(path: str, lifeline: Connection, inherited: Connection | None) -> None:
-    for stop in (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])):
-        signal.signal(stop, signal.SIG_DFL)  # forked copies inherit handlers, and would not exit
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent decides
-    if inherited is not None:
-        inherited.close()
-    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
+def _set_up(path: str, lifeline: Lifeline) -> None:
+    follow_parent(lifeline)
     with Path(path).open("rb") as file:
         _run_in_worker[:] = [pickle.load(file)]
-
-
-def _end_with(lifeline: Connection) -> None:
-    """Exit this process when the other end of the pipe is closed."""
-    lifeline.poll(None)
-    os._exit(1)
 
 
 def _start() -> None:

@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -19,10 +20,11 @@ from anim.errors import AnimError, FormatError, OutputError
 from anim.files import resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, uri
-from anim.gltf.io.source import Opener, Source, glb_chunks, open_bytes, open_file, write_file
+from anim.gltf.io.source import Opener, Source, buffer_files, glb_chunks, open_bytes, open_file, write_file
 from cli import tables
 from cli.errors import UsageError
 from cli.io import output_names, stdout
+from cli.streams import locate, record_files, step_streams
 from cli.text import Reporter
 
 PIPE = "-"
@@ -37,7 +39,7 @@ def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read
     """
     name = called(path)
     try:
-        found = open_bytes(_stdin(), name, opener) if path == PIPE else open_file(path, opener)
+        found = open_bytes(_stdin(), name, opener) if path == PIPE else _open_file(path, opener)
         repaired_note(found.document, name, voice)
         yield found
     except (UsageError, OutputError):
@@ -54,7 +56,7 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
     """
     name = called(path)
     try:
-        yield _stdin() if path == PIPE else resolver.read_file(Path(path), ending), name
+        yield _stdin() if path == PIPE else _read_file(path, ending), name
     except (UsageError, OutputError):
         raise
     except AnimError as error:
@@ -191,10 +193,28 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
 
 def called(path: str) -> str:
     """Return the name of an input for messages."""
-    return "stdin" if path == PIPE else path or "''"
+    if path != PIPE:
+        return path or "''"
+    return "stdin" if (step := step_streams()) is None else step.name
+
+
+def _open_file(path: str, opener: Opener) -> Source:
+    located = locate(path)
+    found = open_file(located, opener)
+    record_files(Path(located), *buffer_files(found))
+    return replace(found, name=path)
+
+
+def _read_file(path: str, ending: str) -> Bytes:
+    located = Path(locate(path))
+    found = resolver.read_file(located, ending)
+    record_files(located)
+    return found
 
 
 def _stdin() -> Bytes:
+    if (step := step_streams()) is not None:
+        return step.input
     if sys.stdin is None:
         raise UsageError("stdin is closed: name a file, or pipe a GLB into stdin")
     if sys.stdin.isatty():

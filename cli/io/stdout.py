@@ -8,10 +8,14 @@ from collections.abc import Iterable
 from anim.errors import not_written
 from anim.files.stream import write_stream
 from cli.errors import UsageError
+from cli.streams import step_streams
 
 
 def write(pieces: Iterable[bytes | memoryview]) -> None:
     """Write all bytes. Raises UsageError if stdout is closed, OutputError if a write fails."""
+    if (step := step_streams()) is not None:
+        step.output += [bytes(piece) for piece in pieces]
+        return
     if sys.stdout is None:
         raise UsageError("stdout is closed", help="name an output file")
     try:
@@ -29,5 +33,5 @@ def write_text(text: str) -> None:
 
 def check_no_terminal() -> None:
     """Raise UsageError if stdout, for binary data, is a terminal."""
-    if sys.stdout is not None and sys.stdout.isatty():
+    if step_streams() is None and sys.stdout is not None and sys.stdout.isatty():
         raise UsageError("the output is binary and stdout is a terminal", help="name an output file, or pipe it on")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -14,10 +12,10 @@ from anim.check.finding import Severity
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError
 from cli.errors import UsageError
+from cli.workflows import config_tables
 
-NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
-_KEYS: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
-    "": {"check": dict, "budget": list},
+_KEYS: Mapping[str, config_tables.Keys] = {
+    "": config_tables.SECTIONS,
     "check": {"select": list, "extend-select": list, "ignore": list, "target": str, "fail-on": str}
     | {"files": list, "params": dict},
     "check.files": {"match": str, "ignore": list},
@@ -85,45 +83,21 @@ def _match(parts: tuple[str, ...], patterns: tuple[str, ...]) -> bool:
 
 def nearest(folder: Path) -> CheckConfig:
     """Return the configuration of a folder: the nearest one, from the folder upwards; an empty one without any."""
-    for each in (folder, *folder.parents):
-        own, project = each / NAME, each / PROJECT
-        tables = [(path, table) for path in (own, project) if (table := _table(path)) is not None]
-        if len(tables) > 1:
-            raise UsageError(f"{each}: has {NAME} and [tool.gltf-anim] in {PROJECT} (expected one of them)")
-        if tables:
-            return _config(*tables[0])
-    return CheckConfig()
+    found = config_tables.find_table(folder)
+    return CheckConfig() if found is None else _config(*found)
 
 
 def read_config(path: str) -> CheckConfig:
     """Return the configuration in a file."""
-    table = _table(Path(path))
-    if table is None:
-        problem = "has no [tool.gltf-anim]" if Path(path).is_file() else "there is no such file"
-        raise UsageError(f"{path}: {problem}")
-    return _config(Path(path), table)
-
-
-def _table(path: Path) -> dict[str, Any] | None:
-    """The settings in a file, None if it has none."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:  # of TOML, or of UTF-8
-        raise UsageError(f"{path}: {error}") from None
-    if path.name != PROJECT:
-        return content
-    table = content.get("tool", {}).get("gltf-anim")
-    return table if isinstance(table, dict) else None
+    return _config(Path(path), config_tables.read_table(path))
 
 
 def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
-    _check_keys(path, "", table)
+    config_tables.check_keys(path, "", table, _KEYS[""])
     about = table.get("check", {})
-    _check_keys(path, "check", about)
+    config_tables.check_keys(path, "check", about, _KEYS["check"])
     for entry in about.get("files", ()):
-        _check_keys(path, "check.files", entry)
+        config_tables.check_keys(path, "check.files", entry, _KEYS["check.files"])
         if "match" not in entry:
             raise UsageError(f"{path}: [[check.files]] has no match")
     budgets = tuple(_budget(path, entry) for entry in table.get("budget", ()))
@@ -148,28 +122,12 @@ def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
 
 
 def _budget(path: Path, entry: Any) -> Budget:
-    _check_keys(path, "budget", entry)
+    config_tables.check_keys(path, "budget", entry, _KEYS["budget"])
     for key in ("match", *(("against",) if "error" in entry else ())):
         if key not in entry:
             raise UsageError(f"{path}: [[budget]] has no {key}")
     limits = tuple((name, float(entry[name])) for name in MEASURES if name in entry)
     return Budget(entry["match"], limits, entry.get("error", ""), entry.get("against", ""))
-
-
-def _check_keys(path: Path, section: str, table: Any) -> None:
-    """Raise UsageError for an unknown key or a value of another type."""
-    known = _KEYS[section]
-    if not isinstance(table, dict):
-        raise UsageError(f"{path}: [{section}] is no table")
-    for key, value in table.items():
-        where = f"{section}.{key}".lstrip(".")
-        if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            raise UsageError(f"{path}: unknown key '{where}'", help=f"did you mean {near[0]}?" if near else "")
-        if not isinstance(value, known[key]):
-            kind = known[key]
-            expected = kind.__name__ if isinstance(kind, type) else "a number"
-            raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {expected})")
 
 
 def check_rules(config: CheckConfig) -> None:

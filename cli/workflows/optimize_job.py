@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+from anim.files import signals
 from anim.gltf.document import Document
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
@@ -25,6 +24,7 @@ from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress
 from cli.reports import optimize_report
+from cli.streams import step_streams
 from cli.text import Reporter, format_length, plural
 
 DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
@@ -49,7 +49,7 @@ class OptimizeJob:
 
     def run(self, request: Request) -> Optimized:
         """Return the result of the search."""
-        with _errors_for_broken_pipes():
+        with signals.ignore_broken_pipes():
             found = optimize(
                 self.source.document,
                 self.scene,
@@ -110,20 +110,6 @@ class OptimizeJob:
             )
 
 
-@contextmanager
-def _errors_for_broken_pipes() -> Iterator[None]:
-    """Ignore SIGPIPE inside: `concurrent.futures` handles writes to ended workers itself.
-
-    After an error its thread may still write, so the signal then stays ignored.
-    """
-    if not hasattr(signal, "SIGPIPE"):
-        yield
-        return
-    usual = signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-    yield
-    signal.signal(signal.SIGPIPE, usual)
-
-
 def _bounded(request: Request, max_error: float) -> Request:
     """The request with a computed bound in metres."""
     return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
@@ -147,10 +133,15 @@ def optimize_job(
         Selection(clip).chosen_clips(reader.names(document)),
         diagonal(scene),
         output,
-        workers or os.cpu_count() or 1,
+        workers or _cores(),
         detailed,
         Progress("optimize", 1000, shown=not voice.quiet),
     )
+
+
+def _cores() -> int:
+    step = step_streams()
+    return (0 if step is None else step.cores) or os.cpu_count() or 1
 
 
 def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:

@@ -53,6 +53,7 @@ Frame Time: 0.033333
 0 96 0 0 0 0 0 0 0
 1 96 0 0 0 30 0 20 0
 """
+RECIPE = '[[recipe]]\nname = "small"\nmatch = "crowd/*.glb"\nsteps = ["resample --fps 4"]\nout = "build/{path}"\n'
 CURVES = "time,door.rx,door.ry,door.rz\n0,0,0,0\n1,90,0,0\n"
 
 
@@ -129,11 +130,12 @@ def test_the_exit_codes_are_in_the_help(call: Call) -> None:
 def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a file of every name that examples use; their clips and nodes have names that examples choose."""
     folder = tmp_path_factory.mktemp("examples")
-    for name in ("scene", "caches"):
+    for name in ("scene", "caches", "crowd"):
         (folder / name).mkdir()
     for name, data in {
         "walk.glb": renamed(built("biped"), ["walk"]),
         "scene/walk.glb": renamed(built("biped"), ["walk"]),
+        "crowd/walk.glb": renamed(built("biped"), ["walk"]),
         "hero.glb": renamed(built("biped"), ["walk", "Run_fast", "Attack_high"]),
         "face.glb": renamed(built("morph_cube"), ["talk"]),
         "arm.glb": built("arm"),
@@ -145,6 +147,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_bytes(data)
     (folder / "walk.bvh").write_text(BVH)
     (folder / "curves.csv").write_text(CURVES)
+    (folder / "gltf-anim.toml").write_text(RECIPE)
     for line in MAKING:
         if line.split()[0] in main.COMMANDS:
             pages.run_here(f"gltf-anim {line}", folder)  # where one fails, only the examples that need it do

@@ -98,6 +98,7 @@ QUIET = {  # a line for each command, and how its product on stdout begins; b"" 
     "inspect": (("arm.glb",), b""),
     "check": (("arm.glb",), b""),
     "loop": (("arm.glb",), b""),
+    "run": (("arm.glb",), b""),
     "collapse": (("arm.glb", "--samples-per-second", "4"), b""),
     "diff": (("arm.glb", "arm.glb"), b""),
     "sample": (("arm.glb", "--at", "0"), b"{"),
@@ -123,6 +124,8 @@ def test_quiet_leaves_out_words_and_never_a_product(command: str, folder: Path, 
     if command == "convert-cache":
         call("bake", "arm.glb", "one.npz", "--clip", "bend", "--fps", "24").product()
     (folder / "door.csv").write_text("time,door.rx\n0,0\n1,90\n")
+    recipe = 'match = "*.glb"\nsteps = ["resample --fps 4"]\nout = "build/{path}"\n'
+    (folder / "gltf-anim.toml").write_text(f"[[recipe]]\n{recipe}")
     assert command in QUIET, f"add a line to QUIET for {command}"
     options, product = QUIET[command]
     run = call(command, *options, "-q")

@@ -153,9 +153,19 @@ def _stamp(path: Path) -> tuple[int, ...]:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
+def buffer_files(source: Source) -> list[Path]:
+    """Return the paths of an input's external buffers."""
+    return list(_files(source, "buffers"))
+
+
 def _external_files(source: Source) -> Iterator[Path]:
     """Yield the paths of an input's buffers and images."""
-    for about in (*json_array(source.document.json, "buffers"), *json_array(source.document.json, "images")):
+    yield from _files(source, "buffers")
+    yield from _files(source, "images")
+
+
+def _files(source: Source, key: str) -> Iterator[Path]:
+    for about in json_array(source.document.json, key):
         address = about.get("uri")
         if source.folder is not None and address is not None and not uri.is_data(address):
             with suppress(FormatError):

@@ -1,0 +1,90 @@
+"""`gltf-anim run`: recipes of the settings over many files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.options import common
+from cli.text import Reporter
+from cli.workflows.run import cache as caching
+from cli.workflows.run import journal as journals
+from cli.workflows.run import workers
+from cli.workflows.run.plan import plan_jobs
+from cli.workflows.run.recipe import chosen_recipes, read_recipes
+from cli.workflows.run.run import RecipeRun
+
+
+def command(
+    inputs: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FILE]...",
+            help="Files, folders, or patterns; without any, all that the recipes match.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    recipe: Annotated[
+        list[str] | None, typer.Option("--recipe", metavar="NAME", help="Only this recipe; may be repeated.")
+    ] = None,
+    config: Annotated[
+        str | None, typer.Option("--config", metavar="FILE", help="Settings, instead of the nearest gltf-anim.toml.")
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Number of processes; 0: one per core.")
+    ] = 0,
+    cache: Annotated[
+        str | None,
+        typer.Option(
+            "--cache",
+            metavar="DIR",
+            help=f"Folder of results and journal.  [default: {caching.NAME} beside the settings]",
+        ),
+    ] = None,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Keep no results, and use none.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the last run: what it made is not even read again.")
+    ] = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
+) -> int:
+    """Run recipes over many files: steps in one process, cached by content, on all cores.
+
+    A recipe is in gltf-anim.toml, or in [tool.gltf-anim] of pyproject.toml. Its steps are command lines without files:
+    commands that make glTF from glTF; from-euler can be the first.
+
+    \b
+        [[recipe]]
+        name = "crowd"
+        match = "crowd/**/*.glb"
+        steps = ["resample --fps 30", "loop --clip '*_loop'", "optimize --max-error 0.5mm"]
+        out = "build/{path}"
+
+    match, out and files named in steps are relative to the folder of the settings. out takes {path}, {folder}, {name}
+    and {stem} (the name without extension). For two recipes with the same output the first counts.
+
+    Results are kept by the content of the input and of the files that steps name, by the steps, and by the version of
+    this tool: a second run makes nothing again. --resume continues a run that was interrupted, by its journal.
+    Files that fail are named, others are done; the exit code is the largest one.
+    """
+    voice = Reporter(quiet, verbose)
+    book = read_recipes(config)
+    planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), named=bool(recipe))
+    folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
+    results = caching.ResultCache(folder)
+    results.prepare()
+    processes = jobs or os.cpu_count() or 1
+    with journals.open_journal(folder / journals.NAME, len(planned), resume=resume) as journal:
+        return RecipeRun(
+            planned,
+            journal,
+            None if no_cache else results,
+            voice,
+            processes,
+            min(processes, len(planned)),
+            workers.local_pool,
+        ).run()

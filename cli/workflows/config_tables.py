@@ -1,0 +1,64 @@
+"""Tables of settings: `gltf-anim.toml`, or `[tool.gltf-anim]` of pyproject.toml, and checks of their keys."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from cli.errors import UsageError
+
+NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
+Keys: TypeAlias = Mapping[str, type | tuple[type, ...]]  # allowed keys, and the types of their values
+SECTIONS: Keys = {"check": dict, "budget": list, "recipe": list}
+
+
+def find_table(folder: Path) -> tuple[Path, dict[str, Any]] | None:
+    """Return the nearest settings, from a folder upwards, and their file; None without any."""
+    for each in (folder, *folder.parents):
+        tables = [(path, table) for path in (each / NAME, each / PROJECT) if (table := _table(path)) is not None]
+        if len(tables) > 1:
+            raise UsageError(f"{each}: has {NAME} and [tool.gltf-anim] in {PROJECT} (expected one of them)")
+        if tables:
+            return tables[0]
+    return None
+
+
+def read_table(path: str) -> dict[str, Any]:
+    """Return the settings in a file."""
+    table = _table(Path(path))
+    if table is None:
+        problem = "has no [tool.gltf-anim]" if Path(path).is_file() else "there is no such file"
+        raise UsageError(f"{path}: {problem}")
+    return table
+
+
+def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
+    """Raise UsageError for an unknown key or a value of another type. section: name of the table, "" for all."""
+    if not isinstance(table, dict):
+        raise UsageError(f"{path}: [{section}] is no table")
+    for key, value in table.items():
+        where = f"{section}.{key}".lstrip(".")
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            raise UsageError(f"{path}: unknown key '{where}'", help=f"did you mean {near[0]}?" if near else "")
+        kind = known[key]
+        if not isinstance(value, kind):
+            expected = kind.__name__ if isinstance(kind, type) else "a number"
+            raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {expected})")
+
+
+def _table(path: Path) -> dict[str, Any] | None:
+    """The settings in a file, None if it has none."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:  # of TOML, or of UTF-8
+        raise UsageError(f"{path}: {error}") from None
+    if path.name != PROJECT:
+        return content
+    table = content.get("tool", {}).get("gltf-anim")
+    return table if isinstance(table, dict) else None

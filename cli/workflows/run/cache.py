@@ -1,0 +1,134 @@
+"""Cache of results by content: a record for each input with its steps, and the product by its own hash."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from anim import __version__
+from anim.arrays import Bytes
+from anim.errors import AnimError
+from anim.files import atomic, resolver
+from cli.workflows.run.steps import MAKING, Step
+
+NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
+FORMAT = 1
+TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# results of `gltf-anim run`: may be deleted\n"
+
+
+@dataclass(frozen=True)
+class CacheRecord:
+    """Result of the steps on one content.
+
+    product: hash of the GLB. size: its bytes. files: hash by path of the other files that were read. is_plain: whether
+    the GLB has no external images, so that as an output it is one file of these bytes.
+    """
+
+    product: str
+    size: int
+    files: dict[str, str]
+    is_plain: bool
+
+
+@dataclass
+class FileHashes:
+    """SHA-256 of files, each read once while it stays the same."""
+
+    _known: dict[str, tuple[tuple[int, int], str]] = field(default_factory=dict)
+
+    def hash(self, path: str) -> str:
+        """Return the hash of a file, "" if it can't be read."""
+        stamp = stamp_of(path)
+        if stamp is None:
+            return ""
+        known = self._known.get(path)
+        if known is None or known[0] != stamp:
+            try:
+                with open(path, "rb") as file:
+                    known = stamp, hashlib.file_digest(file, "sha256").hexdigest()
+            except OSError:
+                return ""
+            self._known[path] = known
+        return known[1]
+
+
+@dataclass(frozen=True)
+class ResultCache:
+    """Folder of results. It may be deleted at any time; several runs may use it at once."""
+
+    folder: Path
+
+    def find(self, key: str, folder: Path, hashes: FileHashes) -> CacheRecord | None:
+        """Return the record of a key if all files that its steps read are the same. folder: of relative paths."""
+        try:
+            record = CacheRecord(**json.loads(self._record(key).read_bytes()))
+        except (OSError, ValueError, TypeError):  # none, or of another version
+            return None
+        same = all(hashes.hash(os.path.join(folder, path)) == digest for path, digest in record.files.items())
+        return record if same else None
+
+    def product(self, record: CacheRecord) -> Bytes | None:
+        """Return the GLB of a record; None if it is lost or damaged."""
+        try:
+            data = resolver.read_file(self._object(record.product))
+        except AnimError:
+            return None
+        return data if hash_of(data) == record.product else None
+
+    def store(self, key: str, product: Bytes, files: dict[str, str], *, is_plain: bool) -> None:
+        """Keep a result. Raises OutputError."""
+        record = CacheRecord(hash_of(product), len(product), files, is_plain)
+        self._write(self._object(record.product), product)
+        self._write(self._record(key), np.frombuffer(json.dumps(asdict(record)).encode(), np.uint8))
+
+    def prepare(self) -> None:
+        """Create the folder, ignored by git and by backups. Raises OutputError."""
+        for name, text in ((".gitignore", "*\n"), ("CACHEDIR.TAG", TAG)):
+            if not (self.folder / name).exists():
+                self._write(self.folder / name, np.frombuffer(text.encode(), np.uint8))
+
+    def _write(self, path: Path, data: Bytes) -> None:
+        with atomic.name_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        atomic.write_file(path, [data])
+
+    def _record(self, key: str) -> Path:
+        return self.folder / "results" / key[:2] / f"{key}.json"
+
+    def _object(self, digest: str) -> Path:
+        return self.folder / "objects" / digest[:2] / digest
+
+
+def recipe_key(steps: tuple[Step, ...], folder: Path, hashes: FileHashes) -> str:
+    """Return the hash of steps, of the files that their options name, and of the tool's version."""
+    files = [hashes.hash(os.path.join(folder, path)) for step in steps for path in step.files]
+    return _hash_json([FORMAT, __version__, [step.words() for step in steps], files])
+
+
+def result_key(recipe: str, steps: tuple[Step, ...], path: str, digest: str) -> str:
+    """Return the hash of a recipe on an input's content. path: of the input, whose name a new clip takes."""
+    name = PurePosixPath(path).name if steps[0].command[0] in MAKING else ""
+    return _hash_json([recipe, digest, name])
+
+
+def hash_of(data: Bytes) -> str:
+    """Return the SHA-256 of bytes."""
+    return hashlib.sha256(data.data).hexdigest()
+
+
+def stamp_of(path: str | Path) -> tuple[int, int] | None:
+    """Return size and modification time of a file; None without one."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_size, found.st_mtime_ns
+
+
+def _hash_json(value: object) -> str:
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()

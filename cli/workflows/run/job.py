@@ -1,0 +1,139 @@
+"""One file of a run: its steps in this process, from bytes to bytes, and the output."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from anim import __version__
+from anim.arrays import Bytes
+from anim.errors import AnimError, UnsupportedError, not_written
+from anim.gltf.document import json_array
+from anim.gltf.io import container, images
+from anim.gltf.io.source import open_bytes, write_file
+from cli import errors, main
+from cli.io.documents import PIPE
+from cli.streams import StepStreams, use_streams
+from cli.workflows.run.cache import FileHashes, ResultCache, stamp_of
+from cli.workflows.run.steps import Step
+
+EMPTY: Bytes = np.empty(0, np.uint8)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A file with its steps.
+
+    folder: of the settings, from which input and output count. cores: processes that a step may use.
+    cache: folder of results, if they are kept, and the key of this one. version: of the tool that plans the job.
+    """
+
+    folder: Path
+    input: str
+    output: str
+    steps: tuple[Step, ...]
+    cores: int = 1
+    cache: Path | None = None
+    key: str = ""
+    version: str = __version__
+
+
+@dataclass(frozen=True)
+class JobResult:
+    """Result of a job. code: exit code. messages: lines of the steps, errors last. size: bytes of the product, a GLB.
+
+    stamp: size and modification time of the input when the job began. seconds: of work.
+    """
+
+    code: int
+    messages: tuple[str, ...] = ()
+    size: int = 0
+    stamp: tuple[int, int] | None = None
+    seconds: float = 0.0
+
+
+def run_job(job: Job) -> JobResult:
+    """Run the steps of a file, and write its output; errors are reported in the result."""
+    began = time.perf_counter()
+    stamp = stamp_of(job.folder / job.input)
+    streams = StepStreams(job.input, EMPTY, job.folder)
+    product = EMPTY
+
+    def work() -> int:
+        nonlocal product
+        _check_version(job.version)
+        code, files, product = run_steps(job, streams)
+        if code == errors.DONE:
+            if job.cache is not None and stamp == stamp_of(job.folder / job.input):  # else of other bytes than its key
+                store(job, product, files)
+            write_output(job, product)
+        return code
+
+    with use_streams(streams):
+        code = errors.run_guarded(work)
+    return JobResult(code, tuple(streams.messages), len(product), stamp, time.perf_counter() - began)
+
+
+def _check_version(version: str) -> None:
+    if version != __version__:
+        raise UnsupportedError(f"the worker has version {__version__} of gltf-anim (expected {version})")
+
+
+def run_steps(job: Job, messages: StepStreams) -> tuple[int, list[Path], Bytes]:
+    """Run the steps; return the exit code, the files that were read, and the GLB that the last step wrote.
+
+    messages: streams that get the messages of all steps.
+    """
+    files: list[Path] = []
+    data = EMPTY
+    for number, step in enumerate(job.steps, 1):
+        streams = StepStreams(job.input, data, job.folder, job.cores)
+        with use_streams(streams):
+            code = main.run(step.words(_named(job.input) if number == 1 else PIPE))
+        messages.messages += streams.messages
+        files += streams.files
+        if code != errors.DONE:
+            messages.messages.append(f"in step {number} of {len(job.steps)}: {shlex.join(step.words()[:1])}")
+            return code, files, EMPTY
+        data = np.frombuffer(b"".join(streams.output), np.uint8)
+    return errors.DONE, files, data
+
+
+def store(job: Job, product: Bytes, files: Sequence[Path]) -> None:
+    """Keep the result in the cache, with the hashes of all files that were read besides the input."""
+    hashes = FileHashes()
+    others = {os.path.relpath(path, job.folder): hashes.hash(str(path)) for path in files}
+    others.pop(os.path.normpath(job.input), None)
+    document = container.read(product)
+    is_plain = not any(images.external_uri(image) for image in json_array(document.json, "images"))
+    assert job.cache is not None
+    ResultCache(job.cache).store(job.key, product, others, is_plain=is_plain)
+
+
+def write_output(job: Job, product: Bytes) -> None:
+    """Write the GLB of the last step as the output, with external images copied beside it. Raises AnimError.
+
+    The same bytes are not written again.
+    """
+    path = job.folder / job.output
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_written(str(path.parent), error) from None
+    source = replace(open_bytes(product, job.output), folder=(job.folder / job.input).parent)
+    try:
+        write_file(source.document, str(path), source, unchanged=product)
+    except AnimError as error:
+        error.problem = error.problem.replace(str(path), job.output)
+        raise
+
+
+def _named(path: str) -> str:
+    """The path as an argument: not an option, nor a pipe."""
+    return f"./{path}" if path.startswith("-") else path

@@ -1,0 +1,97 @@
+"""Journal of a run: a JSON line for each file when it is done, so that an interrupted run can be resumed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from anim import __version__
+from anim.files import atomic
+from cli.workflows.run.cache import stamp_of
+
+NAME = "journal.jsonl"
+STATUSES = MADE, CACHED, DONE_BEFORE, FAILED = "made", "cached", "done before", "failed"
+
+
+@dataclass(frozen=True)
+class JournalEntry:
+    """One file. recipe: hash of its steps. stamps: size and modification time of input and output.
+
+    status: MADE, CACHED, DONE_BEFORE (in an earlier run that is resumed) or FAILED; messages: of failed files.
+    """
+
+    input: str
+    output: str
+    recipe: str
+    status: str
+    code: int = 0
+    seconds: float = 0.0
+    size: int = 0
+    input_stamp: tuple[int, int] | None = None
+    output_stamp: tuple[int, int] | None = None
+    messages: tuple[str, ...] = ()
+
+
+@dataclass
+class Journal:
+    """Journal that a run writes; a line is complete in the file as soon as it is written."""
+
+    file: IO[str]
+    earlier: dict[tuple[str, str], JournalEntry] = field(default_factory=dict)
+
+    def write(self, entry: JournalEntry) -> None:
+        """Append a line."""
+        self.write_line(asdict(entry))
+
+    def write_line(self, value: dict[str, Any]) -> None:
+        """Append a JSON object as a line. Raises OutputError."""
+        with atomic.name_errors(Path(self.file.name)):
+            self.file.write(json.dumps(value, ensure_ascii=False) + "\n")
+            self.file.flush()
+
+    def is_done(self, folder: Path, input: str, output: str, recipe: str) -> bool:
+        """Return whether an earlier run made an output by these steps, and neither file has changed since."""
+        entry = self.earlier.get((input, output))
+        if entry is None or entry.status == FAILED or entry.recipe != recipe or entry.output_stamp is None:
+            return False
+        stamps = stamp_of(folder / input), stamp_of(folder / output)
+        return stamps == (entry.input_stamp, entry.output_stamp)
+
+
+@contextmanager
+def open_journal(path: Path, files: int, *, resume: bool) -> Iterator[Journal]:
+    """Open the journal of a run. resume: append to that of the last run, else begin a new one. Raises OutputError."""
+    earlier = read_journal(path) if resume else {}
+    with atomic.name_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("a" if resume else "w", encoding="utf-8", errors="backslashreplace")
+    with file:
+        journal = Journal(file, earlier)
+        if resume:
+            file.write("\n")  # ends a line that was cut off
+        journal.write_line({"run": {"version": __version__, "files": files, "resumed": resume}})
+        yield journal
+
+
+def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
+    """Return the last entry of each input and output; none without a journal. Lines that are cut off are skipped."""
+    entries: dict[tuple[str, str], JournalEntry] = {}
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return entries
+    for line in lines:
+        with suppress(ValueError, TypeError):
+            value = json.loads(line)
+            stamps = {key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value}
+            entry = JournalEntry(**{**value, **stamps})
+            entries[entry.input, entry.output] = entry
+    return entries
+
+
+def _stamp(value: Any) -> tuple[int, int] | None:
+    return None if value is None else (int(value[0]), int(value[1]))

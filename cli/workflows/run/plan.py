@@ -1,0 +1,82 @@
+"""Files of a run, with the recipe and the output of each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path, PurePosixPath
+
+from anim.errors import NotFoundError
+from anim.gltf.io import container
+from cli.errors import UsageError
+from cli.io import input_files
+from cli.workflows.check_config import matches
+from cli.workflows.run.job import Job
+from cli.workflows.run.recipe import Recipe, RecipeBook
+from cli.workflows.run.steps import EDITING
+
+
+def plan_jobs(book: RecipeBook, recipes: Sequence[Recipe], files: Sequence[str], *, named: bool) -> list[Job]:
+    """Return a job for each file and recipe that matches it; for the same output the first recipe counts.
+
+    files: paths, folders and patterns, from the working folder; empty for all files below the folder of the settings.
+    named: whether the recipes are named by the command line: then files need not match.
+    Outputs are never inputs. Raises UsageError for two files with one output, and NotFoundError without any file.
+    """
+    given = [_relative(book, each) for each in input_files.expand(files)]
+    jobs: dict[str, Job] = {}
+    for recipe in recipes:
+        for path in given or _files(book, recipe):
+            if not (named and given) and not matches(path, recipe.match):
+                continue
+            job = Job(book.folder, path, recipe.output_of(path), recipe.steps)
+            same = jobs.setdefault(job.output, job)
+            if same.input != path:
+                problem = f"'{same.input}' and '{path}' have the same output, '{job.output}'"
+                raise UsageError(f"{book.path}: {problem}", help="out needs {path}, or {folder} with {name} or {stem}")
+    chosen = [job for job in jobs.values() if job.input not in jobs or job.input == job.output]
+    _check(book, chosen, given)
+    return chosen
+
+
+def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
+    for job in jobs:
+        if job.input == job.output:
+            raise UsageError(f"{book.path}: '{job.input}' is its own output (expected another name in out)")
+        ending = PurePosixPath(job.output).suffix
+        if ending.lower() not in container.SUFFIXES:
+            expected = f"expected {' or '.join(container.SUFFIXES)}"
+            raise UsageError(f"{book.path}: glTF is no '{ending}' ({expected}): the output of '{job.input}'")
+    used = {job.input for job in jobs}
+    for path in given:
+        if path not in used:
+            raise UsageError(f"{path}: matches no recipe of {book.path}", help="--recipe NAME chooses one for any file")
+    if not jobs:
+        raise NotFoundError(f"{book.path}: no recipe matches a file")
+
+
+def _relative(book: RecipeBook, path: str) -> str:
+    absolute = Path(os.path.abspath(path))
+    if not absolute.is_relative_to(book.folder):
+        raise UsageError(f"{path}: is outside of {book.folder}, the folder of the settings")
+    return absolute.relative_to(book.folder).as_posix()
+
+
+def _files(book: RecipeBook, recipe: Recipe) -> Iterator[str]:
+    """Files below the folder that can match, without hidden ones and those of the output's own folder."""
+    outputs = _fixed_folder(recipe.out, "{")
+    is_gltf = recipe.steps[0].command[0] in EDITING
+    for folder, folders, names in os.walk(book.folder / _fixed_folder(recipe.match, "*?[")):
+        relative = Path(folder).relative_to(book.folder).as_posix()
+        prefix = "" if relative == "." else f"{relative}/"
+        folders[:] = sorted(each for each in folders if not each.startswith(".") and prefix + each != outputs)
+        for name in sorted(names):
+            if not name.startswith(".") and (not is_gltf or name.lower().endswith(container.SUFFIXES)):
+                yield prefix + name
+
+
+def _fixed_folder(pattern: str, wild: str) -> str:
+    """The folders of a pattern before the first part with a wildcard: "crowd" of "crowd/**/*.glb"."""
+    parts = pattern.split("/")[:-1]
+    fixed = next((i for i, part in enumerate(parts) if any(c in part for c in wild)), len(parts))
+    return "/".join(parts[:fixed])

@@ -1,0 +1,145 @@
+"""A run: looks results up, lets workers make the others, and reports and records each file."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+
+from cli import errors
+from cli.errors import run_guarded
+from cli.progress import Progress
+from cli.streams import StepStreams, use_streams
+from cli.text import Reporter, format_bytes, format_change, format_duration, plural
+from cli.workflows.run import workers
+from cli.workflows.run.cache import FileHashes, ResultCache, recipe_key, result_key, stamp_of
+from cli.workflows.run.job import EMPTY, Job, JobResult, run_job, write_output
+from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
+from cli.workflows.run.steps import Step
+from cli.workflows.run.workers import OpenPool
+
+
+@dataclass
+class RecipeRun:
+    """A run of jobs.
+
+    cache: None to keep no results. processes: in all; count: of jobs at a time. open_pool: opens the pool of workers.
+    """
+
+    jobs: Sequence[Job]
+    journal: Journal
+    cache: ResultCache | None
+    voice: Reporter
+    processes: int
+    count: int
+    open_pool: OpenPool
+    counts: Counter[str] = field(default_factory=Counter)
+    code: int = errors.DONE
+    _hashes: FileHashes = field(default_factory=FileHashes)
+    _recipes: dict[tuple[Step, ...], str] = field(default_factory=dict)
+
+    def run(self) -> int:
+        """Run all jobs; return the largest exit code."""
+        began = time.perf_counter()
+        self._progress = Progress("", len(self.jobs), shown=not self.voice.quiet)
+        try:
+            with closing(self._results(self._look_up())) as results:  # ends the workers
+                for job, result in results:
+                    self._record(job, result, MADE if result.code == errors.DONE else FAILED)
+        finally:
+            self._progress.close()
+        counts = [f"{self.counts[each]} {each}" for each in STATUSES if self.counts[each]]
+        took = format_duration(time.perf_counter() - began)
+        self.voice.info(f"{plural(len(self.jobs), 'file')}: {', '.join(counts)}, {took}")
+        self.journal.write_line({"end": {**self.counts, "code": self.code}})
+        return self.code
+
+    def _results(self, missing: Iterator[Job]) -> Generator[tuple[Job, JobResult], None, None]:
+        if len(self.jobs) == 1:  # in this process: starting another takes longer
+            yield from ((job, run_job(job)) for job in missing)
+            return
+        first = next(missing, None)
+        if first is not None:
+            yield from workers.run_jobs(_chain(first, missing), self.open_pool, self.count)
+
+    def _look_up(self) -> Iterator[Job]:
+        """Yield the jobs without a known result; of others, write the output."""
+        for each in self.jobs:
+            job = replace(each, cores=max(1, self.processes // self.count))
+            recipe = self._recipe(job)
+            if self.journal.is_done(job.folder, job.input, job.output, recipe):
+                self._record(job, JobResult(errors.DONE, stamp=stamp_of(job.folder / job.input)), DONE_BEFORE)
+            elif self.cache is None:
+                yield job
+            else:
+                digest = self._hashes.hash(os.path.join(job.folder, job.input))
+                keyed = replace(job, cache=self.cache.folder, key=result_key(recipe, job.steps, job.input, digest))
+                found = self._from_cache(keyed, self.cache)
+                if found is None:
+                    yield keyed
+                else:
+                    self._record(job, found, CACHED if found.code == errors.DONE else FAILED)
+
+    def _from_cache(self, job: Job, cache: ResultCache) -> JobResult | None:
+        """The result of a job from the cache, with its output written; None if there is none."""
+        began = time.perf_counter()
+        record = cache.find(job.key, job.folder, self._hashes)
+        if record is None:
+            return None
+        stamp = stamp_of(job.folder / job.input)
+        output = os.path.join(job.folder, job.output)
+        if record.is_plain and not output.lower().endswith(".gltf") and self._hashes.hash(output) == record.product:
+            return JobResult(errors.DONE, (), record.size, stamp)
+        product = cache.product(record)
+        if product is None:
+            return None
+        streams = StepStreams(job.input, EMPTY, job.folder)
+        with use_streams(streams):
+            code = run_guarded(lambda: write_output(job, product))
+        return JobResult(code, tuple(streams.messages), record.size, stamp, time.perf_counter() - began)
+
+    def _recipe(self, job: Job) -> str:
+        if job.steps not in self._recipes:
+            self._recipes[job.steps] = recipe_key(job.steps, job.folder, self._hashes)
+        return self._recipes[job.steps]
+
+    def _record(self, job: Job, result: JobResult, status: str) -> None:
+        self.counts[status] += 1
+        self.code = max(self.code, result.code)
+        self._progress.close()
+        self._report(job, result, status)
+        self._progress(self.counts.total(), f"{self.counts.total()} of {len(self.jobs)}, {job.input}")
+        self.journal.write(
+            JournalEntry(
+                job.input,
+                job.output,
+                self._recipe(job),
+                status,
+                result.code,
+                round(result.seconds, 3),
+                result.size,
+                result.stamp,
+                None if status == FAILED else stamp_of(job.folder / job.output),
+                result.messages if status == FAILED else (),
+            )
+        )
+
+    def _report(self, job: Job, result: JobResult, status: str) -> None:
+        """Report a file: its errors and warnings, else a line if it was made; with --verbose all that steps report."""
+        voice = Reporter() if status == FAILED else self.voice
+        for line in result.messages:
+            if status == FAILED or self.voice.verbose or line.startswith("warning: "):
+                Reporter().info(line if job.input in line or status == FAILED else f"{job.input}: {line}")
+        if status == MADE or (self.voice.verbose and status != FAILED):
+            before = 0 if result.stamp is None else result.stamp[0]
+            sizes = format_change(before, result.size) if result.size else format_bytes(before)
+            took = f", {format_duration(result.seconds)}" if status == MADE else f" ({status})"
+            voice.info(f"{job.output}  {sizes}{took}")
+
+
+def _chain(first: Job, others: Iterator[Job]) -> Iterator[Job]:
+    yield first
+    yield from others

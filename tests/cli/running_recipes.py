@@ -1,0 +1,39 @@
+"""Folders with recipes, and the journal of a run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.cli.running import built
+
+STEPS = ("resample --fps 30", "optimize --max-error 0.5mm --effort fast")
+
+
+def write_recipe(
+    folder: Path, *steps: str, match: str = "crowd/**/*.glb", out: str = "build/{path}", **more: str
+) -> None:
+    """Write or extend gltf-anim.toml."""
+    values = {"match": match, "steps": list(steps or STEPS), "out": out, **more}
+    lines = "".join(f"{key} = {json.dumps(value)}\n" for key, value in values.items())
+    path = folder / "gltf-anim.toml"
+    path.write_text((path.read_text() if path.exists() else "") + f"[[recipe]]\n{lines}")
+
+
+def write_crowd(folder: Path, **files: str) -> None:
+    """Write fixtures to crowd/: write_crowd(folder, hero="biped")."""
+    (folder / "crowd").mkdir(exist_ok=True)
+    for name, fixture in files.items():
+        (folder / "crowd" / f"{name}.glb").write_bytes(built(fixture))
+
+
+def journal(folder: Path) -> list[dict[str, Any]]:
+    """The entries of files in the journal."""
+    lines = (folder / ".gltf-anim-cache" / "journal.jsonl").read_text().splitlines()
+    return [entry for line in lines if line and "input" in (entry := json.loads(line))]
+
+
+def statuses(folder: Path) -> dict[str, str]:
+    """Status of each input in the journal."""
+    return {entry["input"]: entry["status"] for entry in journal(folder)}

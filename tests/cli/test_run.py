@@ -1,0 +1,243 @@
+"""`run`: recipes over folders, their cache and journal."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from tests.cli.running import built, help_line, refusal
+from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, write_recipe
+
+PLAIN = ("resample --fps 12",)
+
+
+def test_the_output_is_that_of_single_commands(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped", cube="morph_cube")
+    write_recipe(folder)
+    assert call("run", "crowd/hero.glb", "crowd/cube.glb").code == 0
+    for name in ("hero", "cube"):
+        made = call("resample", f"crowd/{name}.glb", "--fps", "30").product()
+        made = call(*STEPS[1].split(), stdin=made).product()
+        assert (folder / "build" / "crowd" / f"{name}.glb").read_bytes() == made
+
+
+def test_a_second_run_makes_nothing(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, *PLAIN)
+    first = call("run")
+    assert "2 files: 2 made" in first.err
+    stamp = (folder / "build/crowd/hero.glb").stat().st_mtime_ns
+    assert call("run").err.startswith("2 files: 2 cached")
+    assert (folder / "build/crowd/hero.glb").stat().st_mtime_ns == stamp
+    (folder / "crowd/hero.glb").write_bytes(built("morph_cube"))
+    assert "2 files: 1 made, 1 cached" in call("run").err
+    (folder / "crowd/hero.glb").write_bytes(built("biped"))
+    assert call("run").err.startswith("2 files: 2 cached")  # of the first run
+    assert (folder / "build/crowd/hero.glb").read_bytes() == call("resample", "crowd/hero.glb", "--fps", "12").product()
+
+
+def test_a_lost_or_changed_output_comes_from_the_cache(folder: Path, call: Call) -> None:
+    write_recipe(folder, *PLAIN)
+    call("run").product()
+    output = folder / "build/crowd/arm 1.glb"
+    made = output.read_bytes()
+    for change in (output.unlink, lambda: output.write_bytes(b"other")):
+        change()
+        assert call("run").err.startswith("1 file: 1 cached")
+        assert output.read_bytes() == made
+
+
+def test_a_damaged_cache_is_made_again(folder: Path, call: Call) -> None:
+    write_recipe(folder, *PLAIN)
+    call("run").product()
+    made = (folder / "build/crowd/arm 1.glb").read_bytes()
+    for path in (folder / ".gltf-anim-cache/objects").rglob("*"):
+        if path.is_file():
+            path.write_bytes(b"damaged")
+    shutil.rmtree(folder / "build")
+    assert "1 file: 1 made" in call("run").err
+    assert (folder / "build/crowd/arm 1.glb").read_bytes() == made
+
+
+def test_other_steps_and_files_named_in_steps_are_other_results(folder: Path, call: Call) -> None:
+    (folder / "motion").mkdir()
+    (folder / "motion/walk.bvh").write_bytes(call("to-euler", "noop.glb", "-", "--clip", "#0").product())
+    (folder / "hero.glb").write_bytes(built("noop"))
+    recipe = {"match": "motion/*.bvh", "out": "build/{stem}.glb"}
+    write_recipe(folder, "from-euler --onto hero.glb", **recipe)
+    assert "1 file: 1 made" in call("run").err
+    assert "1 file: 1 cached" in call("run").err
+    (folder / "hero.glb").write_bytes(call("retime", "noop.glb", "--speed", "2").product())
+    assert "1 file: 1 made" in call("run").err
+    (folder / "gltf-anim.toml").unlink()
+    write_recipe(folder, "from-euler --onto hero.glb --name walk", **recipe)
+    assert "1 file: 1 made" in call("run").err
+    assert (
+        json.loads(call("inspect", "build/walk.glb", "--format", "json").text)["files"][0]["clips"][-1]["name"]
+        == "walk"
+    )
+
+
+def test_buffers_of_an_input_count_for_the_cache(folder: Path, call: Call) -> None:
+    call("convert", "crowd/arm 1.glb", "crowd/arm.gltf").product()
+    write_recipe(folder, *PLAIN, match="crowd/*.gltf", out="build/{stem}.gltf")
+    assert "1 file: 1 made" in call("run").err
+    assert "1 file: 1 cached" in call("run").err
+    (buffer,) = (folder / "crowd").glob("*.bin")
+    data = bytearray(buffer.read_bytes())
+    data[-1] ^= 1
+    buffer.write_bytes(data)
+    assert "1 file: 1 made" in call("run").err
+    assert call("convert", "build/arm.gltf").product() == call("resample", "crowd/arm.gltf", "--fps", "12").product()
+
+
+def test_a_file_that_fails_is_named_and_the_rest_is_done(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    (folder / "crowd/bad.glb").write_bytes(b"no glTF")
+    write_recipe(folder, *PLAIN)
+    run = call("run")
+    assert run.code == 3
+    assert "gltf-anim: crowd/bad.glb: is no glTF" in run.err
+    assert "in step 1 of 1: resample" in run.err
+    assert "3 files: 2 made, 1 failed" in run.err
+    assert sorted(path.name for path in (folder / "build/crowd").iterdir()) == ["arm 1.glb", "hero.glb"]
+    assert statuses(folder)["crowd/bad.glb"] == "failed"
+
+
+def test_a_later_step_names_the_file_and_the_exit_code_is_the_largest(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    (folder / "crowd/bad.glb").write_bytes(b"no glTF")
+    write_recipe(folder, "resample --fps 12", "trim --to 0.5 --clip walk")
+    run = call("run")
+    assert run.code == 5
+    assert "gltf-anim: crowd/arm 1.glb: " in run.err
+    assert "in step 2 of 2: trim" in run.err
+
+
+def test_warnings_of_steps_are_shown_and_other_lines_with_verbose(folder: Path, call: Call) -> None:
+    write_crowd(folder, arm="arm")
+    (folder / "crowd/arm 1.glb").unlink()
+    write_recipe(folder, "optimize --max-error 1")
+    quiet = call("run", "-q", "--no-cache")
+    assert quiet.err == "crowd/arm.glb: warning: --max-error 1 means 1 m, for want of a unit (0.5mm, 0.1%)\n"
+    assert "crowd/arm.glb  " in call("run", "-v", "--no-cache").err
+
+
+def test_outputs_are_never_inputs(folder: Path, call: Call) -> None:
+    write_recipe(folder, *PLAIN, match="**/*.glb", out="{folder}/{stem}.small.glb")
+    assert "2 files: 2 made" in call("run").err
+    assert "2 files: 2 cached" in call("run").err
+    (folder / "gltf-anim.toml").unlink()
+    write_recipe(folder, *PLAIN, match="crowd/**", out="crowd/build/{name}")
+    call("run").product()
+    (folder / "crowd/arm 1.glb").unlink()
+    (folder / "crowd/arm 1.small.glb").unlink()
+    assert "no recipe matches a file" in call("run").err
+
+
+def test_of_two_recipes_with_one_output_the_first_counts(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, "resample --fps 12", match="crowd/hero.glb", name="hero")
+    write_recipe(folder, "resample --fps 4", name="crowd")
+    write_recipe(folder, "resample --fps 2", out="far/{path}", name="far")
+    assert "4 files: 4 made" in call("run").err
+    made = {each: (folder / each / "crowd/hero.glb").read_bytes() for each in ("build", "far")}
+    for each, fps in (("build", "12"), ("far", "2")):
+        assert made[each] == call("resample", "crowd/hero.glb", "--fps", fps).product()
+    assert "2 files: 2 cached" in call("run", "--recipe", "far").err
+    assert "1 file: 1 made" in call("run", "noop.glb", "--recipe", "far").err  # which it does not match
+
+
+def test_resume_reads_nothing_again_and_makes_what_is_missing(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    (folder / "crowd/bad.glb").write_bytes(b"no glTF")
+    write_recipe(folder, *PLAIN)
+    call("run", "--no-cache")
+    (folder / "crowd/bad.glb").write_bytes(built("arm"))
+    (folder / "build/crowd/hero.glb").unlink()
+    run = call("run", "--resume", "--no-cache")
+    assert "3 files: 2 made, 1 done before" in run.err
+    assert [entry["status"] for entry in journal(folder)].count("done before") == 1
+    assert "3 files: 3 done before" in call("run", "--resume", "--no-cache").err
+    assert "3 files: 3 made" in call("run", "--no-cache").err
+
+
+def test_a_journal_that_was_cut_off_is_read(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, *PLAIN)
+    call("run", "--no-cache", "--cache", "kept").product()
+    path = folder / "kept/journal.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:2]) + lines[2][:30])
+    assert "2 files: 1 made, 1 done before" in call("run", "--resume", "--no-cache", "--cache", "kept").err
+
+
+def test_images_are_copied_beside_the_output(folder: Path, call: Call, tmp_path: Path) -> None:
+    call("convert", "crowd/arm 1.glb", "crowd/arm.gltf").product()
+    path = folder / "crowd/arm.gltf"
+    document = json.loads(path.read_text())
+    document["images"] = [{"uri": "skin.png"}]
+    path.write_text(json.dumps(document))
+    (folder / "crowd/skin.png").write_bytes(b"\x89PNG")
+    write_recipe(folder, *PLAIN, match="crowd/*.gltf", out="build/{stem}.glb")
+    for status in ("made", "cached"):
+        assert f"1 file: 1 {status}" in call("run").err
+        assert (folder / "build/skin.png").read_bytes() == b"\x89PNG"
+        shutil.rmtree(folder / "build")
+
+
+def test_the_cache_is_ignored_by_git(folder: Path, call: Call) -> None:
+    write_recipe(folder, *PLAIN)
+    call("run").product()
+    assert (folder / ".gltf-anim-cache/.gitignore").read_text() == "*\n"
+
+
+@pytest.mark.parametrize(
+    ("steps", "problem", "hint"),
+    [
+        (["resampel --fps 30"], "recipe 1: step 1: there is no command 'resampel'", "did you mean 'resample'?"),
+        (["convert", "resample --fsp 30"], "step 2: resample: no such option: --fsp", "did you mean '--fps'"),
+        (["check"], "'check' makes no glTF from glTF", "a step is one of resample"),
+        (["convert", "from-euler"], "'from-euler' reads no glTF: it can only be the first step", ""),
+        (["simulate spring"], "no such kind 'spring'", "did you mean 'springs'?"),
+        (["resample a.glb --fps 3"], "'a.glb' is a file", ""),
+        (["resample --fps x"], "invalid value for '--fps': 'x' is no number", "resample --help"),
+        (["resample"], "missing option '--fps'", ""),
+        (["optimize --report a.json"], "--report writes a file for every file", ""),
+        (["ease --help"], "--help makes no glTF", ""),
+        (["ease 'x"], "can't be split into words", ""),
+    ],
+)
+def test_unknown_steps_are_refused_before_anything_runs(
+    steps: list[str], problem: str, hint: str, folder: Path, call: Call
+) -> None:
+    write_recipe(folder, *steps)
+    run = call("run")
+    assert problem in refusal(run, 2)
+    assert help_line(run).startswith(hint) or hint in help_line(run)
+    assert not (folder / "build").exists()
+
+
+def test_broken_recipes_are_refused(folder: Path, call: Call) -> None:
+    path = folder / "gltf-anim.toml"
+    assert "has no gltf-anim.toml" in refusal(call("run"), 2) or "there is no gltf-anim.toml" in call("run").err
+    for text, problem in {
+        "[check]\n": "has no [[recipe]]",
+        "[[recipe]]\nsteps = ['convert']\nout = 'x/{path}'\n": "recipe 1: has no match",
+        "[[recipe]]\nstep = []\n": "unknown key 'recipe.step'",
+        "[[recipe]]\nmatch='../*'\nsteps = ['convert']\nout = 'x/{path}'\n": "expected a path below the folder",
+        "[[recipe]]\nmatch='*.glb'\nsteps = ['convert']\nout = 'x/{clip}'\n": "{clip} stands for nothing",
+        "[[recipe]]\nmatch='*.glb'\nsteps = ['convert']\nout = '{path}'\n": "'noop.glb' is its own output",
+        "[[recipe]]\nmatch='**/*.glb'\nsteps = ['convert']\nout = 'a.glb'\n": "have the same output, 'a.glb'",
+        "[[recipe]]\nmatch='*.glb'\nsteps = ['convert']\nout = 'a.obj'\n": "glTF is no '.obj'",
+        "[[recipe]]\nmatch='*.glb'\nsteps = [3]\nout = 'a.glb'\n": "step 1 is no text",
+    }.items():
+        path.write_text(text)
+        assert problem in refusal(call("run"), 2)
+    path.write_text("[[recipe]]\nmatch='*.glb'\nsteps = ['convert']\nout = 'b/{path}'\n")
+    assert "crowd/arm 1.glb: matches no recipe" in refusal(call("run", "crowd"), 2)
+    assert "there is no recipe 'x'" in refusal(call("run", "--recipe", "x"), 2)
