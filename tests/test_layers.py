@@ -75,7 +75,7 @@ PUBLIC = {
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets hierarchy rules schema",
-    "gltf.writing": "append byte_ranges references reindex writer",
+    "gltf.writing": "append byte_ranges references reindex removal writer",
     "measure.compare": "diff name_matching",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "largest_error prover",
@@ -83,6 +83,7 @@ PUBLIC = {
     "measure.inspect": ("contents frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"),
     "measure.loops": "loop_analysis recommendations skin_motion",
     "optimization.search": "plan",
+    "optimization.tracks": "clip_ends needed_keys",
     "show.filmstrip": "camera clips filmstrip image_file",
     "show.plots": (
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations simulation_plot "

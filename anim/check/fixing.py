@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from anim.check.checked_file import CheckedFile
+from anim.check.finding import Occurrence
 from anim.check.rule import Rule
 from anim.check.selection import RuleSelection
+from anim.errors import AnimError
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.measure.continuous_bound.largest_error import largest_error
@@ -16,13 +19,16 @@ from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.contents import read_contents
 from anim.measure.inspect.inspect import inspect
+from anim.model import Clip
 
 MAX_SAFE_ERROR_PER_DIAGONAL = 1e-6
+MAX_PASSES = 4  # over all rules: a fix can make room for another one, as a key at 0 s that is redundant then
+REST = Clip("", ())
 
 
 @dataclass(frozen=True, slots=True)
 class AppliedFix:
-    """A fix that was applied, or refused for its error. count: occurrences. error_m: largest error of a vertex."""
+    """A fix that was applied. count: occurrences. error_m: largest error of a vertex, in m."""
 
     rule: Rule
     count: int
@@ -30,39 +36,86 @@ class AppliedFix:
 
 
 @dataclass(frozen=True, slots=True)
+class RefusedFix:
+    """A fix that was left out: for its error in m, or for a problem of the file."""
+
+    rule: Rule
+    error_m: float
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class FixResult:
-    """The fixed document, the fixes in it, and safe fixes left out because their error was not safe."""
+    """The fixed document, the fixes in it, and those left out."""
 
     document: Document
     applied: tuple[AppliedFix, ...]
-    refused: tuple[AppliedFix, ...]
+    refused: tuple[RefusedFix, ...]
 
 
 def fix_all(file: CheckedFile, selection: RuleSelection, *, unsafe: bool) -> FixResult:
     """Return the document after the fixes of the selected rules. unsafe: also those that may change the motion.
 
-    Each fix is written, read again and compared with the document before: a safe one that moves a vertex by more than
-    1e-6 of the diagonal is left out. Files with faults are not fixed.
+    Each fix is written, read again and compared with the document before; all safe ones together move no vertex by
+    more than 1e-6 of the diagonal: one that would is left out. Rules are applied again until none of them finds
+    anything to fix. Files with faults are not fixed.
     """
-    applied, refused = [], []
-    if file.facts.faults:
-        return FixResult(file.document, (), ())
-    for rule in selection.rules():
-        if rule.fix is None or not (rule.fix.is_safe or unsafe):
-            continue
-        parameters = selection.values(rule)
-        found = list(rule.find(file, parameters))
-        if not found:
-            continue
-        document = rule.fix.apply(file, found, parameters)
-        fixed = _reread(document, file)
-        done = AppliedFix(rule, sum(each.count for each in found), _error(file, fixed))
-        if rule.fix.is_safe and done.error_m > MAX_SAFE_ERROR_PER_DIAGONAL * file.diagonal:
-            refused.append(done)
-            continue
-        applied.append(done)
-        file = fixed
-    return FixResult(file.document, tuple(applied), tuple(refused))
+    fixer = _Fixer(file, selection, unsafe)
+    if not file.facts.faults:
+        for _ in range(MAX_PASSES):
+            if not fixer.run():
+                break
+    return FixResult(fixer.file.document, tuple(fixer.applied.values()), tuple(fixer.refused.values()))
+
+
+@dataclass
+class _Fixer:
+    """Applies fixes to a file. safe_error: sum of the errors of its safe fixes, in m."""
+
+    file: CheckedFile
+    selection: RuleSelection
+    unsafe: bool
+    applied: dict[str, AppliedFix] = field(default_factory=dict)
+    refused: dict[str, RefusedFix] = field(default_factory=dict)
+    safe_error: float = 0.0
+
+    def run(self) -> bool:
+        """Apply each fix once; return whether the file changed."""
+        before = self.file.document
+        for rule in self._rules():
+            found = list(rule.find(self.file, self.selection.values(rule)))
+            if found:
+                try:
+                    self._apply(rule, found)
+                except AnimError as error:
+                    self.refused[rule.code] = RefusedFix(rule, 0.0, str(error))
+        return self.file.document is not before
+
+    def _rules(self) -> Iterator[Rule]:
+        rules = self.selection.rules()
+        codes = {rule.code for rule in rules}
+        for rule in rules:
+            if rule.fix is None or rule.code in self.refused or not codes.isdisjoint(rule.fix.yields_to):
+                continue
+            if rule.fix.is_safe or self.unsafe:
+                yield rule
+
+    def _apply(self, rule: Rule, found: list[Occurrence]) -> None:
+        assert rule.fix is not None
+        document = rule.fix.apply(self.file, found, self.selection.values(rule))
+        if document is self.file.document:
+            return
+        fixed = _reread(document, self.file)
+        error = _error(self.file, fixed, {each.number for each in found})
+        if rule.fix.is_safe:
+            if self.safe_error + error > MAX_SAFE_ERROR_PER_DIAGONAL * self.file.diagonal:
+                self.refused[rule.code] = RefusedFix(rule, error)
+                return
+            self.safe_error += error
+        before = self.applied.get(rule.code, AppliedFix(rule, 0, 0.0))
+        count = before.count + sum(each.count for each in found)
+        self.applied[rule.code] = AppliedFix(rule, count, before.error_m + error)
+        self.file = fixed
 
 
 def _reread(document: Document, before: CheckedFile) -> CheckedFile:
@@ -75,10 +128,12 @@ def _reread(document: Document, before: CheckedFile) -> CheckedFile:
     return CheckedFile(contents, inspect(contents), before.missing)
 
 
-def _error(before: CheckedFile, after: CheckedFile) -> float:
-    """Largest error of a vertex in any clip, in m; clips are matched by index."""
-    ruler = ErrorMetric(before.scene, after.scene)
-    prover = Prover(ruler)
-    pairs = ((clip, after.contents.clips.get(i)) for i, clip in before.contents.clips.items())
-    errors = (largest_error(prover, old, new).error.max_error for old, new in pairs if new is not None)
-    return float(max(errors, default=0.0))
+def _error(before: CheckedFile, after: CheckedFile, numbers: set[int]) -> float:
+    """Largest error of a vertex at rest or in any clip, in m. numbers: of the clips that may be gone."""
+    names = (*before.skeleton.names, *after.skeleton.names[len(before.skeleton) :])  # renamed nodes are the same ones
+    scene = replace(after.scene, skeleton=replace(after.skeleton, names=names))
+    prover = Prover(ErrorMetric(before.scene, scene))
+    old, new = before.contents.clips, after.contents.clips
+    kept = old if len(old) == len(new) else {i: clip for i, clip in old.items() if i not in numbers}
+    pairs = [(REST, REST), *zip(kept.values(), new.values(), strict=False)]
+    return float(max(largest_error(prover, one, other).error.max_error for one, other in pairs))

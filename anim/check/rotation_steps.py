@@ -43,7 +43,11 @@ class RotationSteps:
 
 def rotation_steps(file: CheckedFile) -> RotationSteps:
     """Return the steps of all LINEAR rotation tracks with at least MIN_KEYS keys."""
-    table = file.tracks("rotation", _is_dense)
+    return steps_of(file.tracks("rotation", _is_dense))
+
+
+def steps_of(table: TrackTable) -> RotationSteps:
+    """Return the steps of rotation tracks."""
     inner = table.inner_steps()
     dots = np.ones(len(table.values))
     dots[1:] = quaternion.dot(table.values[1:], table.values[:-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any
 
 from anim.check.advice import clip_advice
 from anim.check.checked_file import CheckedFile
@@ -15,8 +15,7 @@ from anim.gltf.reading import reader
 from anim.measure.inspect.report import ClipReport
 
 MAX_LISTED_PARTS = 3  # parts of a file in one finding
-Parameters: TypeAlias = Mapping[str, float]
-_NONE: Mapping[str, Parameter] = MappingProxyType({})
+_NONE: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +28,36 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
+class TextParameter:
+    """Regular expression that a rule depends on. example: for messages."""
+
+    default: str
+    example: str
+    about: str
+
+
+class Parameters(dict[str, float]):
+    """Numbers of a rule by name. texts: its regular expressions. target: the player of `--target`, "" for none."""
+
+    def __init__(self, numbers: Mapping[str, float], texts: Mapping[str, str] = _NONE, target: str = "") -> None:
+        super().__init__(numbers)
+        self.texts = texts
+        self.target = target
+
+
+@dataclass(frozen=True, slots=True)
 class Fix:
     """Change of a document after which the rule finds nothing.
 
     is_safe: no vertex moves by more than 1e-6 of the model's diagonal, which `fixing` measures on the written bytes.
+    apply: returns the same document if nothing can be fixed. yields_to: codes of rules whose fixes it would undo; it
+    is left out where they are selected.
     """
 
     about: str
     apply: Callable[[CheckedFile, Sequence[Occurrence], Parameters], Document]
     is_safe: bool
+    yields_to: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +69,7 @@ class Rule:
     advice: the remedy, with {fps}, {finer} and {clips} for a command on these clips (see `advice.clip_advice`), or ""
     if each occurrence has its own. is_default: False for rules that only `--select` turns on.
     is_costly: True for rules that sample whole clips; `inspect` leaves them to `check`.
-    targets: severities for players named by `--target`.
+    targets: severities for players named by `--target`. texts: parameters that are regular expressions.
     """
 
     code: str
@@ -65,10 +85,12 @@ class Rule:
     is_default: bool = True
     is_costly: bool = False
     targets: Mapping[str, Severity] = field(default_factory=lambda: MappingProxyType({}))
+    texts: Mapping[str, TextParameter] = field(default_factory=lambda: _NONE)
 
-    def defaults(self) -> dict[str, float]:
+    def defaults(self, target: str = "") -> Parameters:
         """Return the default of each parameter."""
-        return {name: each.default for name, each in self.parameters.items()}
+        numbers = {name: each.default for name, each in self.parameters.items()}
+        return Parameters(numbers, {name: each.default for name, each in self.texts.items()}, target)
 
     def finding(self, found: Sequence[Occurrence], clips: Sequence[ClipReport], severity: Severity) -> Finding:
         """Return one finding for some occurrences (one or more). clips: of the file, for advice."""

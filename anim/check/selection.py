@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from anim.check.finding import Severity
 from anim.check.registry import RULES
-from anim.check.rule import Parameter, Rule
+from anim.check.rule import Parameter, Parameters, Rule, TextParameter
 from anim.errors import NotFoundError, RangeError
 
 TARGETS = tuple(sorted({target for rule in RULES for target in rule.targets}))
@@ -37,7 +38,10 @@ class RuleSelection:
         self.rules()
         for key, text in self.parameters.items():
             rule, name = parameter_of(key)
-            parse_parameter(text, key, rule.parameters[name])
+            if name in rule.texts:
+                parse_pattern(text, key, rule.texts[name])
+            else:
+                parse_parameter(text, key, rule.parameters[name])
 
     def rules(self) -> list[Rule]:
         """Return the selected rules in the table's order."""
@@ -51,14 +55,17 @@ class RuleSelection:
         """Return the severity of a rule's findings for the target."""
         return rule.targets.get(self.target, rule.severity)
 
-    def values(self, rule: Rule) -> dict[str, float]:
+    def values(self, rule: Rule) -> Parameters:
         """Return the parameters of a rule."""
-        values = rule.defaults()
+        values = rule.defaults(self.target)
+        texts = dict(values.texts)
         for key, text in self.parameters.items():
             owner, name = parameter_of(key)
-            if owner is rule:
+            if owner is rule and name in rule.texts:
+                texts[name] = parse_pattern(text, key, rule.texts[name])
+            elif owner is rule:
                 values[name] = parse_parameter(text, key, rule.parameters[name])
-        return values
+        return Parameters(values, texts, self.target)
 
 
 def matching(words: Iterable[str]) -> Iterator[str]:
@@ -82,8 +89,8 @@ def parameter_of(key: str) -> tuple[Rule, str]:
     """Return the rule and the parameter's name of "GA301.angle". Raises NotFoundError."""
     word, _, name = key.partition(".")
     rule = rule_of(word)
-    if name not in rule.parameters:
-        names = ", ".join(f"{rule.code}.{each}" for each in rule.parameters) or "none"
+    if name not in rule.parameters and name not in rule.texts:
+        names = ", ".join(f"{rule.code}.{each}" for each in (*rule.parameters, *rule.texts)) or "none"
         raise NotFoundError(f"there is no parameter '{key}'", help=f"parameters of {rule.code} {rule.name}: {names}")
     return rule, name
 
@@ -95,6 +102,17 @@ def parse_parameter(text: str, key: str, parameter: Parameter) -> float:
         if suffix and number.endswith(suffix):
             return _number(number.removesuffix(suffix), text, key, parameter) * factor
     return _number(number, text, key, parameter)
+
+
+def parse_pattern(text: str, key: str, parameter: TextParameter) -> str:
+    """Return a regular expression. Raises RangeError if it is none."""
+    try:
+        re.compile(text)
+    except re.error as error:
+        raise RangeError(
+            f"parameter {key} is '{text}': {error} (expected a pattern like {parameter.example})"
+        ) from None
+    return text
 
 
 def _number(number: str, text: str, key: str, parameter: Parameter) -> float:

@@ -42,6 +42,10 @@ class TrackTable:
         for clip in dict.fromkeys(self.clips[counts > 0].tolist()):
             yield clip, int(counts[self.clips == clip].sum())
 
+    def targets(self, marked: Bools) -> set[tuple[int, int]]:
+        """Return clip and node of each marked track (T,)."""
+        return {(int(self.clips[i]), int(self.nodes[i])) for i in np.flatnonzero(marked)}
+
 
 def track_table(
     clips: Iterable[tuple[int, Clip]], path: str, wanted: Callable[[Track], bool] = lambda track: True

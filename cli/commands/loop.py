@@ -16,7 +16,7 @@ from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loop, best_
 from anim.measure.loops.recommendations import recommend
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
-from anim.operations import loop as closing
+from anim.operations.close_loop import close_loop
 from anim.operations.selection import Selection
 from cli import tables
 from cli.errors import UsageError
@@ -120,16 +120,9 @@ class _Closing:
 def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float | None) -> Clip:
     root = root_motion_node(skin.skeleton, clip)
     found = analyze_loop(skin, clip, root=root)
-    if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
-        clip = closing.append_first_frame(clip, fps=found.fps, tracks=tracks, root=root)
-    elif found.kind is not LoopKind.CLOSED and blend is None:
+    if blend is None and found.kind not in (LoopKind.OPEN_BY_ONE_FRAME, LoopKind.CLOSED):
         raise UsageError(_problem(found), help=HELP)
-    if blend is None:
-        return clip
-    if found.kind is LoopKind.CLOSED_EXCEPT:
-        tracks &= closing.open_tracks(clip)
-    travel = {i for i, track in enumerate(clip.tracks) if track.node == root and track.path == "translation"}
-    return closing.loop(clip, blend=blend, tracks=tracks - travel)
+    return close_loop(clip, found, root=root, blend=blend, tracks=tracks)
 
 
 def _problem(found: Loop) -> str:

@@ -37,4 +37,6 @@ def explain(rule: Rule) -> str:
     for name, each in rule.parameters.items():
         unit = "" if each.unit == "%" else each.unit
         lines += ["", f"--param {rule.code}.{name}={each.default:g}{unit}  {each.about}"]
+    for name, pattern in rule.texts.items():
+        lines += ["", f"--param '{rule.code}.{name}={pattern.example}'  {pattern.about}"]
     return "\n".join(lines) + "\n"

@@ -156,9 +156,8 @@ class FileChecker:
                 self.voice.warn(f"{source.name} is not fixed: {error}")
                 return
             for each in result.refused:
-                distance = format_length(each.error_m)
-                rule = f"{each.rule.code} {each.rule.name}"
-                self.voice.warn(f"{source.name}: {rule} is not fixed: a vertex would move by {distance}")
+                reason = each.problem or f"a vertex would move by {format_length(each.error_m)}"
+                self.voice.warn(f"{source.name}: {each.rule.code} {each.rule.name} is not fixed: {reason}")
             if result.applied:
                 documents.write(result.document, path, source, dry_run=self.dry_run, voice=self.voice)
                 fixes = ", ".join(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule, counted
+from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
+from anim.gltf.document import Document
 from anim.maths import hermite
-from anim.model import Interpolation, Track
+from anim.model import Clip, Interpolation, Track
+from anim.operations.spline import spline
 
 SAMPLES = np.linspace(0, 1, 17)[1:-1, None, None]  # of a segment: a cubic's extremum is flat, so this is close
 
@@ -38,6 +41,16 @@ def overshoot(track: Track) -> float:
     return float((excess[moving] / (most - least)[moving]).max(initial=0.0))
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with monotone tangents in these tracks, as by `spline`."""
+    return edit_clips(file, found, lambda clip: _within_range(clip, parameters["excess"]))
+
+
+def _within_range(clip: Clip, excess: float) -> Clip:
+    tracks = frozenset(i for i, track in enumerate(clip.tracks) if overshoot(track) > excess)
+    return spline(clip, tangents="monotone", tracks=tracks)
+
+
 RULE = Rule(
     "GA115",
     "cubic-overshoot",
@@ -48,4 +61,5 @@ RULE = Rule(
     counted("CUBICSPLINE track leaves the range of its keys", "CUBICSPLINE tracks leave the range of their keys"),
     "if unintended: gltf-anim spline IN OUT --tangents monotone{clips}",
     parameters={"excess": Parameter(0.1, "%", "distance from the range, as a fraction of it")},
+    fix=Fix("give them monotone tangents", fix, is_safe=False),
 )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import replace_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule, counted
+from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
 from anim.check.track_table import TrackTable
+from anim.gltf.document import Document
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
 
@@ -21,10 +24,16 @@ STILL_PER_JUMP = 1e-3  # steps smaller than this fraction of the smallest jump a
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks."""
+    for _, table, mask in _stepped(file, parameters):
+        yield from file.per_clip(table, mask.astype(np.int64))
+
+
+def _stepped(file: CheckedFile, parameters: Parameters) -> Iterator[tuple[str, TrackTable, Bools]]:
+    """Yield path, tracks, and the mask (T,) of those that are stepped."""
     limits = {"rotation": np.radians(parameters["angle"]), "translation": parameters["distance"] * file.diagonal}
     for path, limit in limits.items():
         table = file.tracks(path, _is_dense)
-        yield from file.per_clip(table, _is_stepped(table, _steps(table), limit).astype(np.int64))
+        yield path, table, _is_stepped(table, _steps(table), limit)
 
 
 def _is_dense(track: Track) -> bool:
@@ -51,6 +60,19 @@ def _steps(table: TrackTable) -> Floats:
     return np.asarray(np.where(table.inner_steps(), steps, 0.0))
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with STEP in these tracks: they jump at the key after the slide."""
+    stepped = {(*target, path) for path, table, mask in _stepped(file, parameters) for target in table.targets(mask)}
+
+    def as_step(number: int, track: Track) -> Track:
+        is_stepped = (number, track.node, track.path) in stepped
+        return replace(track, interpolation=Interpolation.STEP) if is_stepped else track
+
+    clips = {each.number: file.contents.clips[each.number] for each in found}
+    new = {i: replace(clip, tracks=tuple(as_step(i, track) for track in clip.tracks)) for i, clip in clips.items()}
+    return replace_clips(file, new)
+
+
 RULE = Rule(
     "GA114",
     "dense-steps",
@@ -65,4 +87,5 @@ RULE = Rule(
         "angle": Parameter(2, "deg", "smallest jump of a rotation"),
         "distance": Parameter(0.005, "%", "smallest jump of a translation, of the model's size"),
     },
+    fix=Fix("interpolate by STEP", fix, is_safe=False),
 )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import free_name, rename_nodes
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule
+from anim.check.rule import Fix, Parameters, Rule
+from anim.gltf.document import Document
 from anim.gltf.reading import reader
 
 
@@ -29,6 +31,17 @@ def animated_nodes(file: CheckedFile) -> list[int]:
     return sorted({track.node for _, clip in file.clips() for track in clip.tracks if track.node is not None})
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with a number behind all names but the first, and names for nodes without one."""
+    taken, seen, names = set(file.skeleton.names), set(), {}
+    for node in animated_nodes(file):
+        name = file.skeleton.names[node]
+        if name in seen or not name:
+            names[node] = free_name(name or f"node_{node}", taken)
+        seen.add(name)
+    return rename_nodes(file.document, names)
+
+
 RULE = Rule(
     "GA003",
     "duplicate-node-names",
@@ -38,4 +51,5 @@ RULE = Rule(
     "donmccurdy/three-gltf-viewer#58, bdero/flutter_scene#122.",
     find,
     advice="rename them where the file is made",
+    fix=Fix("add a number to all names but the first", fix, is_safe=False),
 )

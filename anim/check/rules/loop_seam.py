@@ -6,11 +6,18 @@ import re
 from collections.abc import Iterator, Sequence
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule
+from anim.check.rule import Fix, Parameter, Parameters, Rule
+from anim.gltf.document import Document
+from anim.measure.inspect.root_motion import root_motion_node
+from anim.measure.loops.loop_analysis import analyze_loop
+from anim.model import Clip
+from anim.operations.close_loop import close_loop
 from anim.units import format_number
 
 LOOP_NAME = re.compile(r"(^|[^a-z])(loop|cycle|idle)([^a-z]|$)", re.IGNORECASE)
+BLEND_S = 0.1  # corrected before the end
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -28,6 +35,17 @@ def problem(found: Sequence[Occurrence]) -> str:
     return f"a loop jumps by {format_number(100 * largest, 2)} % of the model's size"
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with the end of these clips corrected, as by `loop --blend`."""
+    return edit_clips(file, found, lambda clip: _close(clip, file))
+
+
+def _close(clip: Clip, file: CheckedFile) -> Clip:
+    root = root_motion_node(file.skeleton, clip)
+    blend = min(BLEND_S, clip.end - clip.start)
+    return close_loop(clip, analyze_loop(file.motion, clip, root=root), root=root, blend=blend)
+
+
 RULE = Rule(
     "GA107",
     "loop-seam",
@@ -41,4 +59,5 @@ RULE = Rule(
         "gap": Parameter(0.001, "%", "smallest visible jump, of the model's size"),
         "limit": Parameter(0.05, "%", "largest jump of a clip that nearly loops, of the model's size"),
     },
+    fix=Fix("correct the last 0.1 s to end as they start", fix, is_safe=False),
 )

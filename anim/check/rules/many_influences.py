@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
+import numpy as np
+
+from anim.arrays import Floats, Ints
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule
+from anim.check.influences import edit_influences
+from anim.check.rule import Fix, Parameter, Parameters, Rule
+from anim.gltf.document import Document
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -15,6 +21,20 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         if skin.most_influences is not None and skin.most_influences > parameters["influences"]:
             problem = f"up to {skin.most_influences} influences per vertex"
             yield file.in_skin(skin.index, value=skin.most_influences, problem=problem)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with the largest weights of each vertex, which add up to 1 again."""
+    sets = math.ceil(parameters["influences"] / 4)
+
+    def largest(skin: int, joints: Ints, weights: Floats) -> tuple[Ints, Floats]:
+        order = np.argsort(-weights, axis=1, kind="stable")[:, : 4 * sets]
+        joints, weights = np.take_along_axis(joints, order, axis=1), np.take_along_axis(weights, order, axis=1)
+        weights[:, int(parameters["influences"]) :] = 0
+        sums = weights.sum(axis=1, keepdims=True)
+        return np.where(weights > 0, joints, 0), weights / np.where(sums > 0, sums, 1)
+
+    return edit_influences(file, {each.number for each in found}, largest)
 
 
 RULE = Rule(
@@ -26,4 +46,5 @@ RULE = Rule(
     find,
     advice="many players use the first four only: limit them where the mesh is made",
     parameters={"influences": Parameter(4, "", "influences per vertex that players use")},
+    fix=Fix("keep the four largest of each vertex, divided by their sum", fix, is_safe=False),
 )

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import VISIBLE_GAP_PER_SIZE, LoopKind, analyze_loop
+from anim.model import Clip
+from anim.operations.close_loop import close_loop
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -18,6 +22,16 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
             loop = analyze_loop(file.motion, clip, root=root_motion_node(file.skeleton, clip))
             if loop.kind is LoopKind.OPEN_BY_ONE_FRAME:
                 yield file.in_clip(report.index, value=loop.seam, time_s=loop.end)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with the first pose as a last frame of these clips, as by `loop`."""
+    return edit_clips(file, found, lambda clip: _close(clip, file))
+
+
+def _close(clip: Clip, file: CheckedFile) -> Clip:
+    root = root_motion_node(file.skeleton, clip)
+    return close_loop(clip, analyze_loop(file.motion, clip, root=root), root=root)
 
 
 RULE = Rule(
@@ -30,4 +44,5 @@ RULE = Rule(
     counted("clip is open by one frame", "clips are open by one frame"),
     "to add the frame: gltf-anim loop IN OUT{clips}",
     is_costly=True,
+    fix=Fix("add the frame", fix, is_safe=False),
 )

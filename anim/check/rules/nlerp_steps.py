@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_tracks, put_between
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule, counted
+from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
+from anim.gltf.document import Document
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
 
@@ -17,10 +19,16 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such steps."""
     table = file.tracks("rotation", _is_linear)
     angles = np.zeros(len(table.values))
-    dots = np.abs(quaternion.dot(table.values[1:], table.values[:-1]))
+    values = quaternion.normalize(table.values)
+    dots = np.abs(quaternion.dot(values[1:], values[:-1]))
     angles[1:] = 2 * np.arccos(np.clip(dots, 0, 1))
     wide = table.inner_steps() & (angles > np.radians(parameters["angle"]))
     yield from file.per_clip(table, table.count(np.asarray(wide)))
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with keys between wide steps, by slerp."""
+    return edit_tracks(file, found, lambda track: put_between(track, np.radians(parameters["angle"])))
 
 
 def _is_linear(track: Track) -> bool:
@@ -37,6 +45,7 @@ RULE = Rule(
     counted("rotation of more than 45° between keys", "rotations of more than 45° between keys"),
     "to add keys: gltf-anim resample IN OUT --fps {finer}{clips}",
     parameters={"angle": Parameter(45, "deg", "largest step")},
+    fix=Fix("add keys between by slerp", fix, is_safe=True),
     is_default=False,
     targets={"unity": Severity.WARNING},
 )

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document
+from anim.model import Clip
+from anim.optimization.tracks.clip_ends import extend
+
+DURATION_S = 1 / 30  # of a fixed clip
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -14,6 +21,16 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for clip in file.facts.clips:
         if clip.tracks and clip.end_s == clip.start_s:
             yield file.in_clip(clip.index)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with a second key, of the same value, in the first track of these clips."""
+    return edit_clips(file, found, _last_one_frame)
+
+
+def _last_one_frame(clip: Clip) -> Clip:
+    first, *others = clip.tracks
+    return replace(clip, tracks=(extend(first, clip.start, clip.start + DURATION_S), *others))
 
 
 RULE = Rule(
@@ -25,4 +42,5 @@ RULE = Rule(
     find,
     counted("clip is a single pose (duration 0 s)", "clips are single poses (duration 0 s)"),
     "fine for a pose; for players that divide by the duration, give it two keys where it is made",
+    fix=Fix("keep the pose for one frame of 1/30 s", fix, is_safe=False),
 )

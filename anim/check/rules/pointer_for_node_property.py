@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document, Json, copy_json
+from anim.gltf.reading.accessors import FLOAT
+from anim.gltf.validation.channel_targets import EXTENSION, channel_target
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -15,6 +19,33 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         channels = sum(track.pointer is not None and track.path != "pointer" for track in clip.tracks)
         if channels:
             yield file.in_clip(report.index, channels)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with plain channels, and without the extension if nothing else uses it."""
+    json = copy_json(file.json)
+    for each in found:
+        for channel in json["animations"][each.number]["channels"]:
+            node, path, pointer = channel_target(channel) or (None, "", None)
+            sampler = json["animations"][each.number]["samplers"][channel["sampler"]]
+            if node is not None and pointer is not None and _is_plain(json["accessors"][sampler["output"]], path):
+                channel["target"] = {"node": node, "path": path}
+    if not any(channel["target"]["path"] == "pointer" for clip in json["animations"] for channel in clip["channels"]):
+        _remove_extension(json)
+    return replace(file.document, json=json) if json != file.json else file.document
+
+
+def _is_plain(accessor: Json, path: str) -> bool:
+    """True if a plain channel may store its values in this way: floats, or rotations and weights in integers."""
+    return accessor["componentType"] == FLOAT or (path in ("rotation", "weights") and accessor.get("normalized", False))
+
+
+def _remove_extension(json: Json) -> None:
+    for key in ("extensionsUsed", "extensionsRequired"):
+        if EXTENSION in json.get(key, ()):
+            json[key] = [name for name in json[key] if name != EXTENSION]
+            if not json[key]:
+                del json[key]
 
 
 RULE = Rule(
@@ -27,4 +58,5 @@ RULE = Rule(
     find,
     counted("pointer names a property of a node", "pointers name properties of nodes"),
     "write plain channels where the file is made",
+    fix=Fix("write plain channels", fix, is_safe=True),
 )

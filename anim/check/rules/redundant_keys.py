@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import replace_clips, single_keys
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document
+from anim.optimization.tracks.needed_keys import needed_keys
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -14,6 +18,17 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for clip in file.facts.clips:
         if count := clip.redundant_keys:
             yield file.in_clip(clip.index, count)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document without these keys. All clips are looked at together, as they share time axes."""
+    clips = {i: single_keys(clip, file) for i, clip in file.contents.clips.items()}
+    needed = iter(needed_keys([track for clip in clips.values() for track in clip.tracks], file.skeleton))
+    new = {}
+    for i, clip in clips.items():
+        pairs = [(old, *next(needed)) for old in clip.tracks]
+        new[i] = replace(clip, tracks=tuple(old if stays.all() else track for old, track, stays in pairs))
+    return replace_clips(file, {each.number: new[each.number] for each in found})
 
 
 RULE = Rule(
@@ -28,4 +43,5 @@ RULE = Rule(
         "redundant keys (interpolated exactly by their neighbors)",
     ),
     "to remove those that no vertex needs: gltf-anim optimize IN OUT",
+    fix=Fix("remove them", fix, is_safe=True, yields_to=frozenset({"GA102"})),
 )

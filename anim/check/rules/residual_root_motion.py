@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule
+from anim.check.rule import Fix, Parameter, Parameters, Rule
+from anim.gltf.document import Document
+from anim.measure.inspect.root_motion import figure_nodes, root_motions
+from anim.model import Clip, Track
 from anim.units import format_number
 
 VISIBLE_GAP = 1e-3  # of the model's size: larger gaps are no loop
@@ -27,6 +32,28 @@ def problem(found: Sequence[Occurrence]) -> str:
     return f"the root moves by {percent} % of the model's size each time round"
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document without this displacement, taken off evenly over each clip."""
+    return edit_clips(file, found, lambda clip: _in_place(clip, file))
+
+
+def _in_place(clip: Clip, file: CheckedFile) -> Clip:
+    (motion,) = root_motions(file.skeleton, [clip], figure=figure_nodes(file.json, file.skeleton))
+    tracks = [
+        _without_displacement(track) if track.node == motion.root and track.path == "translation" else track
+        for track in clip.tracks
+    ]
+    return replace(clip, tracks=tuple(tracks))
+
+
+def _without_displacement(track: Track) -> Track:
+    times, away = track.times, track.values[-1] - track.values[0]
+    speed = away / (times[-1] - times[0])
+    values = track.values - (times - times[0])[:, None] * speed
+    tangents = [None if each is None else each - speed for each in (track.in_tangents, track.out_tangents)]
+    return track.with_keys(track.time_axis, values, *tangents)
+
+
 RULE = Rule(
     "GA305",
     "residual-root-motion",
@@ -41,4 +68,5 @@ RULE = Rule(
         "most": Parameter(0.05, "%", "largest displacement; more is travel"),
     },
     is_default=False,
+    fix=Fix("take it off evenly over the clip", fix, is_safe=False),
 )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
-from anim.gltf.document import json_array
+from anim.check.node_edits import move_mesh_to_root
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document, copy_json, json_array
 
 TOLERANCE = 1e-6
 
@@ -22,6 +24,13 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
             yield file.in_node(i)
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with these meshes at root nodes without transform."""
+    json = copy_json(file.json)
+    moved = [move_mesh_to_root(json, each.number) for each in found]
+    return replace(file.document, json=json) if any(moved) else file.document
+
+
 RULE = Rule(
     "GA207",
     "skinned-mesh-under-transform",
@@ -32,4 +41,5 @@ RULE = Rule(
     find,
     counted("skinned mesh has a transform that is ignored", "skinned meshes have a transform that is ignored"),
     "put the mesh's node at the root of the scene where the file is made",
+    fix=Fix("move the mesh to a root node without transform", fix, is_safe=True),
 )

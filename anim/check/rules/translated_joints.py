@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from anim.arrays import Ints
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import remove_tracks_at
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule, counted
+from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
+from anim.check.track_table import TrackTable
+from anim.gltf.document import Document
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks, of joints below another joint."""
+    yield from file.per_clip(*_translated(file, parameters))
+
+
+def _translated(file: CheckedFile, parameters: Parameters) -> tuple[TrackTable, Ints]:
+    """All translation tracks, and a 1 (T,) for those of inner joints that move."""
     joints = set(file.joints)
     inner = [joint for joint in joints if int(file.skeleton.parents[joint]) in joints]
     table = file.tracks("translation")
     least, most = table.range()
     stretched = (most - least).max(axis=1, initial=0.0) > parameters["range"] * file.diagonal
-    yield from file.per_clip(table, (stretched & np.isin(table.nodes, inner)).astype(np.int64))
+    return table, (stretched & np.isin(table.nodes, inner)).astype(np.int64)
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document without these tracks, as players show it that drop them."""
+    table, translated = _translated(file, parameters)
+    return remove_tracks_at(file, "translation", table.targets(translated > 0))
 
 
 RULE = Rule(
@@ -32,4 +47,5 @@ RULE = Rule(
     "fine on the same skeleton; for others use rotations where the clip is made",
     parameters={"range": Parameter(1e-3, "%", "largest range, of the model's size")},
     is_default=False,
+    fix=Fix("remove the tracks", fix, is_safe=False),
 )

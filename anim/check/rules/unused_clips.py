@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule, counted
-from anim.gltf.document import json_array
+from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.gltf.document import Document, json_array
+from anim.gltf.writing.removal import remove_animations
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -34,6 +35,11 @@ def _reachable(file: CheckedFile, roots: list[int]) -> set[int | None]:
     return found
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document without these clips, and without their bytes."""
+    return remove_animations(file.document, {each.number for each in found})
+
+
 RULE = Rule(
     "GA005",
     "unused-clips",
@@ -43,4 +49,5 @@ RULE = Rule(
     find,
     counted("clip animates nothing of any scene", "clips animate nothing of any scene"),
     "add the nodes to a scene, or leave the clips out where the file is made",
+    fix=Fix("remove them", fix, is_safe=False),
 )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from anim.arrays import Floats, Ints
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule
+from anim.check.influences import edit_influences
+from anim.check.rule import Fix, Parameters, Rule
+from anim.gltf.document import Document
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -18,6 +21,17 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
             yield file.in_skin(skin.index, skin.off_sums, skin.worst_sum_error or 0.0, problem=problem)
 
 
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with weights that add up to 1; a vertex without weight follows its first joint."""
+
+    def normalized(skin: int, joints: Ints, weights: Floats) -> tuple[Ints, Floats]:
+        weights = weights.copy()
+        weights[~weights.any(axis=1), 0] = 1
+        return joints, weights / weights.sum(axis=1, keepdims=True)
+
+    return edit_influences(file, {each.number for each in found}, normalized)
+
+
 RULE = Rule(
     "GA202",
     "weight-sums",
@@ -26,4 +40,5 @@ RULE = Rule(
     "Some players divide by the sum and some don't, so that vertices are in different places.",
     find,
     advice="normalize weights where the mesh is made",
+    fix=Fix("divide them by their sum, as many players do", fix, is_safe=False),
 )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from anim.check.checked_file import CheckedFile
+from anim.check.edits import edit_tracks
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameter, Parameters, Rule, counted
-from anim.model import Interpolation
+from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
+from anim.gltf.document import Document
+from anim.model import Interpolation, Track
+
+SMALL_PER_LIMIT = 10.0  # scale of a fixed key, in smallest scales that are not zero
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -17,6 +21,19 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     table = file.tracks("scale", lambda track: track.interpolation is not Interpolation.STEP)
     zero = np.asarray((np.abs(table.values) < parameters["scale"]).any(axis=1))
     yield from file.per_clip(table, table.count(zero))
+
+
+def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
+    """Return the document with a small scale instead of zero."""
+    return edit_tracks(file, found, lambda track: _above_zero(track, parameters["scale"]))
+
+
+def _above_zero(track: Track, limit: float) -> Track:
+    zero = np.abs(track.values) < limit
+    if track.path != "scale" or track.interpolation is Interpolation.STEP or not zero.any():
+        return track
+    values = np.where(zero, np.copysign(SMALL_PER_LIMIT * limit, track.values), track.values)
+    return track.with_keys(track.time_axis, values, track.in_tangents, track.out_tangents)
 
 
 RULE = Rule(
@@ -29,4 +46,5 @@ RULE = Rule(
     counted("key has a scale of zero", "keys have a scale of zero"),
     "to hide a node, use a small scale, or KHR_node_visibility, where the file is made",
     parameters={"scale": Parameter(1e-6, "", "smallest scale that is not zero")},
+    fix=Fix("write a scale of 1e-5", fix, is_safe=False),
 )

@@ -27,16 +27,18 @@ def insert_accessors(
     contents: Sequence[AccessorData],
     extension: str = "",
     sources: Sequence[Set[int]] = (),
+    unneeded: Set[int] = frozenset(),
 ) -> Document:
     """Return the document with these animations and the accessors of `contents`.
 
     The samplers of the animations refer to new contents by `PendingIndex`, else to existing accessors.
     replaced: indices of the animations of `document` that are replaced or gone. sources: for each content, the
-    accessors that it replaces: name, extras and index are kept if it replaces exactly one, alone.
+    accessors that it replaces: name, extras and index are kept if it replaces exactly one, alone. unneeded: accessors
+    to remove too, if nothing refers to them.
     """
     outside = references.references_outside(document.json, replaced)
     old_views = json_array(document.json, "bufferViews")
-    freed = _accessors_of(document.json, replaced) | placeholders(document.json)
+    freed = _accessors_of(document.json, replaced) | placeholders(document.json) | unneeded
     freed = freed - outside.accessors - _referenced_accessors(animations)
     unused = compaction.unused_views(document, freed, outside) | empty_views(document.json, outside)
     layout = buffer_views.lay_out_views(contents, extension, fallback_buffer.overhead(document.json, extension))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -189,7 +189,7 @@ def _skin(number: int, document: Document, scene: Scene | None) -> SkinReport:
     counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
     off = [np.abs(i.mesh.weight_sums - 1) for i in using if i.mesh.weight_sums is not None]
     sums = np.concatenate([np.empty(0), *off])
-    unused = len(joints) - len(_useful(using, joints, scene.skeleton))
+    unused = len(joints) - len(useful_joints(using, joints, scene.skeleton))
     return SkinReport(
         number,
         name,
@@ -203,8 +203,8 @@ def _skin(number: int, document: Document, scene: Scene | None) -> SkinReport:
     )
 
 
-def _useful(instances: list[MeshInstance], joints: list[int], skeleton: Skeleton) -> set[int]:
-    """Joints of a skin that influence a vertex, and their ancestors."""
+def useful_joints(instances: Sequence[MeshInstance], joints: Sequence[int], skeleton: Skeleton) -> set[int]:
+    """Return the joints of a skin that influence a vertex, and their ancestors. instances: of its meshes."""
     useful: set[int] = set()
     for instance in instances:
         carrying = set(instance.mesh.joints[instance.mesh.weights > 0].tolist())

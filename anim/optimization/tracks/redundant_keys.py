@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from anim.arrays import Bools
-from anim.measure.inspect.track_statistics import removable_keys
 from anim.model import Clip, Skeleton, Track
 from anim.model.track import share_time_axes
 from anim.optimization.options import Request
 from anim.optimization.search.plan import Solution
+from anim.optimization.tracks.needed_keys import needed_keys
 from anim.optimization.tracks.quantization import EncodedKeys
 
 
@@ -38,31 +35,11 @@ def _is_exact(track: Track, request: Request) -> bool:
 
 def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -> list[tuple[Track, EncodedKeys]]:
     """The tracks without redundant keys; those that lose none keep their `EncodedKeys`."""
-    while True:  # a removed key can make others necessary
-        tracks = share_time_axes(track for track, _ in pairs)  # as in the file
-        masks = [_alternate_keys(mask) for mask in removable_keys(tracks, skeleton)]
-        if not any(mask.any() for mask in masks):
-            return [(track, stored) for track, (_, stored) in zip(tracks, pairs, strict=True)]
-        pairs = [
-            (_select_keys(track, ~mask), stored.select_keys(~mask)) if mask.any() else (track, stored)
-            for track, (_, stored), mask in zip(tracks, pairs, masks, strict=True)
-        ]
-
-
-def _alternate_keys(mask: Bools) -> Bools:
-    """The first, third, … key of every run: a key is redundant only if its neighbors stay."""
-    if not mask.any():
-        return mask
-    begins = np.flatnonzero(mask & ~np.concatenate(([False], mask[:-1])))
-    at = np.arange(len(mask))
-    run = np.searchsorted(begins, at, side="right") - 1
-    since = at - begins[run]
-    return np.asarray(mask & (since % 2 == 0))
-
-
-def _select_keys(track: Track, keep: Bools) -> Track:
-    arriving, leaving = (None if part is None else part[keep] for part in (track.in_tangents, track.out_tangents))
-    return track.with_keys(track.times[keep], track.values[keep], arriving, leaving)
+    needed = needed_keys(share_time_axes(track for track, _ in pairs), skeleton)
+    return [
+        (track, stored if mask.all() else stored.select_keys(mask))
+        for (track, mask), (_, stored) in zip(needed, pairs, strict=True)
+    ]
 
 
 def _changed_solution(

@@ -13,7 +13,7 @@ from anim.check.find import find_all
 from anim.check.finding import Finding
 from anim.check.selection import RuleSelection
 from anim.model import Track
-from tests.anim.check.test_rules import checked, found, with_tracks
+from tests.anim.check.cases import checked, found, with_tracks
 from tests.clips import track
 from tests.files import opened_fixture
 

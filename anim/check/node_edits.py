@@ -1,0 +1,96 @@
+"""Edits of the hierarchy of nodes, for fixes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from anim.gltf.document import Json, json_array
+from anim.gltf.validation.channel_targets import EXTENSION, channel_target
+
+TRANSFORM = ("translation", "rotation", "scale", "matrix")
+MESH = ("mesh", "skin", "weights")
+
+
+def move_mesh_to_root(json: Json, number: int) -> bool:
+    """Make a skinned mesh a root node without transform, in place; return False if that could change more.
+
+    A node that other nodes or tracks need keeps its position; its mesh then moves to a new node.
+    """
+    nodes = json_array(json, "nodes")
+    scenes = [i for i, scene in enumerate(json_array(json, "scenes")) if number in _reachable(nodes, scene)]
+    if _is_extended(json, number):
+        return False
+    if _is_needed(json, number):
+        number = _split(json, number)
+    else:
+        _detach(json, number)
+    for i in scenes:
+        tops = json["scenes"][i].setdefault("nodes", [])
+        if number not in tops:
+            tops.append(number)
+    return True
+
+
+def _reachable(nodes: list[Json], scene: Json) -> set[int]:
+    found: set[int] = set()
+    waiting = list(scene.get("nodes", ()))
+    while waiting:
+        node = waiting.pop()
+        if node not in found:
+            found.add(node)
+            waiting += nodes[node].get("children", ())
+    return found
+
+
+def _is_extended(json: Json, number: int) -> bool:
+    """True if the node or one above it has an extension, such as visibility, that it would lose."""
+    parents = {child: i for i, node in enumerate(json["nodes"]) for child in node.get("children", ())}
+    node: int | None = number
+    while node is not None:
+        if json["nodes"][node].get("extensions"):
+            return True
+        node = parents.get(node)
+    return False
+
+
+def _is_needed(json: Json, number: int) -> bool:
+    """True if a node has children, is a joint, or has tracks of its transform."""
+    node = json["nodes"][number]
+    joints = {joint for skin in json_array(json, "skins") for joint in (*skin["joints"], skin.get("skeleton", -1))}
+    animated = {target[0] for target in _targets(json) if target[1] != "weights"}
+    return bool(node.get("children")) or "camera" in node or number in joints | animated
+
+
+def _targets(json: Json) -> list[tuple[Any, str]]:
+    channels = [each for animation in json_array(json, "animations") for each in animation["channels"]]
+    return [target[:2] for each in channels if (target := channel_target(each)) is not None]
+
+
+def _detach(json: Json, number: int) -> None:
+    for key in TRANSFORM:
+        json["nodes"][number].pop(key, None)
+    for node in json["nodes"]:
+        if number in node.get("children", ()):
+            node["children"] = [child for child in node["children"] if child != number]
+            if not node["children"]:
+                del node["children"]
+
+
+def _split(json: Json, number: int) -> int:
+    """Move mesh, skin and morph weights with their tracks to a new node; return its index."""
+    node = json["nodes"][number]
+    new = {key: node.pop(key) for key in MESH if key in node}
+    if "name" in node:
+        new["name"] = f"{node['name']}_mesh"
+    json["nodes"].append(new)
+    index = len(json["nodes"]) - 1
+    for animation in json_array(json, "animations"):
+        for channel in animation["channels"]:
+            found = channel_target(channel)
+            if found is not None and found[:2] == (number, "weights"):
+                target = channel["target"]
+                if found[2] is None:
+                    target["node"] = index
+                else:
+                    target["extensions"][EXTENSION]["pointer"] = f"/nodes/{index}/weights"
+    return index
