@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
 import typing
 from collections.abc import Callable, Mapping
@@ -18,6 +19,8 @@ from typer.models import ArgumentInfo, OptionInfo
 from anim import units
 from anim.errors import AnimError, RangeError, not_written
 
+OUTPUTS = ("output", "files")  # parameters whose value, or last value, is OUT
+DEPFILE = "gltf_anim.depfile"  # key of the context
 MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
 METAVARS = {str: "TEXT", int: "N", float: "N"}
 LISTINGS = {"EASINGS": "gltf-anim ease --list", "TANGENTS": "gltf-anim spline --list"}  # by the library's table
@@ -52,6 +55,8 @@ class Command(Parsing, TyperCommand):
     def __init__(self, *args: Any, **settings: Any) -> None:
         super().__init__(*args, **settings)
         self.params.append(_memory_option())
+        if any(each.name in OUTPUTS for each in self.params):
+            self.params.append(_depfile_option())
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; errors of the library name its options instead of parameters."""
@@ -62,11 +67,31 @@ class Command(Parsing, TyperCommand):
         try:
             # Results that are not finite are errors where they are written.
             with np.errstate(all="ignore"), memory_limit(ctx.meta.get(MEMORY_LIMIT)):
-                return super().invoke(ctx)
+                path = ctx.meta.get(DEPFILE)
+                return super().invoke(ctx) if path is None else self._invoke_with_depfile(ctx, path)
         except AnimError as error:
             options = {str(each.name): each.opts[0] for each in self.params if each.param_type_name == "option"}
             name_options(error, options)
             raise
+
+    def _invoke_with_depfile(self, ctx: Any, path: str) -> Any:
+        """Run the command, and write a dependency file after it."""
+        from cli.errors import UsageError
+        from cli.io import depfile, documents
+
+        values = [ctx.params[name] for name in OUTPUTS if ctx.params.get(name)]
+        output = "" if not values else values[0] if isinstance(values[0], str) else values[0][-1]
+        if output in ("", documents.PIPE):
+            raise UsageError("--depfile needs an output file: name OUT")
+        documents.check_file(path)
+        if os.path.realpath(path) == os.path.realpath(output):
+            raise UsageError(f"{path}: --depfile would replace OUT (expected another file)")
+        with depfile.record_files() as record:
+            code = super().invoke(ctx)
+        if not code and not ctx.params.get("dry_run"):
+            outputs = list(record.outputs) if "{" in output else [output]
+            documents.write_text(depfile.rule(outputs or [output], list(record.inputs)), path)
+        return code
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the tables of arguments and options."""
@@ -88,6 +113,23 @@ def _memory_option() -> TyperOption:
         callback=_set_memory_limit,
         help="Largest size of an input's decoded data: 4GB. Default: 1GB, or 64 times the file.",
     )
+
+
+def _depfile_option() -> TyperOption:
+    """Option of every command with an output, outside its function."""
+    return TyperOption(
+        param_decls=["--depfile"],
+        type=str,
+        metavar="FILE",
+        expose_value=False,
+        callback=_set_depfile,
+        help="Write a rule of make or ninja: OUT, and all files that were read for it.",
+    )
+
+
+def _set_depfile(ctx: Any, param: Any, value: str | None) -> None:
+    if value is not None:
+        ctx.meta[DEPFILE] = value
 
 
 def _set_memory_limit(ctx: Any, param: Any, value: str | None) -> None:

@@ -19,7 +19,7 @@ from anim.errors import FormatError
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
 from cli.errors import UsageError
-from cli.io import documents
+from cli.io import depfile, documents
 
 
 def inputs(path: str, stack: ExitStack) -> CacheFolder:
@@ -35,6 +35,8 @@ def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     is_pipe = path == documents.PIPE
     place = resolver.resolve_links(Path(path))
     folder = Path(away) if dry_run or is_pipe else place.parent
+    if not dry_run and not is_pipe:
+        depfile.add_output(path)
     return AtomicOutputs(folder, "stdout" if is_pipe else place.name)
 
 
@@ -61,6 +63,7 @@ class CacheFolder:
             if path.is_dir():
                 raise FormatError("is a folder")
             file = path.open("rb")
+            depfile.add_inputs(path)
             self.sizes[name] = os.fstat(file.fileno()).st_size
             return file
         except OSError as error:

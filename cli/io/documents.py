@@ -20,10 +20,19 @@ from anim.errors import AnimError, FormatError, OutputError
 from anim.files import resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, uri
-from anim.gltf.io.source import Opener, Source, buffer_files, glb_chunks, open_bytes, open_file, write_file
+from anim.gltf.io.source import (
+    Opener,
+    Source,
+    buffer_files,
+    external_files,
+    glb_chunks,
+    open_bytes,
+    open_file,
+    write_file,
+)
 from cli import tables
 from cli.errors import UsageError
-from cli.io import output_names, stdout
+from cli.io import depfile, output_names, stdout
 from cli.streams import locate, record_files, step_streams
 from cli.text import Reporter
 
@@ -202,6 +211,7 @@ def _open_file(path: str, opener: Opener) -> Source:
     located = locate(path)
     found = open_file(located, opener)
     record_files(Path(located), *buffer_files(found))
+    depfile.add_inputs(Path(located), *filter(os.path.isfile, external_files(found)))
     return replace(found, name=path)
 
 
@@ -209,6 +219,7 @@ def _read_file(path: str, ending: str) -> Bytes:
     located = Path(locate(path))
     found = resolver.read_file(located, ending)
     record_files(located)
+    depfile.add_inputs(located)
     return found
 
 

@@ -121,7 +121,7 @@ def write_file(
             atomic.write_file(Path(path), content)
         return sum(len(piece) for piece in content)
     same_folder = source is not None and source.is_in_folder(path)
-    spared = [] if source is None or source.is_at(path) else list(_external_files(source))
+    spared = [] if source is None or source.is_at(path) else list(external_files(source))
     text = None if unchanged is None or unchanged[:4].tobytes() == container.MAGIC else unchanged
     size = gltf_files.write(
         document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run, note=note
@@ -158,7 +158,7 @@ def buffer_files(source: Source) -> list[Path]:
     return list(_files(source, "buffers"))
 
 
-def _external_files(source: Source) -> Iterator[Path]:
+def external_files(source: Source) -> Iterator[Path]:
     """Yield the paths of an input's buffers and images."""
     yield from _files(source, "buffers")
     yield from _files(source, "images")

@@ -1,0 +1,70 @@
+"""Dependency files for make and ninja: the output of a command, and every file that it read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+
+
+@dataclass
+class FileRecord:
+    """Files that a command read and wrote, by the names that it used for them."""
+
+    inputs: dict[str, None] = field(default_factory=dict)  # in order
+    outputs: dict[str, None] = field(default_factory=dict)
+
+
+_record: ContextVar[FileRecord | None] = ContextVar("files", default=None)
+
+
+@contextmanager
+def record_files() -> Iterator[FileRecord]:
+    """Record the files that the block reads and writes."""
+    record = FileRecord()
+    token = _record.set(record)
+    try:
+        yield record
+    finally:
+        _record.reset(token)
+
+
+def add_inputs(*paths: Path) -> None:
+    """Record files that were read."""
+    if (record := _record.get()) is not None:
+        record.inputs.update(dict.fromkeys(map(str, paths)))
+
+
+def add_output(path: str) -> None:
+    """Record a file that was written."""
+    if (record := _record.get()) is not None:
+        record.outputs[path] = None
+
+
+def rule(outputs: Sequence[str], inputs: Sequence[str]) -> str:
+    """Return a rule in the syntax of make, which ninja reads too: "walk.glb: in.gltf in.bin".
+
+    rule(["a b.glb"], ["in.gltf", "in.bin"]) → "a\\\\ b.glb: in.gltf in.bin"
+    """
+    needed = [each for each in inputs if each not in outputs]
+    return f"{' '.join(map(escape, outputs))}:{''.join(f' {escape(each)}' for each in needed)}\n"
+
+
+def escape(path: str) -> str:
+    """Return a path with spaces, # and $ escaped, as compilers do."""
+    words = []
+    for i, character in enumerate(path):
+        if character in " \t":  # make takes backslashes before a space as escapes of each other
+            words.append("\\" * (_backslashes_before(path, i) + 1))
+        elif character == "#":
+            words.append("\\")
+        elif character == "$":
+            words.append("$")
+        words.append(character)
+    return "".join(words)
+
+
+def _backslashes_before(path: str, end: int) -> int:
+    return end - len(path[:end].rstrip("\\"))

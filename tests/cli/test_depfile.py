@@ -1,0 +1,130 @@
+"""`--depfile`: rules that make and ninja read, with every file that an output depends on."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from cli import main
+from cli.commands import simulate
+from cli.io import depfile
+from tests.cli.conftest import Call, Find
+from tests.cli.running import ENVIRONMENT, built
+
+
+@pytest.fixture
+def character(tmp_path: Path, asset: Find, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A .gltf with a buffer and an image beside it, in a folder whose name has a space."""
+    shutil.copytree(asset("CesiumMan-gltf/CesiumMan.gltf").parent, tmp_path / "in dir")
+    monkeypatch.chdir(tmp_path)
+    return Path("in dir/CesiumMan.gltf")
+
+
+@pytest.mark.parametrize(
+    ("path", "escaped"),
+    [("a b.glb", r"a\ b.glb"), ("#1 $2.glb", r"\#1\ $$2.glb"), ("a\\ b", "a\\\\\\ b"), ("C:\\x.glb", "C:\\x.glb")],
+)
+def test_names_are_escaped_as_by_compilers(path: str, escaped: str) -> None:
+    assert depfile.escape(path) == escaped
+
+
+def test_all_files_that_are_read_are_named(character: Path, call: Call) -> None:
+    call("resample", character, "out.glb", "--fps", "30", "--depfile", "out.d").product()
+    files = ("CesiumMan.gltf", "CesiumMan_data.bin", "CesiumMan_img0.jpg")
+    assert Path("out.d").read_text() == "out.glb:" + "".join(rf" in\ dir/{name}" for name in files) + "\n"
+
+
+def test_second_inputs_are_named_too(folder: Path, call: Call, asset: Find) -> None:
+    (folder / "hero.glb").write_bytes(built("biped"))
+    call("to-euler", "hero.glb", "walk.bvh", "--clip", "walk", "--depfile", "walk.d").product()
+    assert Path("walk.d").read_text() == "walk.bvh: hero.glb\n"
+    call("from-euler", "walk.bvh", "out.glb", "--onto", "hero.glb", "--depfile", "out.d").product()
+    assert Path("out.d").read_text().split() == ["out.glb:", "walk.bvh", "hero.glb"]
+    call("plot", "hero.glb", "plot.png", "--compare", "out.glb", "--depfile", "plot.d").product()
+    assert Path("plot.d").read_text().split() == ["plot.png:", "hero.glb", "out.glb"]
+
+
+def test_outputs_with_placeholders_are_all_named(folder: Path, call: Call) -> None:
+    call("bake", "crowd/arm 1.glb", "{clip}.npz", "--fps", "2", "--depfile", "bake.d").product()
+    names, _, inputs = Path("bake.d").read_text().partition(":")
+    assert sorted(names.split()) == sorted(path.name for path in folder.glob("*.npz"))
+    assert inputs == " crowd/arm\\ 1.glb\n"
+    first = names.split()[0]
+    call("convert-cache", first, "out.pc2", "--depfile", "out.d").product()
+    assert Path("out.d").read_text() == f"out.pc2: {first}\n"
+
+
+@pytest.mark.parametrize(
+    ("output", "options", "problem"),
+    [
+        ("-", ["--depfile", "x.d"], "--depfile needs an output file: name OUT"),
+        ("out.glb", ["--depfile", "out.glb"], "out.glb: --depfile would replace OUT (expected another file)"),
+        ("out.glb", ["--depfile", "none/x.d"], "none/x.d: there is no folder 'none'"),
+    ],
+)
+def test_wrong_names_are_refused(output: str, options: list[str], problem: str, folder: Path, call: Call) -> None:
+    run = call("trim", "noop.glb", output, "--to", "0.5", *options)
+    assert (run.code, run.text) == (2, "")
+    assert problem in run.err
+    assert not (folder / "out.glb").exists()
+
+
+def test_none_is_written_without_an_output(folder: Path, call: Call) -> None:
+    assert call("retime", "noop.glb", "out.glb", "--speed", "2", "--depfile", "x.d", "--dry-run").code == 0
+    assert call("trim", "none.glb", "out.glb", "--to", "0.5", "--depfile", "x.d").code == 3
+    assert not (folder / "x.d").exists()
+
+
+def commands() -> Iterator[tuple[str, Any]]:
+    """All commands, and the kinds of simulation, by name."""
+    group: Any = typer.main.get_command(main.app)
+    for name in main.COMMANDS:
+        yield name, group.get_command(None, name)
+    kinds: Any = group.get_command(None, "simulate")
+    for kind in simulate.Group.table:
+        yield f"simulate {kind}", kinds.get_command(None, kind)
+
+
+def test_every_writing_command_has_the_option() -> None:
+    reporting = {"inspect", "check", "collapse", "diff", "simulate", "run"}
+    having = {name for name, command in commands() if any(each.name == "depfile" for each in command.params)}
+    assert {name for name, _ in commands()} - having == reporting
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_runs_the_command_again_when_a_buffer_changes(character: Path) -> None:
+    line = "gltf-anim trim 'in dir/CesiumMan.gltf' out.glb --to 1 --depfile out.d"
+    Path("Makefile").write_text(f"out.glb:\n\t{line}\n-include out.d\n")
+    assert "gltf-anim trim" in _built("make")
+    assert "up to date" in _built("make")
+    _change(character.with_name("CesiumMan_data.bin"))
+    assert "gltf-anim trim" in _built("make")
+
+
+@pytest.mark.skipif(shutil.which("ninja") is None, reason="ninja is not installed")
+def test_ninja_runs_the_command_again_when_a_buffer_changes(character: Path) -> None:
+    line = "gltf-anim trim $in $out --to 1 --depfile $out.d"
+    text = f"rule trim\n  command = {line}\n  depfile = $out.d\n  deps = gcc\n"
+    Path("build.ninja").write_text(text + "build out.glb: trim in$ dir/CesiumMan.gltf\n")
+    assert "trim" in _built("ninja", "-v")
+    assert "no work to do" in _built("ninja")
+    _change(character.with_name("CesiumMan_data.bin"))
+    assert "no work to do" not in _built("ninja")
+
+
+def _built(*words: str) -> str:
+    run = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=True)
+    return run.stdout
+
+
+def _change(path: Path) -> None:
+    """Give a file a later modification time."""
+    os.utime(path, (time.time() + 5, time.time() + 5))
