@@ -208,6 +208,7 @@ def test_the_cache_is_ignored_by_git(folder: Path, call: Call) -> None:
         (["resample --fps x"], "invalid value for '--fps': 'x' is no number", "resample --help"),
         (["resample"], "missing option '--fps'", ""),
         (["optimize --report a.json"], "--report writes a file for every file", ""),
+        (["resample --fps 3 --depfile a.d"], "--depfile is about one file", ""),
         (["ease --help"], "--help makes no glTF", ""),
         (["ease 'x"], "can't be split into words", ""),
     ],

@@ -16,12 +16,14 @@ from cli import main
 from cli.errors import UsageError, usage_problem
 from cli.io.documents import PIPE
 from cli.streams import StepStreams, use_streams
+from cli.typer_options import DEPFILE
 
 EDITING = ("resample", "ease", "spline", "retime", "trim", "loop", "simulate", "optimize", "convert")  # glTF to glTF
 MAKING = ("from-euler",)  # glTF from another format: first steps only
 REFUSED = {  # options that no step can have, by parameter
     "dry_run": "writes nothing",
     "report": "writes a file for every file",
+    "depfile": "is about one file",
     "curve_file": "writes no glTF",
     "find": "writes no glTF",
     "list_eases": "writes no glTF",
@@ -105,13 +107,13 @@ def _parsed(command: Any, step: Step, context: Any) -> dict[str, Any]:
     name = step.command[-1]
     try:
         with use_streams(StepStreams("", np.empty(0, np.uint8), Path())):  # for the text of --help
-            values: dict[str, Any] = command.make_context(name, list(step.options), parent=context).params
+            parsed = command.make_context(name, list(step.options), parent=context)
     except typer.Exit:  # --help
         raise UsageError(f"{step.label}: --help makes no glTF") from None
     except TyperException as error:
         problem, hint = usage_problem(error)
         raise UsageError(problem, help=hint) from None
-    return values
+    return {**parsed.params, "depfile": parsed.meta.get(DEPFILE)}
 
 
 def _check_values(command: Any, step: Step, values: dict[str, Any]) -> None:
@@ -120,5 +122,5 @@ def _check_values(command: Any, step: Step, values: dict[str, Any]) -> None:
         if each.param_type_name == "argument" and values[each.name] not in (PIPE, None):
             problem = f"{step.label}: '{values[each.name]}' is a file (expected options: the recipe has the files)"
             raise UsageError(problem)
-        if each.name in REFUSED and values[each.name] not in (None, False):
+        if each.name in REFUSED and values.get(each.name) not in (None, False):
             raise UsageError(f"{step.label}: {max(each.opts, key=len)} {REFUSED[each.name]}: leave it out of a step")
