@@ -57,7 +57,8 @@ LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplo
 LAZY |= {"mujoco", "pxr", "dask", "rapier3d"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
-    "caches.formats": "gltf mesh_sequence",
+    "caches.formats": "flipbook_reader gltf mesh_sequence",
+    "caches.source_document": "bake_source lit_meshes",
     "caches.transforms": "resample statistics up_axis vertex_order",
     "caches.vat": "presets",
     "check.rules": "invalid",
@@ -75,7 +76,7 @@ PUBLIC = {
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets hierarchy rules schema",
-    "gltf.writing": "append byte_ranges references reindex removal writer",
+    "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
     "measure.compare": "diff name_matching",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "largest_error prover",

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from anim.caches.source_document.bake_source import BakeSource
+
+MAX_TARGETS = 256  # morph targets: layers of an array texture in WebGL2, and the limits of bevy and Filament
+
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
@@ -27,6 +31,8 @@ class WriteOptions:
     preset: engine that defines a texture's axes and row order, one of PRESETS of anim.caches.vat.presets.
     depth: number type of a texture: "half" or "float" in EXR.
     rest_mesh: file extension of the rest mesh of a PC2 or MDD: ".ply", ".obj", or "" for none.
+    max_targets: largest number of morph targets.
+    source: document that the cache is a bake of; its materials and texture coordinates are kept. None for one material.
     """
 
     max_error: float | None = None
@@ -35,6 +41,8 @@ class WriteOptions:
     preset: str = "plain"
     depth: str = "float"
     rest_mesh: str = ".ply"
+    max_targets: int = MAX_TARGETS
+    source: BakeSource | None = None
 
 
 @dataclass(frozen=True, slots=True)

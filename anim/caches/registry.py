@@ -88,7 +88,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         gltf.read,
         gltf.write,
         starts_with(b"glTF"),
-        frozenset(("input_fps", "max_error", "quantize", "layout")),
+        frozenset(("input_fps", "max_error", "quantize", "layout", "max_targets", "source")),
         BOTH,
     ),
     ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", b"\x76\x2f\x31\x01", "preset", "depth"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -19,6 +20,7 @@ from cli.errors import UsageError
 from cli.io import cache_files, documents
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
+from cli.workflows.bake_clip import cache_source
 
 Cache = Annotated[
     str,
@@ -44,7 +46,20 @@ def command(
     ] = None,
     up: caches.UpOption = None,
     vertex_order: caches.VertexOrderOption = None,
+    onto: Annotated[
+        str | None,
+        typer.Option(
+            "--onto",
+            metavar="FILE",
+            help=f"{', '.join(caches.formats_with_materials())}: the glTF file of which IN is a bake; OUT keeps its "
+            "materials and texture coordinates.",
+            show_default=False,
+        ),
+    ] = None,
+    clip: common.Clips = None,
     max_error: caches.MaxError = None,
+    max_targets: caches.MaxTargets = None,
+    keep_skeleton: caches.KeepSkeleton = False,
     quantize: caches.Quantize = False,
     layout: caches.LayoutOption = None,
     preset: caches.PresetOption = None,
@@ -61,6 +76,9 @@ def command(
 
     PC2 and MDD get a companion rest mesh (walk.pc2-rest.ply) with the same vertex order; for Blender's Mesh Cache
     modifier use --up z --vertex-order blender. Frame sequences (.ply, .obj, .stl) are numbered: walk_00001.ply.
+    With --onto, a .glb is that file with other vertices, as bake writes it; IN has its vertices in the order of the
+    file, in world space. If it has several clips, --clip selects that of IN, whose channels of other nodes then stay.
+
     Textures (.exr, .png) get a companion JSON file and mesh. A pipe carries one file: no textures, and only one frame
     of a sequence.
     """
@@ -78,10 +96,14 @@ def command(
         "preset": preset,
         "depth": depth,
         "rest_mesh": rest_mesh,
+        "max_targets": max_targets,
     }
+    if onto is None and (clip is not None or keep_skeleton):
+        raise UsageError(f"{'--keep-skeleton' if keep_skeleton else '--clip'} needs --onto FILE")
     # Raises before any work for options that the format doesn't support.
-    caches.write_options(ending, given | {"max_error": max_error})
-    with cache_files.load(input, ReadOptions(input_fps)) as loaded:
+    caches.write_options(ending, given | {"max_error": max_error, "onto": onto})
+    with ExitStack() as stack:
+        loaded = stack.enter_context(cache_files.load(input, ReadOptions(input_fps)))
         if input_fps and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--input-fps does not apply to {loaded.ending}, which stores its frame times")
         if loaded.ending == ".glb":
@@ -89,6 +111,9 @@ def command(
         cache = _changed(loaded.cache, at, fps, up, vertex_order)
         if max_error is not None:
             given["max_error"] = units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
+        if onto is not None:
+            source = stack.enter_context(documents.source(onto, voice))
+            given["source"] = cache_source(source, cache, clip, keep_skeleton=keep_skeleton)
         writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:

@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from anim.arrays import Floats
-from anim.caches.formats import gltf
+from anim.caches.formats import flipbook_reader
 from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS, SIGNATURE_BYTES, reader_for, sniff_format
 from anim.caches.storage import Memory, suffix
@@ -198,14 +198,14 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
     elif path != documents.PIPE:
         with documents.source(path, voice) as source:
             beside = None if source.folder is None else resolver.CompanionFiles(source.folder).open
-            yield gltf.pages(source.document) or source.document, source.name, beside
+            yield flipbook_reader.read_pages(source.document) or source.document, source.name, beside
     else:
         with documents.content(path) as (data, name):
             head = data[:SIGNATURE_BYTES].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data, resolver.refuse_relative)
                 documents.repaired_note(document, name, voice)
-                yield gltf.pages(document) or document, name, resolver.refuse_relative
+                yield flipbook_reader.read_pages(document) or document, name, resolver.refuse_relative
             else:
                 ending = sniff_format(head, len(data))
                 cache_files.check_pipe(name, ending)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from anim.caches.formats import gltf
-from anim.caches.options import WriteOptions
+from anim.caches.options import MAX_TARGETS, WriteOptions
 from anim.caches.registry import CACHE_FORMATS
 from anim.caches.transforms import vertex_order
 from anim.caches.transforms.up_axis import UPS
@@ -65,6 +65,19 @@ MaxError = Annotated[
         "--max-error", metavar="LENGTH", help="Morph targets: maximum vertex error, 0.5mm or 0.1%, default 0.1%."
     ),
 ]
+MaxTargets = Annotated[
+    int | None,
+    typer.Option(
+        "--max-targets",
+        metavar="N",
+        min=1,
+        help=f"Morph targets: at most N, default {MAX_TARGETS}, which WebGL2, bevy and Filament support.",
+        show_default=False,
+    ),
+]
+KeepSkeleton = Annotated[
+    bool, typer.Option("--keep-skeleton", help=".glb: keep skins, and the channels of joints.", show_default=False)
+]
 Quantize = Annotated[bool, typer.Option("--quantize", help="Morph targets as 16-bit integers.")]
 LayoutOption = Annotated[
     Layout | None,
@@ -87,17 +100,21 @@ RestMeshOption = Annotated[
 def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
     """Return the write options of a format from command line options (None, False: not given).
 
+    given: values by option; `onto` is checked only, and `source` is the document.
     Raises UsageError for an option that the format doesn't support.
     """
     takes = CACHE_FORMATS[ending].takes
     said: dict[str, Any] = {name: value for name, value in given.items() if value not in (None, False)}
     for name in said:
-        if name not in takes:
+        if ("source" if name == "onto" else name) not in takes:
             raise UsageError(f"--{name.replace('_', '-')} does not apply to {ending}")
     if "max_error" in said and str(said.get("layout", "")).startswith("flip"):
         raise UsageError("--max-error does not apply to a flip-book, which stores every frame exactly")
+    if "max_targets" in said and str(said.get("layout", "")).startswith("flip"):
+        raise UsageError("--max-targets does not apply to a flip-book")
     if "rest_mesh" in said:
         said["rest_mesh"] = "" if said["rest_mesh"] == "none" else f".{said['rest_mesh']}"
+    said.pop("onto", None)
     plain: dict[str, Any] = {name: str(value) if isinstance(value, StrEnum) else value for name, value in said.items()}
     return WriteOptions(**plain)
 
@@ -105,6 +122,11 @@ def write_options(ending: str, given: Mapping[str, Any]) -> WriteOptions:
 def formats_with(what: str) -> tuple[str, ...]:
     """Return the file extensions of the formats that store "normals" or "tangents"."""
     return tuple(ending for ending, format in CACHE_FORMATS.items() if what in format.holds)
+
+
+def formats_with_materials() -> tuple[str, ...]:
+    """Return the file extensions of the formats that take materials from the source."""
+    return tuple(ending for ending, format in CACHE_FORMATS.items() if "source" in format.takes)
 
 
 def check_supported(ending: str, **wanted: bool) -> None:

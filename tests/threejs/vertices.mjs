@@ -13,8 +13,10 @@ const place = new modules.three.Vector3();
 scene.root.traverse((object) => {
   if (!object.geometry) return;
   if (object.isSkinnedMesh) object.skeleton.update();
-  for (let i = 0; i < object.geometry.attributes.position.count; i++) {
-    object.getVertexPosition(i, place).applyMatrix4(object.matrixWorld);
+  const { position } = object.geometry.attributes;
+  for (let i = 0; i < position.count; i++) {
+    const own = object.isMesh ? object.getVertexPosition(i, place) : place.fromBufferAttribute(position, i); // points
+    own.applyMatrix4(object.matrixWorld);
     found.push(place.x, place.y, place.z);
   }
 });

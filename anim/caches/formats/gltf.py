@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
 from anim.caches.formats import gltf_flipbook, gltf_morph
+from anim.caches.formats.flipbook_reader import read_pages
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs, read_all
-from anim.errors import FormatError, NotFoundError, RangeError
+from anim.errors import NotFoundError, RangeError
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import container
 from anim.gltf.reading import reader
-from anim.gltf.reading.accessors import Accessors
-from anim.model import Clip, FrameChunk, VertexCache
+from anim.model import Clip, VertexCache
 from anim.sampling import frame_times
 from anim.skinning.analysis.weight_sums import unnormalized_weights
 from anim.skinning.bake import bake
@@ -45,57 +44,13 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """
     with read_all(inputs, inputs.main) as data:
         document = container.read(np.frombuffer(data, np.uint8))
-    found = pages(document)
+    found = read_pages(document)
     if found is not None:
         return found
     played = evaluate_document(document, fps=reading.fps, note=reading.note)
     if names := directions(document):
         reading.note(f"{' and '.join(names)} are not played: bake the glTF file with them")
     return played
-
-
-def pages(document: Document) -> VertexCache | None:
-    """Return the frames of a flip-book of this library, None for any other document."""
-    for node in json_array(document.json, "nodes"):
-        said = (node.get("extras") or {}).get(gltf_flipbook.EXTRAS) if isinstance(node.get("extras"), dict) else None
-        if isinstance(said, dict) and said.get("cache") == gltf_flipbook.NAME:
-            return _pages(document, node.get("children", []), "z" if said.get("up") == "z" else "y")
-    return None
-
-
-def _pages(document: Document, children: list[int], up: str) -> VertexCache:
-    accessors = Accessors(document)
-    nodes, meshes = json_array(document.json, "nodes"), json_array(document.json, "meshes")
-    try:
-        pages = [meshes[nodes[child]["mesh"]]["primitives"][0] for child in children]
-        samplers = [sampler for clip in json_array(document.json, "animations") for sampler in clip["samplers"]]
-        times = [accessors.floats(samplers[0]["input"])[0, 0] if samplers else 0.0]
-        times += [accessors.floats(sampler["input"])[1, 0] for sampler in samplers[1:]]
-        indices = pages[0].get("indices")
-        attributes = [page["attributes"] for page in pages]
-        count = document.json["accessors"][attributes[0]["POSITION"]]["count"]
-    except (IndexError, KeyError):
-        raise FormatError("is no flip-book as we write them") from None
-    if len(times) != len(pages):
-        raise FormatError(f"flip-book has {len(pages)} pages and {len(times)} times")
-    faces: Ints = np.empty((0, 3), np.int64) if indices is None else accessors.integers(indices).reshape(-1, 3)
-    has_normals, has_tangents = (all(name in each for each in attributes) for name in ("NORMAL", "TANGENT"))
-    handedness = accessors.floats(attributes[0]["TANGENT"])[:, 3] if has_tangents else None
-
-    def chunks() -> Iterator[FrameChunk]:
-        for i, each in enumerate(attributes):
-            normals = _rows(accessors, each["NORMAL"], count) if has_normals else None
-            tangents = _rows(accessors, each["TANGENT"], count, 4)[..., :3] if has_tangents else None
-            yield FrameChunk(i, _rows(accessors, each["POSITION"], count), normals, tangents)
-
-    return VertexCache(np.array(times), count, faces, chunks, has_normals=has_normals, up=up, handedness=handedness)
-
-
-def _rows(accessors: Accessors, number: int, count: int, width: int = 3) -> Floats:
-    rows = accessors.floats(number)
-    if rows.shape != (count, width):
-        raise FormatError(f"a page of the flip-book has {len(rows)} vertices (the first has {count})")
-    return rows.astype(np.float32)[None]  # type: ignore[return-value]
 
 
 def evaluate_document(

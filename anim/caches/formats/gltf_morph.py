@@ -13,20 +13,21 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
-from anim.caches.formats.gltf_stream import GlbFile, primitive, signed
-from anim.caches.formats.morph_encoding import MAX_INT16, MorphEncoding, encode_morphs
-from anim.caches.options import WriteOptions, WriteResult
+from anim.caches.formats.gltf_stream import GlbFile, primitive, signed, write_document
+from anim.caches.formats.morph_encoding import MAX_INT16, MorphEncoding, encode_morphs, fit_directions
+from anim.caches.options import MAX_TARGETS, WriteOptions, WriteResult
+from anim.caches.source_document.morph_targets import replace_by_morphs
 from anim.caches.storage import Outputs
 from anim.caches.transforms import statistics
 from anim.caches.transforms.pca import fit_basis
 from anim.caches.transforms.resample import reduce_frames
 from anim.errors import RangeError, UnsupportedError
 from anim.gltf.authoring_parts import VERTICES
+from anim.gltf.document import Json
 from anim.model import FrameChunk, VertexCache
 
 DEFAULT_ERROR_PER_DIAGONAL = 1e-3  # fraction of the diagonal, without a given limit
 MAX_POSITION_BYTES = 1 << 30  # of positions, three times this in memory
-MAX_TARGETS = 1024
 PORTABLE_TARGETS = 8  # guaranteed by glTF; most engines support more
 BATCH_FRAMES = 16  # frames compared at a time
 LIMIT_FRACTIONS = 0.98, 0.5  # fractions of the limit, reserve for rounding to float32; the second if the first fails
@@ -48,17 +49,31 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
     limit = (
         writing.max_error if writing.max_error is not None else DEFAULT_ERROR_PER_DIAGONAL * statistics.diagonal(cache)
     )
-    best = _smallest_encoding(whole.positions, cache.times, limit, quantize=writing.quantize)
+    best = _smallest_encoding(
+        whole.positions, cache.times, limit, quantize=writing.quantize, max_targets=writing.max_targets
+    )
     if best is None:
-        advice = "allow a larger `max_error`" + (", or leave out `quantize`" if writing.quantize else "")
-        raise RangeError(f"morph targets can't keep every vertex within {limit:.3g} m", help=advice)
+        quantized = ", or leave out `quantize`" if writing.quantize else ""
+        raise RangeError(
+            f"{_counted(writing.max_targets, 'morph target')} can't keep every vertex within {limit:.3g} m",
+            help=f"allow a larger `max_error`, more `max_targets` (WebGL2 promises {MAX_TARGETS}){quantized}, or use "
+            "`layout` flip-visibility",
+        )
     form, worst = best
-    _write(cache, whole, form, outputs, quantize=writing.quantize)
+    if writing.source is None:
+        _write(cache, whole, form, outputs, quantize=writing.quantize)
+    else:
+        normals, tangents = fit_directions(whole.normals, form), fit_directions(whole.tangents, form)
+        extras = _extras(cache, form)
+        document = replace_by_morphs(
+            cache, form, normals, tangents, writing.source, extras=extras, quantize=writing.quantize
+        )
+        write_document(document, outputs)
     return WriteResult(worst, _notes(form, cache.frame_count))
 
 
 def _smallest_encoding(
-    positions: AnyArray, times: Floats, limit: float, *, quantize: bool
+    positions: AnyArray, times: Floats, limit: float, *, quantize: bool, max_targets: int
 ) -> tuple[MorphEncoding, float] | None:
     """The smallest encoding within the limit as stored, and its error; None if there is none."""
 
@@ -71,9 +86,9 @@ def _smallest_encoding(
     most = len(kept) - 1
     found: list[tuple[MorphEncoding, float]] = []
     for margin in LIMIT_FRACTIONS:
-        found = found or within(_pca_targets(positions, times, limit * margin, most=most))
+        found = found or within(_pca_targets(positions, times, limit * margin, most=min(most, max_targets)))
     fewest = min((len(form.targets) for form, _ in found), default=most)
-    if most <= min(fewest + 1, MAX_TARGETS):
+    if most <= min(fewest + 1, max_targets):
         found += within([_frame_targets(positions, kept)])
     return min(found, key=lambda each: each[0].size(quantize=quantize), default=None)
 
@@ -84,7 +99,7 @@ def _pca_targets(positions: AnyArray, times: Floats, limit: float, *, most: int)
         frames = reduce_frames(positions, times, limit * share) if share else np.arange(len(positions))
         if share and len(frames) == len(positions):
             continue
-        found = fit_basis(positions[frames], limit * (1 - share), most=min(most, MAX_TARGETS))
+        found = fit_basis(positions[frames], limit * (1 - share), most=most)
         if found is not None:
             most = len(found.shapes)
             yield MorphEncoding(name, found.base, found.shapes, frames, found.weights)
@@ -119,7 +134,7 @@ def _write(cache: VertexCache, whole: FrameChunk, form: MorphEncoding, outputs: 
     gltf = file.gltf
     indices = file.add_indices(cache.faces, cache.vertex_count)
     attributes = {"POSITION": file.add(form.base.astype("<f4"), target=VERTICES, bounds=True)}
-    turns, along = _directions(whole.normals, form), _directions(whole.tangents, form)
+    turns, along = fit_directions(whole.normals, form), fit_directions(whole.tangents, form)
     if turns is not None:
         attributes["NORMAL"] = file.add(turns[0].astype("<f4"), target=VERTICES)
     if along is not None and cache.handedness is not None:
@@ -136,7 +151,7 @@ def _write(cache: VertexCache, whole: FrameChunk, form: MorphEncoding, outputs: 
     first = [float(weight) for weight in form.weights[0]]
     gltf.meshes.append(Mesh(primitives=[primitive(attributes, indices, targets)], weights=first or None))
     scale = [form.scale] * 3 if form.scale != 1 else None
-    gltf.nodes.append(Node(name=NAME, mesh=0, scale=scale, extras={EXTRAS: {"cache": form.kind, "up": cache.up}}))
+    gltf.nodes.append(Node(name=NAME, mesh=0, scale=scale, extras=_extras(cache, form)))
     gltf.scenes[0].nodes.append(0)
     if targets and len(form.frames) > 1:
         sampler = AnimationSampler(
@@ -152,20 +167,8 @@ def _write(cache: VertexCache, whole: FrameChunk, form: MorphEncoding, outputs: 
     file.write(outputs, outputs.main)
 
 
-def _directions(normals: AnyArray | None, form: MorphEncoding) -> AnyArray | None:
-    """Normals or tangents (1 + M, V, 3) of the base, unit, and of each target: least-squares fit."""
-    if normals is None:
-        return None
-    kept = normals[form.frames].astype(np.float64)
-    design = np.concatenate((np.ones((len(kept), 1)), form.weights), axis=1)
-    rcond = np.finfo(np.float64).eps * max(design.shape)
-    found = np.linalg.pinv(design, rcond) @ kept.reshape(len(kept), -1)  # equals lstsq, a hundred times faster
-    solved: AnyArray = found.reshape(-1, *normals.shape[1:])
-    length = np.maximum(np.linalg.norm(solved[0], axis=1, keepdims=True), 1e-3)
-    solved /= length  # a base normal must be unit; scaling all normals of a vertex keeps their directions
-    up = np.where(np.abs(np.linalg.norm(solved[0], axis=1, keepdims=True) - 1) < 1e-6, solved[0], (0.0, 1.0, 0.0))
-    solved[0] = up
-    return solved
+def _extras(cache: VertexCache, form: MorphEncoding) -> Json:
+    return {EXTRAS: {"cache": form.kind, "up": cache.up}}
 
 
 def _notes(form: MorphEncoding, frames: int) -> tuple[str, ...]:

@@ -14,6 +14,8 @@ from anim.arrays import AnyArray, Floats
 from anim.caches.storage import COPY_BYTES, Outputs
 from anim.errors import UnsupportedError
 from anim.gltf.authoring_parts import INDICES, VERTICES, add_accessor, create_document, create_material
+from anim.gltf.document import Document
+from anim.gltf.io import container
 from anim.gltf.io.container import BIN_CHUNK, JSON_CHUNK, MAGIC, MAX_GLB_BYTES
 
 if TYPE_CHECKING:
@@ -90,6 +92,13 @@ class GlbFile:
             file.write(struct.pack("<II", self.size, BIN_CHUNK))
             self._bin.seek(0)
             shutil.copyfileobj(self._bin, file, COPY_BYTES)
+
+
+def write_document(document: Document, outputs: Outputs) -> None:
+    """Write a document as a GLB to the main file."""
+    with outputs.create(outputs.main) as file:
+        for piece in container.glb(document):
+            file.write(piece.data)
 
 
 def signed(tangents: AnyArray, handedness: Floats) -> AnyArray:

@@ -1,0 +1,102 @@
+"""Edit a source document: detach skinned meshes, place baked ones, and animate them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.caches.source_document import placement, retained_channels
+from anim.caches.source_document.bake_source import BakedMesh, BakeSource
+from anim.gltf.document import Document, Json, copy_json, json_array
+from anim.gltf.writing.new_accessors import NewAccessors, edit_document
+
+CLIP_NAME = "cache"  # of a bake without a clip
+
+
+@dataclass(slots=True)
+class DocumentEdit:
+    """A source document under edit.
+
+    json: the edited copy. new: accessors for it. channels, samplers: of the baked clip, besides those that stay.
+    roots: nodes with vertices in world space.
+    """
+
+    source: BakeSource
+    meshes: Sequence[BakedMesh]
+    json: Json
+    new: NewAccessors
+    channels: list[Json] = field(default_factory=list)
+    samplers: list[Json] = field(default_factory=list)
+    roots: set[int] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, source: BakeSource, meshes: Sequence[BakedMesh]) -> DocumentEdit:
+        """Return an edit in which the nodes of baked and left-out meshes have none."""
+        json = copy_json(source.document.json)
+        placement.detach_meshes(json, {each.node for each in meshes} | source.left_out)
+        return cls(source, meshes, json, NewAccessors(len(json_array(json, "accessors"))))
+
+    def place(self, baked: BakedMesh, mesh: Json, node: Json) -> int:
+        """Add a mesh in place of a baked one, on a node with the properties of `node`; return the node's index."""
+        index = placement.add_mesh(self.json, mesh, baked.mesh)
+        placed = placement.place_node(self.json, baked, self.source, {**node, "mesh": index})
+        if not self.source.in_mesh_space:
+            self.roots.add(placed)
+        return placed
+
+    def add_mesh(self, mesh: Json, old: int | None) -> int:
+        """Add a mesh without a node, at the index of an `old` one that no node uses; return its index."""
+        if old is not None:
+            return placement.add_mesh(self.json, mesh, old)
+        self.json["meshes"].append(mesh)
+        return len(self.json["meshes"]) - 1
+
+    def place_group(self, baked: BakedMesh, node: Json) -> int:
+        """Add a new node in the space of a baked mesh, with the properties of `node`; return its index."""
+        return placement.place_new_node(self.json, baked, self.source, node)
+
+    def animate(self, nodes: Sequence[int], path: str, times: Floats, values: AnyArray) -> None:
+        """Add a linear sampler, and a channel for it on each of the nodes."""
+        keys = self.new.add(times.astype("<f4")[:, None], bounds=True)
+        sampler = self.add_sampler(keys, self.new.add(np.ascontiguousarray(values)))
+        self.channels += [{"sampler": sampler, "target": {"node": node, "path": path}} for node in nodes]
+
+    def add_sampler(self, keys: int, values: int, interpolation: str = "LINEAR") -> int:
+        """Add a sampler of two accessors; return its index among the new ones."""
+        self.samplers.append({"input": keys, "output": values, "interpolation": interpolation})
+        return len(self.samplers) - 1
+
+    def require(self, *extensions: str, optional: bool = False) -> None:
+        """Name extensions as used and required, or as used only."""
+        for key in ("extensionsUsed",) if optional else ("extensionsUsed", "extensionsRequired"):
+            names = self.json.get(key, [])
+            if missing := [name for name in extensions if name not in names]:
+                self.json[key] = [*names, *missing]
+
+    def document(self) -> Document:
+        """Return the edited document: one clip, no skins that no mesh uses, no bytes that nothing uses."""
+        clip = self._clip()
+        if not self.source.keep_skeleton:
+            retained_channels.drop_unused_skins(self.json)
+        if clip["channels"]:
+            self.json["animations"] = [clip]
+        else:
+            self.json.pop("animations", None)
+        return edit_document(self.source.document, self.json, self.new)
+
+    def _clip(self) -> Json:
+        """The baked clip: new channels, and those of the source's clip that still move something."""
+        if self.source.clip is None:
+            return {"name": CLIP_NAME, "channels": self.channels, "samplers": self.samplers}
+        old = self.json["animations"][self.source.clip]
+        nodes = {each.node for each in self.meshes} | self.source.left_out
+        kept = retained_channels.retained_channels(
+            old, self.source.document.json, self.json, nodes, self.roots, keep_skeleton=self.source.keep_skeleton
+        )
+        used = sorted({channel["sampler"] for channel in kept})
+        number = {index: len(self.samplers) + i for i, index in enumerate(used)}
+        channels = self.channels + [{**channel, "sampler": number[channel["sampler"]]} for channel in kept]
+        return {**old, "channels": channels, "samplers": self.samplers + [old["samplers"][i] for i in used]}

@@ -1,0 +1,133 @@
+"""Options of a bake, its frame times, and the source document of its output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.caches.registry import CACHE_FORMATS
+from anim.caches.source_document.bake_source import BakeSource, baked_meshes
+from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_tangents
+from anim.errors import RangeError
+from anim.gltf.document import Document
+from anim.gltf.io import images
+from anim.gltf.io.source import Source
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
+from anim.gltf.writing.draco_decoding import decode_draco
+from anim.model import Clip, Scene, VertexCache
+from anim.operations.selection import Selection
+from anim.operations.trim import trim
+from anim.sampling.times import frame_times
+from anim.skinning.bake import Baker, bakeable_instances, prepare_bake
+
+
+@dataclass(frozen=True, slots=True)
+class BakeOptions:
+    """Options of the bake of all clips; see `prepare_bake`. start, end: s, of the clip; None for its own ends."""
+
+    method: str
+    blend: float | None
+    bulge_clamp: bool
+    space: str
+    normals: bool
+    tangents: bool
+    rigid: bool
+    fps: float | None
+    start: float | None
+    end: float | None
+
+    def baker(self, scene: Scene, nodes: Sequence[int] | None) -> Baker:
+        """Return the baker of meshes."""
+        return prepare_bake(
+            scene,
+            method=self.method,
+            blend=self.blend,
+            bulge_clamp=self.bulge_clamp,
+            space=self.space,
+            normals=self.normals or self.tangents,
+            tangents=self.tangents,
+            rigid=self.rigid,
+            nodes=nodes,
+        )
+
+    def times(self, clip: Clip) -> Floats:
+        """Return the frame times of a clip: its keys, or frames at the rate, and both ends of the range.
+
+        Raises RangeError for a range outside the clip.
+        """
+        first = clip.start if self.start is None else max(self.start, clip.start)
+        last = clip.end if self.end is None else min(self.end, clip.end)
+        if (self.start, self.end) == (None, None):
+            return clip.key_times if self.fps is None else frame_times(first, last, fps=self.fps)
+        if not first <= last:
+            raise RangeError(
+                f"the range from {first:g} s to {last:g} s is empty (the clip goes from {clip.start:.4g} s to "
+                f"{clip.end:.4g} s)"
+            )
+        if self.fps is not None:
+            return frame_times(first, last, fps=self.fps)
+        inside = clip.key_times[(clip.key_times > first) & (clip.key_times < last)]
+        return np.unique(np.concatenate(([first], inside, [last])))
+
+
+def default_directions(
+    document: Document, scene: Scene, nodes: Sequence[int] | None, ending: str, *, rigid: bool
+) -> tuple[bool, bool]:
+    """Return whether normals and tangents are baked by default: in formats with materials that show them."""
+    if not keeps_materials(ending):
+        return False, False
+    chosen = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
+    is_lit = has_lit_normals(document.json, chosen)
+    return is_lit, is_lit and has_mapped_tangents(document.json, chosen)
+
+
+def keeps_materials(ending: str) -> bool:
+    """Return whether a format takes materials from the source."""
+    return "source" in CACHE_FORMATS[ending].takes
+
+
+def source_options(
+    source: Source,
+    ending: str,
+    options: BakeOptions,
+    scene: Scene,
+    nodes: Sequence[int] | None,
+    clip: tuple[int | None, Clip],
+    *,
+    keep_skeleton: bool,
+) -> Mapping[str, Any]:
+    """Return the write option `source` of a format that keeps materials; else none.
+
+    nodes: of the baked meshes; None for all. Other meshes are then left out. clip: its index, and the clip.
+    """
+    if not keeps_materials(ending):
+        return {}
+    baked = {each.node for each in bakeable_instances(scene, rigid=options.rigid, nodes=nodes)}
+    left_out = frozenset(() if nodes is None else {each.node for each in scene.instances} - baked)
+    document = self_contained(source, {source.document.json["nodes"][node]["mesh"] for node in baked})
+    number, played = clip
+    if number is not None and (options.start, options.end) != (None, None) and played.end > played.start:
+        document = writer.replace_clips(document, {number: trim(played, start=options.start, end=options.end)})
+    return {"source": BakeSource(document, number, left_out, options.space == "mesh", keep_skeleton)}
+
+
+def cache_source(source: Source, cache: VertexCache, clip: Sequence[str] | None, *, keep_skeleton: bool) -> BakeSource:
+    """Return the source of a cache in world space.
+
+    clip: globs for its clip; None for the only one. Raises NotFoundError, RangeError for vertices that do not fit.
+    """
+    names = reader.names(source.document)
+    chosen = Selection(clip).chosen_clips(names) if clip else range(len(names))
+    meshes = {each.mesh for each in baked_meshes(cache, source.document)}
+    number = chosen[0] if len(chosen) == 1 else None
+    return BakeSource(self_contained(source, meshes), number, keep_skeleton=keep_skeleton)
+
+
+def self_contained(source: Source, meshes: set[int]) -> Document:
+    """Return the document of a source with its images inside, and meshes without Draco data."""
+    return images.embed(decode_draco(source.document, meshes), source.folder)

@@ -1,0 +1,50 @@
+"""The files that a bake writes: one for each clip, or mesh, or both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from anim.model import Scene
+from anim.skinning.bake import bakeable_instances
+from cli.errors import UsageError
+from cli.io import cache_files, output_names
+
+PLACEHOLDERS = ("mesh", "clip")
+
+
+@dataclass(frozen=True, slots=True)
+class BakeJob:
+    """An output file to write: indices of its meshes and of its clip; None for a file without clips."""
+
+    file: str
+    group: int
+    clip: int | None
+
+
+MeshGroup = tuple[str, Sequence[int] | None]  # value of {mesh}, and the nodes of the meshes; None for all
+
+
+def mesh_groups(scene: Scene, nodes: Sequence[int] | None, output: str, *, rigid: bool) -> list[MeshGroup]:
+    """Return the meshes grouped by output file: one group per mesh if OUT contains {mesh}."""
+    if "{mesh}" not in output:
+        return [("", nodes)]
+    chosen = {each.node: each.mesh.name for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)}
+    return [(name or scene.skeleton.names[node], [node]) for node, name in chosen.items()] or [("", nodes)]
+
+
+def bake_jobs(output: str, ending: str, groups: Sequence[MeshGroup], clips: Sequence[tuple[str, int]]) -> list[BakeJob]:
+    """Return all output files, with their names expanded and checked. clips: name and index of each."""
+    if "{clip}" not in output and len(clips) > 1:
+        raise UsageError(
+            f"{len(clips)} clips are chosen, but '{output}' holds one",
+            help="choose one with --clip, or put {clip} into OUT for a file per clip",
+        )
+    each_clip: Sequence[tuple[str, int | None]] = clips or [("", None)]
+    pairs = [(i, name, clip) for i in range(len(groups)) for name, clip in each_clip]
+    rows = [{"mesh": groups[i][0], "clip": name} for i, name, _ in pairs]
+    by_clip = "{clip}" in output
+    files = output_names.expand(output, rows, [(clip or 0) if by_clip else i for i, _, clip in pairs])
+    for file in files if len(files) > 1 or "{" in output else ():
+        cache_files.check(file, ending, placeholders=None)
+    return [BakeJob(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
