@@ -58,7 +58,7 @@ LAZY |= {"mujoco", "pxr", "dask", "rapier3d"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
     "caches.formats": "flipbook_reader gltf mesh_sequence",
-    "caches.source_document": "bake_source lit_meshes",
+    "caches.source_document": "bake_source lit_meshes shading_normals",
     "caches.transforms": "resample statistics up_axis vertex_order",
     "caches.vat": "presets",
     "check.rules": "invalid",

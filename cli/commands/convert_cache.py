@@ -20,7 +20,7 @@ from cli.errors import UsageError
 from cli.io import cache_files, documents
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
-from cli.workflows.bake_clip import cache_source
+from cli.workflows.bake_clip import choose_clip, onto_source
 
 Cache = Annotated[
     str,
@@ -113,7 +113,8 @@ def command(
             given["max_error"] = units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
         if onto is not None:
             source = stack.enter_context(documents.source(onto, voice))
-            given["source"] = cache_source(source, cache, clip, keep_skeleton=keep_skeleton)
+            number = choose_clip(source, clip)
+            cache, given["source"] = onto_source(cache, source, number, keep_skeleton=keep_skeleton)
         writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:

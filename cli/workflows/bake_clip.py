@@ -12,6 +12,7 @@ from anim.arrays import Floats
 from anim.caches.registry import CACHE_FORMATS
 from anim.caches.source_document.bake_source import BakeSource, baked_meshes
 from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_tangents
+from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.errors import RangeError
 from anim.gltf.document import Document
 from anim.gltf.io import images
@@ -116,16 +117,22 @@ def source_options(
     return {"source": BakeSource(document, number, left_out, options.space == "mesh", keep_skeleton)}
 
 
-def cache_source(source: Source, cache: VertexCache, clip: Sequence[str] | None, *, keep_skeleton: bool) -> BakeSource:
-    """Return the source of a cache in world space.
+def onto_source(
+    cache: VertexCache, source: Source, clip: int | None, *, keep_skeleton: bool = False
+) -> tuple[VertexCache, BakeSource]:
+    """Return a cache in world space with normals if the source is lit, and the source.
 
-    clip: globs for its clip; None for the only one. Raises NotFoundError, RangeError for vertices that do not fit.
+    clip: index of its clip. Raises RangeError for vertices that do not fit.
     """
+    document = self_contained(source, {each.mesh for each in baked_meshes(cache, source.document)})
+    return with_shading_normals(cache, document), BakeSource(document, clip, keep_skeleton=keep_skeleton)
+
+
+def choose_clip(source: Source, globs: Sequence[str] | None) -> int | None:
+    """Return the index of the clip that globs select, or of the only one; None for several or none."""
     names = reader.names(source.document)
-    chosen = Selection(clip).chosen_clips(names) if clip else range(len(names))
-    meshes = {each.mesh for each in baked_meshes(cache, source.document)}
-    number = chosen[0] if len(chosen) == 1 else None
-    return BakeSource(self_contained(source, meshes), number, keep_skeleton=keep_skeleton)
+    chosen = Selection(globs).chosen_clips(names) if globs else range(len(names))
+    return chosen[0] if len(chosen) == 1 else None
 
 
 def self_contained(source: Source, meshes: set[int]) -> Document:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -15,7 +16,7 @@ from anim.caches.transforms import statistics, up_axis
 from anim.errors import UnstableError
 from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
-from anim.model import Scene
+from anim.model import MeshPart, Scene, VertexCache
 from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.options import SOLVERS, ClothOptions
 from anim.simulation.cloth.selection import select_vertices
@@ -31,6 +32,7 @@ from cli.options import caches, common, meshes, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
 from cli.text import Reporter
+from cli.workflows.bake_clip import keeps_materials, onto_source
 from cli.workflows.cloth_colliders import parse_colliders
 from cli.workflows.simulate_clip import NO_CLIP, driving_clip
 from cli.workflows.simulation_report import check_report, write_report
@@ -142,7 +144,7 @@ def command(
     simulation.check_fps(fps)
     kind = check_report(report)
     ending = cache_files.check(output, None if format is None else f".{format}")
-    given = {"quantize": quantize, "layout": layout}
+    given: dict[str, Any] = {"quantize": quantize, "layout": layout}
     caches.write_options(ending, given | {"max_error": max_error})
     substeps = max(1, math.ceil(1 / (fps * parse_seconds(step, "--step")) - 1e-9))
     limit = None if max_stretch is None else units.parse_fraction(max_stretch, "--max-stretch")
@@ -200,6 +202,8 @@ def command(
     meters = (
         None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
     )
+    if keeps_materials(ending):
+        cache, given["source"] = onto_source(_as_part(cache, scene, node), source, number)
     saved = cache_files.save(
         cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
     )
@@ -212,6 +216,18 @@ def command(
     voice.info(f"{name}  {text.format_bytes(saved.size)}, {_summary(run)}, {took}{' (dry run)' if dry_run else ''}")
     if run.report.advice:
         voice.warn(run.report.advice)
+
+
+def _as_part(cache: VertexCache, scene: Scene, node: int) -> VertexCache:
+    """The cache with the primitives of its mesh, which name the vertices of the source."""
+    mesh = next(each.mesh for each in scene.instances if each.node == node)
+    parts, vertex, face = [], 0, 0
+    for each in mesh.primitives:
+        ends = vertex + each.vertices, face + each.faces
+        if each.vertices:
+            parts.append(MeshPart(mesh.name, (vertex, ends[0]), (face, ends[1]), node, each.material))
+        vertex, face = ends
+    return replace(cache, parts=tuple(parts))
 
 
 def _summary(run: ClothRun) -> str:
