@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from cli import errors
+from cli.io import documents
 from cli.options import common
 from cli.text import Reporter
 from cli.workflows.run import cache as caching
 from cli.workflows.run import journal as journals
-from cli.workflows.run import workers
+from cli.workflows.run.cluster import connect_cluster
+from cli.workflows.run.emit import SCRIPTS
 from cli.workflows.run.plan import plan_jobs
 from cli.workflows.run.recipe import chosen_recipes, read_recipes
 from cli.workflows.run.run import RecipeRun
+
+Script = StrEnum("Script", [(name, name) for name in SCRIPTS])  # type: ignore[misc]
 
 
 def command(
@@ -49,6 +57,17 @@ def command(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the last run: what it made is not even read again.")
     ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Use the workers of a dask scheduler: tcp://host:8786."),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Check the outputs by the settings, as the command check does.")
+    ] = False,
+    emit: Annotated[
+        Script | None,
+        typer.Option("--emit", help="Only print a script of single commands.", show_default=False),
+    ] = None,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
 ) -> int:
@@ -70,21 +89,30 @@ def command(
     Results are kept by the content of the input and of the files that steps name, by the steps, and by the version of
     this tool: a second run makes nothing again. --resume continues a run that was interrupted, by its journal.
     Files that fail are named, others are done; the exit code is the largest one.
+
+    --scheduler needs the extra `cluster`; workers see the files under the same names. Slurm and others start dask's
+    workers (dask-jobqueue). --emit prints what make, ninja or a shell can run instead, in the folder of the settings.
     """
     voice = Reporter(quiet, verbose)
     book = read_recipes(config)
     planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), named=bool(recipe))
+    if emit is not None:
+        documents.write_text(SCRIPTS[emit.value](planned))
+        return errors.DONE
     folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
     results = caching.ResultCache(folder)
     results.prepare()
     processes = jobs or os.cpu_count() or 1
-    with journals.open_journal(folder / journals.NAME, len(planned), resume=resume) as journal:
-        return RecipeRun(
-            planned,
-            journal,
-            None if no_cache else results,
-            voice,
-            processes,
-            min(processes, len(planned)),
-            workers.local_pool,
-        ).run()
+    with ExitStack() as stack:
+        cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
+        journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), resume=resume))
+        run = RecipeRun(planned, journal, None if no_cache else results, voice, processes, cluster)
+        code = run.run()
+    return max(code, _check(run.outputs, quiet=quiet)) if check else code
+
+
+def _check(outputs: Sequence[str], *, quiet: bool) -> int:
+    """Check files by the settings; the exit code."""
+    from cli.commands import check
+
+    return errors.run_guarded(lambda: check.command(list(outputs), quiet=quiet)) if outputs else errors.DONE

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
 from tests.cli.running import built
+from tests.fixtures.reading import split
 
 STEPS = ("resample --fps 30", "optimize --max-error 0.5mm --effort fast")
 
@@ -26,6 +28,16 @@ def write_crowd(folder: Path, **files: str) -> None:
     (folder / "crowd").mkdir(exist_ok=True)
     for name, fixture in files.items():
         (folder / "crowd" / f"{name}.glb").write_bytes(built(fixture))
+
+
+def variant(data: bytes, number: int) -> bytes:
+    """The GLB with other content of the same motion."""
+    document, blob = split(data)
+    document["asset"] = {**document["asset"], "extras": {"number": number}}
+    content = json.dumps(document).encode()
+    content += b" " * (-len(content) % 4)
+    chunks = struct.pack("<I4s", len(content), b"JSON") + content + struct.pack("<I4s", len(blob), b"BIN\0") + blob
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
 def journal(folder: Path) -> list[dict[str, Any]]:

@@ -95,7 +95,7 @@ def run_steps(job: Job, messages: StepStreams) -> tuple[int, list[Path], Bytes]:
     for number, step in enumerate(job.steps, 1):
         streams = StepStreams(job.input, data, job.folder, job.cores)
         with use_streams(streams):
-            code = main.run(step.words(_named(job.input) if number == 1 else PIPE))
+            code = main.run(step.words(argument_of(job.input) if number == 1 else PIPE))
         messages.messages += streams.messages
         files += streams.files
         if code != errors.DONE:
@@ -134,6 +134,6 @@ def write_output(job: Job, product: Bytes) -> None:
         raise
 
 
-def _named(path: str) -> str:
-    """The path as an argument: not an option, nor a pipe."""
+def argument_of(path: str) -> str:
+    """Return a path as an argument: not an option, nor a pipe."""
     return f"./{path}" if path.startswith("-") else path

@@ -8,25 +8,27 @@ from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from cli import errors
 from cli.errors import run_guarded
 from cli.progress import Progress
 from cli.streams import StepStreams, use_streams
 from cli.text import Reporter, format_bytes, format_change, format_duration, plural
-from cli.workflows.run import workers
 from cli.workflows.run.cache import FileHashes, ResultCache, recipe_key, result_key, stamp_of
+from cli.workflows.run.cluster import Cluster
 from cli.workflows.run.job import EMPTY, Job, JobResult, run_job, write_output
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
 from cli.workflows.run.steps import Step
-from cli.workflows.run.workers import OpenPool
+from cli.workflows.run.workers import local_pool, run_jobs
 
 
 @dataclass
 class RecipeRun:
     """A run of jobs.
 
-    cache: None to keep no results. processes: in all; count: of jobs at a time. open_pool: opens the pool of workers.
+    cache: None to keep no results. processes: of this machine. cluster: its workers instead of these.
+    outputs: paths of those that are complete. code: the largest exit code.
     """
 
     jobs: Sequence[Job]
@@ -34,8 +36,8 @@ class RecipeRun:
     cache: ResultCache | None
     voice: Reporter
     processes: int
-    count: int
-    open_pool: OpenPool
+    cluster: Cluster | None = None
+    outputs: list[str] = field(default_factory=list)
     counts: Counter[str] = field(default_factory=Counter)
     code: int = errors.DONE
     _hashes: FileHashes = field(default_factory=FileHashes)
@@ -58,17 +60,25 @@ class RecipeRun:
         return self.code
 
     def _results(self, missing: Iterator[Job]) -> Generator[tuple[Job, JobResult], None, None]:
-        if len(self.jobs) == 1:  # in this process: starting another takes longer
+        if len(self.jobs) == 1 and self.cluster is None:  # in this process: starting another takes longer
             yield from ((job, run_job(job)) for job in missing)
             return
         first = next(missing, None)
         if first is not None:
-            yield from workers.run_jobs(_chain(first, missing), self.open_pool, self.count)
+            pool, count = (
+                (local_pool, self._count) if self.cluster is None else (self.cluster.open_pool, self.cluster.count)
+            )
+            yield from run_jobs(chain([first], missing), pool, count)
+
+    @property
+    def _count(self) -> int:
+        """Number of jobs at a time on this machine."""
+        return min(self.processes, len(self.jobs))
 
     def _look_up(self) -> Iterator[Job]:
         """Yield the jobs without a known result; of others, write the output."""
         for each in self.jobs:
-            job = replace(each, cores=max(1, self.processes // self.count))
+            job = replace(each, cores=1 if self.cluster else max(1, self.processes // self._count))
             recipe = self._recipe(job)
             if self.journal.is_done(job.folder, job.input, job.output, recipe):
                 self._record(job, JobResult(errors.DONE, stamp=stamp_of(job.folder / job.input)), DONE_BEFORE)
@@ -108,6 +118,8 @@ class RecipeRun:
 
     def _record(self, job: Job, result: JobResult, status: str) -> None:
         self.counts[status] += 1
+        if status != FAILED:
+            self.outputs.append(os.path.relpath(job.folder / job.output))
         self.code = max(self.code, result.code)
         self._progress.close()
         self._report(job, result, status)
@@ -138,8 +150,3 @@ class RecipeRun:
             sizes = format_change(before, result.size) if result.size else format_bytes(before)
             took = f", {format_duration(result.seconds)}" if status == MADE else f" ({status})"
             voice.info(f"{job.output}  {sizes}{took}")
-
-
-def _chain(first: Job, others: Iterator[Job]) -> Iterator[Job]:
-    yield first
-    yield from others

@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from typing import TypeAlias
@@ -25,18 +25,22 @@ OpenPool: TypeAlias = Callable[[int], AbstractContextManager[Executor]]  # of a 
 _busy = threading.Event()  # of a worker process, while it runs a job
 
 
-def run_jobs(jobs: Iterator[Job], open_pool: OpenPool, count: int) -> Iterator[Answer]:
+def run_jobs(
+    jobs: Iterator[Job], open_pool: OpenPool, count: int, work: Callable[[Job], JobResult] | None = None
+) -> Iterator[Answer]:
     """Yield the result of every job as it is done, from `count` jobs at a time.
 
+    work: gives the result of a job in a worker; `run_in_worker` without it.
     If a worker process ends, the jobs that were running are run again, each alone: the one that ends its process is
     reported, and all others are done.
     """
+    work = work or run_in_worker
     while True:
-        lost = yield from _run_until_broken(jobs, open_pool, count)
+        lost = yield from _run_until_broken(jobs, open_pool, count, work)
         if not lost:
             return
         for job in lost:
-            if (yield from _run_until_broken(iter([job]), open_pool, 1)):
+            if (yield from _run_until_broken(iter([job]), open_pool, 1, work)):
                 yield job, ended_result(job)
 
 
@@ -47,13 +51,15 @@ def ended_result(job: Job) -> JobResult:
     return JobResult(errors.UNSUPPORTED, (line, "help: if memory ran out, fewer --jobs need less"))
 
 
-def _run_until_broken(jobs: Iterator[Job], open_pool: OpenPool, count: int) -> Generator[Answer, None, list[Job]]:
+def _run_until_broken(
+    jobs: Iterator[Job], open_pool: OpenPool, count: int, work: Callable[[Job], JobResult]
+) -> Generator[Answer, None, list[Job]]:
     """Yield results until all jobs are done, or until the pool is broken; return the jobs that were running then."""
     running: dict[Future[JobResult], Job] = {}
     with open_pool(count) as pool:
         for job in jobs:
             try:
-                running[pool.submit(run_in_worker, job)] = job
+                running[pool.submit(work, job)] = job
             except BrokenProcessPool:
                 return [job, *(yield from _collect(running))]
             if len(running) > count and (lost := (yield from _collect(running, some=True))):
@@ -68,7 +74,7 @@ def _collect(running: dict[Future[JobResult], Job], *, some: bool = False) -> Ge
         done, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in done:
             job = running.pop(future)
-            error = future.exception()
+            error = _error_of(future)
             if isinstance(error, BrokenProcessPool):
                 lost.append(job)
             else:
@@ -76,6 +82,13 @@ def _collect(running: dict[Future[JobResult], Job], *, some: bool = False) -> Ge
         if some:
             break
     return lost
+
+
+def _error_of(future: Future[JobResult]) -> BaseException | None:
+    try:
+        return future.exception()
+    except CancelledError as error:  # the scheduler of a cluster has ended
+        return error
 
 
 def _failed(job: Job, error: BaseException) -> JobResult:

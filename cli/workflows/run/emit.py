@@ -1,0 +1,122 @@
+"""Scripts of single commands that make what a run makes: for a shell, ninja, or make."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import TypeAlias
+
+from anim.gltf.document import json_array
+from anim.gltf.io.images import external_uri
+from anim.gltf.io.source import buffer_files, open_file
+from cli.errors import PROGRAM, UsageError
+from cli.workflows.run.job import Job, argument_of
+from cli.workflows.run.steps import EDITING, Step
+
+HEADER = f"# made by `{PROGRAM} run --emit`"
+EMBED = "--embed"
+Escape: TypeAlias = Callable[[str], str]  # of a text in a rule
+
+
+def shell_script(jobs: Sequence[Job]) -> str:
+    """Return a script for bash, a line a file."""
+    lines = ["#!/usr/bin/env bash", HEADER, "set -euo pipefail", f"cd {shlex.quote(str(jobs[0].folder))}"]
+    folders = sorted({PurePosixPath(job.output).parent.as_posix() for job in jobs})
+    lines.append(f"mkdir -p -- {shlex.join(folders)}")
+    for job in jobs:
+        _check_images(job)
+        lines.append(_pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output))))
+    return "\n".join(lines) + "\n"
+
+
+def makefile(jobs: Sequence[Job]) -> str:
+    """Return rules for make, to be used in the folder of the settings."""
+    rules, names = [], []
+    for job in jobs:
+        _check_images(job)
+        output, *inputs = (_in_make(name) for name in (job.output, job.input, *_other_inputs(job)))
+        command = _pipeline(job, "'$<'", "'$@'", escape=lambda text: text.replace("$", "$$"))
+        rules.append(f"{output}: {' '.join(inputs)}\n\t@mkdir -p '$(@D)'\n\t{command}\n")
+        names.append(output)
+    head = [HEADER, ".DELETE_ON_ERROR:", ".PHONY: all", f"all: {' '.join(names)}\n"]
+    return "\n".join(head + rules)
+
+
+def ninja_file(jobs: Sequence[Job]) -> str:
+    """Return rules and builds for ninja, to be used in the folder of the settings."""
+    rules: dict[tuple[tuple[Step, ...], bool], str] = {}
+    builds = []
+    for job in jobs:
+        _check_images(job)
+        name = rules.setdefault((job.steps, _is_text(job)), f"recipe{len(rules) + 1}")
+        output, *inputs = (_in_ninja(each) for each in (job.output, job.input, *_other_inputs(job)))
+        implicit = f" | {' '.join(inputs[1:])}" if inputs[1:] else ""
+        builds.append(f"build {output}: {name} {inputs[0]}{implicit}\n")
+    texts = []
+    for (steps, is_text), name in rules.items():
+        job = Job(jobs[0].folder, "", "x.gltf" if is_text else "x.glb", steps)
+        command = _pipeline(job, "$in", "$out", escape=lambda text: text.replace("$", "$$"))
+        texts.append(f"rule {name}\n  command = {command}\n  description = $out\n")
+    return "\n".join([HEADER, *texts, *builds])
+
+
+def _pipeline(job: Job, input: str, output: str, escape: Escape = str) -> str:
+    """The steps as commands with pipes between them. input, output: as the script has them."""
+    steps = [*job.steps, *([Step(("convert",), ())] if _is_text(job) else [])]
+    last = len(steps) - 1
+    lines = [
+        " ".join(
+            [
+                PROGRAM,
+                escape(shlex.join(step.command)),
+                input if i == 0 else "-",
+                output if i == last else "-",
+                *([escape(shlex.join(step.options))] if step.options else []),
+            ]
+        )
+        for i, step in enumerate(steps)
+    ]
+    return " | ".join(lines)
+
+
+def _is_text(job: Job) -> bool:
+    """Whether the output is text: a run converts the last step's GLB to it."""
+    return job.output.lower().endswith(".gltf")
+
+
+def _other_inputs(job: Job) -> Iterator[str]:
+    """Yield the other files that a job reads: of its steps' options, and buffers of the input."""
+    for step in job.steps:
+        yield from step.files
+    if job.steps[0].command[0] in EDITING:
+        for path in buffer_files(open_file(str(job.folder / job.input))):
+            yield os.path.relpath(path, os.path.realpath(job.folder))
+
+
+def _check_images(job: Job) -> None:
+    """Raise UsageError for an input with external images, which no pipe carries."""
+    first = job.steps[0]
+    if first.command[0] not in EDITING or EMBED in first.options or (len(job.steps) == 1 and not _is_text(job)):
+        return
+    document = open_file(str(job.folder / job.input)).document
+    outside = [external_uri(image) for image in json_array(document.json, "images") if external_uri(image)]
+    if outside:
+        raise UsageError(
+            f"{job.input}: its image '{outside[0]}' is another file, which commands in a pipe do not copy",
+            help=f'a first step "convert {EMBED}" takes images in',
+        )
+
+
+def _in_make(name: str) -> str:
+    if any(c in name for c in " \t\n#%:;=*?[]~\\|&\"'`<>()"):
+        raise UsageError(f"'{name}': make has no such names", help="--emit ninja or shell")
+    return name.replace("$", "$$")
+
+
+def _in_ninja(name: str) -> str:
+    return name.replace("$", "$$").replace(" ", "$ ").replace(":", "$:")
+
+
+SCRIPTS: Mapping[str, Callable[[Sequence[Job]], str]] = {"shell": shell_script, "ninja": ninja_file, "make": makefile}

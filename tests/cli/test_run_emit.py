@@ -1,0 +1,79 @@
+"""`run --emit`: scripts of single commands write the same bytes; `run --check`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from tests.cli.running import ENVIRONMENT, help_line, refusal
+from tests.cli.running_recipes import write_crowd, write_recipe
+
+TOOLS = {"shell": ["bash", "-e"], "make": ["make", "-j2", "-f"], "ninja": ["ninja", "-f"]}
+
+
+def outputs(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes() for path in (folder / "build").rglob("*") if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_script_makes_what_a_run_makes(tool: str, folder: Path, call: Call) -> None:
+    if shutil.which(TOOLS[tool][0]) is None:
+        pytest.skip(f"{TOOLS[tool][0]} is not installed")
+    (folder / "crowd/arm 1.glb").unlink()
+    write_crowd(folder, **{"hero": "biped", "$home": "morph_cube"})
+    call("convert", "crowd/hero.glb", "crowd/text.gltf").product()
+    write_recipe(folder, "resample --fps 12", "trim --to 0.5 --clip '*'")
+    write_recipe(folder, "resample --fps 12", match="crowd/*.gltf", out="build/{stem}.gltf")
+    call("run", "-q").product()
+    made = outputs(folder)
+    assert {"build/crowd/hero.glb", "build/crowd/$home.glb", "build/text.gltf"} < made.keys()
+    shutil.rmtree(folder / "build")
+    (folder / "script").write_bytes(call("run", "--emit", tool).product())
+    subprocess.run([*TOOLS[tool], "script"], cwd=folder, env=ENVIRONMENT, check=True, capture_output=True)
+    assert outputs(folder) == made
+
+
+def test_make_and_ninja_know_the_files_that_steps_and_inputs_name(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    (folder / "crowd/arm 1.glb").unlink()
+    call("convert", "crowd/hero.glb", "crowd/text.gltf").product()
+    (buffer,) = (each.name for each in (folder / "crowd").glob("*.bin"))
+    write_recipe(folder, "simulate springs --chain '*' --springs tail.json", match="crowd/*.gltf")
+    assert f"build/crowd/text.gltf: crowd/text.gltf tail.json crowd/{buffer}\n" in call("run", "--emit", "make").text
+    line = f"build build/crowd/text.gltf: recipe1 crowd/text.gltf | tail.json crowd/{buffer}\n"
+    assert line in call("run", "--emit", "ninja").text
+
+
+def test_make_refuses_names_that_it_can_not_have(folder: Path, call: Call) -> None:
+    write_recipe(folder, "resample --fps 12")
+    run = call("run", "--emit", "make")
+    assert "make has no such names" in refusal(run, 2)
+    assert help_line(run) == "--emit ninja or shell"
+    assert "'crowd/arm 1.glb'" in call("run", "--emit", "shell").text
+
+
+def test_images_that_a_pipe_would_lose_are_refused(folder: Path, call: Call) -> None:
+    call("convert", "crowd/arm 1.glb", "crowd/arm.gltf").product()
+    path = folder / "crowd/arm.gltf"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "images": [{"uri": "skin.png"}]}))
+    write_recipe(folder, "resample --fps 12", "optimize", match="crowd/*.gltf", out="build/{stem}.glb")
+    assert "its image 'skin.png' is another file" in refusal(call("run", "--emit", "shell"), 2)
+
+
+def test_check_applies_the_rules_to_outputs(folder: Path, call: Call) -> None:
+    write_recipe(folder, "resample --fps 12")
+    run = call("run", "--check")
+    assert run.code == 0
+    assert "1 file checked" in run.text or "1 files checked" in run.text
+    with (folder / "gltf-anim.toml").open("a") as file:
+        file.write('[[budget]]\nmatch = "build/**"\nbytes = 1\n')
+    run = call("run", "--check")
+    assert run.code == 6
+    assert "build/crowd/arm 1.glb: error GA402 over-budget" in run.err
