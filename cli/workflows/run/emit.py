@@ -82,7 +82,7 @@ def _pipeline(job: Job, input: str, output: str, escape: Escape = str) -> str:
 
 
 def _is_text(job: Job) -> bool:
-    """Whether the output is text: a run converts the last step's GLB to it."""
+    """Return whether the output is text: a run converts the last step's GLB to it."""
     return job.output.lower().endswith(".gltf")
 
 
